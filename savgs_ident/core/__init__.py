@@ -1,0 +1,1 @@
+"""What every stage speaks: parameters with units, the rig file, statuses and errors."""

@@ -1,0 +1,102 @@
+"""Parameters are values; unit, bounds, tolerance and source live beside them as metadata.
+
+>>> m_s = Parameter("m_s", 320.0, "kg", tolerance=1.6, lower=0.0)
+>>> table = ParameterTable((m_s,))
+>>> table.as_dict()
+{'m_s': 320.0}
+>>> table.with_values({"m_s": 318.0})["m_s"].value
+318.0
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import inf, isfinite
+
+from savgs_ident.core.errors import InputError
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One physical parameter in SI.
+
+    ``tolerance`` is the standard deviation with which the value is known beforehand [``unit``]; 0 means
+    exact or, for a parameter that is to be identified, that nothing is known beforehand but its bounds.
+    ``source`` says where the number comes from, ``about`` what it is.
+    """
+
+    name: str
+    value: float
+    unit: str
+    tolerance: float = 0.0
+    lower: float = -inf
+    upper: float = inf
+    about: str = ""
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if not isfinite(self.value):
+            raise InputError(f"parameter '{self.name}' is {self.value}", remedy="give a finite number")
+        if not self.lower <= self.value <= self.upper:
+            raise InputError(
+                f"parameter '{self.name}' = {self.value} {self.unit} lies outside its bounds"
+                f" [{self.lower}, {self.upper}]",
+                remedy="mend the value or the bounds in the rig file",
+            )
+        if not (isfinite(self.tolerance) and self.tolerance >= 0.0):
+            raise InputError(
+                f"parameter '{self.name}' has tolerance {self.tolerance}",
+                remedy="give one standard deviation, zero or positive",
+            )
+
+
+@dataclass(frozen=True)
+class ParameterTable(Mapping[str, Parameter]):
+    """An ordered, immutable set of parameters, found by name."""
+
+    entries: tuple[Parameter, ...]
+
+    def __post_init__(self) -> None:
+        names = [entry.name for entry in self.entries]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise InputError(f"parameter '{twice[0]}' is given twice", remedy="keep one of the two")
+
+    def __getitem__(self, name: str) -> Parameter:
+        for entry in self.entries:
+            if entry.name == name:
+                return entry
+        raise KeyError(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return (entry.name for entry in self.entries)
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    def values_of(self, names: tuple[str, ...]) -> tuple[float, ...]:
+        """The values of ``names``, in that order, in SI."""
+        return tuple(self[name].value for name in names)
+
+    def as_dict(self) -> dict[str, float]:
+        """Name to value, in SI: what the model takes."""
+        return {entry.name: entry.value for entry in self.entries}
+
+    def with_values(self, values: Mapping[str, float]) -> "ParameterTable":
+        """The same table with some values replaced.
+
+        Raises :class:`InputError` for a name that is not in the table or a value outside its bounds.
+        """
+        unknown = sorted(set(values) - set(self))
+        if unknown:
+            raise InputError(
+                f"there is no parameter '{unknown[0]}'", remedy="choose among: " + ", ".join(sorted(self))
+            )
+        return ParameterTable(
+            tuple(
+                replace(entry, value=float(values[entry.name])) if entry.name in values else entry
+                for entry in self.entries
+            )
+        )
+
+    def __add__(self, other: "ParameterTable") -> "ParameterTable":
+        return ParameterTable(self.entries + other.entries)
