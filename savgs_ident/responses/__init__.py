@@ -1,0 +1,1 @@
+"""Recorded tests to frequency responses: harmonics of dwells, first harmonic along sweeps."""

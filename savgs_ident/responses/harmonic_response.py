@@ -32,6 +32,9 @@ class HarmonicResponse:
         noise_sd: standard deviation of one sample of what does not repeat [unit], (D, C).
         periods: whole periods in the record, (D,).
         warnings: what a careful reader would want to know.
+        covariance_dof: degrees of freedom of the noise level behind ``covariance``, (D, C, n + 1): its relative
+            variance is 2 / dof. None where the covariance is known rather than estimated. A quadratic form
+            weighted with the inverse of an estimated covariance is too large by dof / (dof - 2) on average.
     """
 
     tests: tuple[str, ...]
@@ -46,6 +49,7 @@ class HarmonicResponse:
     noise_sd: NDArray[np.float64]
     periods: NDArray[np.int64]
     warnings: tuple[DataWarning, ...] = ()
+    covariance_dof: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         for value in vars(self).values():
@@ -55,7 +59,7 @@ class HarmonicResponse:
     @property
     def orders(self) -> int:
         """The highest order held, n."""
-        return self.harmonics.shape[2] - 1
+        return int(self.harmonics.shape[2]) - 1
 
     def channel(self, name: str) -> int:
         """The index of a channel on the second axis; raises ``ValueError`` if it is absent."""

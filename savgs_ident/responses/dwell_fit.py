@@ -1,0 +1,126 @@
+"""One dwell: frequency, harmonics and noise of every channel.
+
+The road's own frequency starts the fit; every channel then says how far its phase drifts against it, and the
+estimates are pooled by their variances. The fit of a channel takes all orders that its sampling carries, not
+only those asked for: what is cut off must neither bend the orders kept nor count as noise.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.responses.clocks import ClockGroup, highest_fitted_order, highest_valid_order
+from savgs_ident.responses.fundamental import frequency_step, refine_frequency, step_variance
+from savgs_ident.responses.noise_spectrum import estimate_noise_density
+from savgs_ident.responses.periodic_fit import fit_periodic
+
+_REFITS = 4
+_MANY_VALUES = 0.5
+
+
+@dataclass(frozen=True)
+class ChannelFit:
+    """Harmonics 0..m of one channel, m the highest valid order; times counted from mid-record.
+
+    ``density`` [unit^2] and ``dof`` describe the noise; ``variance`` and ``pseudo_variance`` are E|dX|^2 and
+    E(dX^2); ``drift_hz`` is how far this channel's own fundamental lies above the dwell's, ``drift_variance``
+    its variance [Hz^2].
+    """
+
+    amplitude: NDArray[np.complex128]
+    density: NDArray[np.float64]
+    dof: NDArray[np.float64]
+    variance: NDArray[np.float64]
+    pseudo_variance: NDArray[np.complex128]
+    noise_sd: float
+    drift_hz: float
+    drift_variance: float
+
+
+@dataclass(frozen=True)
+class DwellFit:
+    """Fundamental [Hz], its standard deviation, whole periods recorded, and the channels by name."""
+
+    frequency: float
+    frequency_sd: float
+    periods: int
+    channels: Mapping[str, ChannelFit]
+
+
+def fit_dwell(groups: tuple[ClockGroup, ...], road: str, start: float, orders: int) -> DwellFit:
+    """Fit all channels of a dwell whose frequency is near ``start`` [Hz], up to ``orders``.
+
+    Raises :class:`numpy.linalg.LinAlgError` when the stamps do not determine the harmonics.
+    """
+    lead = next(group for group in groups if road in group.names)
+    frequency = refine_frequency(lead, lead.names.index(road), start)
+    for _ in range(_REFITS):
+        channels = {
+            name: fit for group in groups for name, fit in _fit_group(group, frequency, orders).items()
+        }
+        shift, variance = _pool(channels)
+        if abs(shift) <= 0.1 * np.sqrt(variance) + 1e-13 * frequency:
+            break
+        frequency += shift
+    periods = min(int(group.span_s * frequency + 0.02) for group in groups)
+    return DwellFit(frequency, float(np.sqrt(variance)), periods, channels)
+
+
+def _pool(channels: Mapping[str, ChannelFit]) -> tuple[float, float]:
+    """Common frequency correction [Hz] and its variance, from the channels that tell."""
+    drift = np.array([fit.drift_hz for fit in channels.values()])
+    variance = np.array([fit.drift_variance for fit in channels.values()])
+    information = 1.0 / variance
+    total = float(np.sum(information))
+    return float(information @ drift) / total, 1.0 / total
+
+
+def _fit_group(group: ClockGroup, frequency: float, orders: int) -> dict[str, ChannelFit]:
+    last = highest_valid_order(group, frequency, orders)
+    if last < 1:
+        return {}
+    highest = highest_fitted_order(group, frequency)
+    fit = fit_periodic(group.time, group.values, frequency, highest, last)
+    noise = estimate_noise_density(group.time, fit.residual, frequency, highest, last)
+    floor = _smallest_density(group.values)[:, None]
+    density = np.maximum(noise.density, floor)
+    kept = fit.amplitude[:, : last + 1]
+    step, weight = frequency_step(group.time, kept, fit.residual, frequency)
+    variance = step_variance(kept, density, weight)
+    spare = group.time.size - 2 * highest - 2
+    noise_sd = np.sqrt(np.maximum(np.sum(fit.residual**2, axis=1) / spare, floor[:, 0]))
+    return {
+        name: ChannelFit(
+            kept[i],
+            density[i],
+            noise.dof[i],
+            density[i] * fit.gain,
+            density[i] * fit.pseudo_gain,
+            float(noise_sd[i]),
+            float(step[i]),
+            float(variance[i]),
+        )
+        for i, name in enumerate(group.names)
+    }
+
+
+def _smallest_density(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Variance that rounding alone leaves, (C,): of the sensor's steps where seen, else of the arithmetic.
+
+    Rounding error repeats with the signal where the period is a whole number of samples, so that what does
+    not repeat would miss it.
+    """
+    step = np.array([_step_of(row) for row in values])
+    arithmetic = 8.0 * np.finfo(np.float64).eps * np.max(np.abs(values), axis=1)
+    smallest: NDArray[np.float64] = np.maximum(step / np.sqrt(12.0), np.maximum(arithmetic, 1e-150))
+    return smallest**2
+
+
+def _step_of(row: NDArray[np.float64]) -> float:
+    """The sensor's step, where values recur often enough to show one; 0 otherwise."""
+    distinct = np.unique(row)
+    if not 1 < distinct.size < _MANY_VALUES * row.size:
+        return 0.0
+    return float(np.quantile(np.diff(distinct), 0.1))
