@@ -1,0 +1,60 @@
+"""Strict numerics for every test, and where the data is.
+
+JAX reads its settings from the environment at its first import: double precision, no broadcasting of unequal
+ranks, no silent promotion of dtypes. Warnings are errors (pyproject.toml).
+"""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from savgs_ident.core.rig import Rig, default_campaign_path, default_rig_path, read_rig
+
+os.environ["JAX_ENABLE_X64"] = "1"
+os.environ["JAX_NUMPY_RANK_PROMOTION"] = "raise"
+os.environ["JAX_NUMPY_DTYPE_PROMOTION"] = "strict"
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+SHARED = REPOSITORY.parent / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of recordings beside the repository; the test is skipped where there is none."""
+    if not SHARED.is_dir():
+        pytest.skip(f"needs the recordings in {SHARED}")
+    return SHARED
+
+
+@pytest.fixture(scope="session")
+def shared_rig(shared_data: Path) -> Path:
+    """The folder with the recordings of the rig and its data sheets."""
+    return shared_data / "rig"
+
+
+@pytest.fixture(scope="session")
+def shared_mcap(shared_data: Path) -> Path:
+    """The folder with MCAP files that others recorded."""
+    return shared_data / "real" / "mcap"
+
+
+@pytest.fixture(scope="session")
+def rig_sheet(shared_rig: Path) -> dict[str, Any]:
+    """The data sheet of the rig."""
+    sheet: dict[str, Any] = json.loads((shared_rig / "rig_sheet.json").read_text())
+    return sheet
+
+
+@pytest.fixture(scope="session")
+def nominal_campaign() -> Path:
+    """The campaign that is shipped with the package."""
+    return default_campaign_path()
+
+
+@pytest.fixture(scope="session")
+def rig() -> Rig:
+    """The rig that is shipped with the package."""
+    return read_rig(default_rig_path())
