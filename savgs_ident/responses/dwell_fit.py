@@ -61,11 +61,20 @@ def fit_dwell(groups: tuple[ClockGroup, ...], road: str, start: float, orders: i
             name: fit for group in groups for name, fit in _fit_group(group, frequency, orders).items()
         }
         shift, variance = _pool(channels)
-        if abs(shift) <= 0.1 * np.sqrt(variance) + 1e-13 * frequency:
-            break
         frequency += shift
+        if _is_settled(abs(shift), variance, frequency, orders * lead.span_s):
+            break
     periods = min(int(group.span_s * frequency + 0.02) for group in groups)
     return DwellFit(frequency, float(np.sqrt(variance)), periods, channels)
+
+
+def _is_settled(shift: float, variance: float, frequency: float, reach: float) -> bool:
+    """Whether a last step is too small to change the harmonics, which feel it to second order only.
+
+    ``reach`` is highest order times duration [s]: the phase at the ends of the record moves by
+    pi * shift * reach, and an amplitude by a sixth of its square.
+    """
+    return shift <= 1e-13 * frequency or (shift <= np.sqrt(variance) and np.pi * shift * reach < 3e-3)
 
 
 def _pool(channels: Mapping[str, ChannelFit]) -> tuple[float, float]:

@@ -32,9 +32,10 @@ class HarmonicResponse:
         noise_sd: standard deviation of one sample of what does not repeat [unit], (D, C).
         periods: whole periods in the record, (D,).
         warnings: what a careful reader would want to know.
-        covariance_dof: degrees of freedom of the noise level behind ``covariance``, (D, C, n + 1): its relative
-            variance is 2 / dof. None where the covariance is known rather than estimated. A quadratic form
-            weighted with the inverse of an estimated covariance is too large by dof / (dof - 2) on average.
+        covariance_dof: degrees of freedom of the noise level behind ``covariance``, (D, C, n + 1): its
+            relative variance is 2 / dof. None where the covariance is known rather than estimated. A
+            quadratic form weighted with the inverse of an estimated covariance is too large by
+            dof / (dof - 2) on average.
     """
 
     tests: tuple[str, ...]
