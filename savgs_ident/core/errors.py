@@ -3,7 +3,8 @@
 An :class:`InputError` ends a command with exit code 2; a :class:`DataWarning` travels along with the
 data it concerns, so that every report can show it.
 
-    >>> print(InputError("column 'sprung_accel' is missing", source="run7.csv", remedy="name it in channels.toml"))
+    >>> remedy = "name it in channels.toml"
+    >>> print(InputError("column 'sprung_accel' is missing", source="run7.csv", remedy=remedy))
     run7.csv: column 'sprung_accel' is missing. Remedy: name it in channels.toml.
 """
 
