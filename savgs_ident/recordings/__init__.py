@@ -1,0 +1,1 @@
+"""CSV and MCAP recordings to immutable, checked campaigns in SI."""

@@ -1,0 +1,120 @@
+"""From the signals a file offers to the canonical channels: which is which, and with what gain.
+
+A reader lists its :class:`Candidate` signals (columns, fields of topics); :func:`bind` applies the channel
+map first and the usual names after it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from savgs_ident.core.errors import DataWarning, InputError
+from savgs_ident.recordings.channel_map import ChannelMap, ChannelRule
+from savgs_ident.recordings.names import canonical_name, is_exact, split_header
+from savgs_ident.recordings.recording import CANONICAL_UNITS
+from savgs_ident.recordings.units import unit_factor
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A signal in a file.
+
+    ``key`` is how the reader finds it, ``text`` its header or field name (a unit may be written there),
+    ``unit`` one that is known from elsewhere (a schema, a convention), ``label`` what people call it.
+    """
+
+    key: str
+    text: str
+    unit: str | None
+    label: str
+
+
+@dataclass(frozen=True)
+class Binding:
+    """A channel made of one signal: SI = gain * raw + bias; ``exact``: its own name or the map said so."""
+
+    channel: str
+    key: str
+    gain: float
+    bias: float
+    label: str
+    exact: bool
+
+
+def bind(
+    candidates: Sequence[Candidate],
+    rules: Sequence[tuple[ChannelRule, str]],
+    mapped: frozenset[str],
+    source: str,
+) -> tuple[tuple[Binding, ...], tuple[DataWarning, ...]]:
+    """Bind signals to channels; ``rules`` pairs each rule of the map with the key of its signal.
+
+    ``mapped`` names the channels that the map settles, here or elsewhere: the usual names do not touch them.
+    Raises :class:`InputError` for an unknown unit or two signals that look alike.
+    """
+    by_key = {candidate.key: candidate for candidate in candidates}
+    bindings: dict[str, Binding] = {}
+    warnings: list[DataWarning] = []
+    for rule, key in rules:
+        bindings[rule.channel] = _by_rule(rule, by_key[key], source, warnings)
+    for candidate in candidates:
+        name = canonical_name(split_header(candidate.text).label)
+        if name is None or name not in CANONICAL_UNITS or name in mapped:
+            continue
+        rival = bindings.get(name)
+        exact = is_exact(split_header(candidate.text).label)
+        if rival is not None and rival.exact and not exact:
+            continue
+        if rival is not None and rival.exact == exact:
+            raise ambiguous(name, rival.label, candidate.label, source)
+        bindings[name] = _by_name(name, candidate, exact, source, warnings)
+    return tuple(bindings.values()), tuple(warnings)
+
+
+def ambiguous(channel: str, one: str, other: str, source: str) -> InputError:
+    """The error for two signals that could both be ``channel``."""
+    return InputError(
+        f"'{one}' and '{other}' could both be it",
+        source=source,
+        channel=channel,
+        remedy=f"name one under [channels.{channel}] in channels.toml",
+    )
+
+
+def mapped_channels(channel_map: ChannelMap) -> frozenset[str]:
+    """The channels that the map settles."""
+    return frozenset(rule.channel for rule in channel_map.rules)
+
+
+def factor_or_si(
+    unit: str | None, channel: str, label: str, source: str, warnings: list[DataWarning]
+) -> float:
+    """The factor of a unit, or 1 with a warning where none is written."""
+    if unit:
+        return unit_factor(unit, channel, source=source)
+    si = CANONICAL_UNITS.get(channel, "s")
+    warnings.append(
+        DataWarning(
+            "unit_assumed",
+            f"'{label}' has no unit, taken as {si}",
+            source=source,
+            channel=channel,
+            remedy=f"write it as '{label} [{si}]' or give the unit in channels.toml",
+        )
+    )
+    return 1.0
+
+
+def _by_rule(rule: ChannelRule, candidate: Candidate, source: str, warnings: list[DataWarning]) -> Binding:
+    unit = rule.unit or split_header(candidate.text).unit or candidate.unit
+    factor = factor_or_si(unit, rule.channel, candidate.label, source, warnings) * rule.sign
+    return Binding(
+        rule.channel, candidate.key, factor * rule.scale, factor * rule.offset, candidate.label, exact=True
+    )
+
+
+def _by_name(
+    name: str, candidate: Candidate, exact: bool, source: str, warnings: list[DataWarning]
+) -> Binding:
+    unit = split_header(candidate.text).unit or candidate.unit
+    factor = factor_or_si(unit, name, candidate.label, source, warnings)
+    return Binding(name, candidate.key, factor, 0.0, candidate.label, exact)

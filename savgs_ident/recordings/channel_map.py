@@ -1,0 +1,157 @@
+"""``channels.toml``: which column or topic is which canonical channel, where the names do not say it.
+
+A file beside the recordings, or one that is given::
+
+    [channels.sprung_accel]
+    column = "ACC_3"            # CSV: the header as it is, or without its unit
+    unit   = "g"                # overrides what the header says
+    sign   = -1                 # this accelerometer counts downwards
+
+    [channels.susp_deflection]
+    topic  = "/pot"             # MCAP: topic and field
+    field  = "data"
+    unit   = "mm"
+    scale  = 1.02               # calibration: SI = unit * sign * (scale * raw + offset)
+    offset = -12.5              # in the unit given, after scale
+
+    [channels.link_angle]
+    topic  = "/joint_states"
+    field  = "position[single_link]"    # by joint name, or position[0]
+
+    [time]
+    column = "clock"            # CSV
+    unit   = "ms"
+    clock  = "header"           # MCAP: header, log or publish; without it the reader judges
+
+    [tests]
+    column = "condition"        # CSV: which column names the test
+    topic  = "/operator"        # MCAP: which topic carries "start X" and "end X"
+
+A channel that is not mentioned is still recognised by its usual name (see ``names.py``).
+"""
+
+import tomllib
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.recordings.recording import CANONICAL_UNITS
+
+FILE_NAME = "channels.toml"
+CLOCKS = ("header", "log", "publish")
+_TEXTS = ("column", "topic", "field", "unit")
+_NUMBERS = ("scale", "offset", "sign")
+
+
+@dataclass(frozen=True)
+class ChannelRule:
+    """How one canonical channel is made: SI = unit * sign * (scale * raw + offset)."""
+
+    channel: str
+    column: str | None = None
+    topic: str | None = None
+    field: str | None = None
+    unit: str | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+    sign: float = 1.0
+
+
+@dataclass(frozen=True)
+class ChannelMap:
+    """The content of ``channels.toml``; an empty one leaves everything to the usual names."""
+
+    rules: tuple[ChannelRule, ...] = ()
+    time_column: str | None = None
+    time_unit: str | None = None
+    clock: str | None = None
+    test_column: str | None = None
+    test_topic: str | None = None
+    source: str = ""
+
+
+def read_channel_map(path: Path | str) -> ChannelMap:
+    """Read ``channels.toml``; raises :class:`InputError` where it is not as described above."""
+    try:
+        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", source=path, remedy="check the path") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"is not TOML: {error}", source=path, remedy="mend the line it names") from error
+    _only(content, ("channels", "time", "tests"), path, "table")
+    time = _table(content, "time", path)
+    _only(time, ("column", "unit", "clock"), path, "key of [time]")
+    tests = _table(content, "tests", path)
+    _only(tests, ("column", "topic"), path, "key of [tests]")
+    channels = _table(content, "channels", path)
+    clock = _text(time, "clock", path)
+    if clock is not None and clock not in CLOCKS:
+        raise InputError(f"clock '{clock}' is not known", source=path, remedy="choose " + ", ".join(CLOCKS))
+    return ChannelMap(
+        rules=tuple(_rule(name, _table(channels, name, path), path) for name in channels),
+        time_column=_text(time, "column", path),
+        time_unit=_text(time, "unit", path),
+        clock=clock,
+        test_column=_text(tests, "column", path),
+        test_topic=_text(tests, "topic", path),
+        source=str(path),
+    )
+
+
+def _rule(name: str, table: dict[str, object], path: Path | str) -> ChannelRule:
+    if name not in CANONICAL_UNITS:
+        raise InputError(
+            f"'{name}' is not a canonical channel", source=path, remedy="use " + ", ".join(CANONICAL_UNITS)
+        )
+    _only(table, (*_TEXTS, *_NUMBERS), path, f"key of [channels.{name}]")
+    texts = {key: _text(table, key, path) for key in _TEXTS}
+    if (texts["column"] is None) == (texts["topic"] is None):
+        raise InputError(
+            "needs either a column or a topic",
+            source=path,
+            channel=name,
+            remedy="give exactly one of the two",
+        )
+    numbers = {key: _number(table, key, path, name) for key in _NUMBERS if key in table}
+    if numbers.get("sign", 1.0) not in (1.0, -1.0):
+        raise InputError("sign is neither 1 nor -1", source=path, channel=name, remedy="use scale for a gain")
+    return ChannelRule(
+        channel=name,
+        column=texts["column"],
+        topic=texts["topic"],
+        field=texts["field"],
+        unit=texts["unit"],
+        scale=numbers.get("scale", 1.0),
+        offset=numbers.get("offset", 0.0),
+        sign=numbers.get("sign", 1.0),
+    )
+
+
+def _only(table: dict[str, object], allowed: tuple[str, ...], path: Path | str, what: str) -> None:
+    unknown = sorted(set(table) - set(allowed))
+    if unknown:
+        raise InputError(f"unknown {what} '{unknown[0]}'", source=path, remedy="use " + ", ".join(allowed))
+
+
+def _table(content: dict[str, object], name: str, path: Path | str) -> dict[str, object]:
+    table = content.get(name, {})
+    if not isinstance(table, dict):
+        raise InputError(
+            f"'{name}' is not a table", source=path, remedy="see the example in the documentation"
+        )
+    return table
+
+
+def _text(table: dict[str, object], key: str, path: Path | str) -> str | None:
+    value = table.get(key)
+    if value is not None and not isinstance(value, str):
+        raise InputError(f"'{key}' is not a text", source=path, remedy="put it in quotes")
+    return value
+
+
+def _number(table: dict[str, object], key: str, path: Path | str, channel: str) -> float:
+    value = table[key]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        raise InputError(f"'{key}' is not a finite number", source=path, channel=channel, remedy="mend it")
+    return float(value)

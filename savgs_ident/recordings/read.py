@@ -1,0 +1,122 @@
+"""Read a campaign: a file, or a folder with the files of an afternoon.
+
+    campaign = read_campaign("campaign.csv.gz")
+    for dwell in campaign.of_kind("dwell"):
+        accel = dwell.channels["sprung_accel"]
+        print(dwell.frequency_hz, accel.time, accel.values)
+    for warning in campaign.warnings:
+        print(warning)
+
+Names and units are recognised where they are usual; where they are not, ``channels.toml`` beside the file
+says what is what (see ``channel_map``).
+"""
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from savgs_ident.core.errors import DataWarning, InputError
+from savgs_ident.recordings.channel_map import FILE_NAME, ChannelMap, read_channel_map
+from savgs_ident.recordings.readers import is_campaign_file, reader_for
+from savgs_ident.recordings.reading import Progress, Reading
+from savgs_ident.recordings.recording import Campaign, Recording
+from savgs_ident.recordings.screening import screen
+
+
+def read_campaign(
+    path: Path | str, channel_map: ChannelMap | Path | str | None = None, *, progress: Progress | None = None
+) -> Campaign:
+    """Read and check everything at ``path``.
+
+    ``path`` is a CSV (plain or gzipped) or MCAP file, or a folder of such files, each with a test or several.
+    ``channel_map`` is a map, or the path of one; without it, a ``channels.toml`` beside the file (or in the
+    folder) is used if there is one. ``progress`` is told the fraction read, 0 to 1.
+
+    Channels are in SI, time in [s] from the start of each test; see :class:`Recording`. Raises
+    :class:`InputError`, which names file, test, channel and time, and what to do.
+    """
+    path = Path(path)
+    try:
+        files = _files(path)
+        the_map = _map_for(path, channel_map)
+        readings = _read_files(files, the_map, progress or _silent)
+        digest = _digest(files)
+    except OSError as error:
+        raise InputError(
+            f"cannot be read: {error.strerror or error}",
+            source=path,
+            remedy="check the path and its permissions",
+        ) from error
+    _check_unique(files, readings)
+    recordings, found = _screen_all(files, readings)
+    told = tuple(warning for reading in readings for warning in reading.warnings)
+    return Campaign(str(path), recordings, (*told, *found), digest)
+
+
+def _silent(fraction: float) -> None:
+    """Nobody wants to know."""
+
+
+def _files(path: Path) -> list[Path]:
+    if not path.exists():
+        raise InputError("does not exist", source=path, remedy="check the path")
+    if path.is_file():
+        return [path]
+    if not path.is_dir():
+        raise InputError("is neither a file nor a folder", source=path, remedy="give a CSV or MCAP file")
+    files = sorted(entry for entry in path.iterdir() if is_campaign_file(entry))
+    if not files:
+        raise InputError("the folder holds no campaign", source=path, remedy="put CSV or MCAP files into it")
+    return files
+
+
+def _map_for(path: Path, channel_map: ChannelMap | Path | str | None) -> ChannelMap:
+    if isinstance(channel_map, ChannelMap):
+        return channel_map
+    if channel_map is not None:
+        return read_channel_map(channel_map)
+    beside = (path if path.is_dir() else path.parent) / FILE_NAME
+    return read_channel_map(beside) if beside.is_file() else ChannelMap()
+
+
+def _read_files(files: Sequence[Path], channel_map: ChannelMap, progress: Progress) -> list[Reading]:
+    readings = []
+    for index, file in enumerate(files):
+
+        def told(fraction: float, index: int = index) -> None:
+            progress((index + fraction) / len(files))
+
+        readings.append(reader_for(file).read(file, channel_map, told))
+    progress(1.0)
+    return readings
+
+
+def _digest(files: Sequence[Path]) -> str:
+    digests = []
+    for file in files:
+        with file.open("rb") as stream:
+            digests.append(hashlib.file_digest(stream, "sha256").hexdigest())
+    return digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
+
+
+def _check_unique(files: Sequence[Path], readings: Sequence[Reading]) -> None:
+    """The same test in two files is one recording in two formats, or two afternoons: not one campaign."""
+    owner: dict[str, Path] = {}
+    for file, reading in zip(files, readings, strict=True):
+        for recording in reading.recordings:
+            if recording.name in owner:
+                raise InputError(
+                    f"the test is in {owner[recording.name].name} and in {file.name}",
+                    source=file.parent,
+                    test=recording.name,
+                    remedy="give one of the files, or one folder for each campaign",
+                )
+        owner |= {recording.name: file for recording in reading.recordings}
+
+
+def _screen_all(
+    files: Sequence[Path], readings: Sequence[Reading]
+) -> tuple[tuple[Recording, ...], tuple[DataWarning, ...]]:
+    """Screen together, so that a standstill in one file serves the dwells in the others."""
+    source = str(files[0] if len(files) == 1 else files[0].parent)
+    return screen([recording for reading in readings for recording in reading.recordings], source)
