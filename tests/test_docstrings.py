@@ -1,6 +1,8 @@
-"""Every public name says what it is: module, class, function."""
+"""Every public name says what it is: module, class, function; and what the examples show is true."""
 
 import ast
+import doctest
+import importlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,6 +10,7 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1] / "savgs_ident"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
+EXAMPLES = [source for source in SOURCES if ">>> " in source.read_text(encoding="utf-8")]
 
 Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -27,6 +30,14 @@ def _undocumented(source: str) -> list[str]:
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_every_public_name_has_a_docstring(source: Path) -> None:
     assert _undocumented(source.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize("source", EXAMPLES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_the_examples_in_the_docstrings_are_true(source: Path) -> None:
+    name = ".".join(source.relative_to(PACKAGE.parent).with_suffix("").parts)
+    result = doctest.testmod(importlib.import_module(name.removesuffix(".__init__")))
+    assert result.attempted > 0
+    assert result.failed == 0
 
 
 def test_a_missing_docstring_is_found() -> None:

@@ -147,8 +147,8 @@ def _load(path: str | Path) -> dict[str, object]:
         ) from error
     except UnicodeDecodeError as error:
         raise InputError("is not text in UTF-8", source=path, remedy="save the file as UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"is not valid TOML: {error}", source=path, remedy="mend that line") from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"is not valid TOML: {error}", source=path, remedy="mend it there") from error
 
 
 def _check_damper_table(velocity: tuple[float, ...], force: tuple[float, ...]) -> None:

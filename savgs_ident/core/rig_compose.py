@@ -39,17 +39,19 @@ def compose_rig(
 ) -> str:
     """The text of a rig file; what :func:`read_rig` makes the same rig of.
 
-    Raises :class:`InputError` for a unit that rig files do not know, or for a ``provenance`` that TOML cannot
-    say (it takes texts, numbers, booleans, dates, lists and tables of these).
+    Raises :class:`InputError` for a missing parameter, a unit that rig files do not know, or a ``provenance``
+    that TOML cannot say (it takes texts, numbers, booleans, dates, lists and tables of these).
     """
+    missing = [entry for entry in SECTION_OF if entry not in parameters]
+    if missing:
+        raise InputError(f"the rig has no parameter '{missing[0]}'", remedy="write a whole rig")
     document = tomlkit.document()
     for line in _HEAD:
         document.add(tomlkit.comment(line))
     document.add("schema", tomlkit.item(SCHEMA))
     document.add("name", tomlkit.item(name))
     for key, section in SECTIONS.items():
-        entries = [parameters[entry] for entry in section.units if entry in parameters]
-        document.add(key, _compose_section(section.title, entries))
+        document.add(key, _compose_section(section.title, [parameters[entry] for entry in section.units]))
     document.add(DAMPER_SECTION, _compose_damper(damper_velocity, damper_force))
     extra = [entry for entry in parameters.entries if entry.name not in SECTION_OF]
     if extra:

@@ -55,6 +55,7 @@ def parse_parameters(document: Document) -> ParameterTable:
     if EXTRA_SECTION in document:
         section = _table_at(document, EXTRA_SECTION)
         _refuse_misplaced(section, EXTRA_SECTION)
+        _refuse_unusual(section)
         entries += [_parse_parameter(section, EXTRA_SECTION, name) for name in section]
     table = ParameterTable(tuple(entries))
     _check_mass_split(table)
@@ -151,6 +152,15 @@ def _refuse_misplaced(section: Document, key: str) -> None:
             )
 
 
+def _refuse_unusual(section: Document) -> None:
+    for name in section:
+        if not name.isidentifier():
+            raise InputError(
+                f"{EXTRA_SECTION}: {name!r} cannot be the name of a parameter",
+                remedy="use letters, digits and underscores",
+            )
+
+
 def _parse_unit(fields: Document, where: str, expected: str | None) -> str:
     if "unit" not in fields:
         raise InputError(f"{where}.unit is missing", remedy=f"the unit here is '{expected or 'one of SI'}'")
@@ -166,9 +176,13 @@ def _text(value: object, where: str) -> str:
 def _number(value: object, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"{where} is {value!r}, not a number", remedy="give a plain number in SI")
-    if isnan(value):
+    try:
+        number = float(value)
+    except OverflowError:
+        raise InputError(f"{where} is larger than any float", remedy="give a number that fits") from None
+    if isnan(number):
         raise InputError(f"{where} is not a number (nan)", remedy="give a finite number")
-    return float(value)
+    return number
 
 
 def _check_mass_split(table: ParameterTable) -> None:
