@@ -9,7 +9,6 @@ from savgs_ident.core.errors import DataWarning
 from savgs_ident.recordings.recording import Campaign, Recording
 from savgs_ident.responses.clocks import ClockGroup
 from savgs_ident.responses.dwell_fit import DwellFit
-from savgs_ident.responses.periodic_fit import rotor_powers
 
 FEWEST_PERIODS = 3
 _FREQUENCY_MISS = 0.02
@@ -129,9 +128,9 @@ def _end_fundamentals(
     count = max(round(periods / frequency * group.rate_hz), 1)
     ends = []
     for part in (slice(None, count), slice(-count, None)):
-        turns = rotor_powers(group.time[part], frequency, 1)[1]
-        values = group.values[:, part]
-        ends.append(2.0 * ((values - values.mean(axis=1, keepdims=True)) @ turns) / turns.size)
+        turns = np.exp(-2j * np.pi * frequency * group.time[part])
+        values = group.values[:, part] - group.values[:, part].mean(axis=1, keepdims=True)
+        ends.append(2.0 * np.mean(values * turns, axis=1))
     return ends[0], ends[1], count
 
 

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from savgs_ident.responses.clocks import ClockGroup, highest_fitted_order, highest_valid_order
 from savgs_ident.responses.fundamental import frequency_step, refine_frequency, step_variance
 from savgs_ident.responses.noise_spectrum import estimate_noise_density
-from savgs_ident.responses.periodic_fit import fit_periodic
+from savgs_ident.responses.periodic_fit import fit_periodic, plan_basis
 
 _REFITS = 4
 _MANY_VALUES = 0.5
+_ARITHMETIC = 1e-12
 
 
 @dataclass(frozen=True)
@@ -91,12 +92,13 @@ def _fit_group(group: ClockGroup, frequency: float, orders: int) -> dict[str, Ch
     if last < 1:
         return {}
     highest = highest_fitted_order(group, frequency)
-    fit = fit_periodic(group.time, group.values, frequency, highest, last)
+    basis = plan_basis(group.time, frequency, highest)
+    fit = fit_periodic(basis, group.values, highest, last)
     noise = estimate_noise_density(group.time, fit.residual, frequency, highest, last)
     floor = _smallest_density(group.values)[:, None]
     density = np.maximum(noise.density, floor)
     kept = fit.amplitude[:, : last + 1]
-    step, weight = frequency_step(group.time, kept, fit.residual, frequency)
+    step, weight = frequency_step(basis, kept, fit.residual)
     variance = step_variance(kept, density, weight)
     spare = group.time.size - 2 * highest - 2
     noise_sd = np.sqrt(np.maximum(np.sum(fit.residual**2, axis=1) / spare, floor[:, 0]))
@@ -122,7 +124,7 @@ def _smallest_density(values: NDArray[np.float64]) -> NDArray[np.float64]:
     not repeat would miss it.
     """
     step = np.array([_step_of(row) for row in values])
-    arithmetic = 8.0 * np.finfo(np.float64).eps * np.max(np.abs(values), axis=1)
+    arithmetic = _ARITHMETIC * np.max(np.abs(values), axis=1)
     smallest: NDArray[np.float64] = np.maximum(step / np.sqrt(12.0), np.maximum(arithmetic, 1e-150))
     return smallest**2
 

@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.responses.clocks import ClockGroup, highest_fitted_order
-from savgs_ident.responses.periodic_fit import evaluate, fit_periodic
+from savgs_ident.responses.nonuniform_fft import signals
+from savgs_ident.responses.periodic_fit import PeriodicBasis, fit_periodic, plan_basis
 
 _ROAD_ORDERS = 5
 _ROUNDS = 12
 _PADDING = 8
+_SETTLED = 1e-8
 
 
 def coarse_frequency(time: NDArray[np.float64], values: NDArray[np.float64]) -> float:
@@ -40,29 +42,27 @@ def refine_frequency(group: ClockGroup, channel: int, start: float) -> float:
         highest = min(_ROAD_ORDERS, highest_fitted_order(group, frequency))
         if highest < 1:
             return frequency
-        fit = fit_periodic(group.time, values, frequency, highest, 0)
-        step, _weight = frequency_step(group.time, fit.amplitude, fit.residual, frequency)
+        basis = plan_basis(group.time, frequency, highest)
+        fit = fit_periodic(basis, values, highest, 0)
+        step, _weight = frequency_step(basis, fit.amplitude, fit.residual)
         if abs(frequency + float(step[0]) - start) * group.span_s > 1.0:
             return frequency
         frequency += float(step[0])
-        if abs(float(step[0])) < 1e-12 * frequency:
+        if abs(float(step[0])) < _SETTLED * frequency:
             break
     return frequency
 
 
 def frequency_step(
-    time: NDArray[np.float64],
-    amplitude: NDArray[np.complex128],
-    residual: NDArray[np.float64],
-    frequency: float,
+    basis: PeriodicBasis, amplitude: NDArray[np.complex128], residual: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Gauss-Newton step [Hz] of each channel and <d', d'> [unit^2/Hz^2], both (C,).
 
     ``amplitude`` (C, m + 1) are the harmonics, ``residual`` (C, N) what they (or more of them) left.
     """
     order = np.arange(amplitude.shape[1])
-    along = time * evaluate(time, 2j * np.pi * order * amplitude, frequency)
-    own = fit_periodic(time, along, frequency, amplitude.shape[1] - 1, 0).residual
+    along = basis.time * signals(basis.plan, 2j * np.pi * order * amplitude)
+    own = fit_periodic(basis, along, amplitude.shape[1] - 1, 0).residual
     weight = np.sum(own**2, axis=1)
     safe = np.where(weight > 0.0, weight, 1.0)
     return np.where(weight > 0.0, np.sum(own * residual, axis=1) / safe, 0.0), weight

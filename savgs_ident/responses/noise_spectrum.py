@@ -18,7 +18,7 @@ import numpy as np
 import scipy.special
 from numpy.typing import NDArray
 
-from savgs_ident.responses.periodic_fit import blocks, rotor_powers
+from savgs_ident.responses.nonuniform_fft import plan_transform, sums
 
 _HIGHEST_DEGREE = 6
 _NEIGHBOURS = 24
@@ -84,10 +84,9 @@ def _line_power(
     time: NDArray[np.float64], residual: NDArray[np.float64], span: float, last: int
 ) -> NDArray[np.float64]:
     """Power of the residual at 0..``last`` cycles per record [unit^2 per sample], (C, last + 1)."""
-    sums = np.zeros((last + 1, residual.shape[0]), dtype=np.complex128)
-    for part in blocks(time.size):
-        sums += rotor_powers(time[part], 1.0 / span, last) @ residual[:, part].T
-    return np.abs(sums.T) ** 2 / time.size
+    plan = plan_transform(2.0 * np.pi * time / span, last)
+    power: NDArray[np.float64] = np.abs(sums(plan, residual)) ** 2 / time.size
+    return power
 
 
 def _fit_density(

@@ -16,13 +16,12 @@ def peak_to_peak(
 ) -> NDArray[np.float64]:
     """Largest less smallest value of Re sum_k X_k exp(2 pi i k s), 0 <= s < 1, over orders 1..n.
 
-    ``harmonics`` and ``valid`` have shape (..., n + 1), the mean first; orders that are not ``valid`` are
-    left out. Returns shape (...), in the unit of ``harmonics``. Only operators are used on the arguments:
-    arrays of another library (JAX) pass through and stay differentiable.
+    ``harmonics`` and ``valid`` have shape (..., n + 1), the mean first, n < ``samples`` / 2; orders that are
+    not ``valid`` are left out. Returns shape (...), in the unit of ``harmonics``. Written against the array
+    API: arrays of another library that follows it pass through, and stay differentiable there.
     """
-    order = np.arange(harmonics.shape[-1])
-    angle = 2.0 * np.pi * np.outer(order, np.arange(samples)) / samples
+    xp = harmonics.__array_namespace__()
     kept = harmonics * valid
-    wave = kept.real @ np.cos(angle) - kept.imag @ np.sin(angle)
-    reach: NDArray[np.float64] = wave.max(-1) - wave.min(-1)
+    wave = xp.fft.irfft(kept, n=samples) * (0.5 * samples)
+    reach: NDArray[np.float64] = xp.max(wave, axis=-1) - xp.min(wave, axis=-1)
     return reach

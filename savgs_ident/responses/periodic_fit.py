@@ -4,26 +4,38 @@ The signals y_c(t_j) of one clock are written as
 
     y_c(t) = sum_{k=-K..K} c_k exp(i k w t) + b t + noise,    c_{-k} = conj(c_k),  X_k = 2 c_k,  X_0 = c_0.
 
-The normal matrix of the exponentials has the entries sum_j exp(i (l - k) w t_j): it depends on l - k only,
-so 2K + 1 sums over the stamps give all of it, and it is close to (number of samples) times the identity
-whatever the jitter, so its Cholesky factor is accurate. The slope b takes up slow drift; it is one further
-row and column. Nothing asks for equal spacing or for a whole number of periods.
+The normal matrix of the exponentials has the entries sum_j exp(i (l - k) w t_j): it depends on l - k only (a
+Toeplitz matrix), so 2K + 1 sums over the stamps give all of it, and it is close to N times the identity
+whatever the jitter. Conjugate gradients, with products by fast Fourier transform, therefore solve it to
+rounding in some ten steps; where they do not, the stamps do not determine the harmonics. The slope b takes up
+slow drift. Nothing asks for equal spacing or for a whole number of periods.
 
-    >>> time = np.arange(1000) / 250.0
-    >>> fit = fit_periodic(time - 2.0, np.cos(2 * np.pi * 2.0 * time)[None], 2.0, highest=3, gains_to=1)
+    >>> time = np.arange(1000) / 250.0 - 2.0
+    >>> basis = plan_basis(time, 2.0, highest=3)
+    >>> fit = fit_periodic(basis, np.cos(4 * np.pi * time)[None], highest=3, gains_to=1)
     >>> np.round(np.abs(fit.amplitude[0]), 9).tolist()
     [0.0, 1.0, 0.0, 0.0]
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+import scipy.fft
 from numpy.typing import NDArray
 
-_BLOCK = 2048
-"""Samples handled at a time: keeps the table of exponentials in the cache and memory bounded."""
+from savgs_ident.responses.nonuniform_fft import TransformPlan, plan_transform, signals, sums
+
+_MOST_STEPS = 150
+_PRECISION = 1e-13
+
+
+@dataclass(frozen=True)
+class PeriodicBasis:
+    """Stamps ``time`` [s], (N,), the fundamental [Hz], and the plan of the sums over them."""
+
+    time: NDArray[np.float64]
+    frequency: float
+    plan: TransformPlan
 
 
 @dataclass(frozen=True)
@@ -45,93 +57,103 @@ class PeriodicFit:
     pseudo_gain: NDArray[np.complex128]
 
 
-def blocks(samples: int) -> Iterator[slice]:
-    """Consecutive slices of at most a few thousand samples that cover ``range(samples)``."""
-    return (slice(start, min(start + _BLOCK, samples)) for start in range(0, samples, _BLOCK))
+def plan_basis(time: NDArray[np.float64], frequency: float, highest: int) -> PeriodicBasis:
+    """The basis in which orders up to ``highest`` of ``frequency`` [Hz] can be fitted at ``time`` [s].
 
-
-def rotor_powers(time: NDArray[np.float64], frequency: float, highest: int) -> NDArray[np.complex128]:
-    """exp(-2 pi i k f t) for k = 0..``highest``, (highest + 1, n), by repeated doubling of the power."""
-    turns = np.empty((highest + 1, time.size), dtype=np.complex128)
-    turns[0] = 1.0
-    if highest == 0:
-        return turns
-    step = np.exp(-2j * np.pi * frequency * time)
-    turns[1] = step
-    known = 2
-    while known <= highest:
-        more = min(known, highest + 1 - known)
-        np.multiply(turns[:more], turns[known - 1] * step, out=turns[known : known + more])
-        known += more
-    return turns
+    Stamps should be counted from near the middle of the record, which keeps harmonics and drift apart.
+    """
+    return PeriodicBasis(time, frequency, plan_transform(2.0 * np.pi * frequency * time, 2 * highest))
 
 
 def fit_periodic(
-    time: NDArray[np.float64], values: NDArray[np.float64], frequency: float, highest: int, gains_to: int
+    basis: PeriodicBasis, values: NDArray[np.float64], highest: int, gains_to: int
 ) -> PeriodicFit:
-    """Harmonics 0..``highest`` of ``values`` (C, N) at ``frequency`` [Hz], sampled at ``time`` [s], (N,).
+    """Harmonics 0..``highest`` of ``values`` (C, N), no higher than ``basis`` was planned for.
 
-    Noise gains are given for the orders 0..``gains_to``. The stamps should be counted from near the middle
-    of the record, which keeps harmonics and drift apart. Raises :class:`numpy.linalg.LinAlgError` when the
+    Noise gains are given for the orders 0..``gains_to``. Raises :class:`numpy.linalg.LinAlgError` when the
     stamps do not determine the harmonics.
     """
+    time = basis.time
     reach = float(np.max(np.abs(time))) or 1.0
     ramp = time / reach
-    lags, on_data, on_ramp = _sums(time, np.vstack([values, ramp]), frequency, highest)
-    normal = np.empty((2 * highest + 2, 2 * highest + 2), dtype=np.complex128)
-    # Row k, column l of E^H E is sum_j exp(i (l - k) w t_j); lags hold sum_j exp(-i m w t_j).
-    normal[:-1, :-1] = scipy.linalg.toeplitz(lags, lags.conj())
-    normal[:-1, -1] = on_ramp
-    normal[-1, :-1] = on_ramp.conj()
-    normal[-1, -1] = ramp @ ramp
-    factor = scipy.linalg.cho_factor(normal, lower=True)
-    right = np.vstack([on_data, (values @ ramp)[None]])
-    solution = scipy.linalg.cho_solve(factor, right)
-    two_sided = solution[highest : 2 * highest + 1].T
-    amplitude = 2.0 * two_sided
-    amplitude[:, 0] = two_sided[:, 0].real
-    slope = solution[-1].real / reach
-    gain, pseudo_gain = _gains(factor, highest, gains_to)
-    residual = values - evaluate(time, amplitude, frequency) - slope[:, None] * time
-    return PeriodicFit(amplitude, slope, residual, gain, pseudo_gain)
+    found = sums(basis.plan, np.vstack([np.ones_like(ramp), ramp, values]))
+    right = np.vstack([_both_sides(found[1:, : highest + 1]), _units(highest, gains_to)])
+    solved = _solve_toeplitz(found[0, : 2 * highest + 1], right)
+    # Row 0 of both: the ramp. It is eliminated last, by its part that no harmonic can imitate.
+    shared = np.sum(right * solved[0].conj(), axis=1)
+    left_of_ramp = float(np.sum(ramp**2)) - shared[0].real
+    from_data = np.sum(values * ramp, axis=1)
+    last_rows = np.concatenate([from_data, np.zeros(gains_to + 1)])
+    slope = (last_rows - shared[1:]) / left_of_ramp
+    solution = solved[1:] - slope[:, None] * solved[0]
+    channels = values.shape[0]
+    amplitude = 2.0 * solution[:channels, highest:]
+    amplitude[:, 0] = amplitude[:, 0].real / 2.0
+    drift = slope[:channels].real / reach
+    gain, pseudo_gain = _gains(solution[channels:], highest)
+    residual = values - signals(basis.plan, amplitude) - drift[:, None] * time
+    return PeriodicFit(amplitude, drift, residual, gain, pseudo_gain)
 
 
-def evaluate(
-    time: NDArray[np.float64], amplitude: NDArray[np.complex128], frequency: float
-) -> NDArray[np.float64]:
-    """The periodic signals X_0 + Re sum X_k exp(2 pi i k f t), (C, N), of ``amplitude`` (C, K + 1)."""
-    signal = np.empty((amplitude.shape[0], time.size))
-    for part in blocks(time.size):
-        turns = rotor_powers(time[part], frequency, amplitude.shape[1] - 1)
-        signal[:, part] = (amplitude.conj() @ turns).real
-    return signal
+def _both_sides(positive: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Orders -K..K from orders 0..K of sums over real data."""
+    return np.concatenate([positive[:, :0:-1].conj(), positive], axis=1)
 
 
-def _sums(
-    time: NDArray[np.float64], rows: NDArray[np.float64], frequency: float, highest: int
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.complex128]]:
-    """Sums of the exponentials: lags 0..2K alone, and orders -K..K against the data and the ramp."""
-    lags = np.zeros(2 * highest + 1, dtype=np.complex128)
-    against = np.zeros((highest + 1, rows.shape[0]), dtype=np.complex128)
-    for part in blocks(time.size):
-        turns = rotor_powers(time[part], frequency, highest)
-        lags[: highest + 1] += turns.sum(axis=1)
-        lags[highest + 1 :] += turns[1:] @ turns[highest]
-        against += turns @ rows[:, part].T
-    both = np.vstack([against[:0:-1].conj(), against])
-    return lags, both[:, :-1], both[:, -1]
+def _units(highest: int, last: int) -> NDArray[np.complex128]:
+    """Unit vectors for the orders 0..``last``, whose solutions are columns of the inverse."""
+    return np.eye(last + 1, 2 * highest + 1, highest, dtype=np.complex128)
+
+
+def _solve_toeplitz(lags: NDArray[np.complex128], right: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Rows x of G x = b for the rows b of ``right`` (R, n); G_kl = conj(lags[l - k]), by conjugate gradients.
+
+    Raises :class:`numpy.linalg.LinAlgError` if that does not converge.
+    """
+    count = right.shape[1]
+    length = scipy.fft.next_fast_len(2 * count - 1)
+    circulant = np.zeros(length, dtype=np.complex128)
+    circulant[:count] = lags
+    circulant[length - count + 1 :] = lags[:0:-1].conj()
+    symbol = scipy.fft.fft(circulant)
+    scale = lags[0].real
+    solution: NDArray[np.complex128] = right / scale
+    residual = right - _times(symbol, solution)
+    direction = residual
+    power = _squares(residual)
+    goal = _PRECISION**2 * _squares(right)
+    for _ in range(_MOST_STEPS):
+        if np.all(power <= goal):
+            return solution
+        image = _times(symbol, direction)
+        curvature = np.sum((direction.conj() * image).real, axis=1)
+        stride = np.where(power > goal, power, 0.0) / np.where(curvature > 0.0, curvature, 1.0)
+        solution = solution + stride[:, None] * direction
+        residual = residual - stride[:, None] * image
+        before, power = power, _squares(residual)
+        direction = residual + (power / np.where(before > 0.0, before, 1.0))[:, None] * direction
+    raise np.linalg.LinAlgError("the time stamps do not determine the harmonics")
+
+
+def _times(symbol: NDArray[np.complex128], rows: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Toeplitz matrix times each row, through the circulant that contains it."""
+    spectrum = scipy.fft.fft(rows, symbol.size) * symbol
+    product: NDArray[np.complex128] = scipy.fft.ifft(spectrum)[:, : rows.shape[1]]
+    return product
+
+
+def _squares(rows: NDArray[np.complex128]) -> NDArray[np.float64]:
+    total: NDArray[np.float64] = np.sum(rows.real**2 + rows.imag**2, axis=1)
+    return total
 
 
 def _gains(
-    factor: tuple[NDArray[np.complex128], bool], highest: int, last: int
+    columns: NDArray[np.complex128], highest: int
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Noise gains of X_0..X_last from the inverse normal matrix: its entries (k, k) and (k, -k)."""
-    order = np.arange(last + 1)
-    units = np.zeros((factor[0].shape[0], last + 1), dtype=np.complex128)
-    units[highest + order, order] = 1.0
-    columns = scipy.linalg.cho_solve(factor, units)
-    gain = 4.0 * columns[highest + order, order].real
-    pseudo_gain = 4.0 * columns[highest - order, order].conj()
+    """Noise gains of X_0..X_m from columns 0..m of the inverse normal matrix: entries (k, k) and (k, -k)."""
+    order = np.arange(columns.shape[0])
+    gain = 4.0 * columns[order, highest + order].real
+    pseudo_gain = 4.0 * columns[order, highest - order].conj()
     gain[0] /= 4.0
     pseudo_gain[0] = gain[0]
     return gain, pseudo_gain
