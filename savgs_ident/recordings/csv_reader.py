@@ -18,10 +18,10 @@ from savgs_ident.recordings.binding import Binding, Candidate, bind, factor_or_s
 from savgs_ident.recordings.channel_map import ChannelMap, ChannelRule
 from savgs_ident.recordings.csv_header import CsvHead, read_head
 from savgs_ident.recordings.csv_table import CsvTable
+from savgs_ident.recordings.kinds import kind_of
 from savgs_ident.recordings.names import TEST_COLUMNS, canonical_name, normalise, split_header
 from savgs_ident.recordings.reading import Progress, Reader, Reading
 from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording
-from savgs_ident.recordings.test_kind import kind_of
 from savgs_ident.recordings.text_blocks import GZIP_MAGIC, TextBlocks
 
 _MOST_REPEATS = 20

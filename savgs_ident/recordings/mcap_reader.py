@@ -18,13 +18,13 @@ from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.binding import Binding, ambiguous
 from savgs_ident.recordings.channel_map import ChannelMap
 from savgs_ident.recordings.clock import choose_clock
+from savgs_ident.recordings.events import Event, Span, looks_like_events, parse_event, spans_of
+from savgs_ident.recordings.kinds import kind_of
 from savgs_ident.recordings.mcap_records import MAGIC, McapRecords, Segment
 from savgs_ident.recordings.mcap_topic import TopicColumns, TopicData, decoder_for
 from savgs_ident.recordings.message_block import DecodeError, message_block
 from savgs_ident.recordings.reading import Progress, Reader, Reading
 from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording
-from savgs_ident.recordings.test_events import TestEvent, TestSpan, looks_like_events, parse_event, spans_of
-from savgs_ident.recordings.test_kind import kind_of
 
 
 def read_mcap(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading:
@@ -47,7 +47,7 @@ class _Gathering:
     """Takes segments, sends the messages to the columns of their topic or to the events."""
 
     def __init__(self, channel_map: ChannelMap, source: str) -> None:
-        self.events: list[TestEvent] = []
+        self.events: list[Event] = []
         self._map = channel_map
         self._source = source
         self._schemas: dict[int, Schema] = {}
@@ -171,7 +171,7 @@ class _Gathering:
 
 
 def _cut_into_tests(
-    topics: tuple[TopicData, ...], spans: tuple[TestSpan, ...], channel_map: ChannelMap, path: Path
+    topics: tuple[TopicData, ...], spans: tuple[Span, ...], channel_map: ChannelMap, path: Path
 ) -> tuple[tuple[Recording, ...], tuple[DataWarning, ...]]:
     """The channels of every test, with time from its start [s]; samples outside every test are dropped."""
     source = str(path)
@@ -185,7 +185,7 @@ def _cut_into_tests(
         warnings.extend(choice.warnings)
     if not spans:
         start = min(int(time.min()) for time in times)
-        spans = (TestSpan(path.stem, start, None, None),)
+        spans = (Span(path.stem, start, None, None),)
     recordings = []
     for span in spans:
         channels: dict[str, Channel] = {}
@@ -198,7 +198,7 @@ def _cut_into_tests(
     return tuple(recordings), tuple(warnings)
 
 
-def _channels_within(span: TestSpan, data: TopicData, time: NDArray[np.int64]) -> dict[str, Channel]:
+def _channels_within(span: Span, data: TopicData, time: NDArray[np.int64]) -> dict[str, Channel]:
     inside = time >= span.start
     if span.stop is not None:
         inside &= time <= span.stop

@@ -12,7 +12,7 @@ import numpy as np
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.checks_clipping import check_clipping
 from savgs_ident.recordings.checks_physics import check_physics
-from savgs_ident.recordings.checks_test import check_complete, check_test, stuck_channels
+from savgs_ident.recordings.checks_record import check_complete, check_test, stuck_channels
 from savgs_ident.recordings.checks_time import check_time
 from savgs_ident.recordings.checks_values import check_missing, check_possible
 from savgs_ident.recordings.gravity import remove_gravity

@@ -21,7 +21,7 @@ _ENDS = ("end", "stop")
 
 
 @dataclass(frozen=True)
-class TestEvent:
+class Event:
     """``time`` [ns] at which the test ``name`` starts or ends; ``frequency_hz`` if the event tells it."""
 
     time: int
@@ -31,7 +31,7 @@ class TestEvent:
 
 
 @dataclass(frozen=True)
-class TestSpan:
+class Span:
     """A test from ``start`` to ``stop`` [ns], both included; ``stop`` None: to the end of the data."""
 
     name: str
@@ -45,16 +45,16 @@ def looks_like_events(topic: str) -> bool:
     return topic.rstrip("/").rpartition("/")[2].lower() in _TOPIC_ENDS
 
 
-def parse_event(payload: bytes, encoding: str, time: int) -> TestEvent | None:
+def parse_event(payload: bytes, encoding: str, time: int) -> Event | None:
     """The event in a message, or None where it is something else."""
     if encoding == "json":
         return _from_json(payload, time)
     text = _cdr_string(payload)
     match = _SPOKEN.match(text) if text is not None else None
-    return TestEvent(time, match[2], match[1].lower() in _STARTS) if match else None
+    return Event(time, match[2], match[1].lower() in _STARTS) if match else None
 
 
-def _from_json(payload: bytes, time: int) -> TestEvent | None:
+def _from_json(payload: bytes, time: int) -> Event | None:
     try:
         message = json.loads(payload)
     except (ValueError, RecursionError):
@@ -64,7 +64,7 @@ def _from_json(payload: bytes, time: int) -> TestEvent | None:
     name, event, frequency = (message.get(key) for key in ("test", "event", "frequency_hz"))
     if not isinstance(name, str) or not name.strip() or event not in (*_STARTS, *_ENDS):
         return None
-    return TestEvent(time, name.strip(), event in _STARTS, _positive(frequency))
+    return Event(time, name.strip(), event in _STARTS, _positive(frequency))
 
 
 def _positive(value: object) -> float | None:
@@ -80,13 +80,11 @@ def _cdr_string(payload: bytes) -> str | None:
     return payload[8 : 8 + length].rstrip(b"\x00").decode("utf-8", errors="replace")
 
 
-def spans_of(
-    events: Sequence[TestEvent], source: str
-) -> tuple[tuple[TestSpan, ...], tuple[DataWarning, ...]]:
+def spans_of(events: Sequence[Event], source: str) -> tuple[tuple[Span, ...], tuple[DataWarning, ...]]:
     """Pair starts with ends. A test without its end runs to the next start (or the end of the data)."""
-    spans: list[TestSpan] = []
+    spans: list[Span] = []
     warnings: list[DataWarning] = []
-    open_span: TestSpan | None = None
+    open_span: Span | None = None
     for event in sorted(events, key=lambda event: event.time):
         if event.is_start:
             if open_span is not None:
@@ -94,7 +92,7 @@ def spans_of(
                 warnings.append(
                     _lonely("has no end event, taken to end at the next start", open_span.name, source)
                 )
-            open_span = TestSpan(event.name, event.time, None, event.frequency_hz)
+            open_span = Span(event.name, event.time, None, event.frequency_hz)
         elif open_span is not None and open_span.name == event.name:
             spans.append(replace(open_span, stop=event.time))
             open_span = None
@@ -108,7 +106,7 @@ def spans_of(
     return _unique(spans), tuple(warnings)
 
 
-def _unique(spans: list[TestSpan]) -> tuple[TestSpan, ...]:
+def _unique(spans: list[Span]) -> tuple[Span, ...]:
     seen: Counter[str] = Counter()
     named = []
     for span in spans:
