@@ -25,6 +25,9 @@ from jaxtyping import Array, Float
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import Parameter
 
+# Near a bound single precision leaves no digits to differentiate.
+jax.config.update("jax_enable_x64", True)
+
 _INSIDE = 0.01
 # Without a bound the map bends only this many standard deviations away: finite, to keep slopes finite.
 _FAR = 1e12

@@ -80,8 +80,7 @@ class FreeVector(eqx.Module):
 
     def jacobian_diag(self, u: Float[Array, " n"]) -> Float[Array, " n"]:
         """d value / d u of every parameter at ``u`` (n,) [SI unit of each]; the Jacobian is diagonal."""
-        slopes: Float[Array, " n"] = jax.jvp(self._values, (u,), (jnp.ones_like(u),))[1]
-        return slopes
+        return jax.jvp(self._values, (u,), (jnp.ones_like(u),))[1]
 
     def prior_residuals(self, u: Float[Array, " n"]) -> Float[Array, " tolerated"]:
         """Deviations of the tolerated parameters in their standard deviations [1].
