@@ -14,7 +14,7 @@ from savgs_ident.recordings.place import Place
 from savgs_ident.recordings.recording import Channel
 
 LONGEST_GAP = 0.10
-"""Largest gap as a fraction of the record."""
+"""How long a gap may be, as a fraction of the record, in a test that a response is made of."""
 _JUMP_STEPS = 5.0
 """A step this many times the median one is a jump: two lost samples in a row are still jitter of a bus."""
 _MOST_REPEATED = 0.10
@@ -22,9 +22,12 @@ _SLOWEST_HZ, _FASTEST_HZ = 2.0, 200e3
 _MIND_UNIT = "check the unit of the time column (s, ms or us)"
 
 
-def check_time(channel: Channel, place: Place) -> tuple[Channel, tuple[DataWarning, ...]]:
+def check_time(
+    channel: Channel, place: Place, longest_gap: float = LONGEST_GAP
+) -> tuple[Channel, tuple[DataWarning, ...]]:
     """The channel with repeated stamps removed, and what there was to say.
 
+    ``longest_gap`` is how long a gap may be, as a fraction of the record.
     Raises :class:`InputError` for stamps that are missing, run backwards, are mostly repeated, or whose rate
     no data logger has.
     """
@@ -49,7 +52,7 @@ def check_time(channel: Channel, place: Place) -> tuple[Channel, tuple[DataWarni
     median = float(np.median(np.diff(channel.time)))
     if not 1.0 / _FASTEST_HZ <= median <= 1.0 / _SLOWEST_HZ:
         raise place.error(f"samples are {median:.3g} s apart, which no data logger does", _MIND_UNIT)
-    return channel, (*warnings, *_jumps(channel, median, place))
+    return channel, (*warnings, *_jumps(channel, median, longest_gap, place))
 
 
 def _without_repeats(channel: Channel, place: Place) -> tuple[Channel, tuple[DataWarning, ...]]:
@@ -75,7 +78,7 @@ def _without_repeats(channel: Channel, place: Place) -> tuple[Channel, tuple[Dat
     )
 
 
-def _jumps(channel: Channel, median: float, place: Place) -> tuple[DataWarning, ...]:
+def _jumps(channel: Channel, median: float, longest_gap: float, place: Place) -> tuple[DataWarning, ...]:
     steps = np.diff(channel.time)
     jumps = np.flatnonzero(steps > _JUMP_STEPS * median)
     if jumps.size == 0:
@@ -83,7 +86,7 @@ def _jumps(channel: Channel, median: float, place: Place) -> tuple[DataWarning, 
     worst = int(np.argmax(steps))
     length = float(channel.time[-1] - channel.time[0])
     told = f"time jumps by {steps[worst]:.4g} s ({jumps.size} such gaps), samples come every {median:.4g} s"
-    if steps[worst] > LONGEST_GAP * length and place.test:
+    if steps[worst] > longest_gap * length:
         raise place.error(told, "record the test again without the gap", time=float(channel.time[worst]))
     return (
         place.warning("time_jump", told, "check the logger for lost samples", float(channel.time[worst])),

@@ -32,7 +32,9 @@ _MOST_MISSING = 0.20
 _REGULAR = 1.5
 
 
-def check_missing(channel: Channel, place: Place) -> tuple[Channel | None, tuple[DataWarning, ...]]:
+def check_missing(
+    channel: Channel, place: Place, longest_gap: float = LONGEST_GAP
+) -> tuple[Channel | None, tuple[DataWarning, ...]]:
     """The channel without its missing samples; None where there is nothing else.
 
     Missing samples that come regularly are those of a slower sensor in a faster table, and no fault.
@@ -57,7 +59,7 @@ def check_missing(channel: Channel, place: Place) -> tuple[Channel | None, tuple
         return kept, ()
     gaps = np.diff(np.concatenate([channel.time[:1], kept.time, channel.time[-1:]]))
     length = float(channel.time[-1] - channel.time[0])
-    if gaps.max() > LONGEST_GAP * length or count > _MOST_MISSING * missing.size:
+    if gaps.max() > longest_gap * length or count > _MOST_MISSING * missing.size:
         raise place.error(
             f"{count} of {missing.size} samples are missing, the longest gap is {gaps.max():.3g} s",
             "record the test again",

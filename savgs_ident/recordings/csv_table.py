@@ -4,6 +4,7 @@ pandas parses the numbers (it is fast and rounds correctly); how many cells a ro
 because pandas fills a short row with missing values and says nothing.
 """
 
+import re
 from io import BytesIO
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,8 @@ from savgs_ident.recordings.csv_header import CsvHead
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_QUOTED = re.compile(rb'"[^"\n]*"')
 
 
 class CsvTable:
@@ -49,9 +52,8 @@ class CsvTable:
         return np.concatenate(blocks) if blocks else np.empty(0)
 
     def _check_ragged(self, block: bytes) -> None:
-        if b'"' in block:
-            return
-        raw = np.frombuffer(block, dtype=np.uint8)
+        text = _QUOTED.sub(b"", block) if b'"' in block else block
+        raw = np.frombuffer(text, dtype=np.uint8)
         ends = np.flatnonzero(raw == ord("\n"))
         marks = np.flatnonzero(raw == ord(self._head.delimiter))
         cells = np.diff(np.searchsorted(marks, ends), prepend=0) + 1
@@ -59,7 +61,7 @@ class CsvTable:
         bad = np.flatnonzero((cells != len(self._head.columns)) & (lengths > 2))
         for index in bad:
             start = int(ends[index - 1]) + 1 if index else 0
-            if block[start : int(ends[index])].strip():
+            if text[start : int(ends[index])].strip():
                 raise InputError(
                     f"line {self._line + int(index) + 1} has {cells[index]} cells,"
                     f" the header has {len(self._head.columns)}",
@@ -85,6 +87,12 @@ class CsvTable:
         }
         try:
             return pd.read_csv(BytesIO(block), dtype=types, **options)
+        except pd.errors.ParserError as error:
+            raise InputError(
+                f"cannot be parsed after line {self._line}: {error}",
+                source=self._source,
+                remedy="look for an unpaired quotation mark, or export the file again",
+            ) from error
         except (ValueError, OverflowError) as error:
             raise self._bad_cell(pd.read_csv(BytesIO(block), dtype=str, **options), error) from error
 

@@ -6,6 +6,7 @@ the error.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.checks_clipping import check_clipping
 from savgs_ident.recordings.checks_physics import check_physics
 from savgs_ident.recordings.checks_record import check_complete, check_test, stuck_channels
-from savgs_ident.recordings.checks_time import check_time
+from savgs_ident.recordings.checks_time import LONGEST_GAP, check_time
 from savgs_ident.recordings.checks_values import check_missing, check_possible
 from savgs_ident.recordings.gravity import remove_gravity
 from savgs_ident.recordings.place import Place
@@ -54,13 +55,14 @@ def screen_test(recording: Recording, source: str) -> tuple[Recording, tuple[Dat
     """One test with cleaned channels; raises :class:`InputError` where it cannot be used."""
     channels: dict[str, Channel] = {}
     warnings: list[DataWarning] = []
+    longest_gap = inf if recording.kind == "other" else LONGEST_GAP
     for name, channel in recording.channels.items():
         place = Place(source, recording.name, name)
-        whole, found = check_missing(_stamped(channel, place), place)
+        whole, found = check_missing(_stamped(channel, place), place, longest_gap)
         warnings.extend(found)
         if whole is None:
             continue
-        ordered, found = check_time(whole, place)
+        ordered, found = check_time(whole, place, longest_gap)
         warnings.extend(found)
         check_possible(ordered, place)
         channels[name] = ordered

@@ -44,7 +44,9 @@ def _csv(
     names = list(signals)
     lines = [separator.join((["test"] if test else []) + [headers.get(name, name) for name in names])]
     lines += [
-        separator.join(([test] if test else []) + ["" if np.isnan(cell) else repr(float(cell)) for cell in row])
+        separator.join(
+            ([test] if test else []) + ["" if np.isnan(cell) else repr(float(cell)) for cell in row]
+        )
         for row in np.column_stack([signals[name] for name in names])
     ]
     return ("\n".join(lines) + "\n").encode()
@@ -88,7 +90,9 @@ def _mcap(
     return path
 
 
-def _json_messages(signals: Signals, test: str, frequency: float | None, start_s: float = 0.0) -> list[Message]:
+def _json_messages(
+    signals: Signals, test: str, frequency: float | None, start_s: float = 0.0
+) -> list[Message]:
     start = EPOCH_NS + round(1e9 * start_s)
     names = [name for name in signals if name != "time"]
     stamps = start + np.rint(1e9 * signals["time"]).astype(np.int64)

@@ -67,7 +67,9 @@ def _coarse_time(signals: Signals, csv: Callable[..., bytes]) -> bytes:
 
 def _interleaved(signals: Signals, csv: Callable[..., bytes]) -> bytes:
     lines = csv(signals, test="a").split(b"\n")
-    return b"\n".join(line.replace(b"a,", b"b,", 1) if i % 2 and i > 1 else line for i, line in enumerate(lines))
+    return b"\n".join(
+        line.replace(b"a,", b"b,", 1) if i % 2 and i > 1 else line for i, line in enumerate(lines)
+    )
 
 
 NAME = "dwell_1.00Hz.csv"
@@ -80,12 +82,20 @@ CASES: dict[str, tuple[str, Build, str]] = {
     "no time column": (NAME, _without("time"), "channel 'time': no column is the time.*channels.toml"),
     "no road": (NAME, _without("road_height"), "channel 'road_height'.*missing.*channels.toml"),
     "no response": (NAME, _without("sprung_accel", "susp_deflection"), "neither sprung_accel nor susp_defl"),
-    "no known column": (NAME, lambda s, csv: b"time [s],a,b\n0,1,2\n1,2,3\n", "no column is known: found.*'a'"),
+    "no known column": (
+        NAME,
+        lambda s, csv: b"time [s],a,b\n0,1,2\n1,2,3\n",
+        "no column is known: found.*'a'",
+    ),
     "unknown unit": (NAME, _replaced(b"road_height [m]", b"road_height [furlong]"), "unknown unit 'furlong'"),
     "unit of something else": (NAME, _replaced(b"road_height [m]", b"road_height [s]"), "'s' is a time"),
     "unit of the time": (NAME, _replaced(b"time [s]", b"time [m]"), "channel 'time': unit 'm' is a length"),
     "mm called m": (NAME, _scaled("susp_deflection", 1e3), "channel 'susp_deflection'.*not possible.*mm"),
-    "road in mm called m": (NAME, _scaled("road_height", 1e3), "channel 'road_height', at .* s: .*not possible"),
+    "road in mm called m": (
+        NAME,
+        _scaled("road_height", 1e3),
+        "channel 'road_height', at .* s: .*not possible",
+    ),
     "deg called rad": (NAME, _scaled("link_angle", 180 / np.pi), "channel 'link_angle'.*deg"),
     "ms called s": (NAME, _scaled("time", 1e3), "samples are 10 s apart.*ms"),
     "us called s": (NAME, _scaled("time", 1e6), "samples are 1e\\+04 s apart"),
@@ -101,10 +111,16 @@ CASES: dict[str, tuple[str, Build, str]] = {
     ),
     "many small gaps": (
         NAME,
-        lambda s, csv: csv(s | {"sprung_accel": np.where(np.arange(1000) % 7 < 2, np.nan, s["sprung_accel"])}),
+        lambda s, csv: csv(
+            s | {"sprung_accel": np.where(np.arange(1000) % 7 < 2, np.nan, s["sprung_accel"])}
+        ),
         "samples are missing",
     ),
-    "infinite value": (NAME, _edit("sprung_accel", 123, np.inf), "sprung_accel', at 1.230 s: 1 values are inf"),
+    "infinite value": (
+        NAME,
+        _edit("sprung_accel", 123, np.inf),
+        "sprung_accel', at 1.230 s: 1 values are inf",
+    ),
     "stuck road": (NAME, _edit("road_height", slice(0, 1000), 0.005), "channel 'road_height'.*unusable"),
     "dwell too short": (NAME, _cut(2.5), "test 'dwell_1.00Hz': the dwell holds 2.5 periods in 2.49 s"),
     "row too long": (NAME, _line(41, lambda line: line + b",7"), "line 42 has 6 cells, the header has 5"),
@@ -114,17 +130,33 @@ CASES: dict[str, tuple[str, Build, str]] = {
         _line(41, lambda line: b"0.4,oops,0,0,0"),
         "channel 'road_height \\[m\\]': 'oops' in data row 41 is not a number",
     ),
-    "decimal comma": (NAME, lambda s, csv: csv(s).replace(b"0.", b"0,"), "cells, the header has 5.*decimal comma"),
-    "duplicate column": (NAME, _replaced(b"link_angle [rad]", b"road_height [m]"), "'road_height \\[m\\]' is there"),
+    "unpaired quote": (NAME, _line(41, lambda line: b'0.4,"0,0,0,0'), "cannot be parsed.*quotation mark"),
+    "short row in quotes": (NAME, _line(41, lambda line: b'"0.4","0",0'), "line 42 has 3 cells"),
+    "decimal comma": (
+        NAME,
+        lambda s, csv: csv(s).replace(b"0.", b"0,"),
+        "cells, the header has 5.*decimal comma",
+    ),
+    "duplicate column": (
+        NAME,
+        _replaced(b"link_angle [rad]", b"road_height [m]"),
+        "'road_height \\[m\\]' is there",
+    ),
     "two that look alike": (
         NAME,
-        lambda s, csv: csv({("az" if n == "sprung_accel" else n): v for n, v in s.items()} | {"acc_z": s["time"]}),
+        lambda s, csv: csv(
+            {("az" if n == "sprung_accel" else n): v for n, v in s.items()} | {"acc_z": s["time"]}
+        ),
         "'az' and 'acc_z' could both be it",
     ),
     "not text": (NAME, lambda s, csv: bytes(range(256)) * 8 + b"\n", "is not a text file"),
     "text after binary": (NAME, lambda s, csv: csv(s) + b"\x00" * 40 + b"\n", "is not a text file"),
     "endless line": (NAME, lambda s, csv: b"1" * 5_000_000, "longer than"),
-    "gzip cut in the header": (NAME + ".gz", lambda s, csv: gzip.compress(csv(s))[:40], "nothing in it is whole"),
+    "gzip cut in the header": (
+        NAME + ".gz",
+        lambda s, csv: gzip.compress(csv(s))[:40],
+        "nothing in it is whole",
+    ),
     "gzip garbage": (NAME + ".gz", lambda s, csv: b"\x1f\x8b" + b"rubbish" * 9, "compressed data is damaged"),
     "unknown suffix": ("dwell.xlsx", lambda s, csv: csv(s), "suffix that no reader knows"),
     "gravity downwards": (
@@ -133,7 +165,11 @@ CASES: dict[str, tuple[str, Build, str]] = {
         "channel 'sprung_accel': its mean is -9.8.*sign = -1",
     ),
     "rows out of order": ("runs.csv", _interleaved, "test 'a': the rows of this test are in .* pieces"),
-    "no row in a test": ("runs.csv", lambda s, csv: b"test,time [s],road [m]\n,0,1\n,1,2\n", "no row belongs"),
+    "no row in a test": (
+        "runs.csv",
+        lambda s, csv: b"test,time [s],road [m]\n,0,1\n,1,2\n",
+        "no row belongs",
+    ),
 }
 
 
@@ -194,9 +230,15 @@ MAPS = {
     "unknown channel": ('[channels.wheel]\ncolumn = "x"', "'wheel' is not a canonical channel"),
     "unknown key": ('[channels.road_height]\ncolumn = "x"\ngain = 2', "unknown key.*'gain'"),
     "neither column nor topic": ("[channels.road_height]\nscale = 2", "either a column or a topic"),
-    "both column and topic": ('[channels.road_height]\ncolumn = "x"\ntopic = "y"', "either a column or a topic"),
+    "both column and topic": (
+        '[channels.road_height]\ncolumn = "x"\ntopic = "y"',
+        "either a column or a topic",
+    ),
     "sign of two": ('[channels.road_height]\ncolumn = "x"\nsign = 2', "neither 1 nor -1"),
-    "scale in words": ('[channels.road_height]\ncolumn = "x"\nscale = "big"', "'scale' is not a finite number"),
+    "scale in words": (
+        '[channels.road_height]\ncolumn = "x"\nscale = "big"',
+        "'scale' is not a finite number",
+    ),
     "column as number": ("[channels.road_height]\ncolumn = 3", "'column' is not a text"),
     "not a table": ("channels = 3", "'channels' is not a table"),
     "unknown clock": ('[time]\nclock = "sun"', "clock 'sun' is not known.*header, log, publish"),

@@ -1,0 +1,225 @@
+"""The ways laboratories write a table all give the same recording."""
+
+import gzip
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from savgs_ident.recordings.channel_map import ChannelMap, ChannelRule
+from savgs_ident.recordings.kinds import kind_of
+from savgs_ident.recordings.names import ALIASES, Header, canonical_name, split_header
+from savgs_ident.recordings.read import read_campaign
+from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign
+from savgs_ident.recordings.units import DIMENSIONS, UNITS, find_unit, unit_factor
+
+Signals = dict[str, NDArray[np.float64]]
+Csv = Callable[..., bytes]
+
+LAB = {
+    "time": "Time (ms)",
+    "road_height": "road_mm",
+    "sprung_accel": "accel_z (g)",
+    "susp_deflection": "Suspension Deflection [mm]",
+    "link_angle": "link_angle [deg]",
+}
+LAB_SCALES = {
+    "time": 1e3, "road_height": 1e3, "sprung_accel": 1 / 9.80665, "susp_deflection": 1e3,
+    "link_angle": 180 / np.pi,
+}  # fmt: skip
+
+
+def _lab(signals: Signals) -> Signals:
+    return {name: values * LAB_SCALES[name] for name, values in signals.items()}
+
+
+def _comma(text: bytes) -> bytes:
+    return text.replace(b".", b",")
+
+
+def _with_unit_row(text: bytes) -> bytes:
+    head, body = text.split(b"\n", 1)
+    return b"time;road;acc_z;deflection;link_angle\ns;m;m/s\xc2\xb2;m;rad\n" + body
+
+
+DIALECTS: dict[str, Callable[[Signals, Csv], bytes]] = {
+    "units of the laboratory": lambda s, csv: csv(_lab(s), headers=LAB),
+    "semicolons": lambda s, csv: csv(s, separator=";"),
+    "tabs": lambda s, csv: csv(s, separator="\t"),
+    "decimal commas": lambda s, csv: csv(s, separator=";").replace(b".", b","),
+    "row of units": lambda s, csv: _with_unit_row(csv(s, separator=";")),
+    "byte order mark": lambda s, csv: b"\xef\xbb\xbf" + csv(s),
+    "Windows line ends": lambda s, csv: csv(s).replace(b"\n", b"\r\n"),
+    "comments and blank lines": lambda s, csv: b"# rig 3\n\n# monday\n" + csv(s).replace(b"\n", b"\n\n", 5),
+    "quoted headers": lambda s, csv: csv(s, headers={n: f'"{n} [{u}]"' for n, u in _si().items()}),
+    "Latin-1 degree sign": lambda s, csv: (
+        csv(
+            s | {"link_angle": s["link_angle"] * 180 / np.pi},
+            headers=_si_headers() | {"link_angle": "link_angle [°]"},
+        )
+        .decode()
+        .encode("latin-1")
+    ),
+    "spaces after commas": lambda s, csv: csv(s).replace(b",", b", "),
+    "a column more": lambda s, csv: csv({"remark": np.zeros(1000)} | s),
+    "later start of the clock": lambda s, csv: csv(s | {"time": s["time"] + 1234.5}),
+    "several gzip members": lambda s, csv: _members(csv(s)),
+}
+
+
+def _si() -> dict[str, str]:
+    return {"time": "s"} | dict(CANONICAL_UNITS)
+
+
+def _si_headers() -> dict[str, str]:
+    return {name: f"{name} [{unit}]" for name, unit in _si().items()}
+
+
+def _members(text: bytes) -> bytes:
+    return gzip.compress(text[:5000]) + gzip.compress(text[5000:])
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_every_dialect_gives_the_same_recording(
+    dialect: str, tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Csv
+) -> None:
+    path = tmp_path / "dwell_1.00Hz.csv"
+    path.write_bytes(DIALECTS[dialect](signals(), csv_bytes))
+    campaign = read_campaign(path)
+    assert campaign.warnings == ()
+    _same(campaign, signals())
+
+
+def _same(campaign: Campaign, signals: Signals) -> None:
+    (recording,) = campaign.recordings
+    assert (recording.name, recording.kind, recording.frequency_hz) == ("dwell_1.00Hz", "dwell", 1.0)
+    assert set(recording.channels) == set(signals) - {"time"}
+    for name, channel in recording.channels.items():
+        assert channel.unit == CANONICAL_UNITS[name]
+        np.testing.assert_allclose(channel.values, signals[name], rtol=1e-12, atol=1e-14)
+        np.testing.assert_allclose(channel.time, signals["time"], rtol=0, atol=1e-9)
+
+
+def test_channels_are_read_only(tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Csv) -> None:
+    path = tmp_path / "dwell_1.00Hz.csv"
+    path.write_bytes(csv_bytes(signals()))
+    channel = read_campaign(path).recordings[0].channels["road_height"]
+    with pytest.raises(ValueError, match="read-only"):
+        channel.values[0] = 1.0
+
+
+def test_a_header_without_unit_is_taken_as_si_and_told(
+    tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Csv
+) -> None:
+    path = tmp_path / "dwell_1.00Hz.csv"
+    path.write_bytes(csv_bytes(signals(), headers={}))
+    campaign = read_campaign(path)
+    assert [w.code for w in campaign.warnings] == ["unit_assumed"] * 5
+    assert "'road_height' has no unit, taken as m" in str(campaign.warnings[1])
+    _same(campaign, signals())
+
+
+def test_a_channel_map_settles_names_units_signs_and_offsets(
+    tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Csv
+) -> None:
+    raw = signals()
+    raw["susp_deflection"] = (-1e3 * raw["susp_deflection"] + 12.5) / 2
+    raw["sprung_accel"] = raw["sprung_accel"] / 9.80665
+    headers = {name: f"AI{i}" for i, name in enumerate(raw)}
+    (tmp_path / "dwell_1.00Hz.csv").write_bytes(csv_bytes(raw, headers=headers))
+    (tmp_path / "channels.toml").write_text(
+        '[time]\ncolumn = "AI0"\nunit = "s"\n'
+        '[channels.road_height]\ncolumn = "AI1"\nunit = "m"\n'
+        '[channels.sprung_accel]\ncolumn = "AI2"\nunit = "g"\n'
+        '[channels.susp_deflection]\ncolumn = "AI3"\nunit = "mm"\nscale = 2\noffset = -12.5\nsign = -1\n'
+        '[channels.link_angle]\ncolumn = "AI4"\nunit = "rad"\n'
+    )
+    for campaign in (read_campaign(tmp_path), read_campaign(tmp_path / "dwell_1.00Hz.csv")):
+        assert campaign.warnings == ()
+        _same(campaign, signals())
+
+
+def test_a_map_wins_over_the_usual_name(
+    tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Csv
+) -> None:
+    path = tmp_path / "dwell_1.00Hz.csv"
+    path.write_bytes(csv_bytes(signals() | {"road_2": 2 * signals()["road_height"]}))
+    rule = ChannelRule("road_height", column="road_2", unit="m")
+    road = read_campaign(path, ChannelMap((rule,))).recordings[0].channels["road_height"]
+    np.testing.assert_allclose(road.values, 2 * signals()["road_height"])
+    assert road.source == "road_2"
+
+
+def test_a_folder_with_one_test_a_file(
+    tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Csv
+) -> None:
+    told: list[float] = []
+    for frequency in (1.0, 2.0, 3.0):
+        (tmp_path / f"dwell_{frequency}Hz.csv").write_bytes(csv_bytes(signals(frequency)))
+    (tmp_path / "notes.md").write_text("not a recording")
+    campaign = read_campaign(tmp_path, progress=told.append)
+    assert [r.frequency_hz for r in campaign.recordings] == [1.0, 2.0, 3.0]
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    (tmp_path / "dwell_3.0Hz.csv").write_bytes(csv_bytes(signals(3.0, 12.0)))
+    assert read_campaign(tmp_path).sha256 != campaign.sha256
+
+
+def test_a_file_much_larger_than_a_block(
+    tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Csv
+) -> None:
+    long = signals(1.0, 1600.0)
+    (tmp_path / "dwell_1.00Hz.csv").write_bytes(csv_bytes(long, test="dwell_1.00Hz"))
+    assert (tmp_path / "dwell_1.00Hz.csv").stat().st_size > 2 * (1 << 22)
+    _same(read_campaign(tmp_path), long)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "frequency"),
+    [
+        ("dwell_2.35Hz", "dwell", 2.35), ("dwell 0.5 Hz run 2", "dwell", 0.5), ("2p75hz", "dwell", 2.75),
+        ("harmonic", "dwell", None), ("sweep_0_3Hz_60s", "sweep", None), ("Chirp 3 Hz", "sweep", None),
+        ("standstill", "standstill", None), ("at_rest", "standstill", None), ("monday", "other", None),
+        ("dwell_0Hz", "dwell", None), ("dwell_" + 400 * "9" + "Hz", "dwell", None),
+    ],
+)  # fmt: skip
+def test_names_tell_kind_and_frequency(name: str, kind: str, frequency: float | None) -> None:
+    assert kind_of(name) == (kind, frequency)
+
+
+@pytest.mark.parametrize(
+    ("text", "header"),
+    [
+        ("a [m/s^2]", Header("a", "m/s^2")), ("accel_z (g)", Header("accel_z", "g")),
+        ("deflection_mm", Header("deflection", "mm")), ("z_r", Header("z_r", None)),
+        ("time_ms", Header("time", "ms")), ("link_angle_deg", Header("link_angle", "deg")),
+        ("link_angle", Header("link_angle", None)), ("[m]", Header("[m]", None)),
+    ],
+)  # fmt: skip
+def test_headers_split_into_label_and_unit(text: str, header: Header) -> None:
+    assert split_header(text) == header
+
+
+@pytest.mark.parametrize(
+    ("text", "channel", "factor"),
+    [
+        ("m/s²", "sprung_accel", 1.0), ("m/s**2", "sprung_accel", 1.0), ("m s^-2", "sprung_accel", 1.0),
+        ("g", "sprung_accel", 9.80665), ("mg", "sprung_accel", 9.80665e-3), ("MM", "susp_deflection", 1e-3),
+        ("µm", "susp_deflection", 1e-6), ("°", "link_angle", np.pi / 180), ("°/s", "link_velocity", np.pi / 180),
+        ("rpm", "link_velocity", 2 * np.pi / 60), ("mA", "motor_current", 1e-3), ("us", "time", 1e-6),
+    ],
+)  # fmt: skip
+def test_units(text: str, channel: str, factor: float) -> None:
+    assert unit_factor(text, channel) == pytest.approx(factor, rel=1e-15)
+
+
+def test_tables_are_consistent() -> None:
+    assert set(ALIASES) == set(DIMENSIONS) == {"time", *CANONICAL_UNITS}
+    assert {unit.dimension for unit in UNITS.values()} == set(DIMENSIONS.values())
+    for channel, unit in CANONICAL_UNITS.items():
+        assert unit_factor(unit, channel) == 1.0
+        assert all(canonical_name(alias) == channel for alias in ALIASES[channel])
+        assert ALIASES[channel][0] == channel
+    assert find_unit("furlong") is None
