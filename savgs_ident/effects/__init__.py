@@ -1,0 +1,1 @@
+"""The catalogue: one unmodelled effect, one file, collected in :mod:`savgs_ident.effects.registry`."""

@@ -1,0 +1,1 @@
+"""Least squares on measured responses, and what they can tell."""

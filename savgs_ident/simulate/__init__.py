@@ -1,0 +1,1 @@
+"""Motions of the rig: periodic steady states and transients."""

@@ -1,0 +1,125 @@
+"""Periodic collocation: the implicit residual at every node, the trapezoidal rule between nodes.
+
+Unknowns at a node are x = (z_s, theta_LW, their velocities, s) and y = (their accelerations, sd). The model
+asks for r(x, y) = 0 at every node; between nodes
+
+    x_{n+1} = x_n + h ((1 - g) xd_n + g xd_{n+1}),      xd = (velocities, y),
+
+with g = 1/2, or g = 1 for states that slip, where backward Euler is the exact play operator. A Newton step
+eliminates y at each node, dy = J dx + e, and what is left is an affine recurrence from node to node that
+closes after one period (:mod:`savgs_ident.simulate.cyclic`).
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax.extend.core import jaxpr_as_fun
+from jaxtyping import Array, Float
+
+from savgs_ident.model.dynamics import Coordinates, Motion
+from savgs_ident.model.kinematics import Values
+from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.simulate import cyclic
+
+Nodes = Float[Array, "k D N"]
+
+
+class Trajectory(NamedTuple):
+    """States x (4 + s, D, N) and their algebraic partners y = (accelerations, sd), (2 + s, D, N)."""
+
+    x: Nodes
+    y: Nodes
+
+
+class Linearised(NamedTuple):
+    """A trajectory's linearisation, ready to solve for any right side.
+
+    ``imbalance`` is -(dr/dy)^-1 r, (2 + s, D, N); ``slope`` is dy/dx, (2 + s, 4 + s, D, N); ``mass`` dr/dy;
+    ``left`` I - h g dxd/dx at the far end of each step.
+    """
+
+    imbalance: Nodes
+    slope: Float[Array, "k m D N"]
+    mass: Float[Array, "k k D N"]
+    left: Float[Array, "m m D N"]
+    factors: cyclic.CyclicFactors
+
+
+def node_residual(model: QuarterCar, p: Values, parts: tuple[Array, ...], inputs: Inputs) -> Array:
+    """The model's residual at one node from its scalar unknowns (x then y)."""
+    size = len(model.states)
+    states = jnp.stack(parts[4 : 4 + size]) if size else jnp.zeros(0)
+    rates = jnp.stack(parts[6 + size :]) if size else jnp.zeros(0)
+    motion = Motion(
+        Coordinates(*parts[:2]), Coordinates(*parts[2:4]), Coordinates(*parts[4 + size : 6 + size])
+    )
+    return model.residual(p, motion, states, rates, inputs)
+
+
+def residual_at_nodes(model: QuarterCar, p: Values, parts: tuple[Array, ...], inputs: Inputs) -> Nodes:
+    """The residual at all nodes of all dwells, (2 + s, D, N)."""
+
+    def one(inputs: Inputs, *parts: Array) -> Array:
+        return node_residual(model, p, parts, inputs)
+
+    over_nodes = jax.vmap(one, in_axes=0, out_axes=-1)
+    return jax.vmap(over_nodes, in_axes=0, out_axes=1)(inputs, *parts)
+
+
+def _residual_and_columns(function: Callable[..., Array], parts: tuple[Array, ...]) -> tuple[Array, Array]:
+    """A residual and its derivatives in each of its scalar arguments.
+
+    One forward pass a column lets each column compute only what that unknown touches.
+    """
+    closed = jaxpr_as_fun(jax.make_jaxpr(function)(*parts))
+    columns = []
+    for i, part in enumerate(parts):
+
+        def along(moved: Array, i: int = i) -> Array:
+            return closed(*parts[:i], moved, *parts[i + 1 :])[0]
+
+        residual, column = jax.jvp(along, (part,), (jnp.ones_like(part),))
+        columns.append(column)
+    return residual, jnp.stack(columns, axis=1)
+
+
+def implicitness(model: QuarterCar) -> Float[Array, "m 1 1"]:
+    """Weight g of the far end of a step for each state."""
+    weights = [0.5] * 4 + [1.0 if state.slips else 0.5 for state in model.states]
+    return jnp.asarray(weights)[:, None, None]
+
+
+def linearise(
+    model: QuarterCar, p: Values, at: Trajectory, inputs: Inputs, steps: Float[Array, "D N"]
+) -> Linearised:
+    """Linearise residual and steps about a trajectory; ``steps`` [s] from each node to the next."""
+    parts = (*at.x, *at.y)
+    residual, jacobian = _residual_and_columns(lambda *z: residual_at_nodes(model, p, z, inputs), parts)
+    size = at.x.shape[0]
+    mass = jacobian[:, size:]
+    right = -jnp.concatenate([jacobian[:, :size], residual[:, None]], axis=1)
+    solved = cyclic.solve_nodes(mass, right)
+    slope, imbalance = solved[:, :size], solved[:, size]
+    kinematic = jnp.zeros((2, *slope.shape[1:])).at[0, 2].set(1.0).at[1, 3].set(1.0)
+    flow = jnp.concatenate([kinematic, slope])
+    weight = implicitness(model)[:, None]
+    eye = jnp.eye(size)[:, :, None, None]
+    left = eye - steps * weight * jnp.roll(flow, -1, axis=-1)
+    matrices = cyclic.solve_nodes(left, eye + steps * (1.0 - weight) * flow)
+    return Linearised(imbalance, slope, mass, left, cyclic.factorise(matrices))
+
+
+def step_defects(model: QuarterCar, at: Trajectory, rate: Nodes, steps: Float[Array, "D N"]) -> Nodes:
+    """By how much x_n plus its step misses x_{n+1}, for rates xd = ``rate``."""
+    weight = implicitness(model)
+    step = steps * ((1.0 - weight) * rate + weight * jnp.roll(rate, -1, axis=-1))
+    return at.x - jnp.roll(at.x, -1, axis=-1) + step
+
+
+def solve_linearised(model: QuarterCar, lin: Linearised, defects: Nodes, imbalance: Nodes) -> Trajectory:
+    """Changes (dx, dy) that cancel step defects given that dy = slope dx + imbalance at the nodes."""
+    right = cyclic.solve_nodes(lin.left, defects[:, None])[:, 0]
+    dx = cyclic.solve(lin.factors, right)
+    return Trajectory(dx, imbalance + cyclic.apply(lin.slope, dx))

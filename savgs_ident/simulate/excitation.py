@@ -1,0 +1,50 @@
+"""What drives the rig in a dwell: harmonics of the road and of the link angle at a frequency."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Complex, Float
+from numpy.typing import ArrayLike
+
+from savgs_ident.model.quarter_car import Inputs, Link
+from savgs_ident.model.tyre import Road
+
+
+class Excitation(NamedTuple):
+    """Inputs of D dwells as complex harmonics, x(t) = X_0 + Re sum_k X_k exp(2 pi i k f t).
+
+    Attributes:
+        frequency: fundamental [Hz], (D,).
+        road: harmonics of the plate's height [m], (D, R + 1).
+        link: harmonics of the link angle [rad], (D, L + 1).
+    """
+
+    frequency: Float[Array, " D"]
+    road: Complex[Array, "D R"]
+    link: Complex[Array, "D L"]
+
+
+def cam_excitation(frequency: ArrayLike, peak_to_peak: float, link_angle: float) -> Excitation:
+    """A cam of height ``peak_to_peak`` [m] at ``frequency`` [Hz], (D,), with a rigid link [rad]."""
+    frequency = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+    road = np.zeros((frequency.size, 2), dtype=np.complex128)
+    road[:, 1] = peak_to_peak / 2.0
+    link = np.full((frequency.size, 1), link_angle, dtype=np.complex128)
+    return Excitation(jnp.asarray(frequency), jnp.asarray(road), jnp.asarray(link))
+
+
+def _synthesise(harmonics: Array, omega: Array, phase: Array) -> tuple[Array, Array]:
+    """Value and time derivative at the nodes, both (D, N)."""
+    order = jnp.arange(harmonics.shape[1])
+    terms = harmonics[:, :, None] * jnp.exp(1j * order[None, :, None] * phase[:, None, :])
+    rates = 1j * order[None, :, None] * omega[:, None, None] * terms
+    return jnp.sum(terms.real, axis=1), jnp.sum(rates.real, axis=1)
+
+
+def inputs_at(excitation: Excitation, phase: Float[Array, "D N"]) -> Inputs:
+    """Road and link at phases [rad] of the period; every field is of shape (D, N)."""
+    omega = 2.0 * jnp.pi * excitation.frequency
+    return Inputs(
+        Road(*_synthesise(excitation.road, omega, phase)), Link(*_synthesise(excitation.link, omega, phase))
+    )

@@ -1,0 +1,207 @@
+"""Periodic steady states of all dwells at once.
+
+A dwell's motion is periodic but not smooth: the rail sticks at every reversal. The motion is found by
+periodic collocation in time (:mod:`savgs_ident.simulate.collocation`): a coarse, evenly spaced solution shows
+where the accelerations change, the nodes move there, and the solution is repeated on them. The nodes then
+serve any nearby parameter set, which is how fits warm-start.
+
+    solution = simulate_periodic(model, p, cam_excitation([2.0, 2.35], 0.0275, np.pi / 2))
+    response = harmonics(p, solution, orders=9)          # complex, (2 dwells, 2 channels, 10)
+
+What the truncation to a finite number of nodes costs is stated by :func:`truncation_error`, which solves once
+more on twice as many nodes.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Complex, Float, Int
+
+from savgs_ident.core.status import Status
+from savgs_ident.model.kinematics import Values
+from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.sensors import read_sensors
+from savgs_ident.simulate.collocation import (
+    Linearised,
+    Trajectory,
+    residual_at_nodes,
+    solve_linearised,
+    step_defects,
+)
+from savgs_ident.simulate.cyclic import solve_nodes
+from savgs_ident.simulate.excitation import Excitation, inputs_at
+from savgs_ident.simulate.mesh import Mesh, adapted_mesh, uniform_mesh
+from savgs_ident.simulate.newton import TOLERANCE, motion_scale, solve_newton
+
+
+@dataclass(frozen=True)
+class PeriodicSettings:
+    """How finely to solve.
+
+    ``coarse`` and ``nodes`` per period (multiples of 16), ``adaptations`` of the nodes to the solution, at
+    most ``iterations`` of Newton's method each time.
+    """
+
+    coarse: int = 96
+    nodes: int = 256
+    adaptations: int = 2
+    iterations: int = 60
+
+
+class PeriodicSolution(eqx.Module):
+    """Periodic motions of D dwells on N nodes, with what is needed to differentiate them.
+
+    ``last_step`` is the last Newton step of each dwell relative to the size of its motion, (D,).
+    """
+
+    excitation: Excitation
+    mesh: Mesh
+    trajectory: Trajectory
+    linearised: Linearised
+    last_step: Float[Array, " D"]
+    iterations: Int[Array, ""]
+
+    def status(self) -> tuple[Status, ...]:
+        """How each dwell ended."""
+        finite = np.isfinite(np.asarray(self.trajectory.x)).all(axis=(0, 2))
+        small = np.asarray(self.last_step) <= TOLERANCE
+        return tuple(
+            Status.CONVERGED if ok and done else Status.MAX_ITERATIONS if ok else Status.NOT_FINITE
+            for ok, done in zip(finite, small, strict=True)
+        )
+
+
+def _steps(excitation: Excitation, mesh: Mesh) -> Array:
+    return jnp.asarray(mesh.gap) / (2.0 * jnp.pi * excitation.frequency[:, None])
+
+
+@eqx.filter_jit
+def solve_on_mesh(
+    model: QuarterCar, p: Values, excitation: Excitation, mesh: Mesh, start: Trajectory, limit: int
+) -> PeriodicSolution:
+    """Newton's method on given nodes from a given start."""
+    mesh = Mesh(*(jnp.asarray(part) for part in mesh))
+    inputs = inputs_at(excitation, mesh.phase)
+    scale = motion_scale(model, inputs, excitation.frequency)
+    result = solve_newton(model, p, start, inputs, _steps(excitation, mesh), scale, limit)
+    return PeriodicSolution(excitation, mesh, *result)
+
+
+@eqx.filter_jit
+def _riding_the_road(model: QuarterCar, excitation: Excitation, phase: Array) -> Trajectory:
+    """The rig carried along by the road as one: where a cold start begins."""
+    road = inputs_at(excitation, phase).road
+    rest = jnp.zeros_like(road.height)
+    states = [road.height if state.slips else rest for state in model.states]
+    x = jnp.stack([road.height, rest, road.velocity, rest, *states])
+    return Trajectory(x, jnp.zeros((2 + len(states), *rest.shape)))
+
+
+def _carry_over(trajectory: Trajectory, old: Mesh, new: Mesh) -> Trajectory:
+    """A trajectory known on old nodes, at new ones, by linear interpolation."""
+
+    def moved(values: np.ndarray) -> np.ndarray:
+        out = np.empty((*values.shape[:2], new.phase.shape[1]))
+        for dwell, (phase, wanted) in enumerate(zip(old.phase, new.phase, strict=True)):
+            for row in range(values.shape[0]):
+                out[row, dwell] = np.interp(wanted, phase, values[row, dwell], period=2.0 * np.pi)
+        return out
+
+    return Trajectory(*(jnp.asarray(moved(np.asarray(part))) for part in trajectory))
+
+
+def adapt(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, nodes: int, limit: int
+) -> PeriodicSolution:
+    """The solution again, on nodes that follow its accelerations."""
+    old = Mesh(*(np.asarray(part) for part in solution.mesh))
+    accelerations = np.asarray(solution.trajectory.y[:2])
+    if not np.isfinite(accelerations).all():
+        return solution
+    frequency = np.asarray(solution.excitation.frequency)
+    mesh = adapted_mesh(old, accelerations, frequency, nodes)
+    start = _carry_over(solution.trajectory, old, mesh)
+    return solve_on_mesh(model, p, solution.excitation, mesh, start, limit)
+
+
+def simulate_periodic(
+    model: QuarterCar, p: Values, excitation: Excitation, settings: PeriodicSettings | None = None
+) -> PeriodicSolution:
+    """Periodic motions from a cold start; look at ``status()`` of the result before using it."""
+    settings = settings or PeriodicSettings()
+    mesh = uniform_mesh(excitation.frequency.shape[0], settings.coarse)
+    start = _riding_the_road(model, excitation, jnp.asarray(mesh.phase))
+    solution = solve_on_mesh(model, p, excitation, mesh, start, settings.iterations)
+    for _ in range(settings.adaptations):
+        solution = adapt(model, p, solution, settings.nodes, settings.iterations)
+    return solution
+
+
+def resolve(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, limit: int = PeriodicSettings.iterations
+) -> PeriodicSolution:
+    """The solution at other parameters, on the same nodes, started from ``solution``."""
+    return solve_on_mesh(model, p, solution.excitation, solution.mesh, solution.trajectory, limit)
+
+
+def _readings(p: Values, trajectory: Trajectory) -> Float[Array, "D C N"]:
+    at_nodes = jax.vmap(jax.vmap(partial(read_sensors, p)))
+    return jnp.stack(at_nodes(trajectory.x[1], trajectory.y[0]), axis=1)
+
+
+def _analyse(signals: Float[Array, "D C N"], mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
+    order = jnp.arange(orders + 1)
+    kernel = jnp.where(order == 0, 1.0, 2.0)[:, None] * jnp.exp(-1j * order[:, None] * mesh.phase[:, None, :])
+    return jnp.einsum("dcn,dkn->dck", signals, kernel * mesh.weight[:, None, :])
+
+
+@eqx.filter_jit
+def harmonics(p: Values, solution: PeriodicSolution, orders: int) -> Complex[Array, "D C K"]:
+    """Complex harmonics 0..orders of the sensor readings, (D, 2, orders + 1), in the channels' SI units.
+
+    Channels are those of :data:`savgs_ident.model.sensors.RESPONSE_CHANNELS`.
+    """
+    return _analyse(_readings(p, solution.trajectory), solution.mesh, orders)
+
+
+@eqx.filter_jit
+def harmonic_sensitivities(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
+) -> Complex[Array, "n D C K"]:
+    """Derivatives of :func:`harmonics` in the named parameters, by the implicit function theorem.
+
+    One factorisation, that of the last Newton step, serves all parameters.
+    """
+    lin, at, mesh = solution.linearised, solution.trajectory, solution.mesh
+    inputs = inputs_at(solution.excitation, mesh.phase)
+    steps = _steps(solution.excitation, mesh)
+    parts = (*at.x, *at.y)
+    still = Trajectory(jnp.zeros_like(at.x), jnp.zeros_like(at.y))
+
+    def along(direction: Array) -> Array:
+        tangent = {name: jnp.zeros_like(p[name]) for name in p} | dict(zip(names, direction, strict=True))
+        _, change = jax.jvp(lambda q: residual_at_nodes(model, q, parts, inputs), (dict(p),), (tangent,))
+        imbalance = -solve_nodes(lin.mass, change[:, None])[:, 0]
+        rate = jnp.concatenate([jnp.zeros_like(at.x[2:4]), imbalance])
+        moved = solve_linearised(model, lin, step_defects(model, still, rate, steps), imbalance)
+        _, signals = jax.jvp(_readings, (dict(p), at), (tangent, moved))
+        return _analyse(signals, mesh, orders)
+
+    return jax.lax.map(along, jnp.eye(len(names)))
+
+
+def truncation_error(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, orders: int
+) -> Float[Array, "D C"]:
+    """Largest change of any order 1..orders when the nodes are doubled, relative to the first harmonic.
+
+    The error of ``solution`` itself is about four thirds of it (the rule is of second order).
+    """
+    nodes = 2 * solution.mesh.phase.shape[1]
+    finer = adapt(model, p, solution, nodes, PeriodicSettings.iterations)
+    coarse, fine = (harmonics(p, each, orders) for each in (solution, finer))
+    return jnp.max(jnp.abs(coarse - fine)[..., 1:], axis=-1) / jnp.abs(fine[..., 1])
