@@ -2,6 +2,8 @@
 
 import json
 from collections.abc import Iterator, Sequence
+from itertools import chain
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -46,8 +48,10 @@ class JsonDecoder:
     ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int64] | None]:
         """The numbers at ``keys``, each (n,), NaN where a message lacks one, and stamps [ns] if any."""
         messages = self._parse([block.payload(index) for index in range(block.log.size)])
-        values = {key: _column(messages, tuple(key.split(".")), key) for key in keys}
-        return values, _stamps(messages)
+        table = _flat_table(messages, keys)
+        if table is None:
+            return {key: _column(messages, tuple(key.split(".")), key) for key in keys}, _stamps(messages)
+        return dict(zip(keys, table.T, strict=True)), _stamps(messages)
 
     def _parse(self, texts: list[bytes]) -> list[dict[str, Any]]:
         try:
@@ -65,6 +69,21 @@ class JsonDecoder:
                 shown = text[:60].decode("utf-8", errors="replace")
                 raise DecodeError(f"a message is not a JSON object: {shown!r}", index)
         return [json.loads(text) for text in texts]
+
+
+def _flat_table(messages: list[dict[str, Any]], keys: Sequence[str]) -> NDArray[np.float64] | None:
+    """The fields of all messages at once, (n, keys); None unless each is a plain number at top level."""
+    try:
+        # One key more than needed: with a single key itemgetter would not give a tuple.
+        rows = list(map(itemgetter(*keys, keys[0]), messages))
+    except KeyError:
+        return None
+    if not set(map(type, chain.from_iterable(rows))) <= {float, int}:
+        return None
+    try:
+        return np.array(rows, dtype=np.float64)[:, : len(keys)]
+    except OverflowError:
+        return None
 
 
 def _column(messages: list[dict[str, Any]], path: tuple[str, ...], key: str) -> NDArray[np.float64]:

@@ -1,7 +1,8 @@
 """One topic of an MCAP file while it is being read: its decoder, its bindings, its growing columns."""
 
+from array import array
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -57,6 +58,17 @@ class TopicData:
     header: NDArray[np.int64] | None
     values: dict[str, NDArray[np.float64]]
 
+    def in_order(self, order: NDArray[np.intp]) -> "TopicData":
+        """The same samples in another order."""
+        log = self.log[order]
+        return replace(
+            self,
+            log=log,
+            publish=log if self.publish is self.log else self.publish[order],
+            header=None if self.header is None else self.header[order],
+            values={name: column[order] for name, column in self.values.items()},
+        )
+
 
 class TopicColumns:
     """Grows block by block; ``finish`` hands everything over."""
@@ -68,10 +80,11 @@ class TopicColumns:
         self._decoder = decoder
         self._map = channel_map
         self._source = source
-        self._log: list[NDArray[np.int64]] = []
-        self._publish: list[NDArray[np.int64]] = []
-        self._header: list[NDArray[np.int64]] | None = []
-        self._values: dict[str, list[NDArray[np.float64]]] = {}
+        # array.array grows in place: it needs the memory once, where lists of blocks would need it twice.
+        self._log = array("q")
+        self._publish: array[int] | None = None
+        self._header: array[int] | None = array("q")
+        self._values: dict[str, array[float]] = {}
 
     def append(self, data: bytes, records: list[int]) -> None:
         """Decode the messages at ``records``; raises :class:`InputError` at the first bad one."""
@@ -93,18 +106,23 @@ class TopicColumns:
     def _append(self, block: MessageBlock) -> None:
         if self.bindings is None:
             self.bindings = self._bind(block.payload(0))
-            self._values = {binding.channel: [] for binding in self.bindings}
+            self._values = {binding.channel: array("d") for binding in self.bindings}
         if not self.bindings:
             return
         values, stamps = self._decoder.decode(block, [binding.key for binding in self.bindings])
         for binding in self.bindings:
-            self._values[binding.channel].append(values[binding.key] * binding.gain + binding.bias)
-        self._log.append(block.log)
-        self._publish.append(block.log if np.array_equal(block.log, block.publish) else block.publish)
+            self._values[binding.channel].frombytes(
+                (values[binding.key] * binding.gain + binding.bias).tobytes()
+            )
+        if self._publish is None and not np.array_equal(block.log, block.publish):
+            self._publish = array("q", self._log)
+        if self._publish is not None:
+            self._publish.frombytes(block.publish.tobytes())
+        self._log.frombytes(block.log.tobytes())
         if stamps is None:
             self._header = None
         elif self._header is not None:
-            self._header.append(stamps)
+            self._header.frombytes(stamps.tobytes())
 
     def _bind(self, first: bytes) -> tuple[Binding, ...]:
         candidates = self._decoder.candidates(first)
@@ -128,18 +146,9 @@ class TopicColumns:
 
     def finish(self) -> TopicData:
         """The whole columns, in order of log time (the order of the file where that is the same)."""
-        log = np.concatenate(self._log)
-        same = all(one is other for one, other in zip(self._log, self._publish, strict=True))
-        publish = log if same else np.concatenate(self._publish)
-        header = None if self._header is None else np.concatenate(self._header)
-        self._log, self._publish, self._header = [], [], None
-        order = None if np.all(np.diff(log) >= 0) else np.argsort(log, kind="stable")
-        values = {}
-        for channel in tuple(self._values):
-            column = np.concatenate(self._values.pop(channel))
-            values[channel] = column if order is None else column[order]
-        if order is not None:
-            publish = publish[order] if publish is not log else log[order]
-            header = None if header is None else header[order]
-            log = publish if same else log[order]
-        return TopicData(self.topic, self.bindings or (), log, publish, header, values)
+        log = np.frombuffer(self._log, dtype=np.int64)
+        publish = log if self._publish is None else np.frombuffer(self._publish, dtype=np.int64)
+        header = None if self._header is None else np.frombuffer(self._header, dtype=np.int64)
+        values = {name: np.frombuffer(column, dtype=np.float64) for name, column in self._values.items()}
+        data = TopicData(self.topic, self.bindings or (), log, publish, header, values)
+        return data if np.all(log[1:] >= log[:-1]) else data.in_order(np.argsort(log, kind="stable"))

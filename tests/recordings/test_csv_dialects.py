@@ -40,7 +40,7 @@ def _comma(text: bytes) -> bytes:
 
 
 def _with_unit_row(text: bytes) -> bytes:
-    head, body = text.split(b"\n", 1)
+    _, body = text.split(b"\n", 1)
     return b"time;road;acc_z;deflection;link_angle\ns;m;m/s\xc2\xb2;m;rad\n" + body
 
 
@@ -207,7 +207,8 @@ def test_headers_split_into_label_and_unit(text: str, header: Header) -> None:
     [
         ("m/s²", "sprung_accel", 1.0), ("m/s**2", "sprung_accel", 1.0), ("m s^-2", "sprung_accel", 1.0),
         ("g", "sprung_accel", 9.80665), ("mg", "sprung_accel", 9.80665e-3), ("MM", "susp_deflection", 1e-3),
-        ("µm", "susp_deflection", 1e-6), ("°", "link_angle", np.pi / 180), ("°/s", "link_velocity", np.pi / 180),
+        ("µm", "susp_deflection", 1e-6), ("°", "link_angle", np.pi / 180),
+        ("°/s", "link_velocity", np.pi / 180),
         ("rpm", "link_velocity", 2 * np.pi / 60), ("mA", "motor_current", 1e-3), ("us", "time", 1e-6),
     ],
 )  # fmt: skip

@@ -211,7 +211,7 @@ def test_a_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "open", refuse)
-    with pytest.raises(InputError, match="Permission denied.*permissions"):
+    with pytest.raises(InputError, match=r"Permission denied.*permissions"):
         read_campaign(path)
 
 
@@ -220,7 +220,7 @@ def test_the_same_test_in_two_files(
 ) -> None:
     for name in ("a.csv", "b.csv"):
         (tmp_path / name).write_bytes(csv_bytes(signals(), test="dwell_1Hz"))
-    with pytest.raises(InputError, match="test 'dwell_1Hz': the test is in a.csv and in b.csv"):
+    with pytest.raises(InputError, match=r"test .dwell_1Hz.: the test is in a\.csv and in b\.csv"):
         read_campaign(tmp_path)
 
 

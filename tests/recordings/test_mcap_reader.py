@@ -21,13 +21,13 @@ from savgs_ident.recordings.read import read_campaign
 
 START = 1_763_715_600_000_000_000
 IMU = (
-    "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
-    "geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n"
-    "geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n"
-    "===\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
-    "===\nMSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
-    "===\nMSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
-).encode()
+    b"std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
+    b"geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n"
+    b"geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n"
+    b"===\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
+    b"===\nMSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
+    b"===\nMSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
+)
 JOINT = (
     b"std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n"
     b"===\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
@@ -199,7 +199,8 @@ def test_the_joint_that_is_the_link(tmp_path: Path, write_mcap: Callable[..., Pa
     with pytest.raises(InputError, match="no topic carries a known channel"):
         read_campaign(path)
     (tmp_path / "channels.toml").write_text(
-        '[channels.link_angle]\ntopic = "/joint_states"\nfield = "position[knee]"\nunit = "deg"\noffset = 90\n'
+        '[channels.link_angle]\ntopic = "/joint_states"\n'
+        'field = "position[knee]"\nunit = "deg"\noffset = 90\n'
     )
     angle = read_campaign(path).recordings[0].channels["link_angle"]
     np.testing.assert_allclose(angle.values, np.deg2rad(90 + 0.1 * np.arange(50)))
