@@ -3,6 +3,11 @@
 A rate that differs between clocks shows in the data: the fundamental comes out different. A constant offset
 between two clocks does not: it looks like a phase lag that grows with frequency, which is also what a
 sensor's delay looks like. Stamps are therefore taken as true up to their rate.
+
+A signal that was sampled without a filter folds what lies above the Nyquist frequency back into the band. A
+periodic one folds onto lines of its own unless the sampling rate and the fundamental have a small common
+multiple: orders k and l share a line where (k - l) f is a multiple of the rate, to within the resolution
+1 / T. Up to that point orders above the Nyquist frequency can be fitted along, and are.
 """
 
 from collections.abc import Mapping
@@ -13,10 +18,14 @@ from numpy.typing import NDArray
 
 from savgs_ident.recordings.recording import Channel, Recording
 
-_FITTED_SHARE = 0.45
+_RESOLUTION = 0.7
+_FARTHEST = 1000
 _TRUSTED_SHARE = 0.40
 _SAMPLES_PER_UNKNOWN = 3
 _MOST_ORDERS = 400
+_MOST_FOLDED = 150
+_NYQUIST_SHARE = 0.45
+_GAP = 1.5
 _FEWEST_SAMPLES = 16
 
 
@@ -31,7 +40,8 @@ class ClockGroup:
     @property
     def rate_hz(self) -> float:
         """Sampling rate between gaps [Hz]."""
-        return float(1.0 / np.median(np.diff(self.time)))
+        intervals = np.diff(self.time)
+        return float(1.0 / np.mean(intervals[intervals < _GAP * np.median(intervals)]))
 
     @property
     def span_s(self) -> float:
@@ -63,10 +73,20 @@ def group_by_clock(
 
 
 def highest_fitted_order(group: ClockGroup, frequency: float) -> int:
-    """Orders to fit: most of what lies below the Nyquist frequency, with samples to spare."""
-    by_rate = int(_FITTED_SHARE * group.rate_hz / frequency)
+    """Orders to fit: all that the stamps tell apart, with samples to spare."""
+    by_line = (shared_line(group, frequency) - 1) // 2
     by_count = (group.time.size // _SAMPLES_PER_UNKNOWN - 2) // 2
-    return max(min(by_rate, by_count, _MOST_ORDERS), 0)
+    by_use = max(int(_NYQUIST_SHARE * group.rate_hz / frequency), _MOST_FOLDED)
+    return max(min(by_line, by_count, by_use, _MOST_ORDERS), 0)
+
+
+def shared_line(group: ClockGroup, frequency: float) -> int:
+    """The smallest difference of two orders that fall on one line of the record, given the sampling."""
+    difference = np.arange(1, max(_FARTHEST, int(2.0 * group.rate_hz / frequency)))
+    folds = difference * frequency / group.rate_hz
+    apart = np.abs(folds - np.round(folds)) * group.rate_hz * group.span_s
+    shared = np.flatnonzero(apart < _RESOLUTION)
+    return int(difference[shared[0]]) if shared.size else int(difference[-1])
 
 
 def highest_valid_order(group: ClockGroup, frequency: float, orders: int) -> int:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import DataWarning
 from savgs_ident.recordings.recording import Campaign, Recording
 from savgs_ident.responses.clocks import ClockGroup
-from savgs_ident.responses.dwell_fit import DwellFit
+from savgs_ident.responses.dwell_fit import ChannelFit, DwellFit
 
 FEWEST_PERIODS = 3
 _FREQUENCY_MISS = 0.02
@@ -76,6 +76,31 @@ def check_noise(campaign: Campaign, fits: Mapping[str, DwellFit]) -> tuple[DataW
                 DataWarning("noise_above_standstill", what, campaign.source, worst, name, None, remedy)
             )
     return tuple(found)
+
+
+def check_folding(source: str, fits: Mapping[str, DwellFit]) -> tuple[DataWarning, ...]:
+    """One warning for each channel with dwells in which orders above the sampling fold onto those kept."""
+    found = []
+    for name in dict.fromkeys(name for fit in fits.values() for name in fit.channels):
+        hit = [
+            test for test, fit in fits.items() if name in fit.channels and np.any(_folds(fit.channels[name]))
+        ]
+        if hit:
+            what = (
+                f"content above the Nyquist frequency folds onto the orders kept in {len(hit)} dwells whose"
+                " frequency divides the sampling rate; the covariance allows for it"
+            )
+            remedy = (
+                "sample faster, filter before sampling, or choose frequencies that do not divide the rate"
+            )
+            found.append(DataWarning("folded_orders", what, source, hit[0], name, None, remedy))
+    return tuple(found)
+
+
+def _folds(channel: ChannelFit) -> NDArray[np.bool_]:
+    """Which orders 1..m owe more of their variance to folding than to noise."""
+    exceeds: NDArray[np.bool_] = channel.folded[1:] > 0.5 * channel.variance[1:]
+    return exceeds
 
 
 def clock_rates(fits: Mapping[str, DwellFit]) -> dict[str, tuple[float, float]]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.responses.clocks import ClockGroup, highest_fitted_order, highest_valid_order
+from savgs_ident.responses.clocks import ClockGroup, highest_fitted_order, highest_valid_order, shared_line
 from savgs_ident.responses.fundamental import frequency_step, refine_frequency, step_variance
 from savgs_ident.responses.noise_spectrum import estimate_noise_density
 from savgs_ident.responses.periodic_fit import fit_periodic, plan_basis
@@ -19,6 +19,8 @@ from savgs_ident.responses.periodic_fit import fit_periodic, plan_basis
 _REFITS = 4
 _MANY_VALUES = 0.5
 _ARITHMETIC = 1e-12
+_FLATTEST, _STEEPEST = 2.0, 8.0
+_ENOUGH_FOR_SLOPE = 5
 
 
 @dataclass(frozen=True)
@@ -26,14 +28,15 @@ class ChannelFit:
     """Harmonics 0..m of one channel, m the highest valid order; times counted from mid-record.
 
     ``density`` [unit^2] and ``dof`` describe the noise; ``variance`` and ``pseudo_variance`` are E|dX|^2 and
-    E(dX^2); ``drift_hz`` is how far this channel's own fundamental lies above the dwell's, ``drift_variance``
-    its variance [Hz^2].
+    E(dX^2), ``folded`` the part of the former that comes from orders folded by the sampling; ``drift_hz`` is
+    how far this channel's own fundamental lies above the dwell's, ``drift_variance`` its variance [Hz^2].
     """
 
     amplitude: NDArray[np.complex128]
     density: NDArray[np.float64]
     dof: NDArray[np.float64]
     variance: NDArray[np.float64]
+    folded: NDArray[np.float64]
     pseudo_variance: NDArray[np.complex128]
     noise_sd: float
     drift_hz: float
@@ -97,6 +100,7 @@ def _fit_group(group: ClockGroup, frequency: float, orders: int) -> dict[str, Ch
     noise = estimate_noise_density(group.time, fit.residual, frequency, highest, last)
     floor = _smallest_density(group.values)[:, None]
     density = np.maximum(noise.density, floor)
+    folded = _folded_power(fit.amplitude, density, fit.gain, shared_line(group, frequency), last)
     kept = fit.amplitude[:, : last + 1]
     step, weight = frequency_step(basis, kept, fit.residual)
     variance = step_variance(kept, density, weight)
@@ -107,7 +111,8 @@ def _fit_group(group: ClockGroup, frequency: float, orders: int) -> dict[str, Ch
             kept[i],
             density[i],
             noise.dof[i],
-            density[i] * fit.gain,
+            density[i] * fit.gain + folded[i],
+            folded[i],
             density[i] * fit.pseudo_gain,
             float(noise_sd[i]),
             float(step[i]),
@@ -115,6 +120,34 @@ def _fit_group(group: ClockGroup, frequency: float, orders: int) -> dict[str, Ch
         )
         for i, name in enumerate(group.names)
     }
+
+
+def _folded_power(
+    amplitude: NDArray[np.complex128],
+    density: NDArray[np.float64],
+    gain: NDArray[np.float64],
+    line: int,
+    last: int,
+) -> NDArray[np.float64]:
+    """Power E|X_l|^2 of the orders l = line -+ k that share a line with order k, (C, last + 1).
+
+    What shares a line cannot be measured. The power of the uppermost quarter of the orders fitted, less their
+    noise, is continued with the power law by which it has fallen from the quarter below (no flatter than the
+    1/l^2 of a waveform with steps): a bias that cannot be known, turned into a variance.
+    """
+    highest = amplitude.shape[1] - 1
+    power = np.abs(amplitude) ** 2 - density[:, -1:] * gain[-1]
+    quarter = max(highest // 4, 1)
+    upper = np.maximum(np.mean(power[:, -quarter:], axis=1), 0.0)
+    lower = np.maximum(np.mean(power[:, -2 * quarter : -quarter], axis=1), upper)
+    fall = np.log(lower / np.where(upper > 0.0, upper, 1.0), where=upper > 0.0, out=np.zeros_like(upper))
+    steepest = _STEEPEST if quarter >= _ENOUGH_FOR_SLOPE else _FLATTEST
+    exponent = np.clip(fall / np.log(7.0 / 5.0), _FLATTEST, steepest)[:, None]
+    middle = highest - 0.5 * quarter
+    order = np.arange(last + 1)
+    shares = (middle / (line - order)) ** exponent + (middle / (line + order)) ** exponent
+    folded: NDArray[np.float64] = upper[:, None] * shares
+    return folded
 
 
 def _smallest_density(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -19,6 +19,7 @@ from savgs_ident.responses.clocks import ClockGroup, group_by_clock, highest_val
 from savgs_ident.responses.dwell_checks import (
     FEWEST_PERIODS,
     check_clocks,
+    check_folding,
     check_frequency,
     check_noise,
     check_steady,
@@ -29,7 +30,6 @@ from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.peak_to_peak_noise import unbiased_peak_to_peak
 
 ROAD = "road_height"
-_ROAD_SIGMAS = 10.0
 
 
 def estimate_response(campaign: Campaign, orders: int = 15) -> HarmonicResponse:
@@ -43,7 +43,7 @@ def estimate_response(campaign: Campaign, orders: int = 15) -> HarmonicResponse:
 
     Dwells that cannot be used are left out with a warning: ``no_road_motion``, ``too_few_periods`` (3 are
     needed to tell noise from signal), ``not_determined``. Further warnings: ``frequency_differs``,
-    ``not_steady``, ``clock_rate_differs``, ``noise_above_standstill``.
+    ``not_steady``, ``clock_rate_differs``, ``noise_above_standstill``, ``folded_orders``.
 
     Raises :class:`InputError` when ``orders`` is below 1 or no dwell can be used.
     """
@@ -57,7 +57,7 @@ def estimate_response(campaign: Campaign, orders: int = 15) -> HarmonicResponse:
         fits, groups, warnings = _fit_all(campaign, orders, stretch)
     for test, fit in fits.items():
         warnings += check_steady(campaign.source, test, groups[test], fit)
-    return _assemble(fits, orders, warnings + clock_warnings + check_noise(campaign, fits))
+    return _assemble(fits, orders, warnings + clock_warnings + _check_all(campaign, fits))
 
 
 def _fit_all(
@@ -85,6 +85,10 @@ def _fit_all(
         fits[recording.name], kept[recording.name] = fit, groups
         warnings += check_frequency(campaign.source, recording, fit.frequency)
     return fits, kept, warnings
+
+
+def _check_all(campaign: Campaign, fits: Mapping[str, DwellFit]) -> tuple[DataWarning, ...]:
+    return check_noise(campaign, fits) + check_folding(campaign.source, fits)
 
 
 def _middle(recording: Recording) -> float:

@@ -141,22 +141,29 @@ def _orders_carried(time: NDArray[np.float64], frequency: float) -> int:
 def _local_harmonic(
     time: NDArray[np.float64], values: NDArray[np.float64], phase: LocalPhase, orders: int
 ) -> tuple[complex, float, float]:
-    """First harmonic at mid-window, its standard deviation for unit noise, and the noise density [unit^2]."""
+    """First harmonic at mid-window, its standard deviation for unit noise, and the noise density [unit^2].
+
+    All products of basis, probes between the harmonics and signal are taken at once. The probes' part that
+    the basis cannot imitate has the products S = G_pp - G_pb G_bb^-1 G_bp, and with the residual v; the noise
+    power seen through m probes is v' S^-1 v / m.
+    """
     angle = phase.at(time)
     unit = (time - phase.middle) / float(np.max(np.abs(time - phase.middle)))
-    waves = np.exp(1j * np.outer(angle, np.arange(1, orders + 1)))
-    waves = np.concatenate([waves.real, waves.imag], axis=1)
-    basis = np.column_stack([waves, waves * unit[:, None], np.ones_like(unit), unit])
-    orthogonal, triangle = np.linalg.qr(basis)
-    weights = np.linalg.solve(triangle, orthogonal.T @ values)
-    inverse = np.linalg.inv(triangle)
-    spread = 0.5 * (np.sum(inverse[0] ** 2) + np.sum(inverse[orders] ** 2))
-    first = complex(weights[0], -weights[orders])
-    residual = values - orthogonal @ (orthogonal.T @ values)
-    between = np.exp(1j * np.outer(angle, [half for half in _HALF_ORDERS if half < orders + 1]))
-    probe = np.concatenate([between.real, between.imag], axis=1)
-    probe, _ = np.linalg.qr(probe - orthogonal @ (orthogonal.T @ probe))
-    return first, float(np.sqrt(spread)), float(np.mean((probe.T @ residual) ** 2))
+    halves = [half for half in _HALF_ORDERS if half < orders + 1]
+    turns = np.exp(1j * np.outer(angle, [*range(1, orders + 1), *halves]))
+    waves = np.concatenate([turns.real[:, :orders], turns.imag[:, :orders]], axis=1)
+    probes = np.concatenate([turns.real[:, orders:], turns.imag[:, orders:]], axis=1)
+    columns = np.column_stack([waves, waves * unit[:, None], np.ones_like(unit), unit, probes, values])
+    products = columns.T @ columns
+    size = 4 * orders + 2
+    inverse = np.linalg.inv(products[:size, :size])
+    weights = inverse @ products[:size, -1]
+    across = products[size:-1, :size]
+    seen = products[size:-1, -1] - across @ weights
+    free = products[size:-1, size:-1] - across @ inverse @ across.T
+    density = float(seen @ np.linalg.solve(free, seen)) / seen.size
+    spread = 0.5 * (inverse[0, 0] + inverse[orders, orders])
+    return complex(weights[0], -weights[orders]), float(np.sqrt(spread)), density
 
 
 def _moving_mean(density: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -4,9 +4,11 @@ A periodic signal has power at the multiples of its fundamental f and nowhere el
 also resolves the P - 1 frequencies between two neighbouring harmonics, and what is found there cannot be
 the signal. The power at those frequencies, I(v) = |sum_j r_j exp(-2 pi i v t_j)|^2 / N, is exponentially
 distributed about the noise density S(v) (variance per sample if the noise were white). Its logarithm is
-fitted by a polynomial in asinh(v / f) by maximum likelihood (Whittle), the degree chosen by Akaike's
-criterion: white noise takes one coefficient and hundreds of degrees of freedom, coloured noise as many as it
-needs. A peak too narrow for the polynomial is found by its excess over the neighbouring frequencies.
+fitted by an even polynomial in asinh(2 v / f) by maximum likelihood (Whittle), the degree chosen by an
+information criterion (3.5 for a coefficient): white noise takes one coefficient and hundreds of degrees of
+freedom, coloured noise as many as it needs. A peak too narrow for the polynomial is found by its excess over
+the neighbouring frequencies. Noise that still rises towards zero below a few cycles per record (slow drift
+beyond a straight line) is understated at order 0, and only there: its level there is not in the record.
 
 References: P. Whittle, Ark. Mat. 2 (1953) 423; R. Pintelon, J. Schoukens, System Identification: A
 Frequency Domain Approach (2012), chapter 2 (noise from non-excited frequencies).
@@ -24,10 +26,12 @@ _HIGHEST_DEGREE = 6
 _NEIGHBOURS = 24
 _PEAK_SIGNIFICANCE = 1e-4
 _ROUNDS = 60
+_REACH = 2.0
+_PENALTY = 3.5
 _SETTLED = 1e-4
 _FEWEST_LINES = 100
 _MOST_TAKEN = 0.5
-_FAR = 10
+_BAND = 0.45
 
 
 @dataclass(frozen=True)
@@ -52,29 +56,30 @@ def estimate_noise_density(
     data tell, the density is that of the last one.
     """
     span = float(time[-1] - time[0]) * time.size / (time.size - 1)
-    lines, kept = _lines_between(span * frequency, highest, orders)
+    lines, kept = _lines_between(span * frequency, time.size, highest, orders)
     power = _line_power(time, residual, span, int(lines[-1]))[:, lines] / kept
     level = np.maximum(np.mean(power, axis=1, keepdims=True), np.finfo(np.float64).tiny)
     wanted = np.minimum(np.arange(orders + 1) * span * frequency, lines[-1])
-    place = np.arcsinh(np.concatenate([lines, wanted]) / (span * frequency))
+    place = np.arcsinh(2.0 * np.concatenate([lines, wanted]) / (span * frequency))
     at_lines, at_orders, dof = _fit_density(place, lines.size, power / level)
     excess, excess_dof = _excess(power / level / at_lines, lines, wanted)
     return NoiseDensity(level * at_orders * excess, np.where(excess > 1.0, excess_dof, dof))
 
 
 def _lines_between(
-    periods: float, highest: int, orders: int
+    periods: float, samples: int, highest: int, orders: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Frequencies, in cycles per record, away from harmonics; and the share of noise the fit left there.
 
     A harmonic fit takes sinc^2(d) of the noise power at a distance of d cycles per record; the drift's
-    regressor, a sawtooth to the periodic mind, takes 3 / (pi j)^2 at j cycles per record.
+    regressor, a sawtooth to the periodic mind, takes 3 / (pi j)^2 at j cycles per record. Orders above the
+    Nyquist frequency take where they fold to: frequencies repeat after as many cycles as there are samples.
     """
-    top = min(highest + 0.5, max(orders + 3.0, _FEWEST_LINES / periods))
+    band = min(highest + 0.5, _BAND * samples / periods)
+    top = min(band, max(_REACH * orders, _FEWEST_LINES / periods))
     lines = np.arange(1, max(int(top * periods), 2) + 1)
-    reach = min(highest, int(top) + _FAR)
-    harmonic = np.arange(-reach, reach + 1) * periods
-    taken = np.sum(np.sinc(lines[:, None] - harmonic) ** 2, axis=1)
+    apart = lines[:, None] - np.arange(-highest, highest + 1) * periods
+    taken = np.sum(np.sinc(apart - samples * np.round(apart / samples)) ** 2, axis=1)
     free = taken < _MOST_TAKEN
     kept = 1.0 - taken - 3.0 / (np.pi * lines) ** 2
     return lines[free], kept[free]
@@ -93,7 +98,8 @@ def _fit_density(
     place: NDArray[np.float64], lines: int, power: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Densities at the first ``lines`` places, where ``power`` is known, and at the others; their dof."""
-    basis = np.polynomial.chebyshev.chebvander(2.0 * place / place.max() - 1.0, _HIGHEST_DEGREE)
+    even = 2.0 * (place / place.max()) ** 2 - 1.0
+    basis = np.polynomial.chebyshev.chebvander(even, _HIGHEST_DEGREE)
     best = np.full(power.shape[0], np.inf)
     log_density = np.zeros((power.shape[0], place.size))
     dof = np.zeros((power.shape[0], place.size - lines))
@@ -103,7 +109,7 @@ def _fit_density(
         everywhere = np.linalg.solve(triangle.T, columns.T).T
         candidate = _maximise_likelihood(orthogonal, power) @ everywhere.T
         model = candidate[:, :lines]
-        criterion = 2.0 * np.sum(model + power * np.exp(-model), axis=1) + 2.0 * (degree + 1)
+        criterion = 2.0 * np.sum(model + power * np.exp(-model), axis=1) + _PENALTY * (degree + 1)
         better = criterion < best
         best = np.where(better, criterion, best)
         log_density[better] = candidate[better]

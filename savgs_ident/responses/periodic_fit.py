@@ -27,6 +27,7 @@ from savgs_ident.responses.nonuniform_fft import TransformPlan, plan_transform, 
 
 _MOST_STEPS = 150
 _PRECISION = 1e-13
+_LOST = 1e6
 
 
 @dataclass(frozen=True)
@@ -121,10 +122,13 @@ def _solve_toeplitz(lags: NDArray[np.complex128], right: NDArray[np.complex128])
     residual = right - _times(symbol, solution)
     direction = residual
     power = _squares(residual)
-    goal = _PRECISION**2 * _squares(right)
+    start = _squares(right)
+    goal = _PRECISION**2 * start
     for _ in range(_MOST_STEPS):
         if np.all(power <= goal):
             return solution
+        if np.any(power > _LOST * start):
+            break
         image = _times(symbol, direction)
         curvature = np.sum((direction.conj() * image).real, axis=1)
         stride = np.where(power > goal, power, 0.0) / np.where(curvature > 0.0, curvature, 1.0)

@@ -67,21 +67,22 @@ def refine_phase(
     for _ in range(_ROUNDS):
         phase = speed * since + 0.5 * acceleration * since**2
         cosine, sine = np.cos(phase), np.sin(phase)
-        linear = np.column_stack([cosine, sine, np.ones_like(unit), unit])
-        weights = np.linalg.lstsq(linear, road, rcond=None)[0]
+        waves = np.column_stack([cosine, sine, np.ones_like(unit), unit])
+        weights = np.linalg.solve(waves.T @ waves, np.sum(waves * road[:, None], axis=0))
         along = weights[1] * cosine - weights[0] * sine
-        both = np.column_stack([linear, along * unit, along * unit**2])
-        left = road - linear @ weights
-        step, *_ = np.linalg.lstsq(both, left, rcond=None)
+        columns = np.column_stack([waves, along * unit, along * unit**2])
+        left = road - np.sum(waves * weights, axis=1)
+        inverse = np.linalg.inv(columns.T @ columns)
+        step = inverse @ np.sum(columns * left[:, None], axis=0)
         speed += step[4] / reach
         acceleration += 2.0 * step[5] / reach**2
         if abs(step[4]) + abs(step[5]) < 1e-9:
             break
-    remainder = left - both @ step
-    variance = float(remainder @ remainder) / max(time.size - 6, 1)
-    spread = np.linalg.inv(both.T @ both)[4, 4] * variance
+    remainder = left - np.sum(columns * step, axis=1)
+    variance = float(np.sum(remainder**2)) / max(time.size - 6, 1)
     amplitude = complex(weights[0], -weights[1])
-    return LocalPhase(middle, float(speed), float(acceleration), amplitude, float(np.sqrt(spread)) / reach)
+    speed_sd = float(np.sqrt(inverse[4, 4] * variance)) / reach
+    return LocalPhase(middle, float(speed), float(acceleration), amplitude, speed_sd)
 
 
 def _passage(time: NDArray[np.float64], height: NDArray[np.float64], first: int, last: int) -> float:
