@@ -1,0 +1,46 @@
+"""The program ``savgs-ident``: one command a task, each in a file of its own.
+
+Commands import what they need when they run, so that ``savgs-ident --help`` answers at once.
+"""
+
+from typing import Annotated
+
+import typer
+
+from savgs_ident import __version__
+from savgs_ident.cli.inspect_command import inspect
+
+app = typer.Typer(
+    name="savgs-ident",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"savgs-ident {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Identify a quarter-car suspension rig from its recordings.
+
+    Exit codes: 0 ok; 1 ran, but the result is not to be trusted; 2 bad input or usage; 130 stopped.
+    """
+
+
+app.command()(inspect)
+
+
+def run() -> None:
+    """Run the program on the arguments of the process."""
+    app()

@@ -1,0 +1,111 @@
+"""Results on disk, each file whole or not at all: written beside its place and then moved there.
+
+Whoever stops a command, or runs out of disk, keeps what was finished and finds no half of a file.
+"""
+
+import csv
+import io
+import json
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from savgs_ident.core.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Json = dict[str, object] | list[object] | str | int | float | bool | None
+"""What a JSON file can say."""
+
+PNG_DPI = 160
+"""Resolution of pictures [1/inch]."""
+
+
+def prepare_folder(folder: Path) -> Path:
+    """Make ``folder`` if need be and try to write there, so that a long run does not end in a refusal.
+
+    Raises :class:`InputError` where it is not a folder or cannot be written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        raise _cannot_write(folder, error) from error
+
+
+def write_bytes(path: Path, content: bytes) -> Path:
+    """Write a file whole or not at all; raises :class:`InputError` if it cannot be written."""
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    except OSError as error:
+        raise _cannot_write(path, error) from error
+    part = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+        part.chmod(0o644)
+        part.replace(path)
+    except OSError as error:
+        raise _cannot_write(path, error) from error
+    finally:
+        part.unlink(missing_ok=True)
+    return path
+
+
+def to_json(record: object) -> str:
+    """``record`` as indented JSON; numpy becomes plain, a number that is not finite becomes null."""
+    return json.dumps(_plain(record), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def write_json(path: Path, record: object) -> Path:
+    """Write :func:`to_json` of a record."""
+    return write_bytes(path, to_json(record).encode("utf-8", "backslashreplace"))
+
+
+def write_table(path: Path, columns: Mapping[str, Sequence[object]]) -> Path:
+    """Write columns, headed by their names with units, as CSV."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return write_bytes(path, text.getvalue().encode())
+
+
+def write_figure(folder: Path, stem: str, figure: "Figure") -> tuple[Path, Path]:
+    """Write ``figure`` as ``stem``.png and ``stem``.pdf; the same figure gives the same bytes."""
+    png, pdf = io.BytesIO(), io.BytesIO()
+    figure.savefig(png, format="png", dpi=PNG_DPI)
+    figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
+    return (
+        write_bytes(folder / f"{stem}.png", png.getvalue()),
+        write_bytes(folder / f"{stem}.pdf", pdf.getvalue()),
+    )
+
+
+def _plain(value: object) -> Json:
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    if value is None or isinstance(value, str | int | float | bool):
+        return value
+    raise TypeError(f"{type(value).__name__} has no place in JSON")
+
+
+def _cannot_write(path: Path, error: OSError) -> InputError:
+    return InputError(
+        f"cannot be written: {error.strerror or error}",
+        source=path,
+        remedy="choose a writable folder with space left: --out DIR",
+    )

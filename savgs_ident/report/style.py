@@ -1,0 +1,83 @@
+"""How all figures look: readable in grey and to colour-blind eyes, with lines and markers told by shape.
+
+Figures are made without pyplot, so that nothing global changes; text that comes from data goes through
+:func:`label_of`, which leaves no character that the font lacks and none that would be read as a formula.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont, get_font
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+INK = "#1a1a1a"
+GREY = "#8a8a8a"
+PALE = "#dedede"
+BLUE = "#0b5ea8"
+ORANGE = "#d95f02"
+
+CHANNEL_TITLES: Mapping[str, str] = MappingProxyType(
+    {"sprung_accel": "sprung-mass acceleration", "susp_deflection": "suspension deflection"}
+)
+"""What the identified channels are called in figures."""
+
+RC: Mapping[str, object] = MappingProxyType(
+    {
+        "font.family": "DejaVu Sans",
+        "font.size": 9.0,
+        "axes.titlesize": 10.0,
+        "axes.titleweight": "bold",
+        "axes.labelsize": 9.0,
+        "axes.edgecolor": INK,
+        "axes.linewidth": 0.8,
+        "axes.grid": True,
+        "axes.axisbelow": True,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "grid.color": PALE,
+        "grid.linewidth": 0.6,
+        "legend.frameon": False,
+        "legend.fontsize": 8.5,
+        "lines.linewidth": 1.6,
+        "text.parse_math": False,
+        "pdf.fonttype": 42,
+    }
+)
+"""Settings in force while a figure is made."""
+
+_TICKS = (0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 50.0)
+
+
+def styled() -> "rc_context":
+    """The context in which figures are made and drawn."""
+    return rc_context(dict(RC))
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of this size [inch] that lays its parts out by itself."""
+    return Figure(figsize=(width, height), layout="constrained", facecolor="white")
+
+
+def frequency_axis(axes: Axes, lowest: float, highest: float, labelled: bool = True) -> None:
+    """A logarithmic frequency axis over [lowest, highest] Hz with round numbers on it."""
+    axes.set_xscale("log")
+    axes.set_xlim(lowest / 1.06, highest * 1.06)
+    axes.xaxis.set_major_locator(FixedLocator([tick for tick in _TICKS if lowest / 1.06 <= tick]))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.tick_params(axis="x", labelbottom=labelled)
+    if labelled:
+        axes.set_xlabel("road frequency [Hz]")
+
+
+def label_of(text: object) -> str:
+    """``text`` with every character that the font cannot draw spelled out."""
+    font = get_font(findfont(FontProperties(family="DejaVu Sans")))
+    known = font.get_charmap()
+    return "".join(
+        char if char.isprintable() and ord(char) in known else char.encode("unicode_escape").decode()
+        for char in str(text)
+    )
