@@ -19,7 +19,17 @@ _JUMP_STEPS = 5.0
 """A step this many times the median one is a jump: two lost samples in a row are still jitter of a bus."""
 _MOST_REPEATED = 0.10
 _SLOWEST_HZ, _FASTEST_HZ = 2.0, 200e3
+_LONGEST_S = 1e9
+"""Thirty years: no test."""
+_FILL = "fill the time column, and check its unit"
 _MIND_UNIT = "check the unit of the time column (s, ms or us)"
+
+
+def check_stamps(channel: Channel, place: Place) -> None:
+    """Raises :class:`InputError` where a sample has no time, or one that is none."""
+    bad = np.flatnonzero(~(np.abs(channel.time) <= _LONGEST_S))
+    if bad.size:
+        raise place.error(f"the time stamp of sample {bad[0] + 1} is missing or no time", _FILL)
 
 
 def check_time(
@@ -28,17 +38,12 @@ def check_time(
     """The channel with repeated stamps removed, and what there was to say.
 
     ``longest_gap`` is how long a gap may be, as a fraction of the record.
-    Raises :class:`InputError` for stamps that are missing, run backwards, are mostly repeated, or whose rate
-    no data logger has.
+    Raises :class:`InputError` for stamps that run backwards, are mostly repeated, or whose rate no logger
+    has.
     """
     time = channel.time
     if time.size < 2:
         raise place.error("has fewer than two samples", "record again")
-    bad = np.flatnonzero(~np.isfinite(time))
-    if bad.size:
-        raise place.error(
-            f"time stamp of sample {bad[0] + 1} is missing or not finite", "fill the time column"
-        )
     steps = np.diff(time)
     back = np.flatnonzero(steps < 0.0)
     if back.size:

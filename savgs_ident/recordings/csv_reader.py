@@ -55,10 +55,12 @@ def read_csv(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading
         )
     runs = table.runs or [(_stem(path), 0)]
     columns = {position: table.take(position) for position in positions}
-    time = columns[time_position] * time_factor
+    # What overflows becomes infinite, and the checks say so.
+    with np.errstate(over="ignore", invalid="ignore"):
+        time = columns[time_position] * time_factor
+        channels = {binding.channel: _channel_values(columns, binding) for binding in bindings}
+        recordings = _cut_into_tests(runs, time, channels, {b.channel: b.label for b in bindings})
     warnings.extend(_end_warnings(text, source, time))
-    channels = {binding.channel: _channel_values(columns, binding) for binding in bindings}
-    recordings = _cut_into_tests(runs, time, channels, {b.channel: b.label for b in bindings})
     warnings.extend(_repeat_warnings(recordings, runs, source))
     return Reading(recordings, tuple(warnings))
 
@@ -203,8 +205,9 @@ def _from_zero(time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Time from the start of the test; a clock that already restarts there is left as it is."""
     if time.size < 2 or not np.isfinite(time[0]):
         return time
-    step = np.nanmedian(np.diff(time))
-    return time if 0.0 <= time[0] <= step else time - time[0]
+    steps = np.diff(time[np.isfinite(time)])
+    starts_here = steps.size > 0 and 0.0 <= time[0] <= np.median(steps)
+    return time if starts_here else time - time[0]
 
 
 def _end_warnings(text: TextBlocks, source: str, time: NDArray[np.float64]) -> Iterator[DataWarning]:

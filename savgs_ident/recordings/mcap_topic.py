@@ -111,9 +111,7 @@ class TopicColumns:
             return
         values, stamps = self._decoder.decode(block, [binding.key for binding in self.bindings])
         for binding in self.bindings:
-            self._values[binding.channel].frombytes(
-                (values[binding.key] * binding.gain + binding.bias).tobytes()
-            )
+            self._values[binding.channel].frombytes((_converted(values[binding.key], binding)).tobytes())
         if self._publish is None and not np.array_equal(block.log, block.publish):
             self._publish = array("q", self._log)
         if self._publish is not None:
@@ -152,3 +150,9 @@ class TopicColumns:
         values = {name: np.frombuffer(column, dtype=np.float64) for name, column in self._values.items()}
         data = TopicData(self.topic, self.bindings or (), log, publish, header, values)
         return data if np.all(log[1:] >= log[:-1]) else data.in_order(np.argsort(log, kind="stable"))
+
+
+def _converted(raw: NDArray[np.float64], binding: Binding) -> NDArray[np.float64]:
+    # What overflows becomes infinite, and the checks say so.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return raw * binding.gain + binding.bias

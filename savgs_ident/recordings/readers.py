@@ -22,7 +22,7 @@ def reader_for(path: Path) -> Reader:
         head = stream.read(16)
     name = path.name.lower()
     for reader in READERS:
-        if head and head.startswith(reader.magic or (b"\x00",)):
+        if head.startswith(reader.magic):
             return reader
     for reader in READERS:
         if not name.endswith(reader.suffixes):

@@ -8,13 +8,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 
-import numpy as np
-
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.checks_clipping import check_clipping
 from savgs_ident.recordings.checks_physics import check_physics
 from savgs_ident.recordings.checks_record import check_complete, check_test, stuck_channels
-from savgs_ident.recordings.checks_time import LONGEST_GAP, check_time
+from savgs_ident.recordings.checks_time import LONGEST_GAP, check_stamps, check_time
 from savgs_ident.recordings.checks_values import check_missing, check_possible
 from savgs_ident.recordings.gravity import remove_gravity
 from savgs_ident.recordings.place import Place
@@ -58,7 +56,8 @@ def screen_test(recording: Recording, source: str) -> tuple[Recording, tuple[Dat
     longest_gap = inf if recording.kind == "other" else LONGEST_GAP
     for name, channel in recording.channels.items():
         place = Place(source, recording.name, name)
-        whole, found = check_missing(_stamped(channel, place), place, longest_gap)
+        check_stamps(channel, Place(source, recording.name, "time"))
+        whole, found = check_missing(channel, place, longest_gap)
         warnings.extend(found)
         if whole is None:
             continue
@@ -79,15 +78,6 @@ def screen_test(recording: Recording, source: str) -> tuple[Recording, tuple[Dat
         *check_test(cleaned, place),
         *_unknown(cleaned, place),
     )
-
-
-def _stamped(channel: Channel, place: Place) -> Channel:
-    bad = np.flatnonzero(~np.isfinite(channel.time))
-    if bad.size:
-        raise Place(place.source, place.test, "time").error(
-            f"the time stamp of sample {bad[0] + 1} is missing or not finite", "fill the time column"
-        )
-    return channel
 
 
 def _once(warnings: list[DataWarning]) -> tuple[DataWarning, ...]:
