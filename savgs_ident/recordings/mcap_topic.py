@@ -111,7 +111,7 @@ class TopicColumns:
             return
         values, stamps = self._decoder.decode(block, [binding.key for binding in self.bindings])
         for binding in self.bindings:
-            self._values[binding.channel].frombytes((_converted(values[binding.key], binding)).tobytes())
+            self._values[binding.channel].frombytes(_converted(values[binding.key], binding).tobytes())
         if self._publish is None and not np.array_equal(block.log, block.publish):
             self._publish = array("q", self._log)
         if self._publish is not None:
