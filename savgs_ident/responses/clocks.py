@@ -12,6 +12,7 @@ multiple: orders k and l share a line where (k - l) f is a multiple of the rate,
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,13 +38,13 @@ class ClockGroup:
     time: NDArray[np.float64]
     values: NDArray[np.float64]
 
-    @property
+    @cached_property
     def rate_hz(self) -> float:
         """Sampling rate between gaps [Hz]."""
         intervals = np.diff(self.time)
         return float(1.0 / np.mean(intervals[intervals < _GAP * np.median(intervals)]))
 
-    @property
+    @cached_property
     def span_s(self) -> float:
         """Time that the samples stand for: one sampling interval longer than from first to last [s]."""
         return float((self.time[-1] - self.time[0]) + 1.0 / self.rate_hz)

@@ -87,8 +87,8 @@ def check_folding(source: str, fits: Mapping[str, DwellFit]) -> tuple[DataWarnin
         ]
         if hit:
             what = (
-                f"content above the Nyquist frequency folds onto the orders kept in {len(hit)} dwells whose"
-                " frequency divides the sampling rate; the covariance allows for it"
+                "content above the Nyquist frequency may fold onto the orders kept where the frequency"
+                f" divides the sampling rate ({len(hit)} of {len(fits)} dwells); the covariance allows for it"
             )
             remedy = (
                 "sample faster, filter before sampling, or choose frequencies that do not divide the rate"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording
+from savgs_ident.responses.products import normal_products
 from savgs_ident.responses.road_phase import LocalPhase, crossing_times, phase_at_crossings, refine_phase
 from savgs_ident.responses.sweep_response import SweepResponse
 
@@ -154,7 +155,7 @@ def _local_harmonic(
     waves = np.concatenate([turns.real[:, :orders], turns.imag[:, :orders]], axis=1)
     probes = np.concatenate([turns.real[:, orders:], turns.imag[:, orders:]], axis=1)
     columns = np.column_stack([waves, waves * unit[:, None], np.ones_like(unit), unit, probes, values])
-    products = columns.T @ columns
+    products = normal_products(columns)
     size = 4 * orders + 2
     inverse = np.linalg.inv(products[:size, :size])
     weights = inverse @ products[:size, -1]

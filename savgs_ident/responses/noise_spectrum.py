@@ -32,6 +32,7 @@ _SETTLED = 1e-4
 _FEWEST_LINES = 100
 _MOST_TAKEN = 0.5
 _BAND = 0.45
+_TOUCHING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,11 @@ def _lines_between(
     top = min(band, max(_REACH * orders, _FEWEST_LINES / periods))
     lines = np.arange(1, max(int(top * periods), 2) + 1)
     apart = lines[:, None] - np.arange(-highest, highest + 1) * periods
-    taken = np.sum(np.sinc(apart - samples * np.round(apart / samples)) ** 2, axis=1)
+    apart -= samples * np.round(apart / samples)
+    # Lines are whole numbers, so the sine of pi * apart depends on the order alone.
+    sine = np.sin(np.pi * periods * np.arange(-highest, highest + 1))
+    touching = np.abs(apart) < _TOUCHING
+    taken = np.sum(np.where(touching, 1.0, (sine / (np.pi * np.where(touching, 1.0, apart))) ** 2), axis=1)
     free = taken < _MOST_TAKEN
     kept = 1.0 - taken - 3.0 / (np.pi * lines) ** 2
     return lines[free], kept[free]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.responses.peak_to_peak import peak_to_peak
 
-_PAIRS = 100
+_PAIRS = 64
 _SEED = 20170709
 
 

@@ -27,6 +27,7 @@ from savgs_ident.responses.nonuniform_fft import TransformPlan, plan_transform, 
 
 _MOST_STEPS = 150
 _PRECISION = 1e-13
+_GAIN_PRECISION = 1e-8
 _LOST = 1e6
 
 
@@ -71,15 +72,19 @@ def fit_periodic(
 ) -> PeriodicFit:
     """Harmonics 0..``highest`` of ``values`` (C, N), no higher than ``basis`` was planned for.
 
-    Noise gains are given for the orders 0..``gains_to``. Raises :class:`numpy.linalg.LinAlgError` when the
-    stamps do not determine the harmonics.
+    Noise gains are given for the orders 0..``gains_to``, to better than 1e-6 of themselves. Raises
+    :class:`numpy.linalg.LinAlgError` when the stamps do not determine the harmonics.
     """
     time = basis.time
     reach = float(np.max(np.abs(time))) or 1.0
     ramp = time / reach
     found = sums(basis.plan, np.vstack([np.ones_like(ramp), ramp, values]))
-    right = np.vstack([_both_sides(found[1:, : highest + 1]), _units(highest, gains_to)])
-    solved = _solve_toeplitz(found[0, : 2 * highest + 1], right)
+    lags = found[0, : 2 * highest + 1]
+    from_rows, units = _both_sides(found[1:, : highest + 1]), _units(highest, gains_to)
+    right = np.vstack([from_rows, units])
+    solved = np.vstack(
+        [_solve_toeplitz(lags, from_rows, _PRECISION), _solve_toeplitz(lags, units, _GAIN_PRECISION)]
+    )
     # Row 0 of both: the ramp. It is eliminated last, by its part that no harmonic can imitate.
     shared = np.sum(right * solved[0].conj(), axis=1)
     left_of_ramp = float(np.sum(ramp**2)) - shared[0].real
@@ -106,7 +111,9 @@ def _units(highest: int, last: int) -> NDArray[np.complex128]:
     return np.eye(last + 1, 2 * highest + 1, highest, dtype=np.complex128)
 
 
-def _solve_toeplitz(lags: NDArray[np.complex128], right: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _solve_toeplitz(
+    lags: NDArray[np.complex128], right: NDArray[np.complex128], precision: float
+) -> NDArray[np.complex128]:
     """Rows x of G x = b for the rows b of ``right`` (R, n); G_kl = conj(lags[l - k]), by conjugate gradients.
 
     Raises :class:`numpy.linalg.LinAlgError` if that does not converge.
@@ -123,7 +130,7 @@ def _solve_toeplitz(lags: NDArray[np.complex128], right: NDArray[np.complex128])
     direction = residual
     power = _squares(residual)
     start = _squares(right)
-    goal = _PRECISION**2 * start
+    goal = precision**2 * start
     for _ in range(_MOST_STEPS):
         if np.all(power <= goal):
             return solution

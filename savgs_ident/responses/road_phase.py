@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from savgs_ident.responses.products import normal_products
+
 _THRESHOLD = 0.3
 _ROUNDS = 8
 
@@ -68,11 +70,11 @@ def refine_phase(
         phase = speed * since + 0.5 * acceleration * since**2
         cosine, sine = np.cos(phase), np.sin(phase)
         waves = np.column_stack([cosine, sine, np.ones_like(unit), unit])
-        weights = np.linalg.solve(waves.T @ waves, np.sum(waves * road[:, None], axis=0))
+        weights = np.linalg.solve(normal_products(waves), np.sum(waves * road[:, None], axis=0))
         along = weights[1] * cosine - weights[0] * sine
         columns = np.column_stack([waves, along * unit, along * unit**2])
         left = road - np.sum(waves * weights, axis=1)
-        inverse = np.linalg.inv(columns.T @ columns)
+        inverse = np.linalg.inv(normal_products(columns))
         step = inverse @ np.sum(columns * left[:, None], axis=0)
         speed += step[4] / reach
         acceleration += 2.0 * step[5] / reach**2

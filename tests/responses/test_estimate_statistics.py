@@ -15,7 +15,7 @@ from savgs_ident.responses.estimate import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.peak_to_peak import peak_to_peak
 
-DRAWS = 200
+DRAWS = 120
 FREQUENCY = 2.013
 ORDERS = 9
 Noise = Callable[[np.random.Generator, int], Any]

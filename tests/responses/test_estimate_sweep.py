@@ -1,5 +1,6 @@
 """A sweep through a linear system whose response is known."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,20 @@ NATURAL, DAMPING = 2 * np.pi * 2.1, 0.25
 FILTER = ([2 * DAMPING * NATURAL, NATURAL**2], [1.0, 2 * DAMPING * NATURAL, NATURAL**2])
 
 
-def sweep(seed: int, noise: float, duration: float = 60.0) -> Recording:
-    """0 to 3 Hz in 60 s at 500 Hz; the channel is the filtered road, simulated on a fine grid."""
-    rng = np.random.default_rng(seed)
+@cache
+def clean(duration: float) -> tuple[Any, Any, Any]:
+    """Time [s], road [m] and filtered road [m] without noise."""
     time = np.arange(int(500 * duration)) / 500.0
     road = 0.01375 * np.sin(np.pi * RATE * time**2)
     _, filtered, _ = scipy.signal.lsim(FILTER, road, time)
-    measured = np.asarray(filtered) + noise * rng.standard_normal(time.size)
+    return time, road, np.asarray(filtered)
+
+
+def sweep(seed: int, noise: float, duration: float = 60.0) -> Recording:
+    """0 to 3 Hz in 60 s at 500 Hz; the channel is the filtered road, simulated on a fine grid."""
+    rng = np.random.default_rng(seed)
+    time, road, filtered = clean(duration)
+    measured = filtered + noise * rng.standard_normal(time.size)
     road = road + 1e-5 * rng.standard_normal(time.size)
     half = time[::2] + 3e-4
     channels = {
