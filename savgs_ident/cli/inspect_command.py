@@ -29,7 +29,7 @@ def inspect(
     from savgs_ident.recordings.read import read_campaign
     from savgs_ident.report.campaign_summary import summarise_campaign, summary_record
     from savgs_ident.report.campaign_text import campaign_text
-    from savgs_ident.report.files import prepare_folder, write_figure, write_json
+    from savgs_ident.report.files import prepare_folder, write_json
     from savgs_ident.report.terminal import plain
 
     voice = Voice(json, quiet)
@@ -44,6 +44,7 @@ def inspect(
         files = [write_json(out / "inspect.json", record)]
         progress("drawing")
         from savgs_ident.report.campaign_figure import campaign_figure
+        from savgs_ident.report.picture import write_figure
 
         files += write_figure(out, "inspect", campaign_figure(summary))
     voice.show(campaign_text(record), plain("Written: " + ", ".join(str(file) for file in files)))

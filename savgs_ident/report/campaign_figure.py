@@ -5,16 +5,18 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 
-from savgs_ident.report.campaign_summary import READINGS, CampaignSummary
+from savgs_ident.report.campaign_summary import CARRIES, CampaignSummary
+from savgs_ident.report.readings import READINGS
 from savgs_ident.report.style import (
     BLUE,
-    CHANNEL_TITLES,
     GREY,
     INK,
     ORANGE,
     frequency_axis,
     label_of,
+    magnitude_axis,
     new_figure,
     styled,
 )
@@ -22,9 +24,7 @@ from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.signal_to_noise import signal_to_noise
 from savgs_ident.responses.sweep_response import SweepResponse
 
-_UNITS = {"sprung_accel": ("m/s²", 1.0), "susp_deflection": ("mm", 1e3)}
-_PER_ROAD = {"sprung_accel": "m/s² per m", "susp_deflection": "m per m"}
-_STEPS = (1, 3, 10, 30, 100, 300, 1000, 3000)
+_STEPS = (CARRIES, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)
 
 
 def campaign_figure(summary: CampaignSummary) -> Figure:
@@ -35,7 +35,7 @@ def campaign_figure(summary: CampaignSummary) -> Figure:
         axes = figure.subplots(3, len(READINGS), squeeze=False, height_ratios=(1.25, 1.0, 0.8))
         span = _span(summary)
         for column, name in zip(axes.T, READINGS, strict=True):
-            column[0].set_title(CHANNEL_TITLES[name])
+            column[0].set_title(READINGS[name].title)
             _draw_response(column[0], summary, name)
             shades = _draw_ratio(column[1], summary.response, name)
             _draw_noise(column[2], summary, name)
@@ -43,7 +43,7 @@ def campaign_figure(summary: CampaignSummary) -> Figure:
                 frequency_axis(axis, *span, labelled=row == 2)
         if shades is not None:
             bar = figure.colorbar(shades, ax=list(axes[1]), aspect=14, pad=0.01)
-            bar.set_label("signal-to-noise of the order [1]")
+            bar.set_label(f"signal-to-noise of the order [1] (x: below {CARRIES:g})")
         figure.align_ylabels(axes)
         return figure
 
@@ -62,8 +62,8 @@ def _usable(response: HarmonicResponse | None, name: str) -> bool:
 
 
 def _draw_response(axes: Axes, summary: CampaignSummary, name: str) -> None:
-    axes.set_yscale("log")
-    axes.set_ylabel(f"first harmonic [{_PER_ROAD[name]} of road]")
+    magnitude_axis(axes)
+    axes.set_ylabel(f"first harmonic [{READINGS[name].per_road} of road]")
     for sweep in summary.sweeps:
         _draw_sweep(axes, sweep, name)
     response = summary.response
@@ -100,17 +100,19 @@ def _draw_ratio(axes: Axes, response: HarmonicResponse | None, name: str) -> Sca
         return None
     ratio = signal_to_noise(response)[:, response.channel(name), 1:]
     frequency, order = np.broadcast_arrays(response.frequency[:, None], np.arange(1, ratio.shape[1] + 1))
-    shown = response.valid[:, response.channel(name), 1:]
-    axes.set_ylim(0.3, ratio.shape[1] + 0.7)
-    norm = BoundaryNorm(_STEPS, 256, extend="both")
+    valid = response.valid[:, response.channel(name), 1:]
+    buried, seen = valid & (ratio < CARRIES), valid & (ratio >= CARRIES)
+    axes.set_ylim(0.2, ratio.shape[1] + 0.8)
+    axes.yaxis.set_major_locator(MultipleLocator(2, offset=1))
+    axes.scatter(frequency[buried], order[buried], s=5, marker="x", linewidths=0.6, color=GREY)
     return axes.scatter(
-        frequency[shown], order[shown], c=np.clip(ratio[shown], 0.1, 1e6),
-        cmap="cividis_r", norm=norm, marker="s", s=26, linewidths=0.3, edgecolors=GREY,
+        frequency[seen], order[seen], c=ratio[seen], norm=BoundaryNorm(_STEPS, 256, extend="max"),
+        cmap="cividis_r", marker="s", s=26, linewidths=0.3, edgecolors=GREY,
     )  # fmt: skip
 
 
 def _draw_noise(axes: Axes, summary: CampaignSummary, name: str) -> None:
-    unit, scale = _UNITS[name]
+    unit, scale = READINGS[name].unit, READINGS[name].scale
     axes.set_ylabel(f"noise of a sample [{unit}]")
     response = summary.response
     if response is not None and _usable(response, name):
@@ -121,4 +123,4 @@ def _draw_noise(axes: Axes, summary: CampaignSummary, name: str) -> None:
         axes.axhline(scale * at_rest, color=INK, linestyle="--", linewidth=1.2, label="at standstill")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="lower left", ncols=2)
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, 1.2 * max(axes.dataLim.y1, np.finfo(float).tiny))

@@ -10,14 +10,12 @@ import numpy as np
 
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, Channel, Recording
+from savgs_ident.report.readings import READINGS
 from savgs_ident.responses.estimate import estimate_response
 from savgs_ident.responses.estimate_sweep import ROAD, estimate_sweep_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.signal_to_noise import signal_to_noise
 from savgs_ident.responses.sweep_response import SweepResponse
-
-READINGS = ("sprung_accel", "susp_deflection")
-"""The channels whose response to the road is identified."""
 
 CARRIES = 3.0
 """Signal-to-noise from which an order counts as seen."""

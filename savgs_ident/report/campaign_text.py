@@ -4,22 +4,21 @@ from typing import Any
 
 from rich.console import Group, RenderableType
 
-from savgs_ident.report.campaign_summary import READINGS
-from savgs_ident.report.terminal import figure_of, plain, table
+from savgs_ident.report.terminal import figure_of, fixed, plain, table
 
 _SHOWN_WARNINGS = 20
 
 
 def campaign_text(record: dict[str, Any]) -> RenderableType:
     """Tables of channels and dwells, the other tests, and the warnings of an ``inspect`` record."""
-    parts = [plain(f"{record['source']}: {_count(record['tests'], 'test')}", "bold"), plain("")]
+    parts = [plain(f"{record['source']}: {_count(record['tests'], 'test')}", "bold")]
     parts.append(_channel_table(record))
     if record["missing_channels"]:
         parts.append(plain("Not recorded: " + ", ".join(record["missing_channels"]) + "\n"))
     if record["dwells"]:
         parts.append(_dwell_table(record["dwells"]))
     parts += [plain(line) for line in _other_tests(record)]
-    parts += [plain(""), *_warnings(record["warnings"])]
+    parts += _warnings(record["warnings"])
     return Group(*parts)
 
 
@@ -31,40 +30,46 @@ def _channel_table(record: dict[str, Any]) -> RenderableType:
     rows = [
         (
             channel["name"],
-            channel["recorded_as"] or "-",
             channel["unit"],
             figure_of(channel["rate_hz"]),
             channel["samples"],
             channel["tests"],
             figure_of(channel["standstill_noise"], 3),
+            channel["recorded_as"] or "-",
         )
         for channel in record["channels"]
     ]
-    headers = ("channel", "recorded as", "unit", "rate [Hz]", "samples", "tests", "noise at rest (1 sd)")
-    return table("Channels", headers, rows, left=3)
+    headers = ("channel", "unit", "rate\n[Hz]", "samples", "tests", "noise at rest\n(1 sd)", "recorded as")
+    return table("Channels", headers, rows, texts=(0, 1, 6))
 
 
 def _dwell_table(dwells: list[dict[str, Any]]) -> RenderableType:
-    rows = []
-    for dwell in dwells:
-        cells = [dwell["test"], figure_of(dwell["frequency_hz"], 5), dwell["periods"] or "-"]
-        cells.append(_reading(dwell, "road_height", "peak_to_peak", 1e3, 4))
-        for name in READINGS:
-            cells.append(_reading(dwell, name, "peak_to_peak", 1e3 if name == "susp_deflection" else 1.0, 4))
-            cells.append(_reading(dwell, name, "signal_to_noise", 1.0, 3))
-            cells.append(_highest(dwell, name))
-        rows.append(cells)
+    rows = [
+        (
+            dwell["test"],
+            fixed(dwell["frequency_hz"], 3),
+            dwell["periods"] or "-",
+            _reading(dwell, "road_height", "peak_to_peak", 1e3, 2),
+            _reading(dwell, "sprung_accel", "peak_to_peak", 1.0, 3),
+            _reading(dwell, "sprung_accel", "signal_to_noise", 1.0, 0),
+            _highest(dwell, "sprung_accel"),
+            _reading(dwell, "susp_deflection", "peak_to_peak", 1e3, 2),
+            _reading(dwell, "susp_deflection", "signal_to_noise", 1.0, 0),
+            _highest(dwell, "susp_deflection"),
+        )
+        for dwell in dwells
+    ]
     headers = (
-        "dwell", "f [Hz]", "periods", "road p-p [mm]",
-        "accel p-p [m/s²]", "S/N", "order", "deflection p-p [mm]", "S/N", "order",
+        "dwell", "f\n[Hz]", "periods", "road\n[mm]", "accel\n[m/s²]", "S/N\n[1]", "order",
+        "defl.\n[mm]", "S/N\n[1]", "order",
     )  # fmt: skip
-    title = "Dwells (p-p: peak to peak; S/N: of the first harmonic; order: highest one seen)"
+    title = "Dwells, peak to peak (S/N: signal-to-noise of the first harmonic; order: highest one seen)"
     return table(title, headers, rows)
 
 
-def _reading(dwell: dict[str, Any], channel: str, key: str, scale: float, digits: int) -> str:
+def _reading(dwell: dict[str, Any], channel: str, key: str, scale: float, places: int) -> str:
     entry = dwell["channels"].get(channel)
-    return "-" if entry is None else figure_of(scale * float(entry[key]), digits)
+    return "-" if entry is None else fixed(scale * float(entry[key]), places)
 
 
 def _highest(dwell: dict[str, Any], channel: str) -> str:

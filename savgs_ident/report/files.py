@@ -11,20 +11,13 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from savgs_ident.core.errors import InputError
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 Json = dict[str, object] | list[object] | str | int | float | bool | None
 """What a JSON file can say."""
-
-PNG_DPI = 160
-"""Resolution of pictures [1/inch]."""
 
 
 def prepare_folder(folder: Path) -> Path:
@@ -76,17 +69,6 @@ def write_table(path: Path, columns: Mapping[str, Sequence[object]]) -> Path:
     writer.writerow(columns)
     writer.writerows(zip(*columns.values(), strict=True))
     return write_bytes(path, text.getvalue().encode())
-
-
-def write_figure(folder: Path, stem: str, figure: "Figure") -> tuple[Path, Path]:
-    """Write ``figure`` as ``stem``.png and ``stem``.pdf; the same figure gives the same bytes."""
-    png, pdf = io.BytesIO(), io.BytesIO()
-    figure.savefig(png, format="png", dpi=PNG_DPI)
-    figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
-    return (
-        write_bytes(folder / f"{stem}.png", png.getvalue()),
-        write_bytes(folder / f"{stem}.pdf", pdf.getvalue()),
-    )
 
 
 def _plain(value: object) -> Json:

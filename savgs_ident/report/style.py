@@ -11,18 +11,13 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 INK = "#1a1a1a"
 GREY = "#8a8a8a"
 PALE = "#dedede"
 BLUE = "#0b5ea8"
 ORANGE = "#d95f02"
-
-CHANNEL_TITLES: Mapping[str, str] = MappingProxyType(
-    {"sprung_accel": "sprung-mass acceleration", "susp_deflection": "suspension deflection"}
-)
-"""What the identified channels are called in figures."""
 
 RC: Mapping[str, object] = MappingProxyType(
     {
@@ -71,6 +66,15 @@ def frequency_axis(axes: Axes, lowest: float, highest: float, labelled: bool = T
     axes.tick_params(axis="x", labelbottom=labelled)
     if labelled:
         axes.set_xlabel("road frequency [Hz]")
+
+
+def magnitude_axis(axes: Axes) -> None:
+    """A logarithmic axis for magnitudes with numbers at 1, 2 and 5 of every decade, written out."""
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_minor_locator(LogLocator(10.0, subs=tuple(range(1, 10))))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def label_of(text: object) -> str:

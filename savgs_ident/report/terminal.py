@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 
-from rich import box
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -18,15 +17,20 @@ def plain(text: object, style: str = "") -> Text:
 
 
 def table(
-    title: str, headers: Sequence[str], rows: Iterable[Sequence[object]], left: int = 1
+    title: str, headers: Sequence[str], rows: Iterable[Sequence[object]], texts: Sequence[int] = (0,)
 ) -> RenderableType:
-    """A table whose first ``left`` columns are texts and the others numbers."""
-    grid = Table(box=box.SIMPLE_HEAD, pad_edge=False, header_style="bold")
+    """A table; the columns whose numbers are in ``texts`` hold texts and stand to the left."""
+    grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
     for index, header in enumerate(headers):
-        grid.add_column(plain(header), justify="left" if index < left else "right", overflow="fold")
+        grid.add_column(plain(header), justify="left" if index in texts else "right", overflow="fold")
     for row in rows:
         grid.add_row(*(plain(cell) for cell in row))
-    return Group(plain(title, "bold"), grid)
+    return Group(plain(title, "bold"), grid, plain(""))
+
+
+def fixed(value: float | None, places: int) -> str:
+    """A number with ``places`` decimals, a dash where there is none."""
+    return "-" if value is None else f"{value:.{places}f}"
 
 
 def figure_of(value: float | None, digits: int = 4) -> str:

@@ -1,0 +1,44 @@
+"""Where an identified rig comes from: data, program, options, and how well its numbers are known."""
+
+import platform
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+
+from savgs_ident import __version__
+from savgs_ident.fit.result import Fit
+from savgs_ident.recordings.recording import Campaign
+
+_PACKAGES = ("jax", "optimistix", "numpy", "scipy")
+
+
+def provenance(fit: Fit, campaign: Campaign, command: Sequence[str]) -> dict[str, object]:
+    """The table ``[provenance]`` of a ``model.toml``; the covariance is in the order of its names, SI."""
+    return {
+        "command": " ".join(command),
+        "data": campaign.source,
+        "data_sha256": campaign.sha256,
+        "effects": list(fit.effects),
+        "free": list(fit.free_names),
+        "known_to_tolerance": [each.name for each in fit.estimates if not each.free],
+        "quantity": fit.quantity,
+        "orders": fit.orders,
+        "chi2": float(fit.chi2),
+        "dof": int(fit.dof),
+        "status": fit.status.name.lower(),
+        "trusted": bool(fit.trusted),
+        "versions": {"savgs_ident": __version__, "python": platform.python_version()} | _versions(),
+        "covariance": {
+            "names": [each.name for each in fit.estimates],
+            "matrix": fit.covariance.tolist(),
+        },
+    }
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "unknown"
+    return found
