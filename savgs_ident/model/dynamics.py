@@ -57,8 +57,9 @@ def swing(p: Values, theta_LW: Float[Array, ""]) -> Swing:
 
 def point_force(p: Values, place: Point, place_slope: Point, force: Point) -> GeneralisedForce:
     """Generalised force of a force (f_y, f_z) [N] at a point [m] with slope d(place)/d(theta_LW) [m/rad]."""
+    along_theta = place_slope[0] * force[0] + place_slope[1] * force[1]
     roll_moment = place[0] * force[1] - (place[1] - p["z_tb"]) * force[0]
-    return jnp.stack([force[1], place_slope @ force, force[0], roll_moment])
+    return jnp.stack([force[1], along_theta, force[0], roll_moment])
 
 
 def _body_force(

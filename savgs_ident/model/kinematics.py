@@ -25,7 +25,8 @@ from jaxtyping import Array, Float
 Values = Mapping[str, Float[Array, ""]]
 """Parameter name to value in SI."""
 
-Point = Float[Array, "2"]
+Point = Float[Array, "2"] | tuple[Float[Array, ""], Float[Array, ""]]
+"""Lateral and vertical coordinate (y, z)."""
 
 
 class Linkage(NamedTuple):

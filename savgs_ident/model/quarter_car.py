@@ -10,36 +10,24 @@ as it stands; time integration solves it for (qdd, sd); nothing is written twice
     simtr = simqc + RailCoulomb() + TyreFriction()
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.model.damper import DamperCurve
-from savgs_ident.model.dynamics import (
-    GeneralisedForce,
-    Motion,
-    carriage_load,
-    inertia_and_weight,
-    point_force,
-    swing,
-)
+from savgs_ident.model.dynamics import GeneralisedForce, Motion, carriage_load, point_force
 from savgs_ident.model.effect import AbstractEffect, InternalState, Port, PortSignals
-from savgs_ident.model.kinematics import Values, strut_length
+from savgs_ident.model.kinematics import Values
+from savgs_ident.model.section import Section, SectionCurves, section
+from savgs_ident.model.strut import Link, strut
 from savgs_ident.model.tyre import Contact, Road, contact, radial_force
 
 HANDLED_PORTS = (Port.STRUT, Port.SUSPENSION, Port.TYRE_RADIAL, Port.TYRE_LATERAL, Port.RAIL)
 """Ports at which a force may act, in the order in which they are evaluated: the rail's load comes last."""
-
-
-class Link(NamedTuple):
-    """Imposed motion of the single link: angle [rad] and velocity [rad/s]."""
-
-    angle: Float[Array, ""]
-    velocity: Float[Array, ""]
 
 
 class Inputs(NamedTuple):
@@ -96,53 +84,56 @@ class QuarterCar(eqx.Module):
         return total, rates
 
     def _evaluate(
-        self, p: Values, motion: Motion, s: Array, inputs: Inputs
+        self, p: Values, at: Section, motion: Motion, s: Array, inputs: Inputs
     ) -> tuple[GeneralisedForce, Array, Loads]:
-        swing_ = swing(p, motion.q.theta_LW)
         zero = jnp.zeros_like(motion.q.z_s)
         omega = motion.qd.theta_LW
 
-        def length_at(theta: Array, link: Array) -> Array:
-            return strut_length(p, theta, link)
+        leg = strut(p, at, omega, inputs.link)
+        extra, rates = self._at(Port.STRUT, p, PortSignals(leg.length, leg.rate, zero), s)
+        push = p["k_sd"] * (p["l_free"] - leg.length) + p["c_sd"] * self.damper(-leg.rate) + extra
 
-        length, length_rate = jax.jvp(
-            length_at, (motion.q.theta_LW, inputs.link.angle), (omega, inputs.link.velocity)
-        )
-        length_slope = jax.grad(length_at)(motion.q.theta_LW, inputs.link.angle)
-        extra, rates = self._at(Port.STRUT, p, PortSignals(length, length_rate, zero), s)
-        strut = p["k_sd"] * (p["l_free"] - length) + p["c_sd"] * self.damper(-length_rate) + extra
-
-        travel, travel_slope = swing_.pose.W[1] - p["W_z"], swing_.slope.W[1]
-        joint, more = self._at(Port.SUSPENSION, p, PortSignals(travel, travel_slope * omega, zero), s)
+        travel = PortSignals(at.W_z - p["W_z"], at.W_z_slope * omega, zero)
+        joint, more = self._at(Port.SUSPENSION, p, travel, s)
         rates |= more
 
-        touch = contact(p, swing_, motion, inputs.road)
-        extra, more = self._at(
-            Port.TYRE_RADIAL, p, PortSignals(touch.compression, touch.compression_rate, zero), s
-        )
+        touch = contact(p, at, motion, inputs.road)
+        pressing = PortSignals(touch.compression, touch.compression_rate, zero)
+        extra, more = self._at(Port.TYRE_RADIAL, p, pressing, s)
         rates |= more
         vertical = radial_force(p, touch, extra) / touch.cos_tilt
-        lateral, more = self._at(
-            Port.TYRE_LATERAL, p, PortSignals(touch.place[0], touch.lateral_velocity, vertical), s
-        )
+        scrub = PortSignals(touch.place[0], touch.lateral_velocity, vertical)
+        lateral, more = self._at(Port.TYRE_LATERAL, p, scrub, s)
         rates |= more
 
-        total = inertia_and_weight(p, swing_, motion)
-        total += point_force(p, touch.place, touch.place_slope, jnp.stack([lateral, vertical]))
-        total += jnp.stack([zero, strut * length_slope + joint * travel_slope, zero, zero])
+        inertia = at.inertia @ jnp.stack([motion.qdd.z_s + p["g"], motion.qdd.theta_LW, omega**2])
+        total = inertia + point_force(p, touch.place, touch.place_slope, (lateral, vertical))
+        total += jnp.stack([zero, push * leg.slope + joint * at.W_z_slope, zero, zero])
         carriage = carriage_load(p, total)
         rail, more = self._at(Port.RAIL, p, PortSignals(motion.q.z_s, motion.qd.z_s, carriage), s)
         rates |= more
         total += jnp.stack([rail, zero, zero, zero])
         rate = jnp.concatenate([rates[effect.name] for effect in self.effects] or [jnp.zeros(0)])
-        loads = Loads(strut, length_rate, vertical, lateral, rail, carriage, -total[2:], touch)
-        return total, rate, loads
+        return total, rate, Loads(push, leg.rate, vertical, lateral, rail, carriage, -total[2:], touch)
 
-    def residual(self, p: Values, motion: Motion, s: Array, sd: Array, inputs: Inputs) -> Array:
-        """The residual, shape (2 + s,): force [N] and moment [N m] out of balance, rates out of balance."""
-        total, rate, _ = self._evaluate(p, motion, s, inputs)
+    def residual(
+        self,
+        p: Values,
+        motion: Motion,
+        s: Array,
+        sd: Array,
+        inputs: Inputs,
+        curves: SectionCurves | None = None,
+    ) -> Array:
+        """The residual, shape (2 + s,): force [N] and moment [N m] out of balance, rates out of balance.
+
+        ``curves`` of the same parameters serve where many points share them; without, the kinematics are
+        evaluated in closed form.
+        """
+        at = (curves or partial(section, p))(motion.q.theta_LW)
+        total, rate, _ = self._evaluate(p, at, motion, s, inputs)
         return jnp.concatenate([total[:2], sd - rate])
 
     def loads(self, p: Values, motion: Motion, s: Array, inputs: Inputs) -> Loads:
         """Forces and reactions along a motion."""
-        return self._evaluate(p, motion, s, inputs)[2]
+        return self._evaluate(p, section(p, motion.q.theta_LW), motion, s, inputs)[2]

@@ -8,12 +8,12 @@ F_tz = radial / cos a, so that the power of F_tz at H is exactly that of the rad
 
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from savgs_ident.model.dynamics import Motion, Swing
+from savgs_ident.model.dynamics import Motion
 from savgs_ident.model.kinematics import Point, Values
+from savgs_ident.model.section import Section
 
 
 class Road(NamedTuple):
@@ -26,9 +26,9 @@ class Road(NamedTuple):
 class Contact(NamedTuple):
     """State of the contact.
 
-    ``place`` [m] is H in the frame of the sprung mass and ``place_slope`` [m/rad] that of the upright's
-    material point at H; ``lateral_velocity`` [m/s] that point's outward velocity; ``compression`` [m] and
-    ``compression_rate`` [m/s] radial; ``cos_tilt`` the cosine of the wheel's tilt.
+    ``place`` [m] is H in the frame of the sprung mass; ``place_slope`` [m/rad] the slope in theta_LW of the
+    upright's material point at H and ``lateral_velocity`` [m/s] that point's outward velocity; ``compression``
+    [m] and ``compression_rate`` [m/s] radial; ``cos_tilt`` the cosine of the wheel's tilt.
     """
 
     place: Point
@@ -39,27 +39,26 @@ class Contact(NamedTuple):
     cos_tilt: Float[Array, ""]
 
 
-def contact(p: Values, swing_: Swing, motion: Motion, road: Road) -> Contact:
+def contact(p: Values, section: Section, motion: Motion, road: Road) -> Contact:
     """Where and how the tyre meets the plate."""
-
-    def axis_length(height: Array, roll: Array) -> Array:
-        return height / jnp.cos(roll + p["tilt"])
-
     omega = motion.qd.theta_LW
-    height = motion.q.z_s + swing_.pose.W[1] - road.height
-    height_rate = motion.qd.z_s + swing_.slope.W[1] * omega - road.velocity
-    roll, roll_slope = swing_.pose.roll_K, swing_.slope.roll_K
-    length, length_rate = jax.jvp(axis_length, (height, roll), (height_rate, roll_slope * omega))
-    tilt = roll + p["tilt"]
-    reach = length * jnp.stack([jnp.sin(tilt), -jnp.cos(tilt)])
-    place_slope = swing_.slope.W + roll_slope * jnp.stack([-reach[1], reach[0]])
+    tilt, tilt_rate = section.roll + p["tilt"], section.roll_slope * omega
+    cosine, sine = jnp.cos(tilt), jnp.sin(tilt)
+    height = motion.q.z_s + section.W_z - road.height
+    height_rate = motion.qd.z_s + section.W_z_slope * omega - road.velocity
+    length = height / cosine
+    length_rate = (height_rate + height * tilt_rate * sine / cosine) / cosine
+    place_slope = (
+        section.W_y_slope + section.roll_slope * height,
+        section.W_z_slope + section.roll_slope * length * sine,
+    )
     return Contact(
-        place=swing_.pose.W + reach,
+        place=(section.W_y + length * sine, section.W_z - height),
         place_slope=place_slope,
         lateral_velocity=place_slope[0] * omega,
         compression=p["r_free"] - length,
         compression_rate=-length_rate,
-        cos_tilt=jnp.cos(tilt),
+        cos_tilt=cosine,
     )
 
 

@@ -6,8 +6,12 @@ asks for r(x, y) = 0 at every node; between nodes
     x_{n+1} = x_n + h ((1 - g) xd_n + g xd_{n+1}),      xd = (velocities, y),
 
 with g = 1/2, or g = 1 for states that slip, where backward Euler is the exact play operator. A Newton step
-eliminates y at each node, dy = J dx + e, and what is left is an affine recurrence from node to node that
-closes after one period (:mod:`savgs_ident.simulate.cyclic`).
+eliminates y at each node, dy = J dx + e, and what is left is
+
+    A_{n+1} dx_{n+1} = B_n dx_n + d_n,    A_n = I - h_{n-1} g F_n,    B_n = I + h_n (1 - g) F_n,
+
+with F = d(xd)/dx. In terms of A_n dx_n it is an affine recurrence whose matrices B_n A_n^-1 need one node
+only; it closes after one period (:mod:`savgs_ident.simulate.cyclic`).
 """
 
 from collections.abc import Callable
@@ -21,13 +25,15 @@ from jaxtyping import Array, Float
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.kinematics import Values
 from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.model.section import SectionCurves, section_curves
 from savgs_ident.simulate import cyclic
+from savgs_ident.simulate.layout import Layout
 
-Nodes = Float[Array, "k D N"]
+Nodes = Float[Array, "k P"]
 
 
 class Trajectory(NamedTuple):
-    """States x (4 + s, D, N) and their algebraic partners y = (accelerations, sd), (2 + s, D, N)."""
+    """States x (4 + s, P) and their algebraic partners y = (accelerations, sd), (2 + s, P)."""
 
     x: Nodes
     y: Nodes
@@ -36,18 +42,20 @@ class Trajectory(NamedTuple):
 class Linearised(NamedTuple):
     """A trajectory's linearisation, ready to solve for any right side.
 
-    ``imbalance`` is -(dr/dy)^-1 r, (2 + s, D, N); ``slope`` is dy/dx, (2 + s, 4 + s, D, N); ``mass`` dr/dy;
-    ``left`` I - h g dxd/dx at the far end of each step.
+    ``imbalance`` is -(dr/dy)^-1 r, (2 + s, P); ``slope`` is dy/dx, (2 + s, 4 + s, P); ``mass`` dr/dy;
+    ``inverse`` A^-1.
     """
 
     imbalance: Nodes
-    slope: Float[Array, "k m D N"]
-    mass: Float[Array, "k k D N"]
-    left: Float[Array, "m m D N"]
+    slope: Float[Array, "k m P"]
+    mass: Float[Array, "k k P"]
+    inverse: Float[Array, "m m P"]
     factors: cyclic.CyclicFactors
 
 
-def node_residual(model: QuarterCar, p: Values, parts: tuple[Array, ...], inputs: Inputs) -> Array:
+def node_residual(
+    model: QuarterCar, p: Values, curves: SectionCurves, parts: tuple[Array, ...], inputs: Inputs
+) -> Array:
     """The model's residual at one node from its scalar unknowns (x then y)."""
     size = len(model.states)
     states = jnp.stack(parts[4 : 4 + size]) if size else jnp.zeros(0)
@@ -55,17 +63,18 @@ def node_residual(model: QuarterCar, p: Values, parts: tuple[Array, ...], inputs
     motion = Motion(
         Coordinates(*parts[:2]), Coordinates(*parts[2:4]), Coordinates(*parts[4 + size : 6 + size])
     )
-    return model.residual(p, motion, states, rates, inputs)
+    return model.residual(p, motion, states, rates, inputs, curves)
 
 
-def residual_at_nodes(model: QuarterCar, p: Values, parts: tuple[Array, ...], inputs: Inputs) -> Nodes:
-    """The residual at all nodes of all dwells, (2 + s, D, N)."""
+def residual_at_nodes(
+    model: QuarterCar, p: Values, curves: SectionCurves, parts: tuple[Array, ...], inputs: Inputs
+) -> Nodes:
+    """The residual at all nodes of all dwells, (2 + s, P)."""
 
     def one(inputs: Inputs, *parts: Array) -> Array:
-        return node_residual(model, p, parts, inputs)
+        return node_residual(model, p, curves, parts, inputs)
 
-    over_nodes = jax.vmap(one, in_axes=0, out_axes=-1)
-    return jax.vmap(over_nodes, in_axes=0, out_axes=1)(inputs, *parts)
+    return jax.vmap(one, in_axes=0, out_axes=-1)(inputs, *parts)
 
 
 def _residual_and_columns(function: Callable[..., Array], parts: tuple[Array, ...]) -> tuple[Array, Array]:
@@ -85,18 +94,21 @@ def _residual_and_columns(function: Callable[..., Array], parts: tuple[Array, ..
     return residual, jnp.stack(columns, axis=1)
 
 
-def implicitness(model: QuarterCar) -> Float[Array, "m 1 1"]:
+def implicitness(model: QuarterCar) -> Float[Array, "m 1"]:
     """Weight g of the far end of a step for each state."""
     weights = [0.5] * 4 + [1.0 if state.slips else 0.5 for state in model.states]
-    return jnp.asarray(weights)[:, None, None]
+    return jnp.asarray(weights)[:, None]
 
 
 def linearise(
-    model: QuarterCar, p: Values, at: Trajectory, inputs: Inputs, steps: Float[Array, "D N"]
+    model: QuarterCar, p: Values, at: Trajectory, inputs: Inputs, layout: Layout, steps: Float[Array, " P"]
 ) -> Linearised:
     """Linearise residual and steps about a trajectory; ``steps`` [s] from each node to the next."""
     parts = (*at.x, *at.y)
-    residual, jacobian = _residual_and_columns(lambda *z: residual_at_nodes(model, p, z, inputs), parts)
+    curves = section_curves(p)
+    residual, jacobian = _residual_and_columns(
+        lambda *z: residual_at_nodes(model, p, curves, z, inputs), parts
+    )
     size = at.x.shape[0]
     mass = jacobian[:, size:]
     right = -jnp.concatenate([jacobian[:, :size], residual[:, None]], axis=1)
@@ -105,21 +117,22 @@ def linearise(
     kinematic = jnp.zeros((2, *slope.shape[1:])).at[0, 2].set(1.0).at[1, 3].set(1.0)
     flow = jnp.concatenate([kinematic, slope])
     weight = implicitness(model)[:, None]
-    eye = jnp.eye(size)[:, :, None, None]
-    left = eye - steps * weight * jnp.roll(flow, -1, axis=-1)
-    matrices = cyclic.solve_nodes(left, eye + steps * (1.0 - weight) * flow)
-    return Linearised(imbalance, slope, mass, left, cyclic.factorise(matrices))
+    eye = jnp.broadcast_to(jnp.eye(size)[:, :, None], flow.shape)
+    inverse = cyclic.solve_nodes(eye - steps[layout.preceding] * weight * flow, eye)
+    matrices = cyclic.product(eye + steps * (1.0 - weight) * flow, inverse)
+    return Linearised(imbalance, slope, mass, inverse, cyclic.factorise(layout, matrices))
 
 
-def step_defects(model: QuarterCar, at: Trajectory, rate: Nodes, steps: Float[Array, "D N"]) -> Nodes:
+def step_defects(
+    model: QuarterCar, at: Trajectory, rate: Nodes, layout: Layout, steps: Float[Array, " P"]
+) -> Nodes:
     """By how much x_n plus its step misses x_{n+1}, for rates xd = ``rate``."""
     weight = implicitness(model)
-    step = steps * ((1.0 - weight) * rate + weight * jnp.roll(rate, -1, axis=-1))
-    return at.x - jnp.roll(at.x, -1, axis=-1) + step
+    step = steps * ((1.0 - weight) * rate + weight * rate[:, layout.following])
+    return at.x - at.x[:, layout.following] + step
 
 
-def solve_linearised(model: QuarterCar, lin: Linearised, defects: Nodes, imbalance: Nodes) -> Trajectory:
+def solve_linearised(layout: Layout, lin: Linearised, defects: Nodes, imbalance: Nodes) -> Trajectory:
     """Changes (dx, dy) that cancel step defects given that dy = slope dx + imbalance at the nodes."""
-    right = cyclic.solve_nodes(lin.left, defects[:, None])[:, 0]
-    dx = cyclic.solve(lin.factors, right)
+    dx = cyclic.apply(lin.inverse, cyclic.solve(layout, lin.factors, defects))
     return Trajectory(dx, imbalance + cyclic.apply(lin.slope, dx))

@@ -9,8 +9,8 @@ of M_n shrink). Products are formed in chunks, all chunks of all dwells at a tim
 dwell; the period closes with (I - M_{N-1} ... M_0) x_0 = d. The factorisation serves any number of right
 sides, which is what makes sensitivities cheap.
 
-Arrays are laid out with the matrix indices first and (dwell, node) last, so that every operation is a long
-vector.
+Arrays are laid out with the matrix indices first and the nodes of all dwells last, so that every operation is
+a long vector.
 """
 
 from typing import NamedTuple
@@ -19,11 +19,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-CHUNK = 16
-"""Nodes in a chunk; the number of nodes in a period is a multiple of it."""
+from savgs_ident.simulate.layout import CHUNK, Layout
 
-Matrices = Float[Array, "m k *nodes"]
-Vectors = Float[Array, "m *nodes"]
+Matrices = Float[Array, "m k P"]
+Vectors = Float[Array, "m P"]
 
 
 def product(left: Matrices, right: Matrices) -> Matrices:
@@ -50,36 +49,37 @@ def solve_nodes(matrix: Matrices, right: Matrices) -> Matrices:
 
 
 class CyclicFactors(NamedTuple):
-    """Factorised recurrence: step matrices, products over chunks, inverse of I - (period's product)."""
+    """Factorised recurrence: step matrices, products over chunks, inverses of I - (product of a period)."""
 
-    steps: Float[Array, "m m D N"]
-    chunks: Float[Array, "m m D c"]
+    steps: Float[Array, "m m P"]
+    chunks: Float[Array, "m m C"]
     closing: Float[Array, "D m m"]
 
 
-def _inside_chunks(array: Float[Array, "*k D N"]) -> Float[Array, "L *k D c"]:
-    split = array.reshape(*array.shape[:-1], -1, CHUNK)
-    return jnp.moveaxis(split, -1, 0)
+def _inside_chunks(array: Float[Array, "*k P"]) -> Float[Array, "L *k C"]:
+    return jnp.moveaxis(array.reshape(*array.shape[:-1], -1, CHUNK), -1, 0)
 
 
-def _over_chunks(array: Float[Array, "*k D c"]) -> Float[Array, "c *k D"]:
-    return jnp.moveaxis(array, -1, 0)
+def _over_chunks(layout: Layout, array: Float[Array, "*k C"], absent: Array) -> Float[Array, "most *k D"]:
+    padded = jnp.concatenate([array, absent[..., None]], axis=-1)
+    return jnp.moveaxis(padded[..., layout.chunk_table], -1, 0)
 
 
-def factorise(steps: Float[Array, "m m D N"]) -> CyclicFactors:
+def factorise(layout: Layout, steps: Float[Array, "m m P"]) -> CyclicFactors:
     """Factorise the recurrence with step matrices M_n."""
 
     def compose(matrices: Array) -> Array:
         total, _ = jax.lax.scan(lambda done, step: (product(step, done), None), matrices[0], matrices[1:])
         return total
 
+    eye = jnp.eye(steps.shape[0])
     chunks = compose(_inside_chunks(steps))
-    period = compose(_over_chunks(chunks))
-    closing = jnp.linalg.inv(jnp.moveaxis(jnp.eye(steps.shape[0])[:, :, None] - period, -1, 0))
+    period = compose(_over_chunks(layout, chunks, eye))
+    closing = jnp.linalg.inv(jnp.moveaxis(eye[:, :, None] - period, -1, 0))
     return CyclicFactors(steps, chunks, closing)
 
 
-def solve(factors: CyclicFactors, right: Float[Array, "m D N"]) -> Float[Array, "m D N"]:
+def solve(layout: Layout, factors: CyclicFactors, right: Float[Array, "m P"]) -> Float[Array, "m P"]:
     """The periodic x_n for right sides d_n, which belong to the step from node n to the next."""
 
     def end(x: Array, step: tuple[Array, Array]) -> tuple[Array, None]:
@@ -88,11 +88,16 @@ def solve(factors: CyclicFactors, right: Float[Array, "m D N"]) -> Float[Array, 
     def pass_on(x: Array, step: tuple[Array, Array]) -> tuple[Array, Array]:
         return apply(step[0], x) + step[1], x
 
+    size = right.shape[0]
     inside = (_inside_chunks(factors.steps), _inside_chunks(right))
-    chunk_sides, _ = jax.lax.scan(end, jnp.zeros_like(inside[1][0]), inside)
-    over = (_over_chunks(factors.chunks), _over_chunks(chunk_sides))
+    sides, _ = jax.lax.scan(end, jnp.zeros_like(inside[1][0]), inside)
+    over = (
+        _over_chunks(layout, factors.chunks, jnp.eye(size)),
+        _over_chunks(layout, sides, jnp.zeros(size)),
+    )
     period_side, _ = jax.lax.scan(end, jnp.zeros_like(over[1][0]), over)
     start = jnp.einsum("dij,jd->id", factors.closing, period_side)
-    _, chunk_starts = jax.lax.scan(pass_on, start, over)
-    _, nodes = jax.lax.scan(pass_on, jnp.moveaxis(chunk_starts, 0, -1), inside)
+    _, starts = jax.lax.scan(pass_on, start, over)
+    present = layout.chunk_table < factors.chunks.shape[-1]
+    _, nodes = jax.lax.scan(pass_on, jnp.moveaxis(starts, 0, -1)[:, present], inside)
     return jnp.moveaxis(nodes, 0, -1).reshape(right.shape)

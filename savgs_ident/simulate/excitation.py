@@ -7,8 +7,10 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 from numpy.typing import ArrayLike
 
-from savgs_ident.model.quarter_car import Inputs, Link
+from savgs_ident.model.quarter_car import Inputs
+from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
+from savgs_ident.simulate.mesh import Mesh
 
 
 class Excitation(NamedTuple):
@@ -35,16 +37,17 @@ def cam_excitation(frequency: ArrayLike, peak_to_peak: float, link_angle: float)
 
 
 def _synthesise(harmonics: Array, omega: Array, phase: Array) -> tuple[Array, Array]:
-    """Value and time derivative at the nodes, both (D, N)."""
+    """Value and time derivative at the nodes, both (P,), from harmonics (P, K)."""
     order = jnp.arange(harmonics.shape[1])
-    terms = harmonics[:, :, None] * jnp.exp(1j * order[None, :, None] * phase[:, None, :])
-    rates = 1j * order[None, :, None] * omega[:, None, None] * terms
-    return jnp.sum(terms.real, axis=1), jnp.sum(rates.real, axis=1)
+    terms = harmonics * jnp.exp(1j * order * phase[:, None])
+    return jnp.sum(terms.real, axis=1), jnp.sum((1j * order * terms).real, axis=1) * omega
 
 
-def inputs_at(excitation: Excitation, phase: Float[Array, "D N"]) -> Inputs:
-    """Road and link at phases [rad] of the period; every field is of shape (D, N)."""
-    omega = 2.0 * jnp.pi * excitation.frequency
+def inputs_at(excitation: Excitation, mesh: Mesh) -> Inputs:
+    """Road and link at the nodes of a mesh; every field is of shape (P,)."""
+    dwell, phase = mesh.layout.dwell, jnp.asarray(mesh.phase)
+    omega = 2.0 * jnp.pi * excitation.frequency[dwell]
     return Inputs(
-        Road(*_synthesise(excitation.road, omega, phase)), Link(*_synthesise(excitation.link, omega, phase))
+        Road(*_synthesise(excitation.road[dwell], omega, phase)),
+        Link(*_synthesise(excitation.link[dwell], omega, phase)),
     )

@@ -10,7 +10,10 @@ the map's own derivative, converge as fast as they do on equal steps.
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Array, Float
 from numpy.typing import NDArray
+
+from savgs_ident.simulate.layout import Layout
 
 SPREAD = 0.5
 """Share of the nodes that follows the accelerations; the rest is spread evenly."""
@@ -21,37 +24,42 @@ _SMOOTHING_TIME = 3e-3
 
 
 class Mesh(NamedTuple):
-    """Nodes over one period of D dwells, N each.
+    """Nodes over one period of every dwell, flat as ``layout`` says.
 
     Attributes:
-        phase: phase of the nodes [rad], (D, N), growing from 0.
-        gap: phase from each node to the next, cyclically [rad], (D, N); sums to 2 pi.
-        weight: quadrature weights of the mean over the period, (D, N); sum to 1.
+        layout: how many nodes belong to which dwell.
+        phase: phase of the nodes [rad], (P,), growing from 0 in every dwell.
+        gap: phase from each node to the next, cyclically [rad], (P,); sums to 2 pi over a dwell.
+        weight: quadrature weights of the mean over the period, (P,); sum to 1 over a dwell.
     """
 
-    phase: NDArray[np.float64]
-    gap: NDArray[np.float64]
-    weight: NDArray[np.float64]
+    layout: Layout
+    phase: Float[Array | np.ndarray, " P"]
+    gap: Float[Array | np.ndarray, " P"]
+    weight: Float[Array | np.ndarray, " P"]
 
 
-def uniform_mesh(dwells: int, nodes: int) -> Mesh:
-    """Equal steps for every dwell."""
-    phase = np.tile(2.0 * np.pi * np.arange(nodes) / nodes, (dwells, 1))
-    return Mesh(phase, np.full_like(phase, 2.0 * np.pi / nodes), np.full_like(phase, 1.0 / nodes))
+def uniform_mesh(layout: Layout) -> Mesh:
+    """Equal steps in every dwell."""
+    return _stack(layout, [2.0 * np.pi * np.arange(count) / count for count in layout.counts])
 
 
 def adapted_mesh(
-    mesh: Mesh, accelerations: NDArray[np.float64], frequency: NDArray[np.float64], nodes: int
+    mesh: Mesh, accelerations: NDArray[np.float64], frequency: NDArray[np.float64], layout: Layout
 ) -> Mesh:
-    """``nodes`` nodes per dwell that follow ``accelerations`` (A, D, n) known on an earlier ``mesh``.
+    """Nodes that follow ``accelerations`` (A, P) known on an earlier ``mesh``, dwells at ``frequency`` [Hz].
 
     The accelerations may have any units: each counts by the share of its own total variation.
     """
-    rates = np.abs(np.roll(accelerations, -1, axis=-1) - accelerations)
-    totals = np.maximum(rates.sum(axis=-1, keepdims=True), np.finfo(float).tiny)
-    share = (rates / totals).mean(axis=0)
+    rates = np.abs(accelerations[:, mesh.layout.following] - accelerations)
     width = np.minimum(_SMOOTHING, _SMOOTHING_TIME * frequency)
-    return _stack([_nodes_of_dwell(*row, nodes) for row in zip(mesh.phase, share, width, strict=True)])
+    rows = []
+    for dwell, count in enumerate(layout.counts):
+        mine = mesh.layout.dwell == dwell
+        totals = np.maximum(rates[:, mine].sum(axis=1, keepdims=True), np.finfo(float).tiny)
+        share = (rates[:, mine] / totals).mean(axis=0)
+        rows.append(_nodes_of_dwell(np.asarray(mesh.phase)[mine], share, width[dwell], count))
+    return _stack(layout, rows)
 
 
 def _nodes_of_dwell(phase: np.ndarray, share: np.ndarray, width: float, nodes: int) -> np.ndarray:
@@ -59,12 +67,10 @@ def _nodes_of_dwell(phase: np.ndarray, share: np.ndarray, width: float, nodes: i
     grid = 2.0 * np.pi * np.arange(_FINE + 1) / _FINE
     edges = np.append(phase, phase[0] + 2.0 * np.pi)
     cumulative = np.append(0.0, np.cumsum(share))
-    wrapped = np.interp(grid, edges, cumulative)
-    density = _smoothed(np.diff(wrapped), width)
-    total = (1.0 - SPREAD) * grid / (2.0 * np.pi) + SPREAD * np.append(
-        0.0, np.cumsum(density)
-    ) / density.sum()
-    return np.interp(np.arange(nodes) / nodes, total, grid)
+    density = np.maximum(_smoothed(np.diff(np.interp(grid, edges, cumulative)), width), 0.0)
+    followed = np.append(0.0, np.cumsum(density)) / max(density.sum(), np.finfo(float).tiny)
+    total = (1.0 - SPREAD) * grid / (2.0 * np.pi) + SPREAD * followed
+    return np.interp(np.arange(nodes) / nodes, total / total[-1], grid)
 
 
 def _smoothed(density: np.ndarray, width: float) -> np.ndarray:
@@ -73,13 +79,15 @@ def _smoothed(density: np.ndarray, width: float) -> np.ndarray:
     return np.fft.irfft(np.fft.rfft(density) * np.exp(-2.0 * (np.pi * order * width) ** 2), density.size)
 
 
-def _stack(rows: list[np.ndarray]) -> Mesh:
-    phase = np.stack(rows)
-    nodes = phase.shape[1]
-    gap = np.diff(phase, axis=1, append=phase[:, :1] + 2.0 * np.pi)
-    uniform = 2.0 * np.pi * np.arange(nodes) / nodes
-    spectrum = np.fft.rfft(phase - uniform, axis=1)
-    order = np.arange(spectrum.shape[1])
+def _stack(layout: Layout, rows: list[np.ndarray]) -> Mesh:
+    gaps = [np.diff(phase, append=phase[0] + 2.0 * np.pi) for phase in rows]
+    return Mesh(layout, *(np.concatenate(part) for part in (rows, gaps, [_weights(phase) for phase in rows])))
+
+
+def _weights(phase: np.ndarray) -> np.ndarray:
+    """d(phase)/d(node number), spectrally, as a share of the period."""
+    nodes = phase.size
+    spectrum = np.fft.rfft(phase - 2.0 * np.pi * np.arange(nodes) / nodes)
+    order = np.arange(spectrum.size)
     order[-1] = 0
-    slope = 1.0 + np.fft.irfft(1j * order * spectrum, nodes, axis=1)
-    return Mesh(phase, gap, slope / nodes)
+    return (1.0 + np.fft.irfft(1j * order * spectrum, nodes)) / nodes

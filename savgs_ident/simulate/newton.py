@@ -19,6 +19,7 @@ from savgs_ident.simulate.collocation import (
     solve_linearised,
     step_defects,
 )
+from savgs_ident.simulate.layout import Layout
 
 TOLERANCE = 1e-7
 """Largest last Newton step, relative to the size of the motion: the error left is far smaller."""
@@ -44,12 +45,24 @@ class _Progress(NamedTuple):
     share: Float[Array, " D"]
 
 
-def motion_scale(model: QuarterCar, inputs: Inputs, frequency: Float[Array, " D"]) -> Float[Array, "m D 1"]:
+def motion_scale(
+    model: QuarterCar, inputs: Inputs, frequency: Float[Array, " D"], layout: Layout
+) -> Float[Array, "m P"]:
     """A typical size of every state: that of the road's motion, seen over an arm of a third of a metre."""
-    lift = (jnp.max(inputs.road.height, axis=-1) - jnp.min(inputs.road.height, axis=-1)) / 2.0
+    lift = _amplitude(inputs.road.height, layout)
     speed = 2.0 * jnp.pi * frequency * lift
     states = [jnp.full_like(lift, state.scale) for state in model.states]
-    return jnp.stack([lift, 3.0 * lift, speed, 3.0 * speed, *states])[:, :, None]
+    return jnp.stack([lift, 3.0 * lift, speed, 3.0 * speed, *states])[:, layout.dwell]
+
+
+def _over_dwells(values: Float[Array, " P"], layout: Layout) -> Float[Array, " D"]:
+    """The largest value in each dwell; NaN where one is NaN."""
+    finite = jnp.where(jnp.isnan(values), jnp.inf, values)
+    return jax.ops.segment_max(finite, layout.dwell, len(layout.counts), indices_are_sorted=True)
+
+
+def _amplitude(values: Float[Array, " P"], layout: Layout) -> Float[Array, " D"]:
+    return (_over_dwells(values, layout) + _over_dwells(-values, layout)) / 2.0
 
 
 def rates_of(at: Trajectory) -> Array:
@@ -58,11 +71,11 @@ def rates_of(at: Trajectory) -> Array:
 
 
 def _newton_step(
-    model: QuarterCar, p: Values, at: Trajectory, inputs: Inputs, steps: Array
+    model: QuarterCar, p: Values, at: Trajectory, inputs: Inputs, layout: Layout, steps: Array
 ) -> tuple[Trajectory, Linearised]:
-    lin = linearise(model, p, at, inputs, steps)
+    lin = linearise(model, p, at, inputs, layout, steps)
     rate = rates_of(at).at[2:].add(lin.imbalance)
-    return solve_linearised(model, lin, step_defects(model, at, rate, steps), lin.imbalance), lin
+    return solve_linearised(layout, lin, step_defects(model, at, rate, layout, steps), lin.imbalance), lin
 
 
 def solve_newton(
@@ -70,8 +83,9 @@ def solve_newton(
     p: Values,
     start: Trajectory,
     inputs: Inputs,
-    steps: Float[Array, "D N"],
-    scale: Float[Array, "m D 1"],
+    layout: Layout,
+    steps: Float[Array, " P"],
+    scale: Float[Array, "m P"],
     limit: int,
 ) -> NewtonResult:
     """Iterate until every dwell's step is below :data:`TOLERANCE` or ``limit`` iterations are used."""
@@ -79,11 +93,11 @@ def solve_newton(
     def advance(progress: _Progress) -> _Progress:
         before = progress.result
         at = before.trajectory
-        change, lin = _newton_step(model, p, at, inputs, steps)
-        length = jnp.max(jnp.abs(change.x) / scale, axis=(0, 2))
+        change, lin = _newton_step(model, p, at, inputs, layout, steps)
+        length = _over_dwells(jnp.max(jnp.abs(change.x) / scale, axis=0), layout)
         damped = jnp.maximum(progress.share / 2.0, LEAST_SHARE)
         share = jnp.where(length > before.last_step, damped, jnp.minimum(1.0, 2.0 * progress.share))
-        taken = jnp.minimum(share, TRUST / length)[:, None]
+        taken = jnp.minimum(share, TRUST / length)[layout.dwell]
         moved = Trajectory(at.x + taken * change.x, at.y + taken * change.y)
         return _Progress(NewtonResult(moved, lin, length, before.iterations + 1), share)
 
@@ -91,8 +105,8 @@ def solve_newton(
         step = progress.result.last_step
         return jnp.any(step > TOLERANCE) & jnp.all(jnp.isfinite(step)) & (progress.result.iterations < limit)
 
-    shape = jax.eval_shape(lambda: linearise(model, p, start, inputs, steps))
+    shape = jax.eval_shape(lambda: linearise(model, p, start, inputs, layout, steps))
     blank = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
-    far = jnp.full(start.x.shape[1], jnp.finfo(jnp.float64).max)
+    far = jnp.full(len(layout.counts), jnp.finfo(jnp.float64).max)
     begin = _Progress(NewtonResult(start, blank, far, jnp.array(0)), jnp.ones_like(far))
     return jax.lax.while_loop(unfinished, advance, begin).result

@@ -24,6 +24,7 @@ from jaxtyping import Array, Complex, Float, Int
 from savgs_ident.core.status import Status
 from savgs_ident.model.kinematics import Values
 from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.section import TRAVEL, section_curves
 from savgs_ident.model.sensors import read_sensors
 from savgs_ident.simulate.collocation import (
     Linearised,
@@ -34,6 +35,7 @@ from savgs_ident.simulate.collocation import (
 )
 from savgs_ident.simulate.cyclic import solve_nodes
 from savgs_ident.simulate.excitation import Excitation, inputs_at
+from savgs_ident.simulate.layout import Layout, layout_for
 from savgs_ident.simulate.mesh import Mesh, adapted_mesh, uniform_mesh
 from savgs_ident.simulate.newton import TOLERANCE, motion_scale, solve_newton
 
@@ -42,18 +44,18 @@ from savgs_ident.simulate.newton import TOLERANCE, motion_scale, solve_newton
 class PeriodicSettings:
     """How finely to solve.
 
-    ``coarse`` and ``nodes`` per period (multiples of 16), ``adaptations`` of the nodes to the solution, at
-    most ``iterations`` of Newton's method each time.
+    ``nodes`` per period, more in proportion to the period of dwells below ``slow`` [Hz]; ``adaptations`` of the
+    nodes to the solution, at most ``iterations`` of Newton's method each time.
     """
 
-    coarse: int = 96
     nodes: int = 256
+    slow: float = 1.4
     adaptations: int = 2
     iterations: int = 60
 
 
 class PeriodicSolution(eqx.Module):
-    """Periodic motions of D dwells on N nodes, with what is needed to differentiate them.
+    """Periodic motions of D dwells on P nodes, with what is needed to differentiate them.
 
     ``last_step`` is the last Newton step of each dwell relative to the size of its motion, (D,).
     """
@@ -66,9 +68,10 @@ class PeriodicSolution(eqx.Module):
     iterations: Int[Array, ""]
 
     def status(self) -> tuple[Status, ...]:
-        """How each dwell ended."""
-        finite = np.isfinite(np.asarray(self.trajectory.x)).all(axis=(0, 2))
-        small = np.asarray(self.last_step) <= TOLERANCE
+        """How each dwell ended; a linkage beyond its travel counts as not finite."""
+        step, layout = np.asarray(self.last_step), self.mesh.layout
+        swing = np.maximum.reduceat(np.abs(np.asarray(self.trajectory.x[1])), layout.starts)
+        finite, small = np.isfinite(step) & (swing <= TRAVEL), step <= TOLERANCE
         return tuple(
             Status.CONVERGED if ok and done else Status.MAX_ITERATIONS if ok else Status.NOT_FINITE
             for ok, done in zip(finite, small, strict=True)
@@ -76,7 +79,7 @@ class PeriodicSolution(eqx.Module):
 
 
 def _steps(excitation: Excitation, mesh: Mesh) -> Array:
-    return jnp.asarray(mesh.gap) / (2.0 * jnp.pi * excitation.frequency[:, None])
+    return jnp.asarray(mesh.gap) / (2.0 * jnp.pi * excitation.frequency[mesh.layout.dwell])
 
 
 @eqx.filter_jit
@@ -84,17 +87,17 @@ def solve_on_mesh(
     model: QuarterCar, p: Values, excitation: Excitation, mesh: Mesh, start: Trajectory, limit: int
 ) -> PeriodicSolution:
     """Newton's method on given nodes from a given start."""
-    mesh = Mesh(*(jnp.asarray(part) for part in mesh))
-    inputs = inputs_at(excitation, mesh.phase)
-    scale = motion_scale(model, inputs, excitation.frequency)
-    result = solve_newton(model, p, start, inputs, _steps(excitation, mesh), scale, limit)
+    inputs = inputs_at(excitation, mesh)
+    layout, steps = mesh.layout, _steps(excitation, mesh)
+    scale = motion_scale(model, inputs, excitation.frequency, layout)
+    result = solve_newton(model, p, start, inputs, layout, steps, scale, limit)
     return PeriodicSolution(excitation, mesh, *result)
 
 
 @eqx.filter_jit
-def _riding_the_road(model: QuarterCar, excitation: Excitation, phase: Array) -> Trajectory:
+def _riding_the_road(model: QuarterCar, excitation: Excitation, mesh: Mesh) -> Trajectory:
     """The rig carried along by the road as one: where a cold start begins."""
-    road = inputs_at(excitation, phase).road
+    road = inputs_at(excitation, mesh).road
     rest = jnp.zeros_like(road.height)
     states = [road.height if state.slips else rest for state in model.states]
     x = jnp.stack([road.height, rest, road.velocity, rest, *states])
@@ -105,26 +108,27 @@ def _carry_over(trajectory: Trajectory, old: Mesh, new: Mesh) -> Trajectory:
     """A trajectory known on old nodes, at new ones, by linear interpolation."""
 
     def moved(values: np.ndarray) -> np.ndarray:
-        out = np.empty((*values.shape[:2], new.phase.shape[1]))
-        for dwell, (phase, wanted) in enumerate(zip(old.phase, new.phase, strict=True)):
+        out = np.empty((values.shape[0], new.layout.total))
+        for dwell in range(len(new.layout.counts)):
+            here, there = old.layout.dwell == dwell, new.layout.dwell == dwell
             for row in range(values.shape[0]):
-                out[row, dwell] = np.interp(wanted, phase, values[row, dwell], period=2.0 * np.pi)
+                phase, wanted = np.asarray(old.phase)[here], np.asarray(new.phase)[there]
+                out[row, there] = np.interp(wanted, phase, values[row, here], period=2.0 * np.pi)
         return out
 
     return Trajectory(*(jnp.asarray(moved(np.asarray(part))) for part in trajectory))
 
 
 def adapt(
-    model: QuarterCar, p: Values, solution: PeriodicSolution, nodes: int, limit: int
+    model: QuarterCar, p: Values, solution: PeriodicSolution, layout: Layout, limit: int
 ) -> PeriodicSolution:
     """The solution again, on nodes that follow its accelerations."""
-    old = Mesh(*(np.asarray(part) for part in solution.mesh))
     accelerations = np.asarray(solution.trajectory.y[:2])
     if not np.isfinite(accelerations).all():
         return solution
     frequency = np.asarray(solution.excitation.frequency)
-    mesh = adapted_mesh(old, accelerations, frequency, nodes)
-    start = _carry_over(solution.trajectory, old, mesh)
+    mesh = adapted_mesh(solution.mesh, accelerations, frequency, layout)
+    start = _carry_over(solution.trajectory, solution.mesh, mesh)
     return solve_on_mesh(model, p, solution.excitation, mesh, start, limit)
 
 
@@ -133,11 +137,13 @@ def simulate_periodic(
 ) -> PeriodicSolution:
     """Periodic motions from a cold start; look at ``status()`` of the result before using it."""
     settings = settings or PeriodicSettings()
-    mesh = uniform_mesh(excitation.frequency.shape[0], settings.coarse)
-    start = _riding_the_road(model, excitation, jnp.asarray(mesh.phase))
+    frequency = np.asarray(excitation.frequency)
+    layout = layout_for(frequency, settings.nodes, settings.slow)
+    mesh = uniform_mesh(layout)
+    start = _riding_the_road(model, excitation, mesh)
     solution = solve_on_mesh(model, p, excitation, mesh, start, settings.iterations)
     for _ in range(settings.adaptations):
-        solution = adapt(model, p, solution, settings.nodes, settings.iterations)
+        solution = adapt(model, p, solution, layout, settings.iterations)
     return solution
 
 
@@ -148,15 +154,17 @@ def resolve(
     return solve_on_mesh(model, p, solution.excitation, solution.mesh, solution.trajectory, limit)
 
 
-def _readings(p: Values, trajectory: Trajectory) -> Float[Array, "D C N"]:
-    at_nodes = jax.vmap(jax.vmap(partial(read_sensors, p)))
-    return jnp.stack(at_nodes(trajectory.x[1], trajectory.y[0]), axis=1)
+def _readings(p: Values, trajectory: Trajectory) -> Float[Array, "P C"]:
+    at_nodes = jax.vmap(partial(read_sensors, p))
+    return jnp.stack(at_nodes(trajectory.x[1], trajectory.y[0]), axis=-1)
 
 
-def _analyse(signals: Float[Array, "D C N"], mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
+def _analyse(signals: Float[Array, "P C"], mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
     order = jnp.arange(orders + 1)
-    kernel = jnp.where(order == 0, 1.0, 2.0)[:, None] * jnp.exp(-1j * order[:, None] * mesh.phase[:, None, :])
-    return jnp.einsum("dcn,dkn->dck", signals, kernel * mesh.weight[:, None, :])
+    kernel = jnp.where(order == 0, 1.0, 2.0) * jnp.exp(-1j * order * jnp.asarray(mesh.phase)[:, None])
+    terms = signals[:, :, None] * (kernel * jnp.asarray(mesh.weight)[:, None])[:, None, :]
+    layout = mesh.layout
+    return jax.ops.segment_sum(terms, layout.dwell, len(layout.counts), indices_are_sorted=True)
 
 
 @eqx.filter_jit
@@ -177,17 +185,19 @@ def harmonic_sensitivities(
     One factorisation, that of the last Newton step, serves all parameters.
     """
     lin, at, mesh = solution.linearised, solution.trajectory, solution.mesh
-    inputs = inputs_at(solution.excitation, mesh.phase)
+    inputs, layout = inputs_at(solution.excitation, mesh), mesh.layout
     steps = _steps(solution.excitation, mesh)
     parts = (*at.x, *at.y)
     still = Trajectory(jnp.zeros_like(at.x), jnp.zeros_like(at.y))
 
     def along(direction: Array) -> Array:
         tangent = {name: jnp.zeros_like(p[name]) for name in p} | dict(zip(names, direction, strict=True))
-        _, change = jax.jvp(lambda q: residual_at_nodes(model, q, parts, inputs), (dict(p),), (tangent,))
+        _, change = jax.jvp(
+            lambda q: residual_at_nodes(model, q, section_curves(q), parts, inputs), (dict(p),), (tangent,)
+        )
         imbalance = -solve_nodes(lin.mass, change[:, None])[:, 0]
         rate = jnp.concatenate([jnp.zeros_like(at.x[2:4]), imbalance])
-        moved = solve_linearised(model, lin, step_defects(model, still, rate, steps), imbalance)
+        moved = solve_linearised(layout, lin, step_defects(model, still, rate, layout, steps), imbalance)
         _, signals = jax.jvp(_readings, (dict(p), at), (tangent, moved))
         return _analyse(signals, mesh, orders)
 
@@ -201,7 +211,7 @@ def truncation_error(
 
     The error of ``solution`` itself is about four thirds of it (the rule is of second order).
     """
-    nodes = 2 * solution.mesh.phase.shape[1]
-    finer = adapt(model, p, solution, nodes, PeriodicSettings.iterations)
+    doubled = Layout(tuple(2 * count for count in solution.mesh.layout.counts))
+    finer = adapt(model, p, solution, doubled, PeriodicSettings.iterations)
     coarse, fine = (harmonics(p, each, orders) for each in (solution, finer))
     return jnp.max(jnp.abs(coarse - fine)[..., 1:], axis=-1) / jnp.abs(fine[..., 1])

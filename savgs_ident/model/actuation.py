@@ -1,0 +1,105 @@
+"""What moves the single link: a motion imposed from outside, or a drive with states of its own.
+
+A simulation asks either for the same things, so that it needs not know which it has: the link's angle and
+velocity from the state, and the state's rates under the torque with which the strut turns the link.
+"""
+
+from abc import abstractmethod
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+from numpy.typing import ArrayLike
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.model.kinematics import Values, strut_length
+from savgs_ident.model.profile import AbstractProfile, Constant, Sine, tabulated
+from savgs_ident.model.quarter_car import Link
+from savgs_ident.recordings.recording import Recording
+
+Scalar = Float[Array, ""]
+
+
+class AbstractActuation(eqx.Module):
+    """How the link moves; ``scales`` are the typical sizes of its states, in their units, for tolerances."""
+
+    scales: eqx.AbstractClassVar[tuple[float, ...]]
+
+    @abstractmethod
+    def start_angle(self, t: Scalar) -> Scalar:
+        """Link angle [rad] at which a motion that begins at rest at time ``t`` [s] begins."""
+
+    @abstractmethod
+    def start(self, p: Values, t: Scalar, load: Scalar) -> Float[Array, " k"]:
+        """State in which the link rests there against a ``load`` [N m]."""
+
+    @abstractmethod
+    def link(self, t: Scalar, state: Float[Array, " k"]) -> Link:
+        """The link's angle and velocity."""
+
+    @abstractmethod
+    def rate(self, p: Values, t: Scalar, state: Float[Array, " k"], load: Scalar) -> Float[Array, " k"]:
+        """Time derivatives of the state; ``load`` [N m] turns the link towards greater angles."""
+
+
+class ImposedLink(AbstractActuation):
+    """A link whose angle [rad] follows ``profile`` whatever the load."""
+
+    profile: AbstractProfile
+    scales = ()
+
+    def start_angle(self, t: Scalar) -> Scalar:
+        """The imposed angle."""
+        return self.profile.value(t)
+
+    def start(self, p: Values, t: Scalar, load: Scalar) -> Float[Array, " k"]:
+        """Nothing: there is no state."""
+        return jnp.zeros(0)
+
+    def link(self, t: Scalar, state: Float[Array, " k"]) -> Link:
+        """The imposed angle and velocity."""
+        return Link(self.profile.value(t), self.profile.rate(t))
+
+    def rate(self, p: Values, t: Scalar, state: Float[Array, " k"], load: Scalar) -> Float[Array, " k"]:
+        """Nothing: there is no state."""
+        return jnp.zeros(0)
+
+
+def held_link(angle: float) -> ImposedLink:
+    """A rigid link at ``angle`` [rad]."""
+    return ImposedLink(Constant(angle))
+
+
+def harmonic_link(mean: float, amplitude: float, frequency: float, settle: float = 0.0) -> ImposedLink:
+    """A link that swings about ``mean`` [rad] by ``amplitude`` [rad] at ``frequency`` [Hz], growing smoothly.
+
+    The swing is at its greatest angle at t = 0, and grows from nothing during the first ``settle`` [s].
+    """
+    return ImposedLink(Sine(amplitude, frequency, mean, 0.0, settle))
+
+
+def tabulated_link(time: ArrayLike, angle: ArrayLike, source: str = "") -> ImposedLink:
+    """A link angle [rad] given at times [s], with a C1 curve between.
+
+    Raises :class:`InputError` as :func:`savgs_ident.model.profile.tabulated` does.
+    """
+    return ImposedLink(tabulated(time, angle, source))
+
+
+def recorded_link(recording: Recording) -> ImposedLink:
+    """The link's motion in a recorded test. Raises :class:`InputError` if it was not recorded."""
+    if "link_angle" not in recording.channels:
+        raise InputError(
+            "the link angle was not recorded",
+            test=recording.name,
+            channel="link_angle",
+            remedy="hold the link at its nominal angle instead",
+        )
+    channel = recording.channels["link_angle"]
+    return tabulated_link(channel.time, channel.values, channel.source)
+
+
+def link_torque(p: Values, strut: Scalar, theta_LW: Scalar, theta_SL: Scalar) -> Scalar:
+    """Torque [N m] towards greater link angles of a strut that pushes apart with a force ``strut`` [N]."""
+    return strut * jax.grad(strut_length, argnums=2)(p, theta_LW, theta_SL)

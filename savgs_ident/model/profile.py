@@ -1,0 +1,133 @@
+"""Functions of time: what a road's height or a link's angle may do.
+
+Every profile has a value and, from it by differentiation, a rate; nobody writes a derivative twice.
+
+    >>> profile = Sine(amplitude=0.01375, frequency=2.0, mean=0.0, phase=0.0, settle=0.0)
+    >>> round(float(profile.value(jnp.asarray(0.5))), 6), round(float(profile.rate(jnp.asarray(0.5))), 6)
+    (0.01375, 0.0)
+"""
+
+from abc import abstractmethod
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from numpy.typing import ArrayLike
+from scipy.interpolate import Akima1DInterpolator
+
+from savgs_ident.core.errors import InputError
+
+Scalar = Float[Array, ""]
+
+
+class AbstractProfile(eqx.Module):
+    """A quantity over time [s], continuously differentiable."""
+
+    @abstractmethod
+    def value(self, t: Scalar) -> Scalar:
+        """The quantity at time ``t`` [s], in its own unit."""
+
+    def rate(self, t: Scalar) -> Scalar:
+        """Its time derivative [unit/s]."""
+        return jax.jvp(self.value, (t,), (jnp.ones_like(t),))[1]
+
+
+class Constant(AbstractProfile):
+    """A quantity that stays as it is."""
+
+    level: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+
+    def value(self, t: Scalar) -> Scalar:
+        """The level, at any time."""
+        return self.level + jnp.zeros_like(t)
+
+
+class Sine(AbstractProfile):
+    """mean + amplitude w(t) cos(2 pi f t + phase), where w rises smoothly from 0 to 1 in ``settle`` [s].
+
+    ``amplitude`` and ``mean`` in the quantity's unit, ``frequency`` [Hz], ``phase`` [rad]. With ``settle`` = 0
+    the motion is steady from the start.
+    """
+
+    amplitude: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    frequency: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    mean: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    phase: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    settle: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+
+    def value(self, t: Scalar) -> Scalar:
+        """The quantity at time ``t`` [s]."""
+        share = jnp.where(self.settle > 0.0, t / jnp.where(self.settle > 0.0, self.settle, 1.0), 1.0)
+        wave = jnp.cos(2.0 * jnp.pi * self.frequency * t + self.phase)
+        return self.mean + self.amplitude * _smooth_rise(share) * wave
+
+
+def _smooth_rise(share: Scalar) -> Scalar:
+    """From 0 to 1 over shares 0 to 1, twice continuously differentiable."""
+    share = jnp.clip(share, 0.0, 1.0)
+    return share**3 * (10.0 + share * (6.0 * share - 15.0))
+
+
+class LinearSweep(AbstractProfile):
+    """amplitude sin(phi(t)) with a frequency dphi/dt that runs linearly and then stays.
+
+    From ``start`` [Hz] at t = 0 to ``end`` [Hz] at t = ``duration`` [s]; phi is the integral of the frequency.
+    A sweep from 0 Hz starts at rest.
+    """
+
+    amplitude: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    start: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    end: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    duration: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+
+    def value(self, t: Scalar) -> Scalar:
+        """The quantity at time ``t`` [s]."""
+        running = jnp.clip(t, 0.0, self.duration)
+        slope = (self.end - self.start) / self.duration
+        turns = (self.start + 0.5 * slope * running) * running + self.end * jnp.maximum(
+            t - self.duration, 0.0
+        )
+        return self.amplitude * jnp.sin(2.0 * jnp.pi * turns)
+
+
+class Tabulated(AbstractProfile):
+    """A curve through knots, C1, that holds its first and last value outside them.
+
+    ``time`` [s] of shape (n,), increasing; ``coefficients`` (4, n - 1) of the cubic between each two knots in
+    powers of the time since the earlier one, cubic first.
+    """
+
+    time: Float[Array, " n"]
+    coefficients: Float[Array, "4 m"]
+
+    def value(self, t: Scalar) -> Scalar:
+        """The quantity at time ``t`` [s]."""
+        inside = jnp.clip(t, self.time[0], self.time[-1])
+        found = jnp.searchsorted(self.time, inside, side="right", method="scan_unrolled") - 1
+        piece = jnp.clip(found, 0, self.coefficients.shape[1] - 1)
+        cubic, square, slope, level = jnp.unstack(self.coefficients[:, piece])
+        offset = inside - self.time[piece]
+        return ((cubic * offset + square) * offset + slope) * offset + level
+
+
+def tabulated(time: ArrayLike, values: ArrayLike, source: str = "") -> Tabulated:
+    """The modified Akima curve through (time [s], values): C1 and local, so that it does not ring at a step.
+
+    Raises :class:`InputError` for fewer than two points, arrays of unequal length, values that are not finite,
+    or times that do not increase.
+    """
+    knots, levels = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    remedy = "give two or more points, finite, with times that increase"
+    if knots.ndim != 1 or knots.shape != levels.shape or knots.size < 2:
+        raise InputError("the profile is no table of times and values", source=source, remedy=remedy)
+    if not (np.isfinite(knots).all() and np.isfinite(levels).all()):
+        raise InputError("the profile has a value that is not finite", source=source, remedy=remedy)
+    back = np.flatnonzero(np.diff(knots) <= 0.0)
+    if back.size:
+        raise InputError(
+            "the time does not increase", source=source, time=float(knots[back[0] + 1]), remedy=remedy
+        )
+    curve = Akima1DInterpolator(knots, levels, method="makima")
+    return Tabulated(jnp.asarray(knots), jnp.asarray(curve.c))

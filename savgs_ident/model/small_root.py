@@ -1,0 +1,83 @@
+"""Roots of small systems of equations, a few unknowns each, inside larger computations.
+
+Newton's method with the exact Jacobian. The forces of the rig are piecewise smooth in what is sought (a
+friction changes sides), so a step may land on another piece: it is repeated until the step that would follow
+is negligible. A root that was not found is NaN, never a number that looks like one.
+
+Derivatives, of any order and in either direction, come from the implicit function theorem at the root, not
+from the iterations.
+
+    >>> root = find_root(lambda x: x**2 - 2.0, jnp.ones(1), jnp.ones(1))
+    >>> round(float(root[0]), 12)
+    1.414213562373
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+PRECISION = 1e-11
+"""Largest Newton step left at a root, relative to the typical size of its unknown."""
+
+LIMIT = 30
+"""Most iterations."""
+
+Vector = Float[Array, " n"]
+
+
+class _Progress(NamedTuple):
+    root: Vector
+    residual: Vector
+    step_left: Float[Array, ""]
+    iterations: Array
+
+
+def solve_dense(matrix: Float[Array, "n n"], right: Vector) -> Vector:
+    """Solve a small linear system by Gaussian elimination with scalars, unrolled.
+
+    Rows are taken in the order given: for matrices whose leading minors do not vanish, such as mass matrices.
+    """
+    size = matrix.shape[0]
+    rows = [[*jnp.unstack(matrix[i]), right[i]] for i in range(size)]
+    for i in range(size):
+        rows[i] = [value / rows[i][i] for value in rows[i]]
+        for j in range(size):
+            if j != i:
+                factor = rows[j][i]
+                rows[j] = [mine - factor * other for mine, other in zip(rows[j], rows[i], strict=True)]
+    return jnp.stack([row[size] for row in rows])
+
+
+def find_root(
+    function: Callable[[Vector], Vector], start: Vector, scale: Vector, precision: float = PRECISION
+) -> Vector:
+    """The root (n,) of ``function`` that Newton's method reaches from ``start``; NaN if it reaches none.
+
+    ``scale`` (n,) is the typical size of each unknown. Where the function may be closed over traced values,
+    derivatives in these are exact.
+    """
+
+    def newton(function: Callable[[Vector], Vector], start: Vector) -> Vector:
+        def advance(now: _Progress) -> _Progress:
+            jacobian = jax.jacfwd(function)(now.root)
+            root = now.root - solve_dense(jacobian, now.residual)
+            residual = function(root)
+            # Where the same piece holds at the new point, the step that is left is what the old Jacobian says.
+            step_left = jnp.max(jnp.abs(solve_dense(jacobian, residual)) / scale)
+            return _Progress(root, residual, step_left, now.iterations + 1)
+
+        def unfinished(now: _Progress) -> Array:
+            return (now.step_left > precision) & (now.iterations < LIMIT)
+
+        begin = _Progress(start, function(start), jnp.asarray(jnp.inf, start.dtype), jnp.asarray(0))
+        end = jax.lax.while_loop(unfinished, advance, begin)
+        return jnp.where(end.step_left <= precision, end.root, jnp.nan)
+
+    def linear(function: Callable[[Vector], Vector], right: Vector) -> Vector:
+        return solve_dense(jax.jacfwd(function)(jnp.zeros_like(right)), right)
+
+    root: Vector = jax.lax.custom_root(function, start, newton, linear)
+    return root

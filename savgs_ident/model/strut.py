@@ -1,0 +1,36 @@
+"""Strut: spring and damper between the eye on the lower wishbone and the crank pin of the single link."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from savgs_ident.model.kinematics import Values, crank_pin
+from savgs_ident.model.section import Section
+
+
+class Link(NamedTuple):
+    """Imposed motion of the single link: angle [rad] and velocity [rad/s]."""
+
+    angle: Float[Array, ""]
+    velocity: Float[Array, ""]
+
+
+class Strut(NamedTuple):
+    """Length l_SD [m], its rate [m/s], and its slopes in theta_LW and in the link angle [m/rad]."""
+
+    length: Float[Array, ""]
+    rate: Float[Array, ""]
+    slope: Float[Array, ""]
+    link_slope: Float[Array, ""]
+
+
+def strut(p: Values, section: Section, omega: Float[Array, ""], link: Link) -> Strut:
+    """The strut at a section whose angle moves at ``omega`` [rad/s]."""
+    pin_y, pin_z = crank_pin(p, link.angle)
+    angle = p["theta_0"] + link.angle
+    span_y, span_z = pin_y - section.E_y, pin_z - section.E_z
+    length = jnp.sqrt(span_y**2 + span_z**2)
+    slope = -(span_y * section.E_y_slope + span_z * section.E_z_slope) / length
+    link_slope = p["l_SL"] * (span_z * jnp.cos(angle) - span_y * jnp.sin(angle)) / length
+    return Strut(length, slope * omega + link_slope * link.velocity, slope, link_slope)
