@@ -3,12 +3,17 @@
 Commands import what they need when they run, so that ``savgs-ident --help`` answers at once.
 """
 
+import sys
 from typing import Annotated
 
 import typer
 
 from savgs_ident import __version__
+from savgs_ident.cli.arguments import spread_values
+from savgs_ident.cli.bode_command import bode
+from savgs_ident.cli.fit_command import demo, fit
 from savgs_ident.cli.inspect_command import inspect
+from savgs_ident.cli.simulate_command import simulate
 
 app = typer.Typer(
     name="savgs-ident",
@@ -38,9 +43,10 @@ def _root(
     """
 
 
-app.command()(inspect)
+for _command in (demo, inspect, fit, bode, simulate):
+    app.command()(_command)
 
 
 def run() -> None:
     """Run the program on the arguments of the process."""
-    app()
+    app(args=spread_values(sys.argv[1:]))

@@ -1,8 +1,11 @@
 """A fit as the JSON object of ``fit.json``: SI throughout, the unit in the key or beside the value."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.errors import DataWarning
 from savgs_ident.fit.result import Fit
 from savgs_ident.report.campaign_summary import warning_record
 from savgs_ident.report.readings import READINGS
@@ -16,7 +19,7 @@ from savgs_ident.report.residuals import (
 )
 
 
-def fit_record(fit: Fit) -> dict[str, object]:
+def fit_record(fit: Fit, warnings: Sequence[DataWarning]) -> dict[str, object]:
     """The contract's keys first, then how the fit went and what it can tell.
 
     ``gap`` holds relative rms residuals [1] before and after the fit and of the noise alone ("floor"), and
@@ -56,7 +59,7 @@ def fit_record(fit: Fit) -> dict[str, object]:
         "orders": fit.orders,
         "starts": [{"chi2": chi2, "status": status.name.lower()} for chi2, status in fit.starts],
         "wall_s": fit.wall_s,
-        "warnings": [warning_record(warning) for warning in fit.measured.warnings],
+        "warnings": [warning_record(warning) for warning in warnings],
     }
 
 

@@ -12,10 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.rig import Rig
 from savgs_ident.core.status import Status
 from savgs_ident.effects.registry import build_model, model_parameters
 from savgs_ident.report.curves import ModelCurve, model_curve
+from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import Excitation
 from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 
@@ -107,3 +109,21 @@ def widest_gaps(known: NDArray[np.float64], count: int) -> NDArray[np.float64]:
         points.insert(gap + 1, middle)
         added.append(middle)
     return np.exp(np.sort(added))
+
+
+def measured_excitation(response: HarmonicResponse, rig: Rig) -> Excitation:
+    """The road and the link of the dwells as they were recorded; a link that was not stands still.
+
+    Raises :class:`InputError` if the road was not recorded.
+    """
+    if "road_height" not in response.channels:
+        raise InputError(
+            "the road was not recorded", channel="road_height", remedy="map the road channel in channels.toml"
+        )
+    road = response.harmonics[:, response.channel("road_height")]
+    if "link_angle" in response.channels:
+        link = response.harmonics[:, response.channel("link_angle")]
+    else:
+        link = np.zeros_like(road)
+        link[:, 0] = rig.parameters["psi_nominal"].value
+    return Excitation(jnp.asarray(response.frequency), jnp.asarray(road), jnp.asarray(link))

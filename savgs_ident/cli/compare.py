@@ -1,0 +1,47 @@
+"""A model solved under the road and link of measured dwells, and drawn against them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from savgs_ident.cli.console import Progress
+from savgs_ident.core.rig import Rig
+from savgs_ident.report.bode import bode_figure
+from savgs_ident.report.bode_record import Compared
+from savgs_ident.report.curves import measured_points
+from savgs_ident.report.picture import write_figure
+from savgs_ident.report.residuals import comparable, whitened
+from savgs_ident.report.solving import between, joined, measured_excitation, solve
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+
+
+def compare(rig: Rig, effects: Sequence[str], measured: HarmonicResponse, progress: Progress) -> Compared:
+    """Solve the model with and without its effects at the measured dwells."""
+    excitation = measured_excitation(measured, rig)
+    progress("solving the model at the dwells")
+    model = solve(rig, effects, excitation, measured.orders)
+    progress("solving SimQC at the dwells")
+    frictionless = solve(rig, (), excitation, measured.orders) if effects else model
+    used = comparable(measured, measured.orders) & model.ok[:, None, None]
+    return Compared(measured, model, frictionless, used)
+
+
+def draw_comparison(
+    rig: Rig, effects: Sequence[str], compared: Compared, out: Path, progress: Progress
+) -> tuple[Path, ...]:
+    """Write bode.png and bode.pdf, the models solved between the dwells too."""
+    gaps = between(compared.model.excitation)
+    orders = compared.measured.orders
+    label = "identified model" if rig.provenance else "model as drawn"
+    progress("solving the model between the dwells")
+    curves = [joined(compared.model, solve(rig, effects, gaps, orders)).curve(label)]
+    if effects:
+        progress("solving SimQC between the dwells")
+        curves.append(
+            joined(compared.frictionless, solve(rig, (), gaps, orders)).curve(
+                "the same without friction (SimQC)"
+            )
+        )
+    progress("drawing")
+    residuals = whitened(compared.measured, compared.model.harmonics, compared.used)
+    points = measured_points(compared.measured)
+    return write_figure(out, "bode", bode_figure("Model and measurement", points, curves, residuals))

@@ -1,0 +1,91 @@
+"""From a campaign to an identified rig and its files: what ``fit`` and ``demo`` have in common.
+
+Each result is written as soon as it is there, so that stopping during the pictures keeps the fit.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from savgs_ident.cli.compare import draw_comparison
+from savgs_ident.cli.console import Progress, Voice, complain
+from savgs_ident.cli.guard import NOT_TRUSTED, OK
+from savgs_ident.cli.models import ModelName, effects_of, free_parameters
+from savgs_ident.cli.selection import up_to_frequency
+from savgs_ident.core.rig import Rig, read_rig, write_rig
+from savgs_ident.effects.registry import model_parameters
+from savgs_ident.fit.least_squares import fit_least_squares
+from savgs_ident.fit.result import Fit
+from savgs_ident.fit.settings import FitSettings
+from savgs_ident.recordings.read import read_campaign
+from savgs_ident.report.bode_record import Compared
+from savgs_ident.report.files import prepare_folder, write_json
+from savgs_ident.report.fit_record import fit_record
+from savgs_ident.report.fit_text import fit_text
+from savgs_ident.report.provenance import provenance
+from savgs_ident.report.solving import Solved, measured_excitation
+from savgs_ident.report.terminal import plain
+from savgs_ident.responses.estimate import estimate_response
+from savgs_ident.simulate.compilation import use_persistent_cache
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to identify from what; ``free`` empty means the paper's parameters."""
+
+    campaign: Path
+    rig: Path
+    channels: Path | None
+    model: ModelName
+    free: tuple[str, ...]
+    settings: FitSettings
+    max_frequency: float | None
+    command: Sequence[str]
+
+
+def identify(job: Job, voice: Voice, out: Path) -> int:
+    """Fit, write fit.json, model.toml, bode.png and bode.pdf to ``out``, and tell; the exit code."""
+    prepare_folder(out)
+    use_persistent_cache()
+    drawing = read_rig(job.rig)
+    effects = effects_of(job.model)
+    free = free_parameters(job.free, job.model, model_parameters(drawing, effects))
+    with voice.working() as progress:
+        progress(f"reading {job.campaign}")
+        told = progress.fraction(f"reading {job.campaign}")
+        campaign = read_campaign(job.campaign, job.channels, progress=told)
+        progress("estimating responses")
+        measured = up_to_frequency(estimate_response(campaign, job.settings.orders), job.max_frequency)
+        fit = fit_least_squares(
+            measured, drawing, effects=effects, free=free, settings=job.settings, progress=progress
+        )
+        record = fit_record(fit, (*campaign.warnings, *measured.warnings))
+        files = [write_json(out / "fit.json", record), out / "model.toml"]
+        identified = replace(fit.rig, provenance=provenance(fit, campaign, job.command))
+        write_rig(identified, out / "model.toml")
+        files += _draw(fit, identified, out, progress)
+    voice.show(fit_text(fit), plain(""), plain("Written: " + ", ".join(str(file) for file in files)))
+    voice.hand_over(record)
+    return conclude(fit)
+
+
+def _draw(fit: Fit, rig: Rig, out: Path, progress: Progress) -> tuple[Path, ...]:
+    excitation = measured_excitation(fit.measured, rig)
+    model = Solved(excitation, fit.predicted, fit.dwell_status)
+    frictionless = Solved(excitation, fit.frictionless, fit.dwell_status)
+    compared = Compared(fit.measured, model, frictionless, fit.used)
+    return draw_comparison(rig, fit.effects, compared, out, progress)
+
+
+def conclude(fit: Fit) -> int:
+    """The exit code of a fit; says on standard error why one is not to be trusted."""
+    if fit.trusted:
+        return OK
+    if not fit.status.ok:
+        reason = fit.status.advice
+    elif not all(status.ok for status in fit.dwell_status):
+        reason = "the model's periodic motion was not found in every dwell"
+    else:
+        reason = "the data cannot tell every free parameter"
+    complain(f"Not to be trusted: {reason}.")
+    return NOT_TRUSTED
