@@ -11,8 +11,9 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PchipInterpolator, PPoly
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.rig import Rig
 
 REFERENCE_VELOCITY = 0.15
@@ -22,8 +23,9 @@ REFERENCE_VELOCITY = 0.15
 class DamperCurve(eqx.Module):
     """Force [N] against compression velocity [m/s] for unit damping: times ``c_sd`` it is the damper's force.
 
-    ``knots`` [m/s] of shape (n,); ``coefficients`` of shape (4, n + 1), cubic first, for the n - 1 intervals
-    between the knots and the straight continuation below and above them.
+    ``knots`` [m/s] of shape (n,); ``coefficients`` of shape (4, n + 1), cubic first, in velocities counted
+    from ``origins`` [m/s] of shape (n + 1,), for the n - 1 intervals between the knots and the straight
+    continuation below and above them.
     """
 
     knots: Float[np.ndarray, " n"]
@@ -39,19 +41,43 @@ class DamperCurve(eqx.Module):
 
 
 def equivalent_damping(velocity: np.ndarray, force: np.ndarray, amplitude: float) -> float:
-    """Energy-equivalent viscous coefficient [N s/m] of a table [m/s], [N] at a velocity amplitude [m/s]."""
-    curve = PchipInterpolator(velocity, force)
-    phase = np.linspace(0.0, 2.0 * np.pi, 4096, endpoint=False)
-    return float(2.0 * np.mean(curve(amplitude * np.sin(phase)) * np.sin(phase)) / amplitude)
+    """Energy-equivalent viscous coefficient [N s/m] of a table [m/s], [N] at a velocity amplitude [m/s].
+
+    The table may be narrower than the amplitude: beyond it the curve is the one of :func:`damper_curve`.
+    """
+    curve = _monotone_curve(velocity, force)
+    corners = np.clip(curve.x / amplitude, -1.0, 1.0)
+    turns = np.arcsin(np.unique(np.concatenate([[-1.0], corners, [1.0]])))
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    half, middle = np.diff(turns) / 2.0, (turns[1:] + turns[:-1]) / 2.0
+    sine = np.sin(middle[:, None] + half[:, None] * nodes)
+    # The way back is the way there: twice the half cycle.
+    energy = 2.0 * np.sum(half[:, None] * weights * curve(amplitude * sine) * sine)
+    return float(energy / (np.pi * amplitude))
+
+
+def _monotone_curve(velocity: np.ndarray, force: np.ndarray) -> PPoly:
+    """PCHIP through the table with a straight piece before and behind it, which hold on and on."""
+    table = PchipInterpolator(velocity, force)
+    first, last = table.derivative()(velocity[[0, -1]])
+    before = np.array([0.0, 0.0, first, force[0] - first])
+    behind = np.array([0.0, 0.0, last, force[-1]])
+    breaks = np.concatenate([velocity[:1] - 1.0, velocity, velocity[-1:] + 1.0])
+    return PPoly(np.column_stack([before, table.c, behind]), breaks)
 
 
 def damper_curve(rig: Rig) -> DamperCurve:
-    """The unit-damping curve of a rig's damper table, continued along its end slopes beyond the table."""
+    """The unit-damping curve of a rig's damper table, continued along its end slopes beyond the table.
+
+    Raises :class:`InputError` for a table that takes no energy at the reference velocity.
+    """
     velocity, force = np.asarray(rig.damper_velocity), np.asarray(rig.damper_force)
-    curve = PchipInterpolator(velocity, force)
-    slope = curve.derivative()
-    ends = [np.array([0.0, 0.0, slope(velocity[i]), force[i]])[:, None] for i in (0, -1)]
-    coefficients = np.concatenate([ends[0], curve.c, ends[1]], axis=1)
-    origins = np.concatenate([velocity[:1], velocity[:-1], velocity[-1:]])
     scale = equivalent_damping(velocity, force, REFERENCE_VELOCITY)
-    return DamperCurve(knots=velocity, coefficients=coefficients / scale, origins=origins)
+    if scale <= 0.0:
+        raise InputError(
+            f"damper table takes no energy at {REFERENCE_VELOCITY} m/s",
+            source=rig.name,
+            remedy="give a force there that resists the motion",
+        )
+    curve = _monotone_curve(velocity, force)
+    return DamperCurve(knots=velocity, coefficients=curve.c / scale, origins=curve.x[:-1])
