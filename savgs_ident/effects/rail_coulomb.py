@@ -29,6 +29,11 @@ to stick; over the tenths of a second of a stick it moves the anchor by less tha
 """
 
 
+def _held_within(x: Float[Array, ""], limit: Float[Array, ""]) -> Float[Array, ""]:
+    """``x`` held within -limit..limit. ``jnp.clip`` halves the slope in a limit of zero, at the null."""
+    return jnp.where(x > limit, limit, jnp.where(x < -limit, -limit, x))
+
+
 class RailCoulomb(AbstractEffect):
     """Load-dependent Coulomb friction of the rail with elasto-plastic presliding."""
 
@@ -48,11 +53,11 @@ class RailCoulomb(AbstractEffect):
         """The friction on the sprung mass [N], up positive."""
         slide = p["mu_r"] * signals.load
         stretch = signals.displacement - state[0]
-        return -jnp.clip(p["k_pre"] * stretch + p["c_pre"] * signals.velocity, -slide, slide)
+        return -_held_within(p["k_pre"] * stretch + p["c_pre"] * signals.velocity, slide)
 
     def rate(self, p: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:
         """The anchor's velocity [m/s]."""
         limit = p["mu_r"] * signals.load / p["k_pre"]
         stretch = signals.displacement - state[0]
-        dragged = (stretch - jnp.clip(stretch, -limit, limit)) / DRAG_TIME
+        dragged = (stretch - _held_within(stretch, limit)) / DRAG_TIME
         return jnp.stack([dragged + CREEP * stretch])
