@@ -27,14 +27,15 @@ def spread_values(words: Sequence[str]) -> list[str]:
     ['fit', '--free', 'mu_r', '--free', 'c_sd', '--quiet', 'run.csv']
     """
     out: list[str] = []
-    option, given = "", 0
+    option, first = "", False
     for word in words:
         if word in SEVERAL:
-            option, given = word, 0
-        elif option and given and SEVERAL[option](word):
+            option, first = word, True
+        elif option and first and not word.startswith("--"):
+            first = False
+        elif option and not first and SEVERAL[option](word):
             out.append(option)
-        elif option and given:
+        else:
             option = ""
-        given += bool(option) and word != option
         out.append(word)
     return out

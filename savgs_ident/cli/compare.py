@@ -10,17 +10,21 @@ from savgs_ident.report.bode_record import Compared
 from savgs_ident.report.curves import measured_points
 from savgs_ident.report.picture import write_figure
 from savgs_ident.report.residuals import comparable, whitened
-from savgs_ident.report.solving import between, joined, measured_excitation, solve
+from savgs_ident.report.solving import solve, solve_between, without_effects
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.measured import measured_excitation
+
+
+SIMQC_LABEL = "the same without friction (SimQC)"
 
 
 def compare(rig: Rig, effects: Sequence[str], measured: HarmonicResponse, progress: Progress) -> Compared:
     """Solve the model with and without its effects at the measured dwells."""
-    excitation = measured_excitation(measured, rig)
+    excitation = measured_excitation(measured, rig.parameters["psi_nominal"].value)
     progress("solving the model at the dwells")
     model = solve(rig, effects, excitation, measured.orders)
     progress("solving SimQC at the dwells")
-    frictionless = solve(rig, (), excitation, measured.orders) if effects else model
+    frictionless = solve(without_effects(rig, effects), effects, excitation, measured.orders)
     used = comparable(measured, measured.orders) & model.ok[:, None, None]
     return Compared(measured, model, frictionless, used)
 
@@ -29,18 +33,13 @@ def draw_comparison(
     rig: Rig, effects: Sequence[str], compared: Compared, out: Path, progress: Progress
 ) -> tuple[Path, ...]:
     """Write bode.png and bode.pdf, the models solved between the dwells too."""
-    gaps = between(compared.model.excitation)
-    orders = compared.measured.orders
     label = "identified model" if rig.provenance else "model as drawn"
     progress("solving the model between the dwells")
-    curves = [joined(compared.model, solve(rig, effects, gaps, orders)).curve(label)]
+    curves = [solve_between(rig, effects, compared.model).curve(label)]
     if effects:
         progress("solving SimQC between the dwells")
-        curves.append(
-            joined(compared.frictionless, solve(rig, (), gaps, orders)).curve(
-                "the same without friction (SimQC)"
-            )
-        )
+        frictionless = solve_between(without_effects(rig, effects), effects, compared.frictionless)
+        curves.append(frictionless.curve(SIMQC_LABEL))
     progress("drawing")
     residuals = whitened(compared.measured, compared.model.harmonics, compared.used)
     points = measured_points(compared.measured)

@@ -7,12 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from savgs_ident.cli.compare import draw_comparison
 from savgs_ident.cli.console import Progress, Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
 from savgs_ident.cli.models import ModelName, effects_of, free_parameters
 from savgs_ident.cli.selection import up_to_frequency
 from savgs_ident.core.rig import Rig, read_rig, write_rig
+from savgs_ident.core.status import Status
 from savgs_ident.effects.registry import model_parameters
 from savgs_ident.fit.least_squares import fit_least_squares
 from savgs_ident.fit.result import Fit
@@ -23,10 +26,11 @@ from savgs_ident.report.files import prepare_folder, write_json
 from savgs_ident.report.fit_record import fit_record
 from savgs_ident.report.fit_text import fit_text
 from savgs_ident.report.provenance import provenance
-from savgs_ident.report.solving import Solved, measured_excitation
+from savgs_ident.report.solving import Solved
 from savgs_ident.report.terminal import plain
 from savgs_ident.responses.estimate import estimate_response
 from savgs_ident.simulate.compilation import use_persistent_cache
+from savgs_ident.simulate.measured import measured_excitation
 
 
 @dataclass(frozen=True)
@@ -70,9 +74,11 @@ def identify(job: Job, voice: Voice, out: Path) -> int:
 
 
 def _draw(fit: Fit, rig: Rig, out: Path, progress: Progress) -> tuple[Path, ...]:
-    excitation = measured_excitation(fit.measured, rig)
+    excitation = measured_excitation(fit.measured, rig.parameters["psi_nominal"].value)
     model = Solved(excitation, fit.predicted, fit.dwell_status)
-    frictionless = Solved(excitation, fit.frictionless, fit.dwell_status)
+    found = np.isfinite(fit.frictionless).all(axis=(1, 2))
+    status = tuple(Status.CONVERGED if each else Status.STALLED for each in found)
+    frictionless = Solved(excitation, fit.frictionless, status)
     compared = Compared(fit.measured, model, frictionless, fit.used)
     return draw_comparison(rig, fit.effects, compared, out, progress)
 

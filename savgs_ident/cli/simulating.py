@@ -14,11 +14,12 @@ from savgs_ident.report.curves import ModelCurve
 from savgs_ident.report.files import write_json, write_table
 from savgs_ident.report.picture import write_figure
 from savgs_ident.report.response_record import response_columns, response_record, response_text
-from savgs_ident.report.solving import Solved, measured_excitation, solve
+from savgs_ident.report.solving import Solved, solve
 from savgs_ident.report.sweep import solve_sweep, sweep_columns, sweep_figure, sweep_record, sweep_text
 from savgs_ident.report.terminal import plain
 from savgs_ident.responses.estimate import estimate_response
 from savgs_ident.simulate.excitation import Excitation, cam_excitation
+from savgs_ident.simulate.measured import measured_excitation
 
 PROGRAMME = (
     0.5, 0.8, 1.1, 1.4, 1.6, 1.75, 1.85, 1.95, 2.0, 2.05, 2.15, 2.25, 2.3, 2.35, 2.4, 2.45, 2.55, 2.65, 2.75,
@@ -78,7 +79,7 @@ def _excitation(
     if campaign is not None:
         progress(f"reading {campaign}")
         recorded = read_campaign(campaign, progress=progress.fraction(f"reading {campaign}"))
-        return measured_excitation(estimate_response(recorded, orders), rig)
+        return measured_excitation(estimate_response(recorded, orders), rig.parameters["psi_nominal"].value)
     values = rig.parameters.values_of(("cam_peak_to_peak", "psi_nominal"))
     return cam_excitation(np.unique(frequency or PROGRAMME), *values)
 

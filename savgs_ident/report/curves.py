@@ -90,12 +90,15 @@ def measured_points(response: HarmonicResponse) -> MeasuredPoints:
 
 
 def phase_deg(transfer: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Phase of one channel over frequency [deg], without jumps, beginning within [0, 360)."""
+    """Phase of one channel over frequency [deg], without jumps, beginning within [-90, 270).
+
+    A suspension's readings begin between 0 and 180 deg: neither end of that range is near.
+    """
     known = np.isfinite(transfer)
     phase = np.full(transfer.shape, np.nan)
     if np.any(known):
         unwrapped = np.degrees(np.unwrap(np.angle(transfer[known])))
-        phase[known] = unwrapped - 360.0 * np.floor(unwrapped[0] / 360.0)
+        phase[known] = unwrapped - 360.0 * np.floor((unwrapped[0] + 90.0) / 360.0)
     return phase
 
 

@@ -12,8 +12,6 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 
-import numpy as np
-
 from savgs_ident.core.errors import InputError
 
 Json = dict[str, object] | list[object] | str | int | float | bool | None
@@ -72,7 +70,7 @@ def write_table(path: Path, columns: Mapping[str, Sequence[object]]) -> Path:
 
 
 def _plain(value: object) -> Json:
-    if isinstance(value, np.ndarray | np.generic):
+    if hasattr(value, "tolist"):  # Arrays and scalars of numpy, without loading it.
         value = value.tolist()
     if isinstance(value, Mapping):
         return {str(key): _plain(entry) for key, entry in value.items()}

@@ -45,10 +45,12 @@ def whitened(
 
 
 def comparable(measured: HarmonicResponse, orders: int) -> NDArray[np.bool_]:
-    """The entries that a model can be held against, (D, 2, orders + 1): valid, and not the mean."""
-    used = _readings_of(measured, measured.valid)[..., : orders + 1].copy()
+    """The entries that a model can be held against, (D, 2, orders + 1): with noise known, not the mean."""
+    kept = slice(0, orders + 1)
+    noise = np.linalg.det(_readings_of(measured, measured.covariance)[:, :, kept])
+    used = _readings_of(measured, measured.valid)[:, :, kept] & np.isfinite(noise) & (noise > 0.0)
     used[..., 0] = False
-    return used
+    return np.asarray(used)
 
 
 def gaps(

@@ -5,24 +5,21 @@ interpolated over frequency. As many frequencies are added as there are dwells, 
 the same shape need no second compilation.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.errors import InputError
 from savgs_ident.core.rig import Rig
 from savgs_ident.core.status import Status
-from savgs_ident.effects.registry import build_model, model_parameters
+from savgs_ident.effects.registry import CATALOGUE, build_model, model_parameters
+from savgs_ident.model.values import as_values
 from savgs_ident.report.curves import ModelCurve, model_curve
-from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import Excitation
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
-
-Told = Callable[[str], None]
-"""Is told what is being done."""
+from savgs_ident.simulate.layout import Layout, layout_for
+from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
 
 
 @dataclass(frozen=True)
@@ -55,12 +52,28 @@ class Solved:
         return model_curve(label, self.frequency, self.harmonics, road, self.ok)
 
 
-def solve(rig: Rig, effects: Sequence[str], excitation: Excitation, orders: int) -> Solved:
-    """The periodic motions of a rig with the named effects."""
+def solve(
+    rig: Rig, effects: Sequence[str], excitation: Excitation, orders: int, layout: Layout | None = None
+) -> Solved:
+    """The periodic motions of a rig with the named effects; ``layout`` as in :func:`simulate_periodic`."""
     table = model_parameters(rig, effects)
     p = {name: jnp.asarray(value) for name, value in table.as_dict().items()}
-    solution = simulate_periodic(build_model(rig, effects), p, excitation)
+    solution = simulate_periodic(build_model(rig, effects), p, excitation, layout=layout)
     return Solved(excitation, np.asarray(harmonics(p, solution, orders)), solution.status())
+
+
+def solve_between(rig: Rig, effects: Sequence[str], known: Solved) -> Solved:
+    """``known`` and as many frequencies again, see :func:`between`, as one."""
+    settings = PeriodicSettings()
+    layout = layout_for(known.frequency, settings.nodes, settings.slow)
+    orders = known.harmonics.shape[2] - 1
+    return joined(known, solve(rig, effects, between(known.excitation), orders, layout))
+
+
+def without_effects(rig: Rig, effects: Sequence[str]) -> Rig:
+    """The rig with the named effects at their null: the same compiled model then shows it without them."""
+    nulls = {name: value for effect in effects for name, value in CATALOGUE[effect].null.items()}
+    return replace(rig, parameters=model_parameters(rig, effects).with_values(nulls))
 
 
 def joined(one: Solved, other: Solved) -> Solved:
@@ -109,21 +122,3 @@ def widest_gaps(known: NDArray[np.float64], count: int) -> NDArray[np.float64]:
         points.insert(gap + 1, middle)
         added.append(middle)
     return np.exp(np.sort(added))
-
-
-def measured_excitation(response: HarmonicResponse, rig: Rig) -> Excitation:
-    """The road and the link of the dwells as they were recorded; a link that was not stands still.
-
-    Raises :class:`InputError` if the road was not recorded.
-    """
-    if "road_height" not in response.channels:
-        raise InputError(
-            "the road was not recorded", channel="road_height", remedy="map the road channel in channels.toml"
-        )
-    road = response.harmonics[:, response.channel("road_height")]
-    if "link_angle" in response.channels:
-        link = response.harmonics[:, response.channel("link_angle")]
-    else:
-        link = np.zeros_like(road)
-        link[:, 0] = rig.parameters["psi_nominal"].value
-    return Excitation(jnp.asarray(response.frequency), jnp.asarray(road), jnp.asarray(link))

@@ -1,0 +1,70 @@
+"""The program as its users run it: as a process of its own, and in this one where that is enough."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import Result
+from typer.testing import CliRunner
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+Program = Callable[..., "subprocess.CompletedProcess[str]"]
+Invoke = Callable[..., Result]
+
+COMMAND = (sys.executable, "-m", "savgs_ident.cli")
+
+
+@pytest.fixture(scope="session")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where compiled programs are kept during the tests, instead of in the user's folder."""
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture(scope="session")
+def environment(cache: Path) -> dict[str, str]:
+    """The environment of the program: the package importable from anywhere."""
+    return os.environ | {"PYTHONPATH": str(REPOSITORY), "SAVGS_IDENT_CACHE": str(cache), "COLUMNS": "100"}
+
+
+@pytest.fixture
+def program(tmp_path: Path, environment: dict[str, str]) -> Program:
+    """Run ``savgs-ident`` with some words, in an empty folder."""
+
+    def run(*words: object) -> "subprocess.CompletedProcess[str]":
+        command = [*COMMAND, *(str(word) for word in words)]
+        return subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False
+        )
+
+    return run
+
+
+@pytest.fixture
+def invoke(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> Invoke:
+    """Run ``savgs-ident`` with some words in this process, in an empty folder."""
+    from savgs_ident.cli.arguments import spread_values
+    from savgs_ident.cli.main import app
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SAVGS_IDENT_CACHE", str(cache))
+    monkeypatch.setenv("COLUMNS", "100")
+
+    def run(*words: object) -> Result:
+        return CliRunner().invoke(app, spread_values([str(word) for word in words]), catch_exceptions=False)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def short_campaign(nominal_campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four dwells and the standstill of the shipped campaign."""
+    import pandas as pd
+
+    table = pd.read_csv(nominal_campaign)
+    kept = ("dwell_1.40Hz", "dwell_2.35Hz", "dwell_4.00Hz", "dwell_6.00Hz", "standstill")
+    path = tmp_path_factory.mktemp("short") / "short.csv"
+    table[table["test"].isin(kept)].to_csv(path, index=False)
+    return path

@@ -1,0 +1,161 @@
+"""Figures say what they show, in units, draw what they are given, and come out as valid files."""
+
+import struct
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.fit.result import Fit
+from savgs_ident.recordings.read import read_campaign
+from savgs_ident.report.bode import bode_figure, response_figure
+from savgs_ident.report.campaign_figure import campaign_figure
+from savgs_ident.report.campaign_summary import CampaignSummary, summarise_campaign
+from savgs_ident.report.curves import ModelCurve, measured_points, model_curve
+from savgs_ident.report.panels import LINES
+from savgs_ident.report.picture import DPI, write_figure
+from savgs_ident.report.residuals import whitened
+from savgs_ident.report.style import label_of
+
+HOSTILE = "a [bold red]b[/] $\\frac{1}{0}$ \x1b[31m\x07 漢 \ud800"
+
+
+@pytest.fixture(scope="module")
+def curves(mass_on_spring: Callable[..., NDArray[np.complex128]]) -> list[ModelCurve]:
+    frequency = np.geomspace(0.5, 6.0, 40)
+    road, ok = np.full(40, 0.01375 + 0.0j), np.ones(40, dtype=np.bool_)
+    return [
+        model_curve(f"damping {d}", frequency, mass_on_spring(frequency, d), road, ok) for d in (0.3, 0.1)
+    ]
+
+
+@pytest.fixture(scope="module")
+def bode(fit: Fit, curves: list[ModelCurve]) -> Figure:
+    residuals = whitened(fit.measured, fit.predicted, fit.used)
+    return bode_figure("A title", measured_points(fit.measured), curves, residuals)
+
+
+@pytest.fixture(scope="module")
+def summary(nominal_campaign: Path) -> CampaignSummary:
+    return summarise_campaign(read_campaign(nominal_campaign))
+
+
+def _panel(figure: Figure, row: int, column: int) -> Axes:
+    return figure.axes[2 * row + column]
+
+
+def test_every_panel_of_the_bode_figure_has_its_unit(bode: Figure) -> None:
+    labels = [axes.get_ylabel() for axes in bode.axes]
+    assert [label.split("[")[1] for label in labels[::2]] == [
+        "m/s² per m of road]",
+        "deg]",
+        "m/s²]",
+        "noise sd]",
+    ]
+    assert [label.split("[")[1] for label in labels[1::2]] == ["m per m of road]", "deg]", "mm]", "noise sd]"]
+    assert all("[Hz]" in _panel(bode, 3, column).get_xlabel() for column in (0, 1))
+
+
+def test_the_bode_figure_draws_the_numbers_it_is_given(
+    bode: Figure, fit: Fit, curves: list[ModelCurve]
+) -> None:
+    lines = _panel(bode, 2, 1).get_lines()
+    assert_allclose(lines[0].get_ydata(), 1e3 * curves[0].peak_to_peak[:, 1])
+    assert_allclose(lines[1].get_ydata(), 1e3 * curves[1].peak_to_peak[:, 1])
+    assert_allclose(lines[2].get_ydata(), 1e3 * fit.measured.peak_to_peak[:, 2])
+
+
+def test_all_residuals_are_inside_their_panel(bode: Figure, fit: Fit) -> None:
+    residuals = whitened(fit.measured, fit.predicted, fit.used)
+    for column in (0, 1):
+        low, high = _panel(bode, 3, column).get_ylim()
+        assert low < np.nanmin(residuals[:, column])
+        assert high > np.nanmax(residuals[:, column])
+        drawn = sum(len(marks.get_offsets()) for marks in _panel(bode, 3, column).collections)
+        assert drawn >= np.count_nonzero(np.isfinite(residuals[:, column]))
+
+
+def test_the_legend_names_every_curve_and_the_error_bars(bode: Figure) -> None:
+    texts = [text.get_text() for text in bode.legends[0].get_texts()]
+    assert texts == ["damping 0.3", "damping 0.1", "measured, ± 2 sd"]
+
+
+def test_lines_differ_without_colour() -> None:
+    dashes = [str(line["linestyle"]) for line in LINES]
+    assert len(set(dashes)) == len(LINES)
+
+
+def test_a_fit_that_is_far_off_is_still_drawn(fit: Fit, curves: list[ModelCurve], tmp_path: Path) -> None:
+    residuals = 1e4 * whitened(fit.measured, fit.predicted, fit.used)
+    figure = bode_figure("far off", measured_points(fit.measured), curves[:1], residuals)
+    write_figure(tmp_path, "bode", figure)
+    assert _panel(figure, 3, 0).get_ylim()[1] > np.nanmax(residuals[:, 0])
+
+
+def test_nothing_solved_and_one_channel_only_is_drawn(fit: Fit, tmp_path: Path) -> None:
+    other = replace(fit.measured, channels=("road_height", "sprung_accel", "something_else"))
+    open_curve = ModelCurve("m", np.array([0.5, 6.0]), np.full((2, 2), np.nan + 0j), np.full((2, 2), np.nan))
+    residuals = np.full((8, 2, 6, 2), np.nan)
+    figure = bode_figure("open", measured_points(other), [open_curve], residuals)
+    png, _ = write_figure(tmp_path, "bode", figure)
+    assert png.stat().st_size > 10_000
+
+
+def test_pictures_are_valid_files_of_the_size_asked_for(bode: Figure, tmp_path: Path) -> None:
+    png, pdf = write_figure(tmp_path, "bode", bode)
+    head = png.read_bytes()[:24]
+    assert head[:8] == b"\x89PNG\r\n\x1a\n"
+    width, height = bode.get_size_inches()
+    assert struct.unpack(">II", head[16:24]) == (round(width * DPI), round(height * DPI))
+    assert pdf.read_bytes().startswith(b"%PDF-")
+    assert pdf.read_bytes().rstrip().endswith(b"%%EOF")
+
+
+def test_the_same_figure_gives_the_same_bytes(curves: list[ModelCurve], tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        write_figure(tmp_path / name, "r", response_figure("title", curves))
+    for suffix in ("png", "pdf"):
+        one, two = (tmp_path / name / f"r.{suffix}" for name in ("one", "two"))
+        assert one.read_bytes() == two.read_bytes()
+
+
+def test_names_in_a_figure_are_neither_formulas_nor_missing_glyphs(
+    curves: list[ModelCurve], tmp_path: Path
+) -> None:
+    named = [replace(curve, label=HOSTILE) for curve in curves]
+    figure = response_figure(HOSTILE, named)
+    write_figure(tmp_path, "r", figure)
+    shown = figure.legends[0].get_texts()[0].get_text()
+    assert "[bold red]" in shown
+    assert "$" in shown
+    assert shown == label_of(HOSTILE)
+    assert "\x1b" not in shown
+
+
+def test_the_picture_of_a_campaign_has_units_and_all_dwells(summary: CampaignSummary) -> None:
+    figure = campaign_figure(summary)
+    panels = figure.axes[:6]
+    assert all("[" in axes.get_ylabel() for axes in panels)
+    assert summary.response is not None
+    for axes in panels[:2]:
+        points = [line for line in axes.get_lines() if line.get_marker() == "o"]
+        assert len(points[0].get_xdata()) == len(summary.response.tests) == 28
+        assert any(line.get_linestyle() == "--" for line in axes.get_lines())
+
+
+def test_a_campaign_without_dwells_is_drawn(summary: CampaignSummary, tmp_path: Path) -> None:
+    bare = replace(summary, response=None, sweeps=(), standstill_noise={})
+    write_figure(tmp_path, "inspect", campaign_figure(bare))
+
+
+def test_a_folder_that_is_not_there_is_an_input_error(bode: Figure, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be written"):
+        write_figure(tmp_path / "nowhere", "bode", bode)

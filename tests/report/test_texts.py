@@ -1,0 +1,188 @@
+"""Tables and records say the numbers of the fit, and names in them are never read as markup."""
+
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from rich.console import Console, RenderableType
+
+from savgs_ident.core.errors import DataWarning
+from savgs_ident.core.rig import read_rig, write_rig
+from savgs_ident.core.status import Status
+from savgs_ident.fit.result import Fit, Verdict
+from savgs_ident.recordings.read import read_campaign
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.report.campaign_summary import summarise_campaign, summary_record
+from savgs_ident.report.campaign_text import campaign_text
+from savgs_ident.report.files import to_json
+from savgs_ident.report.fit_record import fit_record
+from savgs_ident.report.fit_text import fit_text, value_with_error
+from savgs_ident.report.provenance import provenance
+from savgs_ident.report.residuals import chi2_by_dwell
+from savgs_ident.report.terminal import plain
+
+HOSTILE = "[bold red]run[/bold red][link=http://x]\x1b[2J:smile:"
+
+
+def rendered(what: RenderableType, width: int = 100) -> str:
+    stream = io.StringIO()
+    Console(file=stream, width=width, force_terminal=True, color_system="truecolor").print(what)
+    return stream.getvalue()
+
+
+def as_json(record: Mapping[str, object]) -> dict[str, Any]:
+    return dict(json.loads(to_json(record)))
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (0.030018, 0.00012, "0.03002 ± 0.00012"),
+        (5386.23, 9.7, "5386.2 ± 9.7"),
+        (264123.0, 1300.0, "264123 ± 1300"),
+        (1.5, 0.0, "1.5"),
+        (-0.25, 0.031, "-0.250 ± 0.031"),
+        (2.0, float("nan"), "2"),
+    ],
+)
+def test_a_value_has_the_digits_of_its_error(value: float, error: float, text: str) -> None:
+    assert value_with_error(value, error) == text
+
+
+@given(st.floats(-1e9, 1e9), st.floats(1e-9, 1e9))
+def test_a_printed_value_is_right_to_a_tenth_of_its_error(value: float, error: float) -> None:
+    shown = float(value_with_error(value, error).split(" ± ")[0])
+    assert abs(shown - value) <= max(0.1 * error, 0.5e-12 + 1e-15 * abs(value), 0.5 if error >= 10.0 else 0.0)
+
+
+def test_the_text_of_a_fit_says_parameters_quality_and_verdict(fit: Fit) -> None:
+    text = rendered(fit_text(fit))
+    for part in ("mu_r", "0.03002 ± 0.00012", "5386.0 ± 9.7", "N s/m", "163.0/158 = 1.032", "0.40"):
+        assert part in text
+    assert "The data tell all free parameters." in text
+    assert text.index("mu_r") < text.index("chi2/dof") < text.index("Verdict")
+
+
+def test_a_tolerance_parameter_that_moved_is_shown_with_its_shift(fit: Fit) -> None:
+    text = rendered(fit_text(fit))
+    assert "k_t" in text
+    assert "-0.8" in text
+
+
+def test_dwells_that_were_not_solved_are_named(fit: Fit) -> None:
+    status = (Status.CONVERGED,) * 7 + (Status.STALLED,)
+    text = rendered(fit_text(replace(fit, dwell_status=status)))
+    assert "dwell_6.00Hz" in text
+    assert "stalled" in text
+    assert "was not found in: dwell_6.00Hz" in text.replace("\n", " ")
+
+
+def test_the_record_of_a_fit_has_the_keys_of_the_contract(fit: Fit) -> None:
+    record = as_json(fit_record(fit, ()))
+    assert {"parameters", "correlation", "chi2", "dof", "converged", "gap", "dwells"} <= set(record)
+    assert record["parameters"]["c_sd"]["value"] == 5386.0
+    assert record["parameters"]["c_sd"]["unit"] == "N s/m"
+    assert record["parameters"]["k_t"]["free"] is False
+    assert record["correlation"]["mu_r"]["c_sd"] == pytest.approx(-0.5)
+    assert record["converged"] is True
+    assert [dwell["test"] for dwell in record["dwells"]] == list(fit.measured.tests)
+    assert_allclose([dwell["chi2"] for dwell in record["dwells"]], chi2_by_dwell(fit))
+    assert record["gap"]["together"]["before"] > record["gap"]["together"]["after"]
+
+
+def test_residuals_in_the_record_sum_to_chi2(fit: Fit) -> None:
+    for dwell in as_json(fit_record(fit, ()))["dwells"]:
+        parts = [channel["residual_sigma"] for channel in dwell["channels"].values()]
+        total = sum(np.sum(np.square(part["re"])) + np.sum(np.square(part["im"])) for part in parts)
+        assert total == pytest.approx(dwell["chi2"])
+
+
+def test_a_dwell_that_was_not_solved_is_not_converged(fit: Fit) -> None:
+    status = (Status.MAX_ITERATIONS,) + (Status.CONVERGED,) * 7
+    record = fit_record(replace(fit, dwell_status=status), ())
+    assert record["converged"] is False
+    assert record["trusted"] is False
+
+
+def test_data_that_cannot_tell_are_converged_but_not_trusted(fit: Fit) -> None:
+    blind = Verdict(False, ("mu_t and ydot_Hth cannot be told apart.",), (("mu_t", "ydot_Hth"),))
+    record = as_json(fit_record(replace(fit, verdict=blind), (DataWarning("odd", "something is odd"),)))
+    assert record["converged"] is True
+    assert record["trusted"] is False
+    assert record["verdict"]["confounded"] == [["mu_t", "ydot_Hth"]]
+    assert record["warnings"][0]["code"] == "odd"
+
+
+def test_an_identified_rig_is_read_back_with_where_it_comes_from(fit: Fit, tmp_path: Path) -> None:
+    campaign = Campaign("runs/a [b].csv", (), (), "0" * 64)
+    told = provenance(fit, campaign, ("savgs-ident", "fit", "runs/a [b].csv"))
+    write_rig(replace(fit.rig, provenance=told), tmp_path / "model.toml")
+    back = read_rig(tmp_path / "model.toml")
+    assert back.parameters["c_sd"].value == 5386.0
+    assert back.provenance["data_sha256"] == "0" * 64
+    assert back.provenance["free"] == ["mu_r", "c_sd"]
+    covariance = back.provenance["covariance"]
+    assert isinstance(covariance, dict)
+    assert covariance["names"] == ["mu_r", "c_sd", "k_t"]
+    assert_allclose(covariance["matrix"], fit.covariance, rtol=0.0)
+
+
+def test_hostile_names_are_shown_as_they_are() -> None:
+    text = rendered(plain(HOSTILE))
+    assert "[bold red]run[/bold red][link=http://x]" in text
+    assert "\x1b" not in text.replace("\x1b[0m", "")
+    assert ":smile:" in text
+
+
+@given(st.text())
+def test_no_text_carries_control_characters(text: str) -> None:
+    assert all(char.isprintable() or char == "\n" for char in str(plain(text)))
+
+
+def test_hostile_test_names_in_a_campaign_are_shown_as_they_are(tmp_path: Path) -> None:
+    name = "dwell_2Hz_[bold]x[/]"
+    time = np.arange(2000) / 500.0
+    rows = [
+        f"{t:.4f},{0.01 * np.sin(4 * np.pi * t):.8f},{np.sin(4 * np.pi * t + 1.0):.8f},{name}" for t in time
+    ]
+    head = "time [s],road_height [m],sprung_accel [m/s^2],test"
+    (tmp_path / "run.csv").write_text("\n".join([head, *rows]) + "\n")
+    record = as_json(summary_record(summarise_campaign(read_campaign(tmp_path / "run.csv"))))
+    assert name in rendered(campaign_text(record), width=160)
+
+
+def test_the_record_of_the_shipped_campaign_is_what_was_recorded(nominal_campaign: Path) -> None:
+    campaign = read_campaign(nominal_campaign)
+    record = as_json(summary_record(summarise_campaign(campaign)))
+    assert record["tests"] == 30
+    assert len(record["dwells"]) == 28
+    assert all(dwell["usable"] for dwell in record["dwells"])
+    assert_allclose(
+        [dwell["frequency_hz"] for dwell in record["dwells"]],
+        [dwell["asked_hz"] for dwell in record["dwells"]],
+        rtol=1e-4,
+    )
+    for dwell in record["dwells"]:
+        assert dwell["channels"]["road_height"]["peak_to_peak"] == pytest.approx(0.0275, rel=1e-3)
+        assert dwell["channels"]["sprung_accel"]["noise_sd"] == pytest.approx(0.05, rel=0.1)
+    channels = {channel["name"]: channel for channel in record["channels"]}
+    assert channels["sprung_accel"]["standstill_noise"] == pytest.approx(0.05, rel=0.05)
+    assert channels["susp_deflection"]["standstill_noise"] == pytest.approx(1e-4, rel=0.05)
+    assert channels["sprung_accel"]["rate_hz"] == pytest.approx(500.0, rel=1e-3)
+    assert record["missing_channels"] == []
+    assert record["sha256"] == campaign.sha256
+
+
+def test_tables_of_a_campaign_fit_a_terminal_of_80_columns(nominal_campaign: Path) -> None:
+    record = as_json(summary_record(summarise_campaign(read_campaign(nominal_campaign))))
+    text = rendered(campaign_text(record), width=80)
+    rows = [line for line in text.splitlines() if line.startswith("dwell_")]
+    assert len(rows) == 28
