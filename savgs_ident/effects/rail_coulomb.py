@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.model.effect import AbstractEffect, InternalState, Port, PortSignals
-from savgs_ident.model.kinematics import Values
+from savgs_ident.model.values import Values
 
 DRAG_TIME = 2e-4
 """How fast the anchor follows an over-stretched bristle [s]: short beside the 4 ms of a reversal, and

@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.model.effect import AbstractEffect, InternalState, Port, PortSignals
-from savgs_ident.model.kinematics import Values
+from savgs_ident.model.values import Values
 
 
 class TyreFriction(AbstractEffect):

@@ -16,7 +16,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from savgs_ident.model.kinematics import Linkage, Point, Values, linkage
+from savgs_ident.model.kinematics import Linkage, Point, linkage
+from savgs_ident.model.values import Values
 
 GeneralisedForce = Float[Array, "4"]
 """Along (z_s [N], theta_LW [N m], y_s [N], phi [N m])."""

@@ -19,7 +19,7 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.model.kinematics import Values
+from savgs_ident.model.values import Values
 
 
 class Port(Enum):

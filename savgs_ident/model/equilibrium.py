@@ -11,10 +11,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.kinematics import Values, suspension_travel
+from savgs_ident.model.kinematics import suspension_travel
 from savgs_ident.model.quarter_car import Inputs, Link, QuarterCar
 from savgs_ident.model.small_root import find_root
 from savgs_ident.model.tyre import Road
+from savgs_ident.model.values import Values
 
 PRECISION = 1e-9
 """Relative precision of an equilibrium; forces of 1e7 N/m leave no more."""

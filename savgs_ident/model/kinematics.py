@@ -15,15 +15,13 @@ the rigid body that carries C and D; the single link carries the strut's upper e
          E
 """
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-Values = Mapping[str, Float[Array, ""]]
-"""Parameter name to value in SI."""
+from savgs_ident.model.values import Values
 
 Point = Float[Array, "2"] | tuple[Float[Array, ""], Float[Array, ""]]
 """Lateral and vertical coordinate (y, z)."""

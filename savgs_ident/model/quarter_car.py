@@ -21,10 +21,10 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.model.damper import DamperCurve
 from savgs_ident.model.dynamics import GeneralisedForce, Motion, carriage_load, point_force
 from savgs_ident.model.effect import AbstractEffect, InternalState, Port, PortSignals
-from savgs_ident.model.kinematics import Values
 from savgs_ident.model.section import Section, SectionCurves, section
 from savgs_ident.model.strut import Link, strut
 from savgs_ident.model.tyre import Contact, Road, contact, radial_force
+from savgs_ident.model.values import Values
 
 HANDLED_PORTS = (Port.STRUT, Port.SUSPENSION, Port.TYRE_RADIAL, Port.TYRE_LATERAL, Port.RAIL)
 """Ports at which a force may act, in the order in which they are evaluated: the rail's load comes last."""

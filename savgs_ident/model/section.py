@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from savgs_ident.model.dynamics import Coordinates, Motion, inertia_and_weight, swing
-from savgs_ident.model.kinematics import Values
+from savgs_ident.model.values import Values
 
 TRAVEL = 0.35
 """Half the range of theta_LW that curves cover [rad]: some 13 cm of wheel travel either way."""

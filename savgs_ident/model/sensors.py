@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 from jaxtyping import Array, Float
 
-from savgs_ident.model.kinematics import Values, suspension_travel
+from savgs_ident.model.kinematics import suspension_travel
+from savgs_ident.model.values import Values
 
 RESPONSE_CHANNELS = ("sprung_accel", "susp_deflection")
 """The channels that a model predicts, in the order of :class:`Readings`."""

@@ -5,8 +5,9 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from savgs_ident.model.kinematics import Values, crank_pin
+from savgs_ident.model.kinematics import crank_pin
 from savgs_ident.model.section import Section
+from savgs_ident.model.values import Values
 
 
 class Link(NamedTuple):

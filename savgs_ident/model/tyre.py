@@ -12,8 +12,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.model.dynamics import Motion
-from savgs_ident.model.kinematics import Point, Values
+from savgs_ident.model.kinematics import Point
 from savgs_ident.model.section import Section
+from savgs_ident.model.values import Values
 
 
 class Road(NamedTuple):

@@ -57,7 +57,7 @@ def solve(
 ) -> Solved:
     """The periodic motions of a rig with the named effects; ``layout`` as in :func:`simulate_periodic`."""
     table = model_parameters(rig, effects)
-    p = {name: jnp.asarray(value) for name, value in table.as_dict().items()}
+    p = as_values(table.as_dict())
     solution = simulate_periodic(build_model(rig, effects), p, excitation, layout=layout)
     return Solved(excitation, np.asarray(harmonics(p, solution, orders)), solution.status())
 
@@ -121,4 +121,4 @@ def widest_gaps(known: NDArray[np.float64], count: int) -> NDArray[np.float64]:
         middle = 0.5 * (points[gap] + points[gap + 1])
         points.insert(gap + 1, middle)
         added.append(middle)
-    return np.exp(np.sort(added))
+    return np.asarray(np.exp(np.sort(added)))

@@ -23,9 +23,9 @@ from jax.extend.core import jaxpr_as_fun
 from jaxtyping import Array, Float
 
 from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.kinematics import Values
 from savgs_ident.model.quarter_car import Inputs, QuarterCar
 from savgs_ident.model.section import SectionCurves, section_curves
+from savgs_ident.model.values import Values
 from savgs_ident.simulate import cyclic
 from savgs_ident.simulate.layout import Layout
 

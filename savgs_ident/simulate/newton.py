@@ -10,8 +10,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from savgs_ident.model.kinematics import Values
 from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.model.values import Values
 from savgs_ident.simulate.collocation import (
     Linearised,
     Trajectory,

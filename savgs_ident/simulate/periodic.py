@@ -22,10 +22,10 @@ import numpy as np
 from jaxtyping import Array, Complex, Float, Int
 
 from savgs_ident.core.status import Status
-from savgs_ident.model.kinematics import Values
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.section import TRAVEL, section_curves
 from savgs_ident.model.sensors import read_sensors
+from savgs_ident.model.values import Values, as_values
 from savgs_ident.simulate.collocation import (
     Linearised,
     Trajectory,
@@ -129,16 +129,23 @@ def adapt(
     frequency = np.asarray(solution.excitation.frequency)
     mesh = adapted_mesh(solution.mesh, accelerations, frequency, layout)
     start = _carry_over(solution.trajectory, solution.mesh, mesh)
-    return solve_on_mesh(model, p, solution.excitation, mesh, start, limit)
+    return solve_on_mesh(model, as_values(p), solution.excitation, mesh, start, limit)
 
 
 def simulate_periodic(
-    model: QuarterCar, p: Values, excitation: Excitation, settings: PeriodicSettings | None = None
+    model: QuarterCar,
+    p: Values,
+    excitation: Excitation,
+    settings: PeriodicSettings | None = None,
+    layout: Layout | None = None,
 ) -> PeriodicSolution:
-    """Periodic motions from a cold start; look at ``status()`` of the result before using it."""
-    settings = settings or PeriodicSettings()
-    frequency = np.asarray(excitation.frequency)
-    layout = layout_for(frequency, settings.nodes, settings.slow)
+    """Periodic motions from a cold start; look at ``status()`` of the result before using it.
+
+    A ``layout`` of an earlier solution with as many dwells spares a compilation.
+    """
+    p, settings = as_values(p), settings or PeriodicSettings()
+    if layout is None:
+        layout = layout_for(np.asarray(excitation.frequency), settings.nodes, settings.slow)
     mesh = uniform_mesh(layout)
     start = _riding_the_road(model, excitation, mesh)
     solution = solve_on_mesh(model, p, excitation, mesh, start, settings.iterations)
@@ -151,7 +158,7 @@ def resolve(
     model: QuarterCar, p: Values, solution: PeriodicSolution, limit: int = PeriodicSettings.iterations
 ) -> PeriodicSolution:
     """The solution at other parameters, on the same nodes, started from ``solution``."""
-    return solve_on_mesh(model, p, solution.excitation, solution.mesh, solution.trajectory, limit)
+    return solve_on_mesh(model, as_values(p), solution.excitation, solution.mesh, solution.trajectory, limit)
 
 
 def _readings(p: Values, trajectory: Trajectory) -> Float[Array, "P C"]:
