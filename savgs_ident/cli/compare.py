@@ -14,7 +14,6 @@ from savgs_ident.report.solving import solve, solve_between, without_effects
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.measured import measured_excitation
 
-
 SIMQC_LABEL = "the same without friction (SimQC)"
 
 

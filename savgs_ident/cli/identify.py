@@ -76,8 +76,9 @@ def identify(job: Job, voice: Voice, out: Path) -> int:
 def _draw(fit: Fit, rig: Rig, out: Path, progress: Progress) -> tuple[Path, ...]:
     excitation = measured_excitation(fit.measured, rig.parameters["psi_nominal"].value)
     model = Solved(excitation, fit.predicted, fit.dwell_status)
-    found = np.isfinite(fit.frictionless).all(axis=(1, 2))
-    status = tuple(Status.CONVERGED if each else Status.STALLED for each in found)
+    status = tuple(
+        Status.CONVERGED if np.isfinite(each).all() else Status.STALLED for each in fit.frictionless
+    )
     frictionless = Solved(excitation, fit.frictionless, status)
     compared = Compared(fit.measured, model, frictionless, fit.used)
     return draw_comparison(rig, fit.effects, compared, out, progress)

@@ -11,7 +11,7 @@ _SHOWN_WARNINGS = 20
 
 def campaign_text(record: dict[str, Any]) -> RenderableType:
     """Tables of channels and dwells, the other tests, and the warnings of an ``inspect`` record."""
-    parts = [plain(f"{record['source']}: {_count(record['tests'], 'test')}", "bold")]
+    parts: list[RenderableType] = [plain(f"{record['source']}: {_count(record['tests'], 'test')}", "bold")]
     parts.append(_channel_table(record))
     if record["missing_channels"]:
         parts.append(plain("Not recorded: " + ", ".join(record["missing_channels"]) + "\n"))

@@ -83,8 +83,8 @@ def chi2_by_dwell(fit: Fit) -> NDArray[np.float64]:
 def entries_by_dwell(fit: Fit) -> NDArray[np.int64]:
     """How many real data entries of each dwell were fitted, (D,)."""
     if fit.quantity == "peak_to_peak":
-        return np.count_nonzero(np.any(fit.used, axis=2), axis=1)
-    return 2 * np.count_nonzero(fit.used, axis=(1, 2))
+        return np.asarray(np.sum(np.any(fit.used, axis=2), axis=1))
+    return np.asarray(2 * np.sum(fit.used, axis=(1, 2)))
 
 
 def predicted_peak_to_peak(

@@ -4,10 +4,9 @@ Figures are made without pyplot, so that nothing global changes; text that comes
 :func:`label_of`, which leaves no character that the font lacks and none that would be read as a formula.
 """
 
-from collections.abc import Mapping
-from types import MappingProxyType
+from contextlib import AbstractContextManager
 
-from matplotlib import rc_context
+import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
@@ -19,36 +18,33 @@ PALE = "#dedede"
 BLUE = "#0b5ea8"
 ORANGE = "#d95f02"
 
-RC: Mapping[str, object] = MappingProxyType(
-    {
-        "font.family": "DejaVu Sans",
-        "font.size": 9.0,
-        "axes.titlesize": 10.0,
-        "axes.titleweight": "bold",
-        "axes.labelsize": 9.0,
-        "axes.edgecolor": INK,
-        "axes.linewidth": 0.8,
-        "axes.grid": True,
-        "axes.axisbelow": True,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "grid.color": PALE,
-        "grid.linewidth": 0.6,
-        "legend.frameon": False,
-        "legend.fontsize": 8.5,
-        "lines.linewidth": 1.6,
-        "text.parse_math": False,
-        "pdf.fonttype": 42,
-    }
-)
-"""Settings in force while a figure is made."""
-
 _TICKS = (0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 50.0)
 
 
-def styled() -> "rc_context":
+def styled() -> AbstractContextManager[None]:
     """The context in which figures are made and drawn."""
-    return rc_context(dict(RC))
+    return matplotlib.rc_context(
+        {
+            "font.family": "DejaVu Sans",
+            "font.size": 9.0,
+            "axes.titlesize": 10.0,
+            "axes.titleweight": "bold",
+            "axes.labelsize": 9.0,
+            "axes.edgecolor": INK,
+            "axes.linewidth": 0.8,
+            "axes.grid": True,
+            "axes.axisbelow": True,
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+            "grid.color": PALE,
+            "grid.linewidth": 0.6,
+            "legend.frameon": False,
+            "legend.fontsize": 8.5,
+            "lines.linewidth": 1.6,
+            "text.parse_math": False,
+            "pdf.fonttype": 42,
+        }
+    )
 
 
 def new_figure(width: float, height: float) -> Figure:

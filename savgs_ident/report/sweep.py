@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.effects.registry import build_model, model_parameters
 from savgs_ident.model.actuation import held_link
 from savgs_ident.model.road import sweep_road
+from savgs_ident.model.values import as_values
 from savgs_ident.recordings.recording import CANONICAL_UNITS
 from savgs_ident.report.readings import READINGS
 from savgs_ident.report.style import BLUE, GREY, new_figure, styled
@@ -42,7 +42,7 @@ class Sweep:
 
 def solve_sweep(rig: Rig, effects: Sequence[str]) -> Sweep:
     """The sweep of a rig with the named effects, the link held at its nominal angle."""
-    p = {name: jnp.asarray(value) for name, value in model_parameters(rig, effects).as_dict().items()}
+    p = as_values(model_parameters(rig, effects).as_dict())
     time = np.linspace(0.0, DURATION_S, round(DURATION_S * RATE_HZ) + 1)
     cam, angle = rig.parameters.values_of(("cam_peak_to_peak", "psi_nominal"))
     road = sweep_road(cam, LOWEST_HZ, HIGHEST_HZ, DURATION_S)

@@ -3,12 +3,17 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import jax
+import pandas as pd
 import pytest
 from click.testing import Result
 from typer.testing import CliRunner
+
+from savgs_ident.cli.arguments import spread_values
+from savgs_ident.cli.main import app
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 Program = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -42,18 +47,31 @@ def program(tmp_path: Path, environment: dict[str, str]) -> Program:
     return run
 
 
-@pytest.fixture
-def invoke(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> Invoke:
-    """Run ``savgs-ident`` with some words in this process, in an empty folder."""
-    from savgs_ident.cli.arguments import spread_values
-    from savgs_ident.cli.main import app
+@pytest.fixture(scope="session")
+def as_users_have_it() -> Callable[[Sequence[str]], Result]:
+    """Run ``savgs-ident`` with some words in this process, with JAX as it is outside of tests."""
 
+    def run(words: Sequence[str]) -> Result:
+        with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
+            return CliRunner().invoke(app, spread_values(words), catch_exceptions=False)
+
+    return run
+
+
+@pytest.fixture
+def invoke(
+    tmp_path: Path,
+    cache: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    as_users_have_it: Callable[[Sequence[str]], Result],
+) -> Invoke:
+    """Run ``savgs-ident`` with some words in this process, in an empty folder."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SAVGS_IDENT_CACHE", str(cache))
     monkeypatch.setenv("COLUMNS", "100")
 
     def run(*words: object) -> Result:
-        return CliRunner().invoke(app, spread_values([str(word) for word in words]), catch_exceptions=False)
+        return as_users_have_it([str(word) for word in words])
 
     return run
 
@@ -61,8 +79,6 @@ def invoke(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> Invo
 @pytest.fixture(scope="session")
 def short_campaign(nominal_campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Four dwells and the standstill of the shipped campaign."""
-    import pandas as pd
-
     table = pd.read_csv(nominal_campaign)
     kept = ("dwell_1.40Hz", "dwell_2.35Hz", "dwell_4.00Hz", "dwell_6.00Hz", "standstill")
     path = tmp_path_factory.mktemp("short") / "short.csv"
