@@ -88,6 +88,6 @@ def _about_group(
         if error <= TOLD:
             first, second = values[pair[0]], values[pair[1]]
             value = first / second if "/" in label else first * second
-            unit = f"({units[pair[0]]})/({units[pair[1]]})" if "/" in label else "SI"
+            unit = f"{units[pair[0]]}/({units[pair[1]]})" if "/" in label else "(SI)"
             sentences.append(f"What is known is {label} = {value:.4g} {unit}, to {100.0 * error:.2g} %.")
     return sentences

@@ -23,7 +23,7 @@ from savgs_ident.effects.registry import CATALOGUE, build_model, model_parameter
 from savgs_ident.fit.covariance import UNTOLD, spread_of
 from savgs_ident.fit.identifiability import TOLD, untold_groups, verdict_of
 from savgs_ident.fit.minimise import Minimiser, Minimum, Progress
-from savgs_ident.fit.next_dwell import propose_dwell
+from savgs_ident.fit.next_dwell import propose_dwells
 from savgs_ident.fit.problem import Problem, tolerated_parameters, used_parameters
 from savgs_ident.fit.profile import lower_bound
 from savgs_ident.fit.result import Estimate, Fit, Verdict
@@ -158,9 +158,9 @@ def _verdict(
     covariance = _log_covariance(problem, best, values)
     bounds: dict[str, float] = {}
     advice: tuple[str, ...] = ()
-    untold = {name for group in untold_groups(names, covariance) for name in group}
-    if untold or np.sqrt(np.diag(covariance)).max() > TOLD:
-        for name in sorted(untold):
+    if np.sqrt(np.diag(covariance)).max() > TOLD:
+        for group in untold_groups(names, covariance):
+            name = group[-1]  # The others follow it along the line that they trade off along.
             tell(f"looking for a lower bound of {name}")
             bound = lower_bound(minimiser, best, name, tell)
             bounds |= {} if bound is None else {name: bound}
@@ -170,14 +170,11 @@ def _verdict(
 
 
 def _advice(minimiser: Minimiser, best: Minimum, settings: FitSettings) -> tuple[str, ...]:
-    found = propose_dwell(minimiser, best, settings.periodic)
-    if found is None:
-        return ("No single dwell that was considered would help.",)
-    proposal, _ = found
-    return (
-        f"What would help most: {proposal.test}; the largest relative error would be about"
-        f" {100.0 * proposal.worst_sd:.2g} %.",
-    )
+    proposals = propose_dwells(minimiser, best, settings.periodic)
+    if not proposals:
+        return ("No single further dwell that was considered would help.",)
+    tests = "; ".join(f"{each.test} (to {100.0 * each.worst_sd:.2g} %)" for each in proposals)
+    return (f"What would tell every free parameter: {tests}.",)
 
 
 def _log_covariance(problem: Problem, best: Minimum, values: dict[str, float]) -> np.ndarray:

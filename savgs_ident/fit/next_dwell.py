@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.fit.covariance import spread_of
+from savgs_ident.fit.identifiability import TOLD
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.simulate.excitation import Excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
@@ -54,23 +55,20 @@ def _still_link(excitation: Excitation, frequency: NDArray[np.float64], stroke: 
     return Excitation(jnp.asarray(frequency), road, link)
 
 
-def propose_dwell(
-    minimiser: Minimiser, best: Minimum, settings: PeriodicSettings
-) -> tuple[Proposal, float] | None:
-    """The candidate dwell that leaves the smallest worst error, with that error as it is; None if none helps."""
+def propose_dwells(minimiser: Minimiser, best: Minimum, settings: PeriodicSettings) -> tuple[Proposal, ...]:
+    """The best dwell of every family that would tell all free parameters; empty if none would."""
     free = len(minimiser.problem.free.identified)
 
     def worst(jacobian: NDArray[np.float64]) -> float:
         return float(spread_of(jacobian).sd[:free].max())
 
-    now = worst(best.jacobian)
-    proposals = [
-        proposal
-        for candidate in candidates(best.solution.excitation)
-        for proposal in _proposals(minimiser, best, candidate, settings, worst)
-    ]
-    better = min(proposals, key=lambda each: each.worst_sd, default=None)
-    return None if better is None or better.worst_sd > 0.5 * now else (better, now)
+    leaders = []
+    for candidate in candidates(best.solution.excitation):
+        proposals = _proposals(minimiser, best, candidate, settings, worst)
+        leader = min(proposals, key=lambda each: each.worst_sd, default=None)
+        if leader is not None and leader.worst_sd <= TOLD:
+            leaders.append(leader)
+    return tuple(leaders)
 
 
 def _proposals(

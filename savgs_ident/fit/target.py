@@ -18,7 +18,7 @@ from savgs_ident.responses.peak_to_peak import peak_to_peak
 class HarmonicTarget(eqx.Module):
     """Complex harmonics of orders 1..n with their 2 x 2 covariances.
 
-    ``whitening`` (D, 2, n + 1, 2, 2) is the inverse Cholesky factor of the covariance, 0 where ``used`` is not.
+    ``whitening`` (D, 2, n + 1, 2, 2) is the inverse Cholesky factor of the covariance, 0 where not ``used``.
     """
 
     measured: Complex[Array, "D C K"]
