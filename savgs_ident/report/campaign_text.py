@@ -18,7 +18,7 @@ def campaign_text(record: dict[str, Any]) -> RenderableType:
     if record["dwells"]:
         parts.append(_dwell_table(record["dwells"]))
     parts += [plain(line) for line in _other_tests(record)]
-    parts += _warnings(record["warnings"])
+    parts += _warnings(record["source"], record["warnings"])
     return Group(*parts)
 
 
@@ -88,11 +88,15 @@ def _other_tests(record: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _warnings(warnings: list[dict[str, Any]]) -> list[RenderableType]:
+def _warnings(source: str, warnings: list[dict[str, Any]]) -> list[RenderableType]:
     if not warnings:
         return [plain("No warnings.")]
     shown: list[RenderableType] = [plain(_count(len(warnings), "warning"), "bold")]
-    shown += [plain(warning["message"]) for warning in warnings[:_SHOWN_WARNINGS]]
+    # The heading names the source already.
+    shown += [
+        plain(warning["message"].replace(f"] {source}, ", "] ").replace(f"] {source}: ", "] "))
+        for warning in warnings[:_SHOWN_WARNINGS]
+    ]
     if len(warnings) > _SHOWN_WARNINGS:
         shown.append(plain(f"... and {len(warnings) - _SHOWN_WARNINGS} more in inspect.json"))
     return shown

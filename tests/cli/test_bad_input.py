@@ -18,7 +18,7 @@ def flat(text: str) -> str:
     [
         (("fit", "{campaign}", "--free", "mu_x"), "there is no parameter 'mu_x'. Remedy: choose among:"),
         (("fit", "{campaign}", "--model", "simxx"), "'simxx' is not one of 'simqc', 'simtr'"),
-        (("fit", "{campaign}", "--orders", "0"), "0 is not in the range"),
+        (("fit", "{campaign}", "--orders", "0"), "Invalid value for '--orders'"),
         (("fit", "{campaign}", "--rig", "none.toml"), "none.toml: cannot be read"),
         (("fit", "{campaign}", "--max-frequency", "0.1"), "no dwell is at 0.1 Hz or below"),
         (("fit", "{campaign}", "--channels", "none.toml"), "none.toml: cannot be read"),
@@ -29,7 +29,7 @@ def flat(text: str) -> str:
         (("simulate", "{rig}", "--sweep", "--frequency", "2"), "choose one of --frequency, --sweep"),
         (("simulate", "{rig}", "--frequency", "-1"), "give a frequency above 0 Hz"),
         (("simulate", "{rig}", "--frequency", "nan"), "give a frequency above 0 Hz"),
-        (("simulate", "{rig}", "--frequency", "fast"), "'fast' is not a valid float"),
+        (("simulate", "{rig}", "--frequency", "fast"), "Invalid value for '--frequency'"),
         (("simulate", "none.toml"), "none.toml: cannot be read"),
         (("nonsense",), "No such command 'nonsense'"),
     ],
