@@ -16,7 +16,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from savgs_ident.model.kinematics import Linkage, Point, linkage
+from savgs_ident.model.kinematics import Linkage, Pair, Point, linkage
 from savgs_ident.model.values import Values
 
 GeneralisedForce = Float[Array, "4"]
@@ -56,7 +56,9 @@ def swing(p: Values, theta_LW: Float[Array, ""]) -> Swing:
     return Swing(pose, slope, curvature)
 
 
-def point_force(p: Values, place: Point, place_slope: Point, force: Point) -> GeneralisedForce:
+def point_force(
+    p: Values, place: Point | Pair, place_slope: Point | Pair, force: Point | Pair
+) -> GeneralisedForce:
     """Generalised force of a force (f_y, f_z) [N] at a point [m] with slope d(place)/d(theta_LW) [m/rad]."""
     along_theta = place_slope[0] * force[0] + place_slope[1] * force[1]
     roll_moment = place[0] * force[1] - (place[1] - p["z_tb"]) * force[0]

@@ -53,6 +53,10 @@ class PortSignals(NamedTuple):
     tyre_radial    tyre compression                      wheel, away from the plate   0
     tyre_lateral   upright at the contact point, outward upright, outward             F_tz
     ============== ===================================== ============================ =====================
+
+    Force times velocity is power into the rig, but for ``tyre_radial``, where it is power out of it. The
+    velocity is the rate of the displacement, but for ``tyre_lateral``: there it is that of the upright's
+    material point, which the moving contact point leaves behind.
     """
 
     displacement: Float[Array, ""]

@@ -23,8 +23,11 @@ from jaxtyping import Array, Float
 
 from savgs_ident.model.values import Values
 
-Point = Float[Array, "2"] | tuple[Float[Array, ""], Float[Array, ""]]
+Point = Float[Array, "2"]
 """Lateral and vertical coordinate (y, z)."""
+
+Pair = tuple[Float[Array, ""], Float[Array, ""]]
+"""The same as two scalars."""
 
 
 class Linkage(NamedTuple):

@@ -40,8 +40,9 @@ class Inputs(NamedTuple):
 class Loads(NamedTuple):
     """Forces [N] along the way to the residual, for reports and energy balances.
 
-    ``strut`` pushes apart; ``vertical`` is F_tz; ``lateral`` the tyre friction on the upright; ``rail`` the
-    friction on the sprung mass; ``carriage`` |F_Nt| + |F_Nb|; ``reaction`` F_Ny [N] and M_Nx [N m].
+    ``strut`` pushes apart and ``strut_rate`` [m/s] is the rate of its length; ``vertical`` is F_tz;
+    ``lateral`` the tyre friction on the upright; ``rail`` the friction on the sprung mass; ``carriage``
+    |F_Nt| + |F_Nb|; ``reaction`` F_Ny [N] and M_Nx [N m]; ``touch`` the tyre's contact.
     """
 
     strut: Float[Array, ""]
@@ -55,7 +56,11 @@ class Loads(NamedTuple):
 
 
 class QuarterCar(eqx.Module):
-    """The rig without friction, plus the effects that were added to it."""
+    """The rig without friction, plus the effects that were added to it with ``+``.
+
+    Adding raises :class:`InputError` for an effect at a port where no force can act, or one that is in the
+    model already.
+    """
 
     damper: DamperCurve
     effects: tuple[AbstractEffect, ...] = ()
@@ -127,6 +132,7 @@ class QuarterCar(eqx.Module):
     ) -> Array:
         """The residual, shape (2 + s,): force [N] and moment [N m] out of balance, rates out of balance.
 
+        ``s`` and ``sd`` (s,) are the internal states and their rates, in the order of :attr:`states`.
         ``curves`` of the same parameters serve where many points share them; without, the kinematics are
         evaluated in closed form.
         """

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.model.dynamics import Motion
-from savgs_ident.model.kinematics import Point
+from savgs_ident.model.kinematics import Pair
 from savgs_ident.model.section import Section
 from savgs_ident.model.values import Values
 
@@ -32,8 +32,8 @@ class Contact(NamedTuple):
     [m] and ``compression_rate`` [m/s] radial; ``cos_tilt`` the cosine of the wheel's tilt.
     """
 
-    place: Point
-    place_slope: Point
+    place: Pair
+    place_slope: Pair
     lateral_velocity: Float[Array, ""]
     compression: Float[Array, ""]
     compression_rate: Float[Array, ""]

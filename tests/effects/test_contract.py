@@ -26,8 +26,8 @@ from savgs_ident.core.rig import Rig, merge_parameters
 from savgs_ident.core.rig_form import UNIT_OF
 from savgs_ident.effects.registry import CATALOGUE, build_model, model_parameters
 from savgs_ident.model.effect import AbstractEffect, Port, PortSignals
-from savgs_ident.model.kinematics import Values
 from savgs_ident.model.quarter_car import HANDLED_PORTS, QuarterCar
+from savgs_ident.model.values import Values
 
 from ..model.instants import all_parameters, as_values, draw_instants, inputs_of, motion_of
 from ..model.primitives import MAPPABLE, primitives_of

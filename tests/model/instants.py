@@ -14,9 +14,9 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.rig import Rig, merge_parameters
 from savgs_ident.effects.registry import CATALOGUE
 from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.kinematics import Values
 from savgs_ident.model.quarter_car import Inputs, Link
 from savgs_ident.model.tyre import Road
+from savgs_ident.model.values import Values
 
 LARGEST = np.array([0.03, 0.25, 0.5, 2.0, 8.0, 40.0, 0.02, 0.5, np.pi / 2.0, 8.0])
 """Half ranges of what is drawn; the road is drawn about the wheel, the link angle about its middle."""

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from savgs_ident.core.rig import Rig
-from savgs_ident.model.kinematics import Linkage, Values, linkage, strut_length
+from savgs_ident.model.kinematics import Linkage, linkage, strut_length
 from savgs_ident.model.quarter_car import Loads, QuarterCar
+from savgs_ident.model.values import Values
 
 from .free_body import Drive, FreeBodies, State
 from .instants import as_values, draw_instants, inputs_of, motion_of, shifted
@@ -96,16 +97,20 @@ def _look(model: QuarterCar) -> Look:
     return lambda numbers, instant, stretch: look(as_values(numbers), instant, np.float64(stretch))
 
 
-@pytest.fixture(scope="module")
-def look_simqc(simqc: QuarterCar) -> Look:
-    """A view of SimQC, compiled once."""
-    return _look(simqc)
+FRICTIONLESS = {"mu_r": 0.0, "mu_t": 0.0}
+"""With these SimTR is SimQC, to the last digit: the contract of the effects says so."""
 
 
 @pytest.fixture(scope="module")
 def look_simtr(simtr: QuarterCar) -> Look:
     """A view of SimTR, compiled once."""
     return _look(simtr)
+
+
+@pytest.fixture(scope="module")
+def look_simqc(look_simtr: Look) -> Look:
+    """A view of SimQC."""
+    return lambda numbers, instant, stretch: look_simtr(numbers | FRICTIONLESS, instant, stretch)
 
 
 @pytest.fixture(scope="module")
@@ -181,7 +186,7 @@ def test_the_motion_needs_what_the_separate_bodies_need(cases: list[Case], seen_
     """At any accelerations: what is out of balance in the model is what drives would have to add."""
     for case, seen in zip(cases, seen_simqc, strict=True):
         answer = case.bodies.inverse(case.state, case.drive, *case.instant[4:6], mu_t=0.0)
-        assert np.asarray(seen.residual) == pytest.approx([-answer.lift, -answer.swing], abs=1e-9 * FORCE)
+        assert np.asarray(seen.residual[:2]) == pytest.approx([-answer.lift, -answer.swing], abs=1e-9 * FORCE)
 
 
 @pytest.mark.parametrize("friction", [False, True], ids=["simqc", "simtr"])

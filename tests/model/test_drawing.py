@@ -12,12 +12,13 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.model.kinematics import (
-    Values,
     installation_ratio,
     strut_length,
     suspension_travel,
 )
 from savgs_ident.model.quarter_car import Loads, QuarterCar
+from savgs_ident.model.section import SectionCurves, section_curves
+from savgs_ident.model.values import Values
 
 from .instants import NOMINAL, as_values, inputs_of, motion_of
 
@@ -38,15 +39,17 @@ class Small(NamedTuple):
 def small(simqc: QuarterCar, numbers: dict[str, float]) -> Callable[[NDArray[np.float64]], Small]:
     """SimQC linearised about an instant."""
 
-    def residual(moved: Array, p: Values, instant: Array) -> Array:
+    def residual(moved: Array, p: Values, curves: SectionCurves, instant: Array) -> Array:
         at = instant.at[jnp.array([0, 1, 4, 5])].set(moved)
-        return simqc.residual(p, motion_of(at), jnp.zeros(0), jnp.zeros(0), inputs_of(at))
+        return simqc.residual(p, motion_of(at), jnp.zeros(0), jnp.zeros(0), inputs_of(at), curves)
 
     @jax.jit
     def linearise(p: Values, instant: Array) -> tuple[Array, Array, Loads]:
         moved = instant[jnp.array([0, 1, 4, 5])]
         loads = simqc.loads(p, motion_of(instant), jnp.zeros(0), inputs_of(instant))
-        value, slope = jax.linearize(lambda x: residual(x, p, instant), moved)
+        # The curves are the closed form to 1e-11 and much less to differentiate once more.
+        curves = section_curves(p)
+        value, slope = jax.linearize(lambda x: residual(x, p, curves, instant), moved)
         columns = [slope(unit) for unit in jnp.unstack(jnp.eye(4))]
         return value, jnp.stack(columns, axis=1), loads
 

@@ -13,9 +13,9 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.effects.rail_coulomb import RailCoulomb
 from savgs_ident.effects.tyre_friction import TyreFriction
 from savgs_ident.model.effect import AbstractEffect, InternalState, Port, PortSignals
-from savgs_ident.model.kinematics import Values
 from savgs_ident.model.quarter_car import HANDLED_PORTS, QuarterCar
 from savgs_ident.model.sensors import read_sensors
+from savgs_ident.model.values import Values
 
 from .instants import NOMINAL, as_values, draw_instants, inputs_of, motion_of
 
