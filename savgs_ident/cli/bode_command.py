@@ -54,7 +54,7 @@ def bode(
         compared = compare(rig, effects, measured, progress)
         record = bode_record(compared, effects)
         files = [write_json(out / "bode.json", record)]
-        files += draw_comparison(rig, effects, compared, out, progress)
+        files += draw_comparison(rig, effects, compared, recorded.source, out, progress)
     voice.show(bode_text(record), plain("Written: " + ", ".join(str(file) for file in files)))
     voice.hand_over(record)
     if record["converged"]:

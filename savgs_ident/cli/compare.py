@@ -29,9 +29,10 @@ def compare(rig: Rig, effects: Sequence[str], measured: HarmonicResponse, progre
 
 
 def draw_comparison(
-    rig: Rig, effects: Sequence[str], compared: Compared, out: Path, progress: Progress
+    rig: Rig, effects: Sequence[str], compared: Compared, source: str, out: Path, progress: Progress
 ) -> tuple[Path, ...]:
-    """Write bode.png and bode.pdf, the models solved between the dwells too."""
+    """Write bode.png and bode.pdf, the models solved between the dwells too; ``source`` was measured."""
+    title = f"Model and measurement: {Path(source).name}"
     label = "identified model" if rig.provenance else "model as drawn"
     progress("solving the model between the dwells")
     curves = [solve_between(rig, effects, compared.model).curve(label)]
@@ -42,4 +43,4 @@ def draw_comparison(
     progress("drawing")
     residuals = whitened(compared.measured, compared.model.harmonics, compared.used)
     points = measured_points(compared.measured)
-    return write_figure(out, "bode", bode_figure("Model and measurement", points, curves, residuals))
+    return write_figure(out, "bode", bode_figure(title, points, curves, residuals))

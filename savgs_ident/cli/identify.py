@@ -67,13 +67,13 @@ def identify(job: Job, voice: Voice, out: Path) -> int:
         files = [write_json(out / "fit.json", record), out / "model.toml"]
         identified = replace(fit.rig, provenance=provenance(fit, campaign, job.command))
         write_rig(identified, out / "model.toml")
-        files += _draw(fit, identified, out, progress)
+        files += _draw(fit, identified, campaign.source, out, progress)
     voice.show(fit_text(fit), plain(""), plain("Written: " + ", ".join(str(file) for file in files)))
     voice.hand_over(record)
     return conclude(fit)
 
 
-def _draw(fit: Fit, rig: Rig, out: Path, progress: Progress) -> tuple[Path, ...]:
+def _draw(fit: Fit, rig: Rig, source: str, out: Path, progress: Progress) -> tuple[Path, ...]:
     excitation = measured_excitation(fit.measured, rig.parameters["psi_nominal"].value)
     model = Solved(excitation, fit.predicted, fit.dwell_status)
     status = tuple(
@@ -81,7 +81,7 @@ def _draw(fit: Fit, rig: Rig, out: Path, progress: Progress) -> tuple[Path, ...]
     )
     frictionless = Solved(excitation, fit.frictionless, status)
     compared = Compared(fit.measured, model, frictionless, fit.used)
-    return draw_comparison(rig, fit.effects, compared, out, progress)
+    return draw_comparison(rig, fit.effects, compared, source, out, progress)
 
 
 def conclude(fit: Fit) -> int:

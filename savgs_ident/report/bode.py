@@ -54,10 +54,17 @@ def response_figure(title: str, curves: Sequence[ModelCurve]) -> Figure:
             draw_phase(column[1], curves, None, c)
             draw_peak_to_peak(column[2], curves, None, c, shown)
             for axes in column:
+                _mark_solved(axes)
                 frequency_axis(axes, frequency.min(), frequency.max(), labelled=axes is column[-1])
         figure.align_ylabels(grid)
         _share_legend(figure, title)
         return figure
+
+
+def _mark_solved(axes: Axes) -> None:
+    """Points where the model was solved; the line between them only guides the eye."""
+    for line in axes.get_lines():
+        line.set(marker="o", markersize=3.5, markerfacecolor="white")
 
 
 def _share_legend(figure: Figure, title: str) -> None:

@@ -1,6 +1,6 @@
 """A fit in the terminal: the parameters with their errors, how well it fits, what the data can tell."""
 
-from math import floor, log10
+from math import floor, isfinite, isinf, log10
 from typing import Any
 
 from rich.console import Group, RenderableType
@@ -12,7 +12,7 @@ from savgs_ident.report.residuals import chi2_by_dwell, entries_by_dwell
 from savgs_ident.report.terminal import fixed, plain, table
 
 _SHOWN_DWELLS = 5
-_FAR_SIGMA = 2.0
+_FAR = 2.0
 
 
 def fit_text(fit: Fit) -> RenderableType:
@@ -20,6 +20,7 @@ def fit_text(fit: Fit) -> RenderableType:
     parts = [
         _identified(fit),
         _quality(fit),
+        *_correlation(fit),
         plain(""),
         _gap_table(gap_record(fit)),
         *_tolerances(fit),
@@ -32,6 +33,8 @@ def fit_text(fit: Fit) -> RenderableType:
 
 def value_with_error(value: float, error: float) -> str:
     """A value to the second significant digit of its error, ``0.03001 ± 0.00012``."""
+    if isinf(error):
+        return f"{value:.3g}, not told"
     if not error > 0.0:
         return f"{value:.6g}"
     places = min(max(1 - floor(log10(error)), 0), 12)
@@ -44,8 +47,8 @@ def _identified(fit: Fit) -> RenderableType:
             each.name,
             value_with_error(each.value, each.stderr),
             "" if each.unit == "1" else each.unit,
-            fixed(100.0 * each.stderr / abs(each.value), 2) if each.value else "-",
-            fit.rig.parameters[each.name].about if each.name in fit.rig.parameters else "",
+            fixed(100.0 * each.stderr / abs(each.value), 2) if each.value and isfinite(each.stderr) else "-",
+            _about(fit, each.name),
         )
         for each in fit.estimates
         if each.free
@@ -63,6 +66,24 @@ def _quality(fit: Fit) -> RenderableType:
         f"chi2/dof = {fit.chi2:.1f}/{fit.dof}{ratio} on {what} of {len(fit.measured.tests)} dwells"
         f" ({fit.wall_s:.1f} s)"
     )
+
+
+def _about(fit: Fit, name: str) -> str:
+    """What a parameter is, in a few words."""
+    return fit.rig.parameters[name].about.split(",")[0] if name in fit.rig.parameters else ""
+
+
+def _correlation(fit: Fit) -> list[RenderableType]:
+    """The free parameters that trade off most against each other."""
+    names = fit.free_names
+    pairs = [(one, other) for one in range(len(names)) for other in range(one)]
+    known = [pair for pair in pairs if isfinite(fit.correlation[pair])]
+    if not known:
+        return []
+    one, other = max(known, key=lambda pair: abs(fit.correlation[pair]))
+    return [
+        plain(f"Strongest correlation: {names[other]} with {names[one]}, {fit.correlation[one, other]:+.2f}")
+    ]
 
 
 def _gap_table(gap: dict[str, Any]) -> RenderableType:
@@ -89,7 +110,7 @@ def _tolerances(fit: Fit) -> list[RenderableType]:
     rows = [
         (
             each.name,
-            f"{each.prior:.6g} ± {each.prior_sd:.2g}",
+            value_with_error(each.prior, each.prior_sd),
             value_with_error(each.value, each.stderr),
             each.unit,
             f"{(each.value - each.prior) / each.prior_sd:+.1f}",
@@ -117,7 +138,7 @@ def _dwells(fit: Fit) -> list[RenderableType]:
     bad = [
         d
         for d in sorted(range(len(ratio)), key=lambda d: -ratio[d])
-        if ratio[d] > _FAR_SIGMA or not fit.dwell_status[d].ok
+        if ratio[d] > _FAR or not fit.dwell_status[d].ok
     ]
     if not bad:
         return []
@@ -130,7 +151,7 @@ def _dwells(fit: Fit) -> list[RenderableType]:
         )
         for d in bad[:_SHOWN_DWELLS]
     ]
-    title = f"Dwells that the model does not explain: {len(bad)}"
+    title = f"Dwells that the model explains worst (chi2 per entry above {_FAR:g}, or not solved): {len(bad)}"
     return [table(title, ("dwell", "f\n[Hz]", "chi2 per\nentry", "solution"), rows, texts=(0, 3))]
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from savgs_ident.report.curves import MeasuredPoints, ModelCurve, phase_deg
@@ -54,7 +54,7 @@ def draw_magnitude(
 def draw_phase(axes: Axes, curves: Sequence[ModelCurve], measured: MeasuredPoints | None, c: int) -> None:
     """Phase of the first harmonic against the road."""
     axes.set_ylabel("phase to the road [deg]")
-    axes.yaxis.set_major_locator(MultipleLocator(45.0))
+    axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1.0, 1.5, 3.0, 4.5, 9.0, 10.0]))
     for curve, line in zip(curves, LINES, strict=False):
         axes.plot(curve.frequency, phase_deg(curve.transfer[:, c]), **line)
     if measured is not None:

@@ -159,3 +159,13 @@ def test_a_campaign_without_dwells_is_drawn(summary: CampaignSummary, tmp_path: 
 def test_a_folder_that_is_not_there_is_an_input_error(bode: Figure, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"):
         write_figure(tmp_path / "nowhere", "bode", bode)
+
+
+def test_a_response_at_a_single_frequency_is_seen(
+    mass_on_spring: Callable[..., NDArray[np.complex128]],
+) -> None:
+    frequency = np.array([2.0])
+    road, ok = np.full(1, 0.01375 + 0.0j), np.ones(1, dtype=np.bool_)
+    curve = model_curve("one", frequency, mass_on_spring(frequency, 0.3), road, ok)
+    figure = response_figure("one point", [curve])
+    assert all(axes.get_lines()[0].get_marker() == "o" for axes in figure.axes)

@@ -51,6 +51,7 @@ def as_json(record: Mapping[str, object]) -> dict[str, Any]:
         (1.5, 0.0, "1.5"),
         (-0.25, 0.031, "-0.250 ± 0.031"),
         (2.0, float("nan"), "2"),
+        (0.2512, float("inf"), "0.251, not told"),
     ],
 )
 def test_a_value_has_the_digits_of_its_error(value: float, error: float, text: str) -> None:
@@ -65,8 +66,16 @@ def test_a_printed_value_is_right_to_a_tenth_of_its_error(value: float, error: f
 
 def test_the_text_of_a_fit_says_parameters_quality_and_verdict(fit: Fit) -> None:
     text = rendered(fit_text(fit))
-    for part in ("mu_r", "0.03002 ± 0.00012", "5386.0 ± 9.7", "N s/m", "163.0/158 = 1.032", "0.40"):
+    for part in (
+        "mu_r",
+        "0.03002 ± 0.00012",
+        "5386.0 ± 9.7",
+        "N s/m",
+        "163.0/158 = 1.032",
+        "0.40",
+    ):
         assert part in text
+    assert "Strongest correlation: mu_r with c_sd, -0.50" in text
     assert "The data tell all free parameters." in text
     assert text.index("mu_r") < text.index("chi2/dof") < text.index("Verdict")
 
