@@ -180,7 +180,7 @@ def _advice(minimiser: Minimiser, best: Minimum, settings: FitSettings) -> tuple
 def _log_covariance(problem: Problem, best: Minimum, values: dict[str, float]) -> np.ndarray:
     """Covariance of the logarithms of the free parameters."""
     count = len(problem.free.identified)
-    slope = np.asarray(problem.free.jacobian_diag(best.u))[:count]
+    slope = np.asarray(problem.slopes(best.u))[:count]
     scale = slope / np.array([values[name] for name in problem.free.identified])
     return spread_of(best.jacobian).covariance[:count, :count] * np.outer(scale, scale)
 
@@ -189,7 +189,7 @@ def _estimates(
     problem: Problem, best: Minimum, table: ParameterTable
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
     values = problem.parameters(best.u)
-    slope = np.asarray(problem.free.jacobian_diag(best.u))
+    slope = np.asarray(problem.slopes(best.u))
     spread = spread_of(best.jacobian)
     covariance = spread.covariance * np.outer(slope, slope)
     estimates = []

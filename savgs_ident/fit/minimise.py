@@ -20,7 +20,7 @@ from savgs_ident.simulate.periodic import PeriodicSolution
 Progress = Callable[[str], None]
 """Is told what is going on, a line at a time."""
 
-TOLERANCE = 1e-3
+TOLERANCE = 1e-2
 """Change of coordinates and residuals at which to stop; both count in standard deviations or logarithms."""
 
 

@@ -50,7 +50,11 @@ class Problem(eqx.Module):
 
     def parameters(self, u: Float[Array, " n"]) -> Values:
         """All parameters of the model [SI] at unconstrained coordinates."""
-        return self.fixed | self.free.to_constrained(u)
+        return self.fixed | _to_constrained(self.free, u)
+
+    def slopes(self, u: Float[Array, " n"]) -> Float[Array, " n"]:
+        """d(parameter)/du of every free parameter [its SI unit]."""
+        return _slopes(self.free, u)
 
     @property
     def unpinned(self) -> Pins:
@@ -84,6 +88,17 @@ def tolerated_parameters(model: QuarterCar, table: ParameterTable, free: tuple[s
     return tuple(name for name in known_to_tolerance(table, free) if name in used)
 
 
+# Compiled as a whole: the maps of forty parameters, one operation at a time, would take seconds.
+@eqx.filter_jit
+def _to_constrained(free: FreeVector, u: Array) -> dict[str, Array]:
+    return free.to_constrained(u)
+
+
+@eqx.filter_jit
+def _slopes(free: FreeVector, u: Array) -> Array:
+    return free.jacobian_diag(u)
+
+
 class Found(NamedTuple):
     """The moving parts of a periodic solution: see :class:`PeriodicSolution`."""
 
@@ -115,7 +130,7 @@ def _residuals_jvp(
     predicted = harmonics(p, solution, problem.orders)
     by_name = harmonic_sensitivities(problem.model, p, solution, problem.free.names, problem.orders)
     columns = jax.vmap(lambda change: jax.jvp(problem.target, (predicted,), (change,))[1])(by_name)
-    data = columns.T * problem.free.jacobian_diag(u)
+    data = columns.T * problem.slopes(u)
     priors = jax.jacfwd(problem.free.prior_residuals)(u)
     jacobian = jnp.concatenate([data, priors, jnp.diag(pins.weight)])
     found = _found(solution)

@@ -3,7 +3,7 @@
 The pose of the linkage and the inertia of the unsprung bodies depend on one variable, theta_LW. A
 :class:`Section` holds them at one angle; :func:`section` computes it in closed form. Where many points share
 one parameter set, :class:`SectionCurves` does the same from polynomials through the closed form at Chebyshev
-nodes, to about 1e-11, at a tenth of the cost and still differentiable in every hardpoint.
+nodes, to about 1e-12, at a tenth of the cost and still differentiable in every hardpoint.
 
 The inertia forces are affine in (zdd_s + g, thetadd, thetad^2), so a 4 x 3 matrix says all about them.
 """
@@ -15,14 +15,20 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from numpy.polynomial import chebyshev
 
-from savgs_ident.model.dynamics import Coordinates, Motion, inertia_and_weight, swing
+from savgs_ident.model.dynamics import Coordinates, Motion, Swing, inertia_and_weight, swing
+from savgs_ident.model.kinematics import linkage
 from savgs_ident.model.values import Values
 
 TRAVEL = 0.35
 """Half the range of theta_LW that curves cover [rad]: some 13 cm of wheel travel either way."""
 
-_NODES = 14
+_NODES = 18
+_POINTS = chebyshev.chebpts1(_NODES)
+_TO_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(_POINTS, _NODES - 1))
+_DERIVATIVE = chebyshev.chebval(_POINTS, chebyshev.chebder(_TO_COEFFICIENTS)).T
+"""From values at the nodes to those of the derivative of the polynomial through them."""
 
 
 class Section(NamedTuple):
@@ -48,12 +54,16 @@ class Section(NamedTuple):
 
 def section(p: Values, theta_LW: Float[Array, ""]) -> Section:
     """The section at ``theta_LW`` [rad] in closed form; NaN where the linkage cannot be assembled."""
-    swing_ = swing(p, theta_LW)
-    zero, one = jnp.zeros_like(theta_LW), jnp.ones_like(theta_LW)
+    return _section_of(p, swing(p, theta_LW))
+
+
+def _section_of(p: Values, swing_: Swing) -> Section:
+    zero = jnp.zeros_like(swing_.pose.roll_K)
+    one = jnp.ones_like(zero)
     weightless = dict(p) | {"g": zero}
 
     def inertia(lift: Array, alpha: Array, omega: Array) -> Array:
-        motion = Motion(Coordinates(zero, theta_LW), Coordinates(zero, omega), Coordinates(lift, alpha))
+        motion = Motion(Coordinates(zero, zero), Coordinates(zero, omega), Coordinates(lift, alpha))
         return inertia_and_weight(weightless, swing_, motion)
 
     columns = (inertia(one, zero, zero), inertia(zero, one, zero), inertia(zero, zero, one))
@@ -66,23 +76,28 @@ def section(p: Values, theta_LW: Float[Array, ""]) -> Section:
 
 
 class SectionCurves(eqx.Module):
-    """Polynomials of all entries of a section over ``theta_LW / TRAVEL``, (22, n), constant first."""
+    """Chebyshev coefficients of all entries of a section over ``theta_LW / TRAVEL``, (22, n)."""
 
     coefficients: Float[Array, "entries n"]
 
     def __call__(self, theta_LW: Float[Array, ""]) -> Section:
-        """The section at ``theta_LW`` [rad], good to about 1e-11 within :data:`TRAVEL`."""
+        """The section at ``theta_LW`` [rad], good to about 1e-12 within :data:`TRAVEL`."""
         ratio = theta_LW / TRAVEL
-        powers = [jnp.ones_like(ratio)]
-        for _ in range(_NODES - 1):
-            powers.append(powers[-1] * ratio)
-        entries = self.coefficients @ jnp.stack(powers)
+        terms = [jnp.ones_like(ratio), ratio]
+        while len(terms) < _NODES:
+            terms.append(2.0 * ratio * terms[-1] - terms[-2])
+        entries = self.coefficients @ jnp.stack(terms)
         return Section(*entries[:10], inertia=entries[10:].reshape(4, 3))
 
 
 def section_curves(p: Values) -> SectionCurves:
-    """The curves of a parameter set."""
-    nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
-    at_nodes = jax.vmap(lambda theta: section(p, theta))(jnp.asarray(TRAVEL * nodes))
+    """The curves of a parameter set.
+
+    Only the pose is evaluated in closed form; its derivatives at the nodes are those of the polynomial.
+    """
+    pose = jax.vmap(lambda theta: linkage(p, theta))(jnp.asarray(TRAVEL * _POINTS))
+    slope = jax.tree.map(lambda values: jnp.tensordot(_DERIVATIVE / TRAVEL, values, axes=1), pose)
+    curvature = jax.tree.map(lambda values: jnp.tensordot(_DERIVATIVE / TRAVEL, values, axes=1), slope)
+    at_nodes = jax.vmap(lambda swing_: _section_of(p, swing_))(Swing(pose, slope, curvature))
     entries = jnp.stack([*at_nodes[:10], *at_nodes.inertia.reshape(_NODES, 12).T])
-    return SectionCurves(entries @ np.linalg.inv(np.vander(nodes, increasing=True)).T)
+    return SectionCurves(entries @ _TO_COEFFICIENTS.T)

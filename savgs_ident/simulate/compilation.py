@@ -2,9 +2,24 @@
 
 import os
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import jax
+
+
+_QUICK = "--xla_cpu_use_fusion_emitters=false"
+_QUICK_IS_KNOWN_TO = "0.10."
+
+
+def _spare_the_compiler() -> None:
+    """Compile in half the time and memory, for the same speed of what is compiled.
+
+    A flag that XLA does not know ends the process, hence only for versions on which it was tried.
+    """
+    flags = os.environ.get("XLA_FLAGS", "")
+    if version("jaxlib").startswith(_QUICK_IS_KNOWN_TO) and "fusion_emitters" not in flags:
+        os.environ["XLA_FLAGS"] = f"{flags} {_QUICK}".strip()
 
 
 def cache_folder() -> Path:
@@ -22,7 +37,11 @@ def cache_folder() -> Path:
 
 
 def use_persistent_cache() -> bool:
-    """Keep compiled programs from now on; False where the folder cannot be written, and nothing is kept."""
+    """Keep compiled programs from now on; False where the folder cannot be written, and nothing is kept.
+
+    To be called before anything is computed: the compiler is set up here too.
+    """
+    _spare_the_compiler()
     folder = cache_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -31,5 +50,5 @@ def use_persistent_cache() -> bool:
     if not os.access(folder, os.W_OK):
         return False
     jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     return True
