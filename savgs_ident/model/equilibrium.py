@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.kinematics import suspension_travel
 from savgs_ident.model.quarter_car import Inputs, Link, QuarterCar
+from savgs_ident.model.section import SectionCurves
 from savgs_ident.model.small_root import find_root
 from savgs_ident.model.tyre import Road
 from savgs_ident.model.values import Values
@@ -38,18 +39,24 @@ def _at_rest(q: Coordinates) -> Motion:
 
 
 def static_equilibrium(
-    model: QuarterCar, p: Values, link_angle: Float[Array, ""], road_height: Float[Array, ""]
+    model: QuarterCar,
+    p: Values,
+    link_angle: Float[Array, ""],
+    road_height: Float[Array, ""],
+    curves: SectionCurves | None = None,
 ) -> Equilibrium:
     """Where the rig rests at a link angle [rad] and a height of the plate [m]; NaN if it finds no rest.
 
-    Differentiable in everything, exactly.
+    ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`. Differentiable in everything,
+    exactly.
     """
     zero = jnp.zeros_like(link_angle)
     inputs = Inputs(Road(road_height, zero), Link(link_angle, zero))
     states = [state.scale for state in model.states]
 
     def residual(x: Array) -> Array:
-        return model.residual(p, _at_rest(Coordinates(x[0], x[1])), x[2:], jnp.zeros_like(x[2:]), inputs)
+        still = jnp.zeros_like(x[2:])
+        return model.residual(p, _at_rest(Coordinates(x[0], x[1])), x[2:], still, inputs, curves)
 
     scale = jnp.asarray([*COORDINATE_SCALE, *states])
     x = find_root(residual, jnp.zeros(2 + len(states)), scale, PRECISION)
@@ -57,11 +64,11 @@ def static_equilibrium(
     return Equilibrium(q, x[2:], model.loads(p, _at_rest(q), x[2:], inputs).strut)
 
 
-def deflection_zero(model: QuarterCar, p: Values) -> Float[Array, ""]:
+def deflection_zero(model: QuarterCar, p: Values, curves: SectionCurves | None = None) -> Float[Array, ""]:
     """Suspension travel from the drawing [m] at which a recorded deflection is zero.
 
     That is at standstill with the link at its nominal angle.
     """
     nominal = jnp.asarray(p["psi_nominal"])
-    rest = static_equilibrium(model, p, nominal, jnp.zeros_like(nominal))
+    rest = static_equilibrium(model, p, nominal, jnp.zeros_like(nominal), curves)
     return suspension_travel(p, rest.q.theta_LW)

@@ -13,7 +13,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 from numpy.typing import ArrayLike
 from scipy.interpolate import Akima1DInterpolator
 
@@ -95,19 +95,30 @@ class LinearSweep(AbstractProfile):
 class Tabulated(AbstractProfile):
     """A curve through knots, C1, that holds its first and last value outside them.
 
-    ``time`` [s] of shape (n,), increasing; ``coefficients`` (4, n - 1) of the cubic between each two knots in
-    powers of the time since the earlier one, cubic first.
+    ``time`` [s] of shape (n,), increasing; ``coefficients`` (n - 1, 4) of the cubic between each two knots in
+    powers of the time since the earlier one, cubic first. ``first`` (n - 1,) is the last knot at or before the
+    beginning of each of n - 1 equal parts of the time: where to look for a knot.
     """
 
     time: Float[Array, " n"]
-    coefficients: Float[Array, "4 m"]
+    coefficients: Float[Array, "m 4"]
+    first: Int[Array, " m"]
+
+    def _piece(self, t: Scalar) -> Int[Array, ""]:
+        parts = self.first.shape[0]
+        share = (t - self.time[0]) / (self.time[-1] - self.time[0])
+        part = jnp.clip((share * parts).astype(self.first.dtype), 0, parts - 1)
+
+        def later(piece: Array) -> Array:
+            return (piece < parts - 1) & (self.time[jnp.minimum(piece + 1, parts)] <= t)
+
+        return jax.lax.while_loop(later, lambda piece: piece + 1, self.first[part])
 
     def value(self, t: Scalar) -> Scalar:
         """The quantity at time ``t`` [s]."""
         inside = jnp.clip(t, self.time[0], self.time[-1])
-        found = jnp.searchsorted(self.time, inside, side="right", method="scan_unrolled") - 1
-        piece = jnp.clip(found, 0, self.coefficients.shape[1] - 1)
-        cubic, square, slope, level = jnp.unstack(self.coefficients[:, piece])
+        piece = self._piece(jax.lax.stop_gradient(inside))
+        cubic, square, slope, level = jnp.unstack(self.coefficients[piece])
         offset = inside - self.time[piece]
         return ((cubic * offset + square) * offset + slope) * offset + level
 
@@ -130,4 +141,6 @@ def tabulated(time: ArrayLike, values: ArrayLike, source: str = "") -> Tabulated
             "the time does not increase", source=source, time=float(knots[back[0] + 1]), remedy=remedy
         )
     curve = Akima1DInterpolator(knots, levels, method="makima")
-    return Tabulated(jnp.asarray(knots), jnp.asarray(curve.c))
+    parts = np.linspace(knots[0], knots[-1], knots.size)[:-1]
+    first = np.searchsorted(knots, parts, side="right") - 1
+    return Tabulated(jnp.asarray(knots), jnp.asarray(curve.c.T), jnp.asarray(first))

@@ -12,9 +12,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.kinematics import Values
 from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.model.section import SectionCurves
 from savgs_ident.model.small_root import find_root
+from savgs_ident.model.values import Values
 
 ACCELERATION_SCALE = (1.0, 3.0)
 """Typical accelerations of z_s [m/s^2] and theta_LW [rad/s^2]."""
@@ -28,17 +29,24 @@ class Rates(NamedTuple):
 
 
 def solve_rates(
-    model: QuarterCar, p: Values, q: Coordinates, qd: Coordinates, s: Float[Array, " s"], inputs: Inputs
+    model: QuarterCar,
+    p: Values,
+    q: Coordinates,
+    qd: Coordinates,
+    s: Float[Array, " s"],
+    inputs: Inputs,
+    curves: SectionCurves | None = None,
 ) -> Rates:
     """Accelerations and rates that make the residual vanish; NaN where there are none.
 
-    Differentiable in everything, exactly, by the implicit function theorem.
+    ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`. Differentiable in everything,
+    exactly, by the implicit function theorem.
     """
     still = jnp.zeros_like(s)
 
     def residual(accelerations: Array) -> Array:
         motion = Motion(q, qd, Coordinates(accelerations[0], accelerations[1]))
-        return model.residual(p, motion, s, still, inputs)
+        return model.residual(p, motion, s, still, inputs, curves)
 
     scale = jnp.asarray(ACCELERATION_SCALE)
     accelerations = find_root(lambda y: residual(y)[:2], jnp.zeros(2), scale)

@@ -22,10 +22,11 @@ from savgs_ident.core.status import Status
 from savgs_ident.model.actuation import AbstractActuation, link_torque
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.equilibrium import deflection_zero, static_equilibrium
-from savgs_ident.model.kinematics import Values
 from savgs_ident.model.quarter_car import Inputs, Loads, QuarterCar
 from savgs_ident.model.road import RoadMotion
+from savgs_ident.model.section import TRAVEL, SectionCurves, section_curves
 from savgs_ident.model.sensors import Readings, read_sensors
+from savgs_ident.model.values import Values
 from savgs_ident.simulate.rates import Rates, solve_rates
 
 TOLERANCE = 1e-7
@@ -84,7 +85,8 @@ class TransientSolution(eqx.Module):
         """How the integration ended. Only if it is ``ok`` do the arrays hold a motion."""
         if bool(self.result == dfx.RESULTS.successful):
             finite = bool(jnp.isfinite(self.readings.sprung_accel).all())
-            return Status.CONVERGED if finite else Status.NOT_FINITE
+            inside = bool((jnp.abs(self.motion.q.theta_LW) < TRAVEL).all())
+            return Status.CONVERGED if finite and inside else Status.NOT_FINITE
         if bool(self.result == dfx.RESULTS.max_steps_reached):
             return Status.MAX_ITERATIONS
         return Status.NOT_FINITE
@@ -97,11 +99,19 @@ class TransientSolution(eqx.Module):
 
 @eqx.filter_jit
 def rest_state(
-    model: QuarterCar, p: Values, road: RoadMotion, link: AbstractActuation, t: Float[Array, ""]
+    model: QuarterCar,
+    p: Values,
+    road: RoadMotion,
+    link: AbstractActuation,
+    t: Float[Array, ""],
+    curves: SectionCurves | None = None,
 ) -> RigState:
-    """The rig at static equilibrium with the road and the link as they stand at time ``t`` [s]."""
+    """The rig at static equilibrium with the road and the link as they stand at time ``t`` [s].
+
+    ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`.
+    """
     angle = link.start_angle(t)
-    rest = static_equilibrium(model, p, angle, road.height(t))
+    rest = static_equilibrium(model, p, angle, road.height(t), curves)
     still = Coordinates(jnp.zeros_like(angle), jnp.zeros_like(angle))
     return RigState(
         rest.q, still, rest.s, link.start(p, t, link_torque(p, rest.strut, rest.q.theta_LW, angle))
@@ -109,10 +119,16 @@ def rest_state(
 
 
 def _inputs_and_rates(
-    model: QuarterCar, p: Values, road: RoadMotion, link: AbstractActuation, t: Array, now: RigState
+    model: QuarterCar,
+    p: Values,
+    road: RoadMotion,
+    link: AbstractActuation,
+    t: Array,
+    now: RigState,
+    curves: SectionCurves | None = None,
 ) -> tuple[Inputs, Rates]:
     inputs = Inputs(road.at(t), link.link(t, now.actuation))
-    return inputs, solve_rates(model, p, now.q, now.qd, now.s, inputs)
+    return inputs, solve_rates(model, p, now.q, now.qd, now.s, inputs, curves)
 
 
 def state_rates(
@@ -122,9 +138,13 @@ def state_rates(
     link: AbstractActuation,
     t: Float[Array, ""],
     now: RigState,
+    curves: SectionCurves | None = None,
 ) -> RigState:
-    """Time derivative of the state: the right side of the differential equations."""
-    inputs, rates = _inputs_and_rates(model, p, road, link, t, now)
+    """Time derivative of the state: the right side of the differential equations.
+
+    ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`.
+    """
+    inputs, rates = _inputs_and_rates(model, p, road, link, t, now, curves)
     strut = model.loads(p, Motion(now.q, now.qd, rates.qdd), now.s, inputs).strut
     load = link_torque(p, strut, now.q.theta_LW, inputs.link.angle)
     return RigState(now.qd, rates.qdd, rates.sd, link.rate(p, t, now.actuation, load))
@@ -151,10 +171,11 @@ def _integrate(
     link: AbstractActuation,
     times: Array,
     start: RigState,
-    tolerance: float,
+    tolerance: Float[Array, ""],
+    curves: SectionCurves,
 ) -> dfx.Solution:
     def rates(t: Array, x: Array, args: None) -> Array:
-        return _pack(state_rates(model, p, road, link, t, _unpack(model, x)))
+        return _pack(state_rates(model, p, road, link, t, _unpack(model, x), curves))
 
     controller = dfx.PIDController(
         rtol=tolerance, atol=tolerance * _scales(model, link), pcoeff=0.2, icoeff=0.4, dtmin=LEAST_STEP
@@ -174,30 +195,31 @@ def _integrate(
     )
 
 
+_curves = eqx.filter_jit(section_curves)
+_zero = eqx.filter_jit(deflection_zero)
+
+
 @eqx.filter_jit
 def _observe(
-    model: QuarterCar, p: Values, road: RoadMotion, link: AbstractActuation, found: dfx.Solution
+    model: QuarterCar,
+    p: Values,
+    road: RoadMotion,
+    link: AbstractActuation,
+    found: dfx.Solution,
+    zero: Float[Array, ""],
+    curves: SectionCurves,
 ) -> TransientSolution:
-    zero = deflection_zero(model, p)
-
-    def one(t: Array, now: RigState) -> tuple[Inputs, Motion, Readings]:
-        inputs, rates = _inputs_and_rates(model, p, road, link, t, now)
+    def one(at: tuple[Array, Array]) -> tuple[RigState, Inputs, Motion, Readings]:
+        t, now = at[0], _unpack(model, at[1])
+        inputs, rates = _inputs_and_rates(model, p, road, link, t, now, curves)
         seen = read_sensors(p, now.q.theta_LW, rates.qdd.z_s)
         shown = seen._replace(susp_deflection=seen.susp_deflection - p["deflection_gain"] * zero)
-        return inputs, Motion(now.q, now.qd, rates.qdd), shown
+        return now, inputs, Motion(now.q, now.qd, rates.qdd), shown
 
-    states = jax.vmap(lambda x: _unpack(model, x))(found.ys)
-    inputs, motion, readings = jax.vmap(one)(found.ts, states)
-    return TransientSolution(
-        found.ts,
-        motion,
-        states.s,
-        states.actuation,
-        inputs,
-        readings,
-        found.stats["num_steps"],
-        found.result,
-    )
+    # One after the other: compiling the Newton iteration for all instants side by side takes far longer.
+    now, inputs, motion, readings = jax.lax.map(one, (found.ts, found.ys))
+    steps = found.stats["num_steps"]
+    return TransientSolution(found.ts, motion, now.s, now.actuation, inputs, readings, steps, found.result)
 
 
 def simulate_transient(
@@ -216,10 +238,10 @@ def simulate_transient(
     whose states are then part of the motion. ``tolerance`` is relative, per step. Look at ``status()`` of the
     result before using it. Differentiable in forward mode (``jax.jvp``, ``jax.jacfwd``).
     """
-    instants = jnp.asarray(times, dtype=jnp.float64)
-    start = rest_state(model, p, road, link, instants[0]) if initial is None else initial
-    found = _integrate(model, p, road, link, instants, start, tolerance)
-    return _observe(model, p, road, link, found)
+    instants, curves = jnp.asarray(times, dtype=jnp.float64), _curves(p)
+    start = rest_state(model, p, road, link, instants[0], curves) if initial is None else initial
+    found = _integrate(model, p, road, link, instants, start, jnp.asarray(tolerance), curves)
+    return _observe(model, p, road, link, found, _zero(model, p, curves), curves)
 
 
 @eqx.filter_jit
