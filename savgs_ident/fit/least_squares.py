@@ -209,7 +209,7 @@ def _frictionless(
 ) -> np.ndarray:
     """The same estimates with every effect at its null: the compiled model serves for SimQC too."""
     nulls = {name: value for effect in effects for name, value in CATALOGUE[effect].null.items()}
-    p = as_values(dict(problem.parameters(best.u)) | nulls)
+    p = dict(problem.parameters(best.u)) | as_values(nulls)
     solution = simulate_periodic(problem.model, p, excitation, settings.periodic)
     ok = np.array([status.ok for status in solution.status()])
     response = np.asarray(harmonics(p, solution, problem.orders))

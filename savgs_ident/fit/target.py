@@ -4,6 +4,8 @@ A target maps predicted harmonics (D, 2, n + 1) to residuals that are independen
 model is true. Both kinds see the two response channels only, as far as the measurement carries them.
 """
 
+from typing import Any, cast
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -46,8 +48,9 @@ class PeakToPeakTarget(eqx.Module):
 
     def __call__(self, predicted: Complex[Array, "D C K"]) -> Float[Array, " m"]:
         """Residuals in standard deviations, (D * 2,)."""
-        reach = peak_to_peak(predicted, jnp.asarray(self.used))
-        return ((reach - self.measured) * self.weight).ravel()
+        # It is written against the array API, its types name NumPy's arrays.
+        reach = cast(Any, peak_to_peak)(predicted, jnp.asarray(self.used))
+        return jnp.ravel((reach - self.measured) * self.weight)
 
     @property
     def entries(self) -> int:

@@ -68,11 +68,8 @@ def _section_of(p: Values, swing_: Swing) -> Section:
 
     columns = (inertia(one, zero, zero), inertia(zero, one, zero), inertia(zero, zero, one))
     pose, slope = swing_.pose, swing_.slope
-    return Section(
-        *(*pose.W, *pose.E, pose.roll_K),
-        *(*slope.W, *slope.E, slope.roll_K),
-        inertia=jnp.stack(columns, axis=1),
-    )
+    places = (*pose.W, *pose.E, pose.roll_K, *slope.W, *slope.E, slope.roll_K)
+    return Section(*places, jnp.stack(columns, axis=1))
 
 
 class SectionCurves(eqx.Module):
@@ -87,7 +84,7 @@ class SectionCurves(eqx.Module):
         while len(terms) < _NODES:
             terms.append(2.0 * ratio * terms[-1] - terms[-2])
         entries = self.coefficients @ jnp.stack(terms)
-        return Section(*entries[:10], inertia=entries[10:].reshape(4, 3))
+        return Section(*entries[:10], entries[10:].reshape(4, 3))
 
 
 def section_curves(p: Values) -> SectionCurves:

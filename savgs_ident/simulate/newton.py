@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int
 
 from savgs_ident.model.quarter_car import Inputs, QuarterCar
@@ -107,6 +108,6 @@ def solve_newton(
 
     shape = jax.eval_shape(lambda: linearise(model, p, start, inputs, layout, steps))
     blank = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
-    far = jnp.full(len(layout.counts), jnp.finfo(jnp.float64).max)
+    far = jnp.full(len(layout.counts), np.finfo(np.float64).max)
     begin = _Progress(NewtonResult(start, blank, far, jnp.array(0)), jnp.ones_like(far))
     return jax.lax.while_loop(unfinished, advance, begin).result
