@@ -69,7 +69,7 @@ def _section_of(p: Values, swing_: Swing) -> Section:
     columns = (inertia(one, zero, zero), inertia(zero, one, zero), inertia(zero, zero, one))
     pose, slope = swing_.pose, swing_.slope
     places = (*pose.W, *pose.E, pose.roll_K, *slope.W, *slope.E, slope.roll_K)
-    return Section(*places, jnp.stack(columns, axis=1))
+    return Section._make((*places, jnp.stack(columns, axis=1)))
 
 
 class SectionCurves(eqx.Module):
@@ -84,7 +84,7 @@ class SectionCurves(eqx.Module):
         while len(terms) < _NODES:
             terms.append(2.0 * ratio * terms[-1] - terms[-2])
         entries = self.coefficients @ jnp.stack(terms)
-        return Section(*entries[:10], entries[10:].reshape(4, 3))
+        return Section._make((*entries[:10], entries[10:].reshape(4, 3)))
 
 
 def section_curves(p: Values) -> SectionCurves:
