@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from savgs_ident.core.errors import InputError
 from savgs_ident.model.kinematics import strut_length
 from savgs_ident.model.profile import AbstractProfile, Constant, Sine, tabulated
-from savgs_ident.model.quarter_car import Link
+from savgs_ident.model.strut import Link
 from savgs_ident.model.values import Values
 from savgs_ident.recordings.recording import Recording
 

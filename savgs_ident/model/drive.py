@@ -21,7 +21,7 @@ from jaxtyping import Array, Float
 from savgs_ident.model.actuation import AbstractActuation
 from savgs_ident.model.pmsm import Axes, control_current, current_rate, motor_torque
 from savgs_ident.model.profile import AbstractProfile, Constant
-from savgs_ident.model.quarter_car import Link
+from savgs_ident.model.strut import Link
 from savgs_ident.model.values import Values
 
 Scalar = Float[Array, ""]
@@ -193,4 +193,4 @@ class Drive(AbstractActuation):
 
 def holding_drive(angle: float) -> Drive:
     """A drive that holds the link at ``angle`` [rad], as in passive tests."""
-    return Drive(PositionReference(Constant(angle)), angle)
+    return Drive(PositionReference(Constant(angle)), jnp.asarray(angle))

@@ -21,6 +21,9 @@ from savgs_ident.core.errors import InputError
 
 Scalar = Float[Array, ""]
 
+Number = Float[Array, ""] | float
+"""A number that becomes an array on entry."""
+
 
 class AbstractProfile(eqx.Module):
     """A quantity over time [s], continuously differentiable."""
@@ -37,7 +40,7 @@ class AbstractProfile(eqx.Module):
 class Constant(AbstractProfile):
     """A quantity that stays as it is."""
 
-    level: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    level: Number = eqx.field(converter=jnp.asarray)
 
     def value(self, t: Scalar) -> Scalar:
         """The level, at any time."""
@@ -51,11 +54,11 @@ class Sine(AbstractProfile):
     the motion is steady from the start.
     """
 
-    amplitude: Float[Array, ""] = eqx.field(converter=jnp.asarray)
-    frequency: Float[Array, ""] = eqx.field(converter=jnp.asarray)
-    mean: Float[Array, ""] = eqx.field(converter=jnp.asarray)
-    phase: Float[Array, ""] = eqx.field(converter=jnp.asarray)
-    settle: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    amplitude: Number = eqx.field(converter=jnp.asarray)
+    frequency: Number = eqx.field(converter=jnp.asarray)
+    mean: Number = eqx.field(converter=jnp.asarray)
+    phase: Number = eqx.field(converter=jnp.asarray)
+    settle: Number = eqx.field(converter=jnp.asarray)
 
     def value(self, t: Scalar) -> Scalar:
         """The quantity at time ``t`` [s]."""
@@ -77,10 +80,10 @@ class LinearSweep(AbstractProfile):
     A sweep from 0 Hz starts at rest.
     """
 
-    amplitude: Float[Array, ""] = eqx.field(converter=jnp.asarray)
-    start: Float[Array, ""] = eqx.field(converter=jnp.asarray)
-    end: Float[Array, ""] = eqx.field(converter=jnp.asarray)
-    duration: Float[Array, ""] = eqx.field(converter=jnp.asarray)
+    amplitude: Number = eqx.field(converter=jnp.asarray)
+    start: Number = eqx.field(converter=jnp.asarray)
+    end: Number = eqx.field(converter=jnp.asarray)
+    duration: Number = eqx.field(converter=jnp.asarray)
 
     def value(self, t: Scalar) -> Scalar:
         """The quantity at time ``t`` [s]."""
