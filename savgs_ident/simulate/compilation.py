@@ -7,7 +7,6 @@ from pathlib import Path
 
 import jax
 
-
 _QUICK = "--xla_cpu_use_fusion_emitters=false"
 _QUICK_IS_KNOWN_TO = "0.10."
 

@@ -1,0 +1,74 @@
+"""A fit before it is done: what is fitted to what, and the problem that it makes."""
+
+from typing import NamedTuple
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.free_vector import FreeVector
+from savgs_ident.core.parameter import ParameterTable
+from savgs_ident.core.rig import Rig
+from savgs_ident.effects.registry import build_model, model_parameters
+from savgs_ident.fit.problem import Problem, tolerated_parameters, used_parameters
+from savgs_ident.fit.settings import FitSettings
+from savgs_ident.fit.target import harmonic_target, peak_to_peak_target
+from savgs_ident.model.values import as_values
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.excitation import Excitation
+from savgs_ident.simulate.measured import measured_excitation
+
+
+class Task(NamedTuple):
+    """A rig with effects, all its parameters, a response and how to fit it; the problem that follows."""
+
+    rig: Rig
+    effects: tuple[str, ...]
+    table: ParameterTable
+    measured: HarmonicResponse
+    settings: FitSettings
+    excitation: Excitation
+    problem: Problem
+
+
+def plan_task(
+    measured: HarmonicResponse,
+    rig: Rig,
+    effects: tuple[str, ...],
+    free: tuple[str, ...],
+    settings: FitSettings,
+) -> Task:
+    """The task of fitting ``free``.
+
+    Raises :class:`InputError` for names that do not exist or that the model does not use, and for a response
+    that cannot be used.
+    """
+    table = model_parameters(rig, effects)
+    excitation = measured_excitation(measured, rig.parameters["psi_nominal"].value)
+    problem = _problem(measured, rig, table, effects, free, settings)
+    return Task(rig, effects, table, measured, settings, excitation, problem)
+
+
+def _problem(
+    measured: HarmonicResponse,
+    rig: Rig,
+    table: ParameterTable,
+    effects: tuple[str, ...],
+    free: tuple[str, ...],
+    settings: FitSettings,
+) -> Problem:
+    model = build_model(rig, effects)
+    used = used_parameters(model, table)
+    for name in free:
+        if name not in table:
+            raise InputError(
+                f"there is no parameter '{name}'", remedy="choose among: " + ", ".join(sorted(used))
+            )
+        if name not in used:
+            raise InputError(
+                f"the model does not depend on '{name}'", remedy="choose among: " + ", ".join(sorted(used))
+            )
+    tolerated = () if settings.fixed_tolerances else tolerated_parameters(model, table, free)
+    fixed = as_values(table.as_dict())
+    by_harmonics = settings.quantity == "harmonics"
+    target = harmonic_target(measured, settings.orders) if by_harmonics else peak_to_peak_target(measured)
+    orders = target.used.shape[-1] - 1
+    free_vector = FreeVector(table, free, tolerated)
+    return Problem(model, free_vector, fixed, target, orders, settings.periodic.iterations)
