@@ -99,6 +99,7 @@ def peak_to_peak_target(measured: HarmonicResponse) -> PeakToPeakTarget:
     present, places = response_channels(measured)
     sd = measured.peak_to_peak_sd[:, places]
     used = measured.valid[:, places] & present[None, :, None]
+    used[:, :, 0] = False
     told = used[:, :, 1] & (sd > 0.0)
     if not told.any():
         raise InputError("no peak-to-peak value of the response can be used", remedy="record longer dwells")
