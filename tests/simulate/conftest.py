@@ -11,17 +11,20 @@ from savgs_ident.effects.registry import MODELS, build_model, model_parameters
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values, as_values
 from savgs_ident.simulate.compilation import use_persistent_cache
+from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
+
+from .programme import FEW, PROGRAMME, cam
 
 
 @pytest.fixture(scope="package", autouse=True)
-def _vectors_over_nodes() -> Iterator[None]:
-    """Solvers spread (P,) over (m, P) everywhere; programs are kept from one run to the next.
+def _as_users_have_it() -> Iterator[None]:
+    """Solvers spread (P,) over (m, P) and count orders in integers; compiled programs are kept.
 
     JAX looks for its cache at the first compilation of a process, which another test may have been.
     """
     use_persistent_cache()
     compilation_cache.reset_cache()
-    with jax.numpy_rank_promotion("allow"):
+    with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):
         yield
 
 
@@ -41,3 +44,15 @@ def friction(rig: Rig) -> QuarterCar:
 def frictionless(rig: Rig) -> QuarterCar:
     """SimQC."""
     return build_model(rig, MODELS["simqc"])
+
+
+@pytest.fixture(scope="package")
+def programme(friction: QuarterCar, numbers: Values) -> PeriodicSolution:
+    """SimTR in all dwells of the programme, from a cold start with default settings."""
+    return simulate_periodic(friction, numbers, cam(PROGRAMME))
+
+
+@pytest.fixture(scope="package")
+def few(friction: QuarterCar, numbers: Values) -> PeriodicSolution:
+    """SimTR in a few unlike dwells, from a cold start with default settings."""
+    return simulate_periodic(friction, numbers, cam(FEW))
