@@ -30,7 +30,7 @@ from savgs_ident.report.solving import Solved
 from savgs_ident.report.terminal import plain
 from savgs_ident.responses.estimate import estimate_response
 from savgs_ident.simulate.compilation import use_persistent_cache
-from savgs_ident.simulate.measured import measured_excitation
+from savgs_ident.simulate.measured import MODELLED_CHANNELS, measured_excitation
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,8 @@ def identify(job: Job, voice: Voice, out: Path) -> int:
         told = progress.fraction(f"reading {job.campaign}")
         campaign = read_campaign(job.campaign, job.channels, progress=told)
         progress("estimating responses")
-        measured = up_to_frequency(estimate_response(campaign, job.settings.orders), job.max_frequency)
+        response = estimate_response(campaign.only(MODELLED_CHANNELS), job.settings.orders)
+        measured = up_to_frequency(response, job.max_frequency)
         fit = fit_least_squares(
             measured, drawing, effects=effects, free=free, settings=job.settings, progress=progress
         )

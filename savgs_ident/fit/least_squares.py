@@ -30,6 +30,9 @@ FREE = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
 EXPLAINED = 2.0
 """A first start that ends with chi2 per datum below this has explained the data; no other is needed."""
 
+ROUGHLY = 0.05
+"""Share of chi2 below which a step is not worth another before the nodes are adapted to the result."""
+
 _SHIFT = 0.4
 """Distance of further starts from the first in every free coordinate: about a factor of one and a half."""
 
@@ -58,7 +61,7 @@ def fit_least_squares(
     tell("preparing the fit")
     minimiser = Minimiser(problem, first)
     first_u, *others = _starts(task)
-    tried = [minimiser.minimise(first_u, first, task.settings.steps, tell)]
+    tried = [minimiser.minimise(first_u, first, task.settings.steps, tell, enough=ROUGHLY)]
     for u in others:
         if tried[0].status.ok and tried[0].cost < EXPLAINED * problem.target.entries:
             break
@@ -89,7 +92,7 @@ def _starts(task: Task) -> list[Array]:
 def _from_start(task: Task, minimiser: Minimiser, u: Array, tell: Progress) -> Minimum:
     p = task.problem.parameters(u)
     near = simulate_periodic(task.problem.model, p, task.excitation, task.settings.periodic)
-    return minimiser.minimise(u, near, task.settings.steps, tell)
+    return minimiser.minimise(u, near, task.settings.steps, tell, enough=ROUGHLY)
 
 
 def _refined(task: Task, minimiser: Minimiser, best: Minimum, tell: Progress) -> Minimum:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
@@ -57,7 +58,10 @@ def _step(solver: Any, u: Array, args: tuple[Problem, Pins, PeriodicSolution], s
 
 @eqx.filter_jit
 def _initial(solver: Any, u: Array, args: tuple[Problem, Pins, PeriodicSolution]) -> Any:
-    shapes = eqx.filter_eval_shape(_function, u, args)
+    near = args[2]
+    found = Found(near.trajectory, near.last_step)
+    rows = args[0].target.size + len(args[0].free.tolerated) + u.size
+    shapes = jax.ShapeDtypeStruct((rows,), u.dtype), jax.eval_shape(lambda: found)
     return solver.init(_function, u, args, {}, *shapes, frozenset())
 
 
@@ -90,11 +94,15 @@ class Minimiser(eqx.Module):
         steps: int,
         progress: Progress,
         pins: Pins | None = None,
+        enough: float = 1e-6,
     ) -> Minimum:
-        """Minimise from ``u``, on the nodes of the solution ``near`` there, parameters pinned as told."""
+        """Minimise from ``u``, on the nodes of the solution ``near`` there, parameters pinned as told.
+
+        A step that lowers the sum of squares by less than the share ``enough`` is the last.
+        """
         pins = pins or self.problem.unpinned
         state = eqx.tree_at(lambda each: each.y_eval, self.blank, u)
-        status = Status.MAX_ITERATIONS
+        status, before = Status.MAX_ITERATIONS, np.inf
         for count in range(1, steps + 1):
             u, state, done, fine = _step(self.solver, u, (self.problem, pins, near), state)
             near = state.aux.put_into(near)
@@ -103,9 +111,10 @@ class Minimiser(eqx.Module):
                 status = Status.NOT_FINITE
                 break
             progress(f"step {count}: chi2 = {cost:.6g}")
-            if done:
+            if done or 0.0 <= before - cost < enough * cost:
                 status = Status.CONVERGED
                 break
+            before = cost
         return self._minimum(u, near, state, status)
 
     def evaluate(self, u: Float[Array, " n"], near: PeriodicSolution) -> Minimum:

@@ -34,6 +34,11 @@ class HarmonicTarget(eqx.Module):
         return jnp.einsum("dckij,dckj->dcki", self.whitening, parts).ravel()
 
     @property
+    def size(self) -> int:
+        """Residuals, those of unused entries included."""
+        return 2 * int(np.size(self.used))
+
+    @property
     def entries(self) -> int:
         """Real numbers compared."""
         return 2 * int(self.used.sum())
@@ -51,6 +56,11 @@ class PeakToPeakTarget(eqx.Module):
         # It is written against the array API, its types name NumPy's arrays.
         reach = cast(Any, peak_to_peak)(predicted, jnp.asarray(self.used))
         return jnp.ravel((reach - self.measured) * self.weight)
+
+    @property
+    def size(self) -> int:
+        """Residuals, those of unused entries included."""
+        return int(np.size(self.weight))
 
     @property
     def entries(self) -> int:

@@ -5,8 +5,8 @@ their own time stamps, because a bus samples an accelerometer and an encoder nei
 nor at the same rate.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -86,6 +86,14 @@ class Campaign:
     recordings: tuple[Recording, ...]
     warnings: tuple[DataWarning, ...]
     sha256: str
+
+    def only(self, channels: Collection[str]) -> "Campaign":
+        """The same tests with no other channels than these."""
+        kept = tuple(
+            replace(each, channels={n: c for n, c in each.channels.items() if n in channels})
+            for each in self.recordings
+        )
+        return replace(self, recordings=kept)
 
     def of_kind(self, kind: TestKind) -> tuple[Recording, ...]:
         """The tests of one kind, in recorded order."""

@@ -42,7 +42,7 @@ def styled() -> AbstractContextManager[None]:
             "legend.fontsize": 8.5,
             "lines.linewidth": 1.6,
             "text.parse_math": False,
-            "pdf.fonttype": 42,
+            "pdf.fonttype": 3,
         }
     )
 

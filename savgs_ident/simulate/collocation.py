@@ -27,7 +27,7 @@ from savgs_ident.model.quarter_car import Inputs, QuarterCar
 from savgs_ident.model.section import SectionCurves, section_curves
 from savgs_ident.model.values import Values
 from savgs_ident.simulate import cyclic
-from savgs_ident.simulate.layout import Layout
+from savgs_ident.simulate.layout import CHUNK, Layout
 
 Nodes = Float[Array, "k P"]
 
@@ -51,6 +51,23 @@ class Linearised(NamedTuple):
     mass: Float[Array, "k k P"]
     inverse: Float[Array, "m m P"]
     factors: cyclic.CyclicFactors
+
+
+def blank_linearised(model: QuarterCar, layout: Layout) -> Linearised:
+    """Zeros of the shapes that :func:`linearise` gives."""
+    size, nodes, dwells = 4 + len(model.states), layout.total, len(layout.counts)
+    inner = size - 2
+    return Linearised(
+        imbalance=jnp.zeros((inner, nodes)),
+        slope=jnp.zeros((inner, size, nodes)),
+        mass=jnp.zeros((inner, inner, nodes)),
+        inverse=jnp.zeros((size, size, nodes)),
+        factors=cyclic.CyclicFactors(
+            steps=jnp.zeros((size, size, nodes)),
+            chunks=jnp.zeros((size, size, nodes // CHUNK)),
+            closing=jnp.zeros((dwells, size, size)),
+        ),
+    )
 
 
 def node_residual(

@@ -5,11 +5,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.model.sensors import RESPONSE_CHANNELS
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import Excitation
 
 SIGNIFICANT = 4.0
 """Harmonics below this many standard deviations are taken as noise and not imposed."""
+
+MODELLED_CHANNELS = ("road_height", "link_angle", *RESPONSE_CHANNELS)
+"""The channels that the model takes or gives."""
 
 LINK_ORDERS = 9
 """Highest order of the link's motion that is imposed; what lies above is below the encoder's resolution."""

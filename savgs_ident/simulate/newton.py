@@ -16,6 +16,7 @@ from savgs_ident.model.values import Values
 from savgs_ident.simulate.collocation import (
     Linearised,
     Trajectory,
+    blank_linearised,
     linearise,
     solve_linearised,
     step_defects,
@@ -106,8 +107,7 @@ def solve_newton(
         step = progress.result.last_step
         return jnp.any(step > TOLERANCE) & jnp.all(jnp.isfinite(step)) & (progress.result.iterations < limit)
 
-    shape = jax.eval_shape(lambda: linearise(model, p, start, inputs, layout, steps))
-    blank = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
+    blank = blank_linearised(model, layout)
     far = jnp.full(len(layout.counts), np.finfo(np.float64).max)
     begin = _Progress(NewtonResult(start, blank, far, jnp.array(0)), jnp.ones_like(far))
     return jax.lax.while_loop(unfinished, advance, begin).result
