@@ -98,7 +98,8 @@ class Minimiser(eqx.Module):
     ) -> Minimum:
         """Minimise from ``u``, on the nodes of the solution ``near`` there, parameters pinned as told.
 
-        A step that lowers the sum of squares by less than the share ``enough`` is the last.
+        A step that lowers the sum of squares by less than the share ``enough`` is the last; one that was
+        rejected, and so lowers it by nothing, says nothing.
         """
         pins = pins or self.problem.unpinned
         state = eqx.tree_at(lambda each: each.y_eval, self.blank, u)
@@ -111,7 +112,7 @@ class Minimiser(eqx.Module):
                 status = Status.NOT_FINITE
                 break
             progress(f"step {count}: chi2 = {cost:.6g}")
-            if done or 0.0 <= before - cost < enough * cost:
+            if done or 0.0 < before - cost < enough * cost:
                 status = Status.CONVERGED
                 break
             before = cost
