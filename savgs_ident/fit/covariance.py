@@ -27,6 +27,8 @@ class Spread(NamedTuple):
 
 def spread_of(jacobian: NDArray[np.float64]) -> Spread:
     """The spread for residuals of unit variance with ``jacobian`` (m, n), priors among the rows."""
-    _, singular, axes = np.linalg.svd(jacobian, full_matrices=False)
+    # Fewer residuals than coordinates leave directions untold; the thin decomposition would drop them.
+    missing = max(0, jacobian.shape[1] - jacobian.shape[0])
+    _, singular, axes = np.linalg.svd(np.pad(jacobian, ((0, missing), (0, 0))), full_matrices=False)
     sd = 1.0 / np.maximum(singular, 1.0 / UNTOLD)
     return Spread((axes.T * sd**2) @ axes)
