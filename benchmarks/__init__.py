@@ -1,0 +1,1 @@
+"""How fast the package is, beside its peers on the same work: ``python -m benchmarks``."""

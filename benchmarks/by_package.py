@@ -1,0 +1,55 @@
+"""This package: periodic collocation of all dwells at once."""
+
+import numpy as np
+
+from benchmarks.outcome import Outcome
+from benchmarks.task import ORDERS, PARAMETERS, Harmonics, Task, errors_percent
+from benchmarks.timing import median_time, timed
+from savgs_ident.simulate.periodic import (
+    PeriodicSolution,
+    harmonic_sensitivities,
+    harmonics,
+    resolve,
+    simulate_periodic,
+)
+
+REPEATS = 9
+CHANGE = 1.01
+"""Warm starts begin this far from the answer, in each of the four parameters."""
+
+
+def measure(task: Task, reference: Harmonics) -> Outcome:
+    """Cold start, warm start, and what the gradient adds."""
+    excitation, dwells = task.excitation, task.frequency.size
+    moved = task.values | {name: CHANGE * task.values[name] for name in PARAMETERS}
+
+    def cold() -> tuple[PeriodicSolution, object]:
+        solution = simulate_periodic(task.model, task.values, excitation)
+        return solution, harmonics(task.values, solution, ORDERS)
+
+    (start, response), first_s = timed(cold)
+    cold_s = median_time(cold, REPEATS)
+
+    def value() -> tuple[PeriodicSolution, object]:
+        solution = resolve(task.model, moved, start)
+        return solution, harmonics(moved, solution, ORDERS)
+
+    def gradient() -> tuple[object, object]:
+        solution, at = value()
+        return at, harmonic_sensitivities(task.model, moved, solution, PARAMETERS, ORDERS)
+
+    _, first_gradient_s = timed(gradient)
+    value_s, gradient_s = median_time(value, REPEATS), median_time(gradient, REPEATS)
+    stuck = [f"{f:g} Hz" for f, s in zip(task.frequency, start.status(), strict=True) if not s.ok]
+    return Outcome(
+        {
+            "response_ms_per_frequency": 1e3 * cold_s / dwells,
+            "response_warm_ms_per_frequency": 1e3 * value_s / dwells,
+            "gradient_over_value": gradient_s / value_s,
+            "gradient_over_value_cold": (cold_s + gradient_s - value_s) / cold_s,
+            "response_compile_s": first_s - cold_s,
+            "gradient_compile_s": first_gradient_s - gradient_s,
+            "error_percent_ours": float(errors_percent(np.asarray(response), reference).max()),
+        },
+        (f"ours: not converged at {', '.join(stuck)}",) if stuck else (),
+    )

@@ -1,0 +1,65 @@
+"""The figures by key: unit, digits shown, and one sentence on what each means."""
+
+from typing import NamedTuple
+
+
+class Figure(NamedTuple):
+    """Unit ("" for a ratio), format, meaning."""
+
+    unit: str
+    shown: str
+    meaning: str
+
+
+FIGURES: dict[str, Figure] = {
+    "response_ms_per_frequency": Figure(
+        "ms",
+        ".1f",
+        "Response of one dwell (harmonics 0-9, both channels) from a cold start, programs compiled.",
+    ),
+    "response_warm_ms_per_frequency": Figure(
+        "ms", ".1f", "The same, started from the response before all four parameters changed by 1 %."
+    ),
+    "gradient_over_value": Figure(
+        "", ".2f", "Warm response with its derivatives in four parameters, over the warm response alone."
+    ),
+    "gradient_over_value_cold": Figure("", ".2f", "The same ratio for a cold start."),
+    "response_compile_s": Figure(
+        "s", ".1f", "Compiling the response, once per machine (it is kept on disk)."
+    ),
+    "gradient_compile_s": Figure(
+        "s", ".1f", "Compiling the warm start and the derivatives, once per machine."
+    ),
+    "error_percent_ours": Figure(
+        "%", ".3f", "Our largest error of an order 1-9, of the first harmonic, against a tight integration."
+    ),
+    "speedup_harmonicbalance": Figure(
+        "x", ".1f", "How many times longer `harmonicbalance` takes for a dwell."
+    ),
+    "speedup_scipy": Figure("x", ".1f", "How many times longer scipy's LSODA takes to the steady state."),
+    "speedup_diffrax": Figure("x", ".1f", "How many times longer diffrax takes to the steady state."),
+    "speedup_gradient_harmonicbalance": Figure(
+        "x", ".1f", "The same for value and gradient, with 1 + 4 runs for finite differences (computed)."
+    ),
+    "speedup_gradient_scipy": Figure("x", ".1f", "The same for scipy (computed: 1 + 4 runs)."),
+    "speedup_gradient_diffrax": Figure("x", ".1f", "The same for diffrax (computed: 1 + 4 runs)."),
+    "harmonicbalance_ms_per_frequency": Figure(
+        "ms", ".0f", "A dwell by `harmonicbalance`, mean of those solved."
+    ),
+    "harmonicbalance_dwells_solved": Figure("", ".0f", "Dwells that it solves within 0.1 %."),
+    "harmonicbalance_orders": Figure("", ".0f", "Orders that it needs for that, mean."),
+    "error_percent_harmonicbalance": Figure("%", ".3f", "Its largest error in these dwells."),
+    "scipy_ms_per_frequency": Figure("ms", ".0f", "A dwell by scipy, mean."),
+    "scipy_calls_per_frequency": Figure("", ".0f", "Right-hand sides that LSODA asks for in a dwell, mean."),
+    "scipy_call_us": Figure("us", ".0f", "Time of scipy per right-hand side, all included."),
+    "error_percent_scipy": Figure("%", ".3f", "Its largest error."),
+    "diffrax_ms_per_frequency": Figure("ms", ".0f", "A dwell by diffrax, mean; all dwells vectorised."),
+    "error_percent_diffrax": Figure("%", ".3f", "Its largest error."),
+    "fit_cold_s": Figure("s", ".1f", "`savgs-ident fit` on the shipped campaign, whole process, first time."),
+    "fit_cached_s": Figure("s", ".1f", "The same again, with the compiled programs on disk."),
+    "fit_peak_mb": Figure("MB", ".0f", "Most memory that either took."),
+    "mcap_samples_per_s": Figure(
+        "1/s", ",.0f", "Samples (of six channels) read per second from a long MCAP file."
+    ),
+    "mcap_peak_mb": Figure("MB", ".0f", "Most memory of that process, the samples read included."),
+}

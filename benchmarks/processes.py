@@ -1,0 +1,79 @@
+"""Whole processes: how long they run and how much memory they take at most (POSIX)."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from benchmarks.outcome import Outcome, Tell
+from benchmarks.write_long_mcap import write_long_mcap
+from savgs_ident.core.rig import default_campaign_path
+
+RATE_HZ = 1000.0
+
+
+class Ran(NamedTuple):
+    """Wall-clock time [s], most resident memory [MB], exit code, standard output."""
+
+    seconds: float
+    peak_mb: float
+    code: int
+    output: str
+
+
+def run_process(arguments: Sequence[str], environment: Mapping[str, str] | None = None) -> Ran:
+    """Run Python with ``arguments`` to its end; what it says on standard error is dropped."""
+    starter = Path(__file__).with_name("measure_process.py")
+    ran = subprocess.run(
+        [sys.executable, starter, sys.executable, *arguments],
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+        env=os.environ | dict(environment or {}),
+    )
+    return Ran(*json.loads(ran.stdout))
+
+
+def measure_fit(tell: Tell) -> Outcome:
+    """``savgs-ident fit`` on the shipped campaign, without and with compiled programs in the cache."""
+    with TemporaryDirectory() as folder:
+        arguments = ["-m", "savgs_ident.cli", "fit", str(default_campaign_path())]
+        arguments += ["--out", str(Path(folder) / "out"), "--quiet"]
+        environment = {"SAVGS_IDENT_CACHE": str(Path(folder) / "cache")}
+        tell("fit: first time")
+        cold = run_process(arguments, environment)
+        tell("fit: with the cache")
+        cached = run_process(arguments, environment)
+    ended = {cold.code, cached.code} - {0}
+    return Outcome(
+        {
+            "fit_cold_s": cold.seconds,
+            "fit_cached_s": cached.seconds,
+            "fit_peak_mb": max(cold.peak_mb, cached.peak_mb),
+        },
+        (f"fit: ended with exit code {max(ended)}, so its figures mean nothing",) if ended else (),
+    )
+
+
+def measure_mcap(minutes: float, tell: Tell) -> Outcome:
+    """Reading a long MCAP campaign of JSON messages with six channels each."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "long.mcap"
+        tell(f"mcap: writing {minutes:g} minutes")
+        samples = write_long_mcap(path, minutes, RATE_HZ)
+        size_mb = path.stat().st_size / 1e6
+        tell("mcap: reading")
+        ran = run_process(["-m", "benchmarks.read_whole", str(path)])
+    if ran.code != 0:
+        return Outcome({}, (f"mcap: reading ended with exit code {ran.code}",))
+    return Outcome(
+        {"mcap_samples_per_s": samples / float(ran.output), "mcap_peak_mb": ran.peak_mb},
+        (
+            f"mcap: {minutes:g} minutes at {RATE_HZ:g} Hz, {samples} samples of six channels, "
+            f"{size_mb:.0f} MB (zstd).",
+        ),
+    )

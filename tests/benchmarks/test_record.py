@@ -1,0 +1,94 @@
+"""The benchmarks' table and record: contract keys, ratios, and that nothing measured is left out."""
+
+import json
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from benchmarks import __main__ as program
+from benchmarks.figures import FIGURES
+from benchmarks.outcome import Outcome
+from benchmarks.suite import NAMES, Size, speedups
+from benchmarks.table import make_table
+
+CONTRACT = (
+    "response_ms_per_frequency",
+    "response_warm_ms_per_frequency",
+    "gradient_over_value",
+    "speedup_harmonicbalance",
+    "speedup_scipy",
+    "speedup_diffrax",
+    "fit_cold_s",
+    "fit_cached_s",
+    "fit_peak_mb",
+    "mcap_samples_per_s",
+    "mcap_peak_mb",
+)
+
+
+def test_every_figure_of_the_contract_is_explained() -> None:
+    assert set(CONTRACT) <= set(FIGURES)
+    assert all(figure.meaning.endswith(".") for figure in FIGURES.values())
+
+
+def test_speedups_are_ratios_to_the_cold_start() -> None:
+    figures = {
+        "response_ms_per_frequency": 10.0,
+        "response_warm_ms_per_frequency": 2.0,
+        "gradient_over_value_cold": 1.25,
+        "scipy_ms_per_frequency": 400.0,
+    }
+    assert speedups(figures) == pytest.approx({"speedup_scipy": 40.0, "speedup_gradient_scipy": 160.0})
+
+
+def test_outcomes_add_up() -> None:
+    total = Outcome({"a": 1.0}, ("one",)) + Outcome({"b": 2.0}, ("two",))
+    assert (dict(total.figures), total.notes) == ({"a": 1.0, "b": 2.0}, ("one", "two"))
+
+
+def test_table_shows_every_figure_with_its_meaning_and_the_notes() -> None:
+    figures = dict.fromkeys(FIGURES, 1234.5)
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(make_table(figures, ("a note",), {"machine_cores": 2.0}))
+    text = console.export_text()
+    for key, figure in FIGURES.items():
+        (line,) = (each for each in text.splitlines() if each.split()[:1] == [key])
+        assert format(1234.5, figure.shown) in line
+        assert figure.meaning in line
+    assert "a note" in text
+    assert "cores 2.0" in text
+
+
+def test_record_is_flat_and_holds_what_was_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked: list[tuple[tuple[str, ...], Size]] = []
+
+    def run(names: tuple[str, ...], size: Size, tell: object) -> Outcome:
+        asked.append((tuple(names), size))
+        return Outcome({"mcap_peak_mb": 123.0}, ("short",))
+
+    monkeypatch.setattr(program, "run_suite", run)
+    file = tmp_path / "figures.json"
+    program.main(["--quick", "--only", "mcap", "fit", "--json", str(file)])
+    record = json.loads(file.read_text())
+    assert asked == [(("mcap", "fit"), program.QUICK)]
+    assert record["mcap_peak_mb"] == 123.0
+    assert all(isinstance(value, str | float | int) for value in record.values())
+    assert "mcap_peak_mb" in capsys.readouterr().out
+
+
+def test_everything_runs_unless_told_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    monkeypatch.setattr(program, "run_suite", lambda *each: asked.append(each[:2]) or Outcome())
+    program.main([])
+    assert asked == [(NAMES, program.FULL)]
+
+
+def test_unknown_benchmark_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as raised:
+        program.main(["--only", "nothing"])
+    assert raised.value.code == 2
+    assert "nothing" in capsys.readouterr().err
