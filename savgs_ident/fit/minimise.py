@@ -70,6 +70,15 @@ def _matrix(state: Any) -> Array:
     return state.f_info.jac.as_matrix()
 
 
+def _left_to_gain(state: Any) -> float:
+    """By how much a Gauss-Newton step from the last accepted point would lower the sum of squares."""
+    residual, matrix = np.asarray(state.f_info.residual), np.asarray(_matrix(state))
+    if not np.isfinite(matrix).all():
+        return np.inf
+    along = matrix @ np.linalg.lstsq(matrix, residual)[0]
+    return float(along @ along)
+
+
 class Minimiser(eqx.Module):
     """A problem with its compiled step.
 
@@ -98,8 +107,8 @@ class Minimiser(eqx.Module):
     ) -> Minimum:
         """Minimise from ``u``, on the nodes of the solution ``near`` there, parameters pinned as told.
 
-        A step that lowers the sum of squares by less than the share ``enough`` is the last; one that was
-        rejected, and so lowers it by nothing, says nothing.
+        A step that lowers the sum of squares by less than the share ``enough`` is the last. One that was
+        rejected lowers it by nothing; then what a whole step would gain by the linearisation decides.
         """
         pins = pins or self.problem.unpinned
         state = eqx.tree_at(lambda each: each.y_eval, self.blank, u)
@@ -112,7 +121,8 @@ class Minimiser(eqx.Module):
                 status = Status.NOT_FINITE
                 break
             progress(f"step {count}: chi2 = {cost:.6g}")
-            if done or 0.0 < before - cost < enough * cost:
+            gain = before - cost or _left_to_gain(state)
+            if done or 0.0 <= gain < enough * cost:
                 status = Status.CONVERGED
                 break
             before = cost

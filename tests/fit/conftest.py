@@ -1,0 +1,60 @@
+"""The shipped campaign, its fit, and a small problem on a few dwells that many tests share.
+
+Compiling takes most of the time here, so programs are kept from one run of the tests to the next, and what
+can share a program does.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+from jax.experimental.compilation_cache import compilation_cache
+
+from savgs_ident.core.rig import Rig
+from savgs_ident.effects.registry import MODELS
+from savgs_ident.fit.least_squares import FREE, fit_least_squares
+from savgs_ident.fit.result import Fit
+from savgs_ident.recordings.read import read_campaign
+from savgs_ident.responses.estimate import estimate_response
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.compilation import use_persistent_cache
+
+from .bench import FEW, Bench, only, true_rig
+
+
+@pytest.fixture(scope="package", autouse=True)
+def _as_users_have_it() -> Iterator[None]:
+    """Solvers spread (P,) over (m, P) and count orders in integers; compiled programs are kept.
+
+    JAX looks for its cache at the first compilation of a process, which another test may have been.
+    """
+    use_persistent_cache()
+    compilation_cache.reset_cache()
+    with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):
+        yield
+
+
+@pytest.fixture(scope="package")
+def measured(nominal_campaign: Path) -> HarmonicResponse:
+    """The response of the shipped campaign, orders 0..9."""
+    return estimate_response(read_campaign(nominal_campaign), 9)
+
+
+@pytest.fixture(scope="package")
+def nominal(measured: HarmonicResponse, rig: Rig) -> Fit:
+    """The paper's fit of the shipped campaign."""
+    return fit_least_squares(measured, rig, effects=MODELS["simtr"], free=FREE)
+
+
+@pytest.fixture(scope="package")
+def few(measured: HarmonicResponse) -> HarmonicResponse:
+    """A few dwells of the shipped campaign."""
+    return only(measured, np.isin(np.round(measured.frequency, 2), FEW))
+
+
+@pytest.fixture(scope="package")
+def bench(few: HarmonicResponse, rig: Rig) -> Bench:
+    """The paper's parameters on few dwells of a rig whose others are known to be as they truly are."""
+    return Bench(few, true_rig(rig))
