@@ -1,0 +1,47 @@
+"""The same campaign from other files: the same samples, and the same tests with other clocks and noise."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from savgs_ident.core.rig import Rig
+from savgs_ident.effects.registry import MODELS
+from savgs_ident.fit.least_squares import FREE, fit_least_squares
+from savgs_ident.fit.result import Fit
+from savgs_ident.recordings.read import read_campaign
+from savgs_ident.responses.estimate import estimate_response
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+
+from .bench import TRUTH
+
+
+@pytest.mark.slow
+def test_the_same_samples_in_json_give_the_same_fit(
+    nominal: Fit, measured: HarmonicResponse, shared_rig: Path, rig: Rig
+) -> None:
+    campaign = read_campaign(shared_rig / "nominal" / "campaign_json.mcap")
+    response = estimate_response(campaign, 9)
+    sd = np.sqrt(np.trace(measured.covariance, axis1=-2, axis2=-1))
+    assert np.max(np.abs(response.harmonics - measured.harmonics)[measured.valid] / sd[measured.valid]) < 1e-4
+    fit = fit_least_squares(response, rig, effects=MODELS["simtr"], free=FREE)
+    for estimate in nominal.estimates:
+        other = fit.by_name[estimate.name]
+        assert other.value == pytest.approx(estimate.value, rel=1e-6, abs=1e-6 * estimate.stderr)
+        assert other.stderr == pytest.approx(estimate.stderr, rel=1e-5)
+    assert fit.chi2 == pytest.approx(nominal.chi2, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_other_clocks_rates_and_noise_give_the_same_parameters_within_their_errors(
+    nominal: Fit, shared_rig: Path, rig: Rig
+) -> None:
+    response = estimate_response(read_campaign(shared_rig / "nominal" / "campaign_ros2.mcap"), 9)
+    fit = fit_least_squares(response, rig, effects=MODELS["simtr"], free=FREE)
+    assert fit.trusted
+    assert fit.chi2 / fit.dof < 1.6
+    for name, share in {"mu_r": 0.01, "c_sd": 0.01, "mu_t": 0.03, "ydot_Hth": 0.03}.items():
+        here, there = fit.by_name[name], nominal.by_name[name]
+        assert here.value == pytest.approx(TRUTH[name], rel=share)
+        assert abs(here.value - TRUTH[name]) <= 4.0 * here.stderr
+        assert abs(here.value - there.value) <= 4.0 * np.hypot(here.stderr, there.stderr)
