@@ -52,6 +52,9 @@ FIGURES: dict[str, Figure] = {
     "scipy_ms_per_frequency": Figure("ms", ".0f", "A dwell by scipy, mean."),
     "scipy_calls_per_frequency": Figure("", ".0f", "Right-hand sides that LSODA asks for in a dwell, mean."),
     "scipy_call_us": Figure("us", ".0f", "Time of scipy per right-hand side, all included."),
+    "scipy_bound_ms_per_frequency": Figure(
+        "ms", ".0f", "What scipy would take if calling the right-hand side and LSODA itself cost nothing."
+    ),
     "error_percent_scipy": Figure("%", ".3f", "Its largest error."),
     "diffrax_ms_per_frequency": Figure("ms", ".0f", "A dwell by diffrax, mean; all dwells vectorised."),
     "error_percent_diffrax": Figure("%", ".3f", "Its largest error."),
