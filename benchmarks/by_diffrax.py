@@ -23,7 +23,7 @@ Integrate = Callable[[Array, Array, Array], tuple[Array, Array]]
 
 SETTLING_S = 2.1
 TOLERANCE = 1e-6
-"""The shortest settling [s] and, in whole decades, the loosest tolerance that hold 0.1 % in every dwell."""
+"""Settling [s] and tolerance chosen by hand, near the least that holds 0.1 % in every dwell."""
 
 REFERENCE_SETTLING_S = 8.0
 REFERENCE_TOLERANCE = 1e-9

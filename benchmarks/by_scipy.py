@@ -18,7 +18,7 @@ from benchmarks.timing import timed
 
 SETTLING_S = 2.1
 TOLERANCE = 1e-5
-"""The shortest settling [s] and, in whole decades, the loosest tolerance that hold 0.1 % in every dwell."""
+"""Settling [s] and tolerance chosen by hand, near the least that holds 0.1 % in every dwell."""
 
 MOST_STEPS = 1_000_000
 _INSIDE = 20_000
