@@ -1,14 +1,13 @@
 """A model solved under the road and link of measured dwells, and drawn against them."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from savgs_ident.cli.console import Progress
 from savgs_ident.core.rig import Rig
-from savgs_ident.report.bode import bode_figure
 from savgs_ident.report.bode_record import Compared
 from savgs_ident.report.curves import measured_points
-from savgs_ident.report.picture import write_figure
 from savgs_ident.report.residuals import comparable, whitened
 from savgs_ident.report.solving import solve, solve_between, without_effects
 from savgs_ident.responses.harmonic_response import HarmonicResponse
@@ -35,11 +34,15 @@ def draw_comparison(
     title = f"Model and measurement: {Path(source).name}"
     label = "identified model" if rig.provenance else "model as drawn"
     progress("solving the model between the dwells")
-    curves = [solve_between(rig, effects, compared.model).curve(label)]
+    shown = {label: (rig, compared.model)}
     if effects:
-        progress("solving SimQC between the dwells")
-        frictionless = solve_between(without_effects(rig, effects), effects, compared.frictionless)
-        curves.append(frictionless.curve(SIMQC_LABEL))
+        shown[SIMQC_LABEL] = (without_effects(rig, effects), compared.frictionless)
+    # A solver needs one core and leaves Python free: both curves, and loading what draws them, take the time of one.
+    with ThreadPoolExecutor() as pool:
+        found = [pool.submit(solve_between, which, effects, known) for which, known in shown.values()]
+        from savgs_ident.report.bode import bode_figure
+        from savgs_ident.report.picture import write_figure
+    curves = [each.result().curve(name) for name, each in zip(shown, found, strict=True)]
     progress("drawing")
     residuals = whitened(compared.measured, compared.model.harmonics, compared.used)
     points = measured_points(compared.measured)

@@ -59,7 +59,7 @@ def fit_least_squares(
     first = simulate_periodic(problem.model, problem.fixed, task.excitation, task.settings.periodic)
     as_given = np.asarray(harmonics(problem.fixed, first, problem.orders))
     tell("preparing the fit")
-    minimiser = Minimiser(problem, first)
+    minimiser = Minimiser(problem)
     first_u, *others = _starts(task)
     tried = [minimiser.minimise(first_u, first, task.settings.steps, tell, enough=ROUGHLY)]
     for u in others:

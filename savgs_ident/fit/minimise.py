@@ -1,7 +1,7 @@
 """Levenberg-Marquardt steps of optimistix, taken one by one.
 
-Taking the steps from Python costs nothing beside the model and lets each one be reported and interrupted. One
-compiled step serves every start, every profile and every planned test of a problem.
+Taking the steps from Python costs nothing beside the model and lets each one be reported and interrupted. The
+problem is evaluated, residuals and Jacobian, before the optimiser is asked for its step.
 """
 
 from collections.abc import Callable
@@ -15,14 +15,21 @@ import optimistix as optx
 from jaxtyping import Array, Float
 
 from savgs_ident.core.status import Status
-from savgs_ident.fit.problem import Found, Pins, Problem, residuals
+from savgs_ident.fit.problem import Evaluation, Linearised, Pins, Problem, evaluate
 from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.stored import placed
 
 Progress = Callable[[str], None]
 """Is told what is going on, a line at a time."""
 
 TOLERANCE = 1e-2
 """Change of coordinates and residuals at which to stop; both count in standard deviations or logarithms."""
+
+
+SHARPNESS = 30.0
+"""Residuals are given to the optimiser in this part of a standard deviation. It damps the first step by one of
+its units of information on every coordinate: a whole standard deviation would hold back the tolerances, of
+which data and prior together hardly tell more."""
 
 
 class Minimum(NamedTuple):
@@ -44,35 +51,28 @@ class Minimum(NamedTuple):
         return float(self.residual @ self.residual)
 
 
-def _function(u: Array, args: tuple[Problem, Pins, PeriodicSolution]) -> tuple[Array, Found]:
-    problem, pins, near = args
-    return residuals(u, problem=problem, pins=pins, near=near)
+def _affine(u: Array, at: Linearised) -> tuple[Array, None]:
+    """Value and derivative are the problem's own where the optimiser asks for them: at the point evaluated."""
+    return SHARPNESS * (at.residual + at.jacobian @ (u - at.u)), None
 
 
 @eqx.filter_jit
-def _step(solver: Any, u: Array, args: tuple[Problem, Pins, PeriodicSolution], state: Any) -> tuple[Any, ...]:
-    u, state, _ = solver.step(_function, u, args, {}, state, frozenset())
-    done, result = solver.terminate(_function, u, args, {}, state, frozenset())
+def _step(solver: Any, u: Array, at: Linearised, state: Any) -> tuple[Any, ...]:
+    u, state, _ = solver.step(_affine, u, at, {}, state, frozenset())
+    done, result = solver.terminate(_affine, u, at, {}, state, frozenset())
     return u, state, done, result == optx.RESULTS.successful
 
 
 @eqx.filter_jit
-def _initial(solver: Any, u: Array, args: tuple[Problem, Pins, PeriodicSolution]) -> Any:
-    near = args[2]
-    found = Found(near.trajectory, near.last_step)
-    rows = args[0].target.size + len(args[0].free.tolerated) + u.size
-    shapes = jax.ShapeDtypeStruct((rows,), u.dtype), jax.eval_shape(lambda: found)
-    return solver.init(_function, u, args, {}, *shapes, frozenset())
+def _blank(solver: Any, rows: int, count: int) -> Any:
+    u, residual = jnp.zeros(count), jnp.zeros(rows)
+    nowhere = Linearised(u, residual, jnp.zeros((rows, count)))
+    return solver.init(_affine, u, nowhere, {}, jax.eval_shape(lambda: residual), None, frozenset())
 
 
-@eqx.filter_jit
-def _matrix(state: Any) -> Array:
-    return state.f_info.jac.as_matrix()
-
-
-def _left_to_gain(state: Any) -> float:
-    """By how much a Gauss-Newton step from the last accepted point would lower the sum of squares."""
-    residual, matrix = np.asarray(state.f_info.residual), np.asarray(_matrix(state))
+def _left_to_gain(at: Linearised) -> float:
+    """By how much a Gauss-Newton step would lower the sum of squares."""
+    residual, matrix = np.asarray(at.residual), np.asarray(at.jacobian)
     if not np.isfinite(matrix).all():
         return np.inf
     along = matrix @ np.linalg.lstsq(matrix, residual)[0]
@@ -90,11 +90,11 @@ class Minimiser(eqx.Module):
     solver: Any
     blank: Any
 
-    def __init__(self, problem: Problem, near: PeriodicSolution) -> None:
+    def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.solver = optx.LevenbergMarquardt(rtol=TOLERANCE, atol=TOLERANCE)
-        start = jnp.zeros(len(problem.free.names))
-        self.blank = _initial(self.solver, start, (problem, problem.unpinned, near))
+        count = len(problem.free.names)
+        self.blank = _blank(self.solver, problem.target.size + len(problem.free.tolerated) + count, count)
 
     def minimise(
         self,
@@ -107,36 +107,39 @@ class Minimiser(eqx.Module):
     ) -> Minimum:
         """Minimise from ``u``, on the nodes of the solution ``near`` there, parameters pinned as told.
 
-        A step that lowers the sum of squares by less than the share ``enough`` is the last. One that was
-        rejected lowers it by nothing; then what a whole step would gain by the linearisation decides.
+        The last step is the one that lowers the sum of squares by less than the share ``enough``, or after
+        which the linearisation promises no more than that. A rejected step lowers it by nothing, which says
+        nothing: then the promise alone decides.
         """
         pins = pins or self.problem.unpinned
-        state = eqx.tree_at(lambda each: each.y_eval, self.blank, u)
+        best = trial = evaluate(self.problem, u, pins, near)
+        u, state = trial.at.u, eqx.tree_at(lambda each: each.y_eval, placed(self.blank), trial.at.u)
         status, before = Status.MAX_ITERATIONS, np.inf
         for count in range(1, steps + 1):
-            u, state, done, fine = _step(self.solver, u, (self.problem, pins, near), state)
-            near = state.aux.put_into(near)
-            cost = float(jnp.sum(state.f_info.residual**2))
+            u, state, done, fine = _step(self.solver, u, trial.at, state)
+            best = trial if bool(jnp.all(u == trial.at.u)) else best
+            cost = float(jnp.sum(best.at.residual**2))
             if not (fine and np.isfinite(cost)):
                 status = Status.NOT_FINITE
                 break
             progress(f"step {count}: chi2 = {cost:.6g}")
-            gain = before - cost or _left_to_gain(state)
-            if done or 0.0 <= gain < enough * cost:
+            small = enough * cost
+            if done or 0.0 < before - cost < small or _left_to_gain(best.at) < small:
                 status = Status.CONVERGED
                 break
             before = cost
-        return self._minimum(u, near, state, status)
+            if count < steps:
+                trial = evaluate(self.problem, state.y_eval, pins, best.solution)
+        return _minimum(best, status)
 
     def evaluate(self, u: Float[Array, " n"], near: PeriodicSolution) -> Minimum:
         """Residuals and Jacobian at ``u``, without moving."""
-        state = eqx.tree_at(lambda each: each.y_eval, self.blank, u)
-        args = (self.problem, self.problem.unpinned, near)
-        _, state, _, fine = _step(self.solver, u, args, state)
-        status = Status.CONVERGED if fine else Status.NOT_FINITE
-        return self._minimum(u, state.aux.put_into(near), state, status)
+        found = evaluate(self.problem, u, self.problem.unpinned, near)
+        fine = bool(jnp.isfinite(found.at.residual).all())
+        return _minimum(found, Status.CONVERGED if fine else Status.NOT_FINITE)
 
-    def _minimum(self, u: Array, near: PeriodicSolution, state: Any, status: Status) -> Minimum:
-        rows = state.f_info.residual.size - u.size
-        residual, jacobian = np.asarray(state.f_info.residual)[:rows], np.asarray(_matrix(state))[:rows]
-        return Minimum(u, residual, jacobian, near, status)
+
+def _minimum(found: Evaluation, status: Status) -> Minimum:
+    u, residual, jacobian = found.at
+    rows = residual.size - u.size
+    return Minimum(u, np.asarray(residual)[:rows], np.asarray(jacobian)[:rows], found.solution, status)

@@ -2,18 +2,17 @@
 
 The residuals are those of the data in standard deviations, followed by the deviations of the tolerance
 parameters in theirs (their priors). The Jacobian is exact: sensitivities of the periodic solution by the
-implicit function theorem, chained through target and coordinates. It is formed once per evaluation and given
-to JAX as the derivative of the residuals, so that any optimiser may ask for it.
+implicit function theorem, chained through target and coordinates.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from savgs_ident.core.free_vector import FreeVector, known_to_tolerance
+from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.fit.target import Target
 from savgs_ident.model.dynamics import Coordinates, Motion
@@ -22,13 +21,13 @@ from savgs_ident.model.sensors import read_sensors
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
 from savgs_ident.model.values import Values, as_values
-from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.periodic import (
     PeriodicSolution,
     harmonic_sensitivities,
     harmonics,
-    solve_on_mesh,
+    resolve,
 )
+from savgs_ident.simulate.stored import placed, stored
 
 
 class Pins(NamedTuple):
@@ -82,12 +81,6 @@ def used_parameters(model: QuarterCar, table: ParameterTable) -> frozenset[str]:
     return frozenset(n for n, v in zip(sorted(values), jaxpr.invars, strict=True) if id(v) in read)
 
 
-def tolerated_parameters(model: QuarterCar, table: ParameterTable, free: tuple[str, ...]) -> tuple[str, ...]:
-    """Parameters known to a tolerance that the response depends on and that are not free."""
-    used = used_parameters(model, table)
-    return tuple(name for name in known_to_tolerance(table, free) if name in used)
-
-
 # Compiled as a whole: the maps of forty parameters, one operation at a time, would take seconds.
 @eqx.filter_jit
 def _to_constrained(free: FreeVector, u: Array) -> dict[str, Array]:
@@ -99,53 +92,45 @@ def _slopes(free: FreeVector, u: Array) -> Array:
     return free.jacobian_diag(u)
 
 
-class Found(NamedTuple):
-    """The moving parts of a periodic solution: see :class:`PeriodicSolution`."""
+class Linearised(NamedTuple):
+    """A problem about the point ``u`` (n,): residuals (m,) there and their Jacobian (m, n)."""
 
-    trajectory: Trajectory
-    last_step: Float[Array, " D"]
-
-    def put_into(self, solution: PeriodicSolution) -> PeriodicSolution:
-        """``solution`` with these parts; its linearisation is left as it was."""
-        return eqx.tree_at(lambda each: (each.trajectory, each.last_step), solution, tuple(self))
+    u: Float[Array, " n"]
+    residual: Float[Array, " m"]
+    jacobian: Float[Array, "m n"]
 
 
-@eqx.filter_custom_jvp
-def residuals(
-    u: Float[Array, " n"], *, problem: Problem, pins: Pins, near: PeriodicSolution
-) -> tuple[Float[Array, " m"], Found]:
-    """Residuals of data, priors and pins at ``u``; what was found there, on the nodes of ``near``."""
+class Evaluation(NamedTuple):
+    """A problem evaluated at a point, and the model's periodic motions there."""
+
+    at: Linearised
+    solution: PeriodicSolution
+
+
+def evaluate(problem: Problem, u: Float[Array, " n"], pins: Pins, near: PeriodicSolution) -> Evaluation:
+    """Residuals of data, priors and pins at ``u``, on the nodes of ``near`` and started from it.
+
+    The solver is the compiled one that made ``near``: it is neither traced nor compiled again.
+    """
+    u, pins = placed((u, pins))
     p = problem.parameters(u)
-    solution = _solve(problem, p, near)
-    return _residuals_at(problem, pins, u, harmonics(p, solution, problem.orders)), _found(solution)
+    solution = resolve(problem.model, p, near, problem.iterations)
+    residual, jacobian = _compared(problem, pins, u, p, solution)
+    return Evaluation(Linearised(u, residual, jacobian), solution)
 
 
-@residuals.def_jvp
-def _residuals_jvp(
-    primals: tuple[Array], tangents: tuple[Array], *, problem: Problem, pins: Pins, near: PeriodicSolution
-) -> tuple[tuple[Array, Found], tuple[Array, Found]]:
-    (u,), (direction,) = primals, tangents
-    p = problem.parameters(u)
-    solution = _solve(problem, p, near)
+@eqx.filter_jit
+def _compared(*args: Any) -> tuple[Array, ...]:
+    return stored(_residual_and_jacobian, *args)
+
+
+def _residual_and_jacobian(
+    problem: Problem, pins: Pins, u: Array, p: Values, solution: PeriodicSolution
+) -> tuple[Array, Array]:
     predicted = harmonics(p, solution, problem.orders)
     by_name = harmonic_sensitivities(problem.model, p, solution, problem.free.names, problem.orders)
     columns = jax.vmap(lambda change: jax.jvp(problem.target, (predicted,), (change,))[1])(by_name)
+    priors = problem.free.prior_residuals
+    residual = jnp.concatenate([problem.target(predicted), priors(u), pins.weight * (u - pins.at)])
     data = columns.T * problem.slopes(u)
-    priors = jax.jacfwd(problem.free.prior_residuals)(u)
-    jacobian = jnp.concatenate([data, priors, jnp.diag(pins.weight)])
-    found = _found(solution)
-    still = jax.tree.map(jnp.zeros_like, found)
-    return (_residuals_at(problem, pins, u, predicted), found), (jacobian @ direction, still)
-
-
-def _found(solution: PeriodicSolution) -> Found:
-    return Found(solution.trajectory, solution.last_step)
-
-
-def _solve(problem: Problem, p: Values, near: PeriodicSolution) -> PeriodicSolution:
-    return solve_on_mesh(problem.model, p, near.excitation, near.mesh, near.trajectory, problem.iterations)
-
-
-def _residuals_at(problem: Problem, pins: Pins, u: Array, predicted: Array) -> Array:
-    held = pins.weight * (u - pins.at)
-    return jnp.concatenate([problem.target(predicted), problem.free.prior_residuals(u), held])
+    return residual, jnp.concatenate([data, jax.jacfwd(priors)(u), jnp.diag(pins.weight)])

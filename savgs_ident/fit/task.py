@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.free_vector import FreeVector
+from savgs_ident.core.free_vector import FreeVector, known_to_tolerance
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.rig import Rig
 from savgs_ident.effects.registry import build_model, model_parameters
-from savgs_ident.fit.problem import Problem, tolerated_parameters, used_parameters
+from savgs_ident.fit.problem import Problem, used_parameters
 from savgs_ident.fit.settings import FitSettings
 from savgs_ident.fit.target import harmonic_target, peak_to_peak_target
 from savgs_ident.model.values import as_values
@@ -65,10 +65,10 @@ def _problem(
             raise InputError(
                 f"the model does not depend on '{name}'", remedy="choose among: " + ", ".join(sorted(used))
             )
-    tolerated = () if settings.fixed_tolerances else tolerated_parameters(model, table, free)
+    tolerated = tuple(name for name in known_to_tolerance(table, free) if name in used)
     fixed = as_values(table.as_dict())
     by_harmonics = settings.quantity == "harmonics"
     target = harmonic_target(measured, settings.orders) if by_harmonics else peak_to_peak_target(measured)
     orders = target.used.shape[-1] - 1
-    free_vector = FreeVector(table, free, tolerated)
+    free_vector = FreeVector(table, free, () if settings.fixed_tolerances else tolerated)
     return Problem(model, free_vector, fixed, target, orders, settings.periodic.iterations)

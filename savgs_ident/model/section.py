@@ -87,6 +87,8 @@ class SectionCurves(eqx.Module):
         return Section._make((*entries[:10], entries[10:].reshape(4, 3)))
 
 
+# Compiled by itself: it is traced once for the solver and for its derivatives.
+@eqx.filter_jit
 def section_curves(p: Values) -> SectionCurves:
     """The curves of a parameter set.
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from savgs_ident.report.curves import MeasuredPoints, ModelCurve
 from savgs_ident.report.panels import draw_magnitude, draw_peak_to_peak, draw_phase, draw_residuals
 from savgs_ident.report.readings import READINGS
-from savgs_ident.report.style import frequency_axis, label_of, new_figure, styled
+from savgs_ident.report.style import fix_labels, frequency_axis, label_of, new_figure, styled
 
 
 def bode_figure(
@@ -36,7 +36,7 @@ def bode_figure(
             for axes in column:
                 lowest, highest = float(measured.frequency[0]), float(measured.frequency[-1])
                 frequency_axis(axes, lowest, highest, labelled=axes is column[-1])
-        figure.align_ylabels(grid)
+                fix_labels(axes)
         _share_legend(figure, title)
         _explain_residuals(figure, grid[-1, 0])
         return figure
@@ -56,7 +56,7 @@ def response_figure(title: str, curves: Sequence[ModelCurve]) -> Figure:
             for axes in column:
                 _mark_solved(axes)
                 frequency_axis(axes, frequency.min(), frequency.max(), labelled=axes is column[-1])
-        figure.align_ylabels(grid)
+                fix_labels(axes)
         _share_legend(figure, title)
         return figure
 

@@ -3,6 +3,8 @@
 import io
 from pathlib import Path
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.figure import Figure
 
 from savgs_ident.report.files import write_bytes
@@ -19,11 +21,14 @@ def write_figure(folder: Path, stem: str, figure: Figure) -> tuple[Path, Path]:
     """
     png, pdf = io.BytesIO(), io.BytesIO()
     with styled():
-        # Laid out once: the layout of a large figure takes longer than its drawing.
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")
-        figure.savefig(png, format="png", dpi=DPI)
-        figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
+        # Laid out once and drawn once a file; saving by the figure itself would do both over again each time.
+        figure.dpi = DPI
+        engine = figure.get_layout_engine()
+        if engine is not None:
+            engine.execute(figure)
+            figure.set_layout_engine("none")
+        FigureCanvasAgg(figure).print_png(png)
+        FigureCanvasPdf(figure).print_pdf(pdf, metadata={"CreationDate": None})
     return (
         write_bytes(folder / f"{stem}.png", png.getvalue()),
         write_bytes(folder / f"{stem}.pdf", pdf.getvalue()),

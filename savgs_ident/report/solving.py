@@ -52,22 +52,30 @@ class Solved:
         return model_curve(label, self.frequency, self.harmonics, road, self.ok)
 
 
+_DRAWN = PeriodicSettings(adaptations=1)
+"""Settings for curves: a second adaptation of the nodes moves them by less than the width of a line."""
+
+
 def solve(
-    rig: Rig, effects: Sequence[str], excitation: Excitation, orders: int, layout: Layout | None = None
+    rig: Rig,
+    effects: Sequence[str],
+    excitation: Excitation,
+    orders: int,
+    settings: PeriodicSettings | None = None,
+    layout: Layout | None = None,
 ) -> Solved:
-    """The periodic motions of a rig with the named effects; ``layout`` as in :func:`simulate_periodic`."""
+    """The periodic motions of a rig with the named effects; the rest as in :func:`simulate_periodic`."""
     table = model_parameters(rig, effects)
     p = as_values(table.as_dict())
-    solution = simulate_periodic(build_model(rig, effects), p, excitation, layout=layout)
+    solution = simulate_periodic(build_model(rig, effects), p, excitation, settings, layout)
     return Solved(excitation, np.asarray(harmonics(p, solution, orders)), solution.status())
 
 
 def solve_between(rig: Rig, effects: Sequence[str], known: Solved) -> Solved:
     """``known`` and as many frequencies again, see :func:`between`, as one."""
-    settings = PeriodicSettings()
-    layout = layout_for(known.frequency, settings.nodes, settings.slow)
+    layout = layout_for(known.frequency, _DRAWN.nodes, _DRAWN.slow)
     orders = known.harmonics.shape[2] - 1
-    return joined(known, solve(rig, effects, between(known.excitation), orders, layout))
+    return joined(known, solve(rig, effects, between(known.excitation), orders, _DRAWN, layout))
 
 
 def without_effects(rig: Rig, effects: Sequence[str]) -> Rig:

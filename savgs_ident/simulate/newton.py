@@ -9,6 +9,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.tree_util import PyTreeDef
 from jaxtyping import Array, Float, Int
 
 from savgs_ident.model.quarter_car import Inputs, QuarterCar
@@ -21,6 +22,7 @@ from savgs_ident.simulate.collocation import (
     solve_linearised,
     step_defects,
 )
+from savgs_ident.simulate.cyclic import CyclicFactors
 from savgs_ident.simulate.layout import Layout
 
 TOLERANCE = 1e-7
@@ -40,6 +42,14 @@ class NewtonResult(NamedTuple):
     linearised: Linearised
     last_step: Float[Array, " D"]
     iterations: Int[Array, ""]
+
+
+def newton_structure() -> PyTreeDef:
+    """How the arrays of a result belong together."""
+    zero = jnp.zeros(())
+    factors = CyclicFactors(zero, zero, zero)
+    result = NewtonResult(Trajectory(zero, zero), Linearised(zero, zero, zero, zero, factors), zero, zero)
+    return jax.tree.structure(result)
 
 
 class _Progress(NamedTuple):

@@ -14,6 +14,7 @@ more on twice as many nodes.
 
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -37,7 +38,8 @@ from savgs_ident.simulate.cyclic import solve_nodes
 from savgs_ident.simulate.excitation import Excitation, inputs_at
 from savgs_ident.simulate.layout import Layout, layout_for
 from savgs_ident.simulate.mesh import Mesh, adapted_mesh, uniform_mesh
-from savgs_ident.simulate.newton import TOLERANCE, motion_scale, solve_newton
+from savgs_ident.simulate.newton import TOLERANCE, motion_scale, newton_structure, solve_newton
+from savgs_ident.simulate.stored import placed, stored
 
 
 @dataclass(frozen=True)
@@ -82,16 +84,27 @@ def _steps(excitation: Excitation, mesh: Mesh) -> Array:
     return jnp.asarray(mesh.gap) / (2.0 * jnp.pi * excitation.frequency[mesh.layout.dwell])
 
 
-@eqx.filter_jit
 def solve_on_mesh(
     model: QuarterCar, p: Values, excitation: Excitation, mesh: Mesh, start: Trajectory, limit: int
 ) -> PeriodicSolution:
     """Newton's method on given nodes from a given start."""
+    p, excitation, mesh, start = placed((p, excitation, mesh, start))
+    parts = _solved(model, p, excitation, mesh, start, limit)
+    return PeriodicSolution(excitation, mesh, *jax.tree.unflatten(newton_structure(), parts))
+
+
+@eqx.filter_jit
+def _solved(*args: Any) -> tuple[Array, ...]:
+    return stored(_solve, *args)
+
+
+def _solve(
+    model: QuarterCar, p: Values, excitation: Excitation, mesh: Mesh, start: Trajectory, limit: int
+) -> tuple[Array, ...]:
     inputs = inputs_at(excitation, mesh)
     layout, steps = mesh.layout, _steps(excitation, mesh)
     scale = motion_scale(model, inputs, excitation.frequency, layout)
-    result = solve_newton(model, p, start, inputs, layout, steps, scale, limit)
-    return PeriodicSolution(excitation, mesh, *result)
+    return tuple(jax.tree.leaves(solve_newton(model, p, start, inputs, layout, steps, scale, limit)))
 
 
 @eqx.filter_jit

@@ -68,7 +68,7 @@ class Bench:
         self.task = plan_task(measured, rig, MODELS["simtr"], FREE, settings)
         problem = self.task.problem
         self.first = simulate_periodic(problem.model, problem.fixed, self.task.excitation)
-        self.minimiser = Minimiser(problem, self.first)
+        self.minimiser = Minimiser(problem)
 
     def u(self, values: Mapping[str, float]) -> Array:
         """Coordinates of the free parameters at ``values`` [SI]."""
@@ -96,4 +96,4 @@ class Bench:
     def fit(self, measured: NDArray[np.complex128], start: Mapping[str, float] | None = None) -> Minimum:
         """Minimise for other harmonics, from the rig's own values or others."""
         u = self.u(dict(self.task.table.as_dict()) | dict(start or {}))
-        return self.seeing(measured).minimise(u, self.first, 40, silent)
+        return self.seeing(measured).minimise(u, self.first, 40, silent, enough=1e-9)

@@ -51,7 +51,7 @@ def test_the_jacobian_holds_with_tolerances_and_priors_too(few: HarmonicResponse
     task = plan_task(three, rig, MODELS["simtr"], FREE, FitSettings())
     problem = task.problem
     first = simulate_periodic(problem.model, problem.fixed, task.excitation)
-    minimiser = Minimiser(problem, first)
+    minimiser = Minimiser(problem)
     count, priors = len(problem.free.names), len(problem.free.tolerated)
     assert {"k_sd", "k_t", "m_s", "C_y", "k_pre"} <= set(problem.free.tolerated)
     u = jnp.asarray(np.random.default_rng(3).uniform(-0.5, 0.5, count))
