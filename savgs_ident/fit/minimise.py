@@ -23,13 +23,16 @@ Progress = Callable[[str], None]
 """Is told what is going on, a line at a time."""
 
 TOLERANCE = 1e-2
-"""Change of coordinates and residuals at which to stop; both count in standard deviations or logarithms."""
-
+"""Change of coordinates and of what the optimiser is given at which it stops by itself."""
 
 SHARPNESS = 30.0
 """Residuals are given to the optimiser in this part of a standard deviation. It damps the first step by one of
 its units of information on every coordinate: a whole standard deviation would hold back the tolerances, of
 which data and prior together hardly tell more."""
+
+
+NOTHING = 1e-10
+"""A change of chi2 that means nothing, however small chi2 is."""
 
 
 class Minimum(NamedTuple):
@@ -107,9 +110,8 @@ class Minimiser(eqx.Module):
     ) -> Minimum:
         """Minimise from ``u``, on the nodes of the solution ``near`` there, parameters pinned as told.
 
-        The last step is the one that lowers the sum of squares by less than the share ``enough``, or after
-        which the linearisation promises no more than that. A rejected step lowers it by nothing, which says
-        nothing: then the promise alone decides.
+        The last step is the one after which the linearisation promises to lower the sum of squares by less
+        than the share ``enough``, or that the optimiser takes for its last and that lowered it by no more.
         """
         pins = pins or self.problem.unpinned
         best = trial = evaluate(self.problem, u, pins, near)
@@ -123,8 +125,8 @@ class Minimiser(eqx.Module):
                 status = Status.NOT_FINITE
                 break
             progress(f"step {count}: chi2 = {cost:.6g}")
-            small = enough * cost
-            if done or 0.0 < before - cost < small or _left_to_gain(best.at) < small:
+            small = enough * cost + NOTHING
+            if _left_to_gain(best.at) < small or (done and before - cost < small):
                 status = Status.CONVERGED
                 break
             before = cost

@@ -110,7 +110,7 @@ class Evaluation(NamedTuple):
 def evaluate(problem: Problem, u: Float[Array, " n"], pins: Pins, near: PeriodicSolution) -> Evaluation:
     """Residuals of data, priors and pins at ``u``, on the nodes of ``near`` and started from it.
 
-    The solver is the compiled one that made ``near``: it is neither traced nor compiled again.
+    The solver is the one that made ``near``, compiled already.
     """
     u, pins = placed((u, pins))
     p = problem.parameters(u)

@@ -17,6 +17,8 @@ DPI = 160
 def write_figure(folder: Path, stem: str, figure: Figure) -> tuple[Path, Path]:
     """Write ``figure`` as ``stem``.png and ``stem``.pdf; the same figure gives the same bytes.
 
+    This is the last thing to do with a figure: its layout is settled and its canvas is the printed one.
+
     Raises :class:`InputError` if a file cannot be written.
     """
     png, pdf = io.BytesIO(), io.BytesIO()

@@ -69,7 +69,7 @@ def fix_labels(axes: Axes) -> None:
 
     Left to themselves they look for room among all ticks of all neighbours, half of the time that a figure takes.
     """
-    axes.yaxis.set_label_coords(-0.105, 0.5)
+    axes.yaxis.set_label_coords(-0.125, 0.5)
     if not axes.get_xlabel():
         axes.xaxis.set_label_coords(0.5, 0.0)
     axes.set_title(axes.get_title(), y=1.0)

@@ -1,4 +1,4 @@
-"""Compiled programs, kept from one run to the next in the user's cache folder."""
+"""Programs, traced and compiled, kept from one run to the next in the user's cache folder."""
 
 import os
 import sys
@@ -22,7 +22,7 @@ def _spare_the_compiler() -> None:
 
 
 def cache_folder() -> Path:
-    """Where compiled programs are kept: ``SAVGS_IDENT_CACHE``, else the platform's cache folder."""
+    """Where programs are kept: ``SAVGS_IDENT_CACHE``, else the platform's cache folder."""
     chosen = os.environ.get("SAVGS_IDENT_CACHE")
     if chosen:
         return Path(chosen)

@@ -9,7 +9,6 @@ import dataclasses
 import enum
 import hashlib
 from collections.abc import Callable, Iterator
-from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -20,6 +19,12 @@ import numpy as np
 
 _PACKAGE = "savgs_ident"
 _TRACERS = ("jax", "jaxlib", "equinox", "numpy", "scipy")
+_SETTINGS = (
+    "jax_enable_x64",
+    "jax_default_matmul_precision",
+    "jax_numpy_dtype_promotion",
+    "jax_numpy_rank_promotion",
+)
 
 
 class _UntoldError(Exception):
@@ -32,18 +37,9 @@ def fingerprint(function: Callable[..., Any], args: tuple[Any, ...]) -> str | No
         told = [_origin(function), *_description(args)]
     except _UntoldError:
         return None
-    told += [_source(), jax.default_backend(), str(jax.dtypes.canonicalize_dtype(float))]
-    told += [version(package) for package in _TRACERS]
+    told += [_SOURCE, jax.default_backend(), *map(version, _TRACERS)]
+    told += [f"{setting} {getattr(jax.config, setting)}" for setting in _SETTINGS]
     return hashlib.sha256("\n".join(told).encode()).hexdigest()
-
-
-@cache
-def _source() -> str:
-    """A digest of all source files of this package."""
-    digest = hashlib.sha256()
-    for file in sorted(_sources(files(_PACKAGE)), key=str):
-        digest.update(file.read_bytes())
-    return digest.hexdigest()
 
 
 def _sources(folder: Traversable) -> Iterator[Traversable]:
@@ -52,6 +48,17 @@ def _sources(folder: Traversable) -> Iterator[Traversable]:
             yield from _sources(each)
         elif each.name.endswith(".py"):
             yield each
+
+
+def _digest_of_source() -> str:
+    digest = hashlib.sha256()
+    for file in sorted(_sources(files(_PACKAGE)), key=str):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+# Taken when this package is loaded: what is on disk later is not what runs.
+_SOURCE = _digest_of_source()
 
 
 def _origin(thing: Any) -> str:

@@ -7,8 +7,8 @@ in use (:mod:`savgs_ident.simulate.compilation`), what was traced is kept too.
 
 import hashlib
 import os
-import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -76,10 +76,12 @@ def _read(file: Path) -> export.Exported | None:
 def _write(file: Path, program: export.Exported) -> None:
     """Keep a program, whole or not at all; a folder that cannot be written keeps nothing."""
     content = bytes(program.serialize())
+    part = file.with_name(f"{file.name}-{os.getpid()}")
     try:
-        handle, name = tempfile.mkstemp(dir=file.parent, prefix="traced-", suffix=".part")
-        with os.fdopen(handle, "wb") as part:
-            part.write(hashlib.sha256(content).digest() + content)
-        Path(name).replace(file)
+        part.write_bytes(hashlib.sha256(content).digest() + content)
+        part.replace(file)
     except OSError:
         return
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)

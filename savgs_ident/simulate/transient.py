@@ -205,7 +205,6 @@ def _integrate(
     )
 
 
-_curves = eqx.filter_jit(section_curves)
 _zero = eqx.filter_jit(deflection_zero)
 
 
@@ -248,7 +247,7 @@ def simulate_transient(
     whose states are then part of the motion. ``tolerance`` is relative, per step. Look at ``status()`` of the
     result before using it. Differentiable in forward mode (``jax.jvp``, ``jax.jacfwd``).
     """
-    instants, curves = jnp.asarray(times, dtype=jnp.float64), _curves(p)
+    instants, curves = jnp.asarray(times, dtype=jnp.float64), section_curves(p)
     start = rest_state(model, p, road, link, instants[0], curves) if initial is None else initial
     found = _integrate(model, p, road, link, instants, start, jnp.asarray(tolerance), curves)
     return _observe(model, p, road, link, found, _zero(model, p, curves), curves)

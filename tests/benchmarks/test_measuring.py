@@ -2,7 +2,6 @@
 
 import sys
 
-import jax
 import numpy as np
 import pytest
 
@@ -19,7 +18,7 @@ from savgs_ident.model.values import as_values
 def task(rig: Rig) -> Task:
     effects = MODELS["simtr"]
     values = as_values(model_parameters(rig, effects).as_dict())
-    curves = jax.jit(section_curves)(values)
+    curves = section_curves(values)
     model = build_model(rig, effects)
     return Task(model, values, np.array([0.8, 3.0]), 0.01375, 1.5, curves, np.zeros(5))
 

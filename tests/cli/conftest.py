@@ -21,6 +21,8 @@ Invoke = Callable[..., Result]
 
 COMMAND = (sys.executable, "-m", "savgs_ident.cli")
 
+_AS_USERS_HAVE_IT = {"jax_numpy_dtype_promotion": "standard", "jax_numpy_rank_promotion": "allow"}
+
 
 @pytest.fixture(scope="session")
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -52,8 +54,15 @@ def as_users_have_it() -> Callable[[Sequence[str]], Result]:
     """Run ``savgs-ident`` with some words in this process, with JAX as it is outside of tests."""
 
     def run(words: Sequence[str]) -> Result:
-        with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
+        # The program works in several threads; JAX's context managers hold in their own only.
+        strict = {name: jax.config.values[name] for name in _AS_USERS_HAVE_IT}
+        for name, setting in _AS_USERS_HAVE_IT.items():
+            jax.config.update(name, setting)
+        try:
             return CliRunner().invoke(app, spread_values(words), catch_exceptions=False)
+        finally:
+            for name, setting in strict.items():
+                jax.config.update(name, setting)
 
     return run
 

@@ -93,7 +93,12 @@ class Bench:
         """The minimiser of the same problem for other harmonics."""
         return eqx.tree_at(lambda each: each.problem.target.measured, self.minimiser, jnp.asarray(measured))
 
-    def fit(self, measured: NDArray[np.complex128], start: Mapping[str, float] | None = None) -> Minimum:
+    def fit(
+        self,
+        measured: NDArray[np.complex128],
+        start: Mapping[str, float] | None = None,
+        enough: float = 1e-6,
+    ) -> Minimum:
         """Minimise for other harmonics, from the rig's own values or others."""
         u = self.u(dict(self.task.table.as_dict()) | dict(start or {}))
-        return self.seeing(measured).minimise(u, self.first, 40, silent, enough=1e-9)
+        return self.seeing(measured).minimise(u, self.first, 40, silent, enough=enough)

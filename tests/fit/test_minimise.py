@@ -73,7 +73,7 @@ def test_clean_data_give_the_truth_back(bench: Bench) -> None:
 @pytest.mark.parametrize("start", AWAY, ids=str)
 def test_it_comes_back_from_far_away(bench: Bench, start: dict[str, float]) -> None:
     data = bench.predicted(TRUTH) + bench.noise(1)
-    near, far = bench.fit(data), bench.fit(data, start)
+    near, far = bench.fit(data, enough=1e-9), bench.fit(data, start, enough=1e-9)
     assert far.status is Status.CONVERGED
     assert far.cost == pytest.approx(near.cost, abs=1e-3)
     assert np.asarray(far.u) == pytest.approx(np.asarray(near.u), abs=1e-5)

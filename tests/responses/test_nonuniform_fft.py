@@ -18,7 +18,7 @@ def test_fast_sums_equal_plain_sums(highest: int, samples: int, seed: int) -> No
     rows = rng.standard_normal((2, samples))
     turns = np.exp(-1j * np.outer(np.arange(highest + 1), phase))
     plan = plan_transform(phase, highest)
-    # A phase of many turns is known to its rounding only, in either way of summing.
+    # The phase of an order is known to its rounding only: here after hundreds of turns.
     precision = 2e-12 + 2.0 * np.finfo(float).eps * highest * np.abs(phase).max()
     assert np.max(np.abs(sums(plan, rows) - rows @ turns.T)) < precision * np.abs(rows).sum()
     amplitude = rng.standard_normal((2, highest + 1)) + 1j * rng.standard_normal((2, highest + 1))
