@@ -98,7 +98,7 @@ def solve_newton(
     layout: Layout,
     steps: Float[Array, " P"],
     scale: Float[Array, "m P"],
-    limit: int,
+    limit: Int[Array, ""],
 ) -> NewtonResult:
     """Iterate until every dwell's step is below :data:`TOLERANCE` or ``limit`` iterations are used."""
 

@@ -41,13 +41,16 @@ from savgs_ident.simulate.mesh import Mesh, adapted_mesh, uniform_mesh
 from savgs_ident.simulate.newton import TOLERANCE, motion_scale, newton_structure, solve_newton
 from savgs_ident.simulate.stored import placed, stored
 
+COARSE = 10
+"""Iterations on nodes that are to move: enough to show where, whether or not all dwells have converged."""
+
 
 @dataclass(frozen=True)
 class PeriodicSettings:
     """How finely to solve.
 
     ``nodes`` per period, more in proportion to the period of dwells below ``slow`` [Hz]; ``adaptations`` of the
-    nodes to the solution, at most ``iterations`` of Newton's method each time.
+    nodes to the solution; at most ``iterations`` of Newton's method on the last nodes.
     """
 
     nodes: int = 256
@@ -88,8 +91,8 @@ def solve_on_mesh(
     model: QuarterCar, p: Values, excitation: Excitation, mesh: Mesh, start: Trajectory, limit: int
 ) -> PeriodicSolution:
     """Newton's method on given nodes from a given start."""
-    p, excitation, mesh, start = placed((p, excitation, mesh, start))
-    parts = _solved(model, p, excitation, mesh, start, limit)
+    p, excitation, mesh, start, most = placed((p, excitation, mesh, start, jnp.asarray(limit)))
+    parts = _solved(model, p, excitation, mesh, start, most)
     return PeriodicSolution(excitation, mesh, *jax.tree.unflatten(newton_structure(), parts))
 
 
@@ -99,7 +102,7 @@ def _solved(*args: Any) -> tuple[Array, ...]:
 
 
 def _solve(
-    model: QuarterCar, p: Values, excitation: Excitation, mesh: Mesh, start: Trajectory, limit: int
+    model: QuarterCar, p: Values, excitation: Excitation, mesh: Mesh, start: Trajectory, limit: Array
 ) -> tuple[Array, ...]:
     inputs = inputs_at(excitation, mesh)
     layout, steps = mesh.layout, _steps(excitation, mesh)
@@ -161,9 +164,10 @@ def simulate_periodic(
         layout = layout_for(np.asarray(excitation.frequency), settings.nodes, settings.slow)
     mesh = uniform_mesh(layout)
     start = _riding_the_road(model, excitation, mesh)
-    solution = solve_on_mesh(model, p, excitation, mesh, start, settings.iterations)
-    for _ in range(settings.adaptations):
-        solution = adapt(model, p, solution, layout, settings.iterations)
+    first, *later = [COARSE] * settings.adaptations + [settings.iterations]
+    solution = solve_on_mesh(model, p, excitation, mesh, start, first)
+    for limit in later:
+        solution = adapt(model, p, solution, layout, limit)
     return solution
 
 
