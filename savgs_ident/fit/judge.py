@@ -1,5 +1,7 @@
 """The verdict of a finished minimisation: errors, what trades off, how low it can go, which test would help."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from savgs_ident.fit.covariance import spread_of
@@ -10,6 +12,9 @@ from savgs_ident.fit.problem import Problem
 from savgs_ident.fit.profile import lower_bound
 from savgs_ident.fit.result import Verdict
 from savgs_ident.fit.task import Task
+
+EXPLAINED = 2.0
+"""chi2 per datum up to which the data count as explained."""
 
 
 def judge(task: Task, minimiser: Minimiser, best: Minimum, tell: Progress) -> Verdict:
@@ -31,7 +36,19 @@ def judge(task: Task, minimiser: Minimiser, best: Minimum, tell: Progress) -> Ve
             bounds |= {} if bound is None else {name: bound}
         tell("looking for a test that would help")
         advice = _advice(task, minimiser, best)
-    return verdict_of(names, values, units, covariance, bounds, advice)
+    verdict = verdict_of(names, values, units, covariance, bounds, advice)
+    return replace(verdict, sentences=(*_misfit(problem, best), *verdict.sentences))
+
+
+def _misfit(problem: Problem, best: Minimum) -> tuple[str, ...]:
+    rows = best.residual[: best.residual.size - len(problem.free.tolerated)]
+    excess = float(rows @ rows) / max(problem.target.entries - len(problem.free.identified), 1)
+    if excess <= EXPLAINED:
+        return ()
+    return (
+        f"The model does not explain these data: chi2/dof = {excess:.3g}. The parameters make up for what is "
+        "missing in it; their errors are those of the noise alone.",
+    )
 
 
 def _advice(task: Task, minimiser: Minimiser, best: Minimum) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from jaxtyping import Array
 
 from savgs_ident.core.rig import Rig
 from savgs_ident.fit.assemble import Outcome, assemble_fit
-from savgs_ident.fit.judge import judge
+from savgs_ident.fit.judge import EXPLAINED, judge
 from savgs_ident.fit.minimise import Minimiser, Minimum, Progress
 from savgs_ident.fit.result import Fit
 from savgs_ident.fit.settings import FitSettings
@@ -27,11 +27,11 @@ from savgs_ident.simulate.periodic import adapt, harmonics, simulate_periodic
 FREE = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
 """The four parameters that the paper identifies."""
 
-EXPLAINED = 2.0
-"""A first start that ends with chi2 per datum below this has explained the data; no other is needed."""
-
 ROUGHLY = 0.05
 """Share of chi2 below which a step is not worth another before the nodes are adapted to the result."""
+
+EXPLORING = 12
+"""Most steps from a further start: enough to see whether it leads to a better minimum."""
 
 _SHIFT = 0.4
 """Distance of further starts from the first in every free coordinate: about a factor of one and a half."""
@@ -92,7 +92,7 @@ def _starts(task: Task) -> list[Array]:
 def _from_start(task: Task, minimiser: Minimiser, u: Array, tell: Progress) -> Minimum:
     p = task.problem.parameters(u)
     near = simulate_periodic(task.problem.model, p, task.excitation, task.settings.periodic)
-    return minimiser.minimise(u, near, task.settings.steps, tell, enough=ROUGHLY)
+    return minimiser.minimise(u, near, min(EXPLORING, task.settings.steps), tell, enough=ROUGHLY)
 
 
 def _refined(task: Task, minimiser: Minimiser, best: Minimum, tell: Progress) -> Minimum:

@@ -15,7 +15,7 @@ import optimistix as optx
 from jaxtyping import Array, Float
 
 from savgs_ident.core.status import Status
-from savgs_ident.fit.problem import Evaluation, Linearised, Pins, Problem, evaluate
+from savgs_ident.fit.problem import Evaluation, Linearised, Pins, Problem, evaluate, evaluate_beside
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.stored import placed
 
@@ -131,7 +131,7 @@ class Minimiser(eqx.Module):
                 break
             before = cost
             if count < steps:
-                trial = evaluate(self.problem, state.y_eval, pins, best.solution)
+                trial = evaluate_beside(self.problem, state.y_eval, pins, best)
         return _minimum(best, status)
 
     def evaluate(self, u: Float[Array, " n"], near: PeriodicSolution) -> Minimum:

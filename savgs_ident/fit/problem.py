@@ -114,7 +114,24 @@ def evaluate(problem: Problem, u: Float[Array, " n"], pins: Pins, near: Periodic
     """
     u, pins = placed((u, pins))
     p = problem.parameters(u)
-    solution = resolve(problem.model, p, near, problem.iterations)
+    return _evaluation(problem, pins, u, p, resolve(problem.model, p, near, problem.iterations))
+
+
+def evaluate_beside(problem: Problem, u: Float[Array, " n"], pins: Pins, best: Evaluation) -> Evaluation:
+    """The same, started from a ``best`` point known so far; whose Jacobian it borrows if it is no better.
+
+    Such a point is rejected by any optimiser, and its own Jacobian would cost most of the evaluation.
+    """
+    u, pins = placed((u, pins))
+    p = problem.parameters(u)
+    solution = resolve(problem.model, p, best.solution, problem.iterations)
+    residual = _residual_at(problem, pins, u, p, solution)
+    if jnp.sum(residual**2) < jnp.sum(best.at.residual**2):
+        return _evaluation(problem, pins, u, p, solution)
+    return Evaluation(Linearised(u, residual, best.at.jacobian), solution)
+
+
+def _evaluation(problem: Problem, pins: Pins, u: Array, p: Values, solution: PeriodicSolution) -> Evaluation:
     residual, jacobian = _compared(problem, pins, u, p, solution)
     return Evaluation(Linearised(u, residual, jacobian), solution)
 
@@ -130,7 +147,12 @@ def _residual_and_jacobian(
     predicted = harmonics(p, solution, problem.orders)
     by_name = harmonic_sensitivities(problem.model, p, solution, problem.free.names, problem.orders)
     columns = jax.vmap(lambda change: jax.jvp(problem.target, (predicted,), (change,))[1])(by_name)
-    priors = problem.free.prior_residuals
-    residual = jnp.concatenate([problem.target(predicted), priors(u), pins.weight * (u - pins.at)])
-    data = columns.T * problem.slopes(u)
-    return residual, jnp.concatenate([data, jax.jacfwd(priors)(u), jnp.diag(pins.weight)])
+    priors = jax.jacfwd(problem.free.prior_residuals)(u)
+    jacobian = jnp.concatenate([columns.T * problem.slopes(u), priors, jnp.diag(pins.weight)])
+    return _residual_at(problem, pins, u, p, solution), jacobian
+
+
+@eqx.filter_jit
+def _residual_at(problem: Problem, pins: Pins, u: Array, p: Values, solution: PeriodicSolution) -> Array:
+    data = problem.target(harmonics(p, solution, problem.orders))
+    return jnp.concatenate([data, problem.free.prior_residuals(u), pins.weight * (u - pins.at)])
