@@ -41,34 +41,23 @@ def plan_task(
     that cannot be used.
     """
     table = model_parameters(rig, effects)
+    model = build_model(rig, effects)
+    used = used_parameters(model, table)
+    _check_free(free, table, used)
+    tolerated = tuple(name for name in known_to_tolerance(table, free) if name in used)
+    free_vector = FreeVector(table, free, () if settings.fixed_tolerances else tolerated)
+    by_harmonics = settings.quantity == "harmonics"
+    target = harmonic_target(measured, settings.orders) if by_harmonics else peak_to_peak_target(measured)
+    orders, iterations = target.used.shape[-1] - 1, settings.periodic.iterations
+    problem = Problem(model, free_vector, as_values(table.as_dict()), target, orders, iterations)
     excitation = measured_excitation(measured, rig.parameters["psi_nominal"].value)
-    problem = _problem(measured, rig, table, effects, free, settings)
     return Task(rig, effects, table, measured, settings, excitation, problem)
 
 
-def _problem(
-    measured: HarmonicResponse,
-    rig: Rig,
-    table: ParameterTable,
-    effects: tuple[str, ...],
-    free: tuple[str, ...],
-    settings: FitSettings,
-) -> Problem:
-    model = build_model(rig, effects)
-    used = used_parameters(model, table)
+def _check_free(free: tuple[str, ...], table: ParameterTable, used: frozenset[str]) -> None:
+    remedy = "choose among: " + ", ".join(sorted(used))
     for name in free:
         if name not in table:
-            raise InputError(
-                f"there is no parameter '{name}'", remedy="choose among: " + ", ".join(sorted(used))
-            )
+            raise InputError(f"there is no parameter '{name}'", remedy=remedy)
         if name not in used:
-            raise InputError(
-                f"the model does not depend on '{name}'", remedy="choose among: " + ", ".join(sorted(used))
-            )
-    tolerated = tuple(name for name in known_to_tolerance(table, free) if name in used)
-    fixed = as_values(table.as_dict())
-    by_harmonics = settings.quantity == "harmonics"
-    target = harmonic_target(measured, settings.orders) if by_harmonics else peak_to_peak_target(measured)
-    orders = target.used.shape[-1] - 1
-    free_vector = FreeVector(table, free, () if settings.fixed_tolerances else tolerated)
-    return Problem(model, free_vector, fixed, target, orders, settings.periodic.iterations)
+            raise InputError(f"the model does not depend on '{name}'", remedy=remedy)

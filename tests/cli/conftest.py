@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import jax
 import pandas as pd
 import pytest
 from click.testing import Result
@@ -15,13 +14,13 @@ from typer.testing import CliRunner
 from savgs_ident.cli.arguments import spread_values
 from savgs_ident.cli.main import app
 
+from .. import relaxed
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 Program = Callable[..., "subprocess.CompletedProcess[str]"]
 Invoke = Callable[..., Result]
 
 COMMAND = (sys.executable, "-m", "savgs_ident.cli")
-
-_AS_USERS_HAVE_IT = {"jax_numpy_dtype_promotion": "standard", "jax_numpy_rank_promotion": "allow"}
 
 
 @pytest.fixture(scope="session")
@@ -54,15 +53,8 @@ def as_users_have_it() -> Callable[[Sequence[str]], Result]:
     """Run ``savgs-ident`` with some words in this process, with JAX as it is outside of tests."""
 
     def run(words: Sequence[str]) -> Result:
-        # The program works in several threads; JAX's context managers hold in their own only.
-        strict = {name: jax.config.values[name] for name in _AS_USERS_HAVE_IT}
-        for name, setting in _AS_USERS_HAVE_IT.items():
-            jax.config.update(name, setting)
-        try:
+        with relaxed.as_users_have_it():
             return CliRunner().invoke(app, spread_values(words), catch_exceptions=False)
-        finally:
-            for name, setting in strict.items():
-                jax.config.update(name, setting)
 
     return run
 

@@ -37,9 +37,6 @@ STATEFUL = [pytest.param(effect, id=name) for name, effect in CATALOGUE.items() 
 FOLDER = Path(savgs_ident.effects.__file__).parent
 NO_EFFECTS = {"__init__", "registry"}
 
-MAY_ADD_ENERGY: dict[str, str] = {}
-"""Effects that may take away from a loss of the rig, and so add energy, with the reason."""
-
 CENTRE = {Port.STRUT: 0.45, Port.TYRE_RADIAL: 0.013, Port.TYRE_LATERAL: 0.65}
 """About where a port's displacement is [m]; elsewhere zero."""
 
@@ -274,8 +271,6 @@ def test_derivatives_in_its_parameters_are_those_of_differences(
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_it_adds_no_energy_over_a_cycle(effect: AbstractEffect, numbers: dict[str, float], seed: int) -> None:
     """Power of the force into the rig, with its internal states back where they were."""
-    if effect.name in MAY_ADD_ENERGY:
-        pytest.skip(MAY_ADD_ENERGY[effect.name])
     p = as_values(numbers)
     cycle = _cycle(effect, p, seed)
     if effect.states:

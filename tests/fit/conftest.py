@@ -7,10 +7,8 @@ can share a program does.
 from collections.abc import Iterator
 from pathlib import Path
 
-import jax
 import numpy as np
 import pytest
-from jax.experimental.compilation_cache import compilation_cache
 
 from savgs_ident.core.rig import Rig
 from savgs_ident.effects.registry import MODELS
@@ -19,20 +17,14 @@ from savgs_ident.fit.result import Fit
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.responses.estimate import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.compilation import use_persistent_cache
 
+from ..relaxed import with_kept_programs
 from .bench import FEW, Bench, only, true_rig
 
 
 @pytest.fixture(scope="package", autouse=True)
 def _as_users_have_it() -> Iterator[None]:
-    """Solvers spread (P,) over (m, P) and count orders in integers; compiled programs are kept.
-
-    JAX looks for its cache at the first compilation of a process, which another test may have been.
-    """
-    use_persistent_cache()
-    compilation_cache.reset_cache()
-    with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):
+    with with_kept_programs():
         yield
 
 

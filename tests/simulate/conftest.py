@@ -2,29 +2,21 @@
 
 from collections.abc import Iterator
 
-import jax
 import pytest
-from jax.experimental.compilation_cache import compilation_cache
 
 from savgs_ident.core.rig import Rig
 from savgs_ident.effects.registry import MODELS, build_model, model_parameters
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values, as_values
-from savgs_ident.simulate.compilation import use_persistent_cache
 from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 
+from ..relaxed import with_kept_programs
 from .programme import FEW, PROGRAMME, cam
 
 
 @pytest.fixture(scope="package", autouse=True)
 def _as_users_have_it() -> Iterator[None]:
-    """Solvers spread (P,) over (m, P) and count orders in integers; compiled programs are kept.
-
-    JAX looks for its cache at the first compilation of a process, which another test may have been.
-    """
-    use_persistent_cache()
-    compilation_cache.reset_cache()
-    with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):
+    with with_kept_programs():
         yield
 
 
