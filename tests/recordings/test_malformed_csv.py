@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.read import read_campaign
 
+from .refusal import check_refusal
+
 Signals = dict[str, NDArray[np.float64]]
 Build = Callable[[Signals, Callable[..., bytes]], bytes]
 
@@ -184,6 +186,7 @@ def test_broken_table_is_refused_with_reason_place_and_remedy(
         read_campaign(path)
     assert str(path) in str(caught.value)
     assert "Remedy: " in str(caught.value)
+    check_refusal(path, caught.value)
 
 
 def test_the_table_behind_the_broken_ones_is_good(
@@ -258,5 +261,6 @@ def test_broken_channel_map(
     text, message = MAPS[case]
     (tmp_path / "channels.toml").write_text(text)
     (tmp_path / NAME).write_bytes(csv_bytes(signals()))
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(InputError, match=message) as caught:
         read_campaign(tmp_path / NAME)
+    check_refusal(tmp_path / NAME, caught.value)

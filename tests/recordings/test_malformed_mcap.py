@@ -13,6 +13,8 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.mcap_records import LARGEST_CHUNK, MAGIC
 from savgs_ident.recordings.read import read_campaign
 
+from .refusal import check_refusal
+
 START = 1_763_715_600_000_000_000
 FLOAT64 = b"float64 data"
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
@@ -66,6 +68,7 @@ def test_broken_container_is_refused(case: str, tmp_path: Path) -> None:
         read_campaign(path)
     assert str(path) in str(caught.value)
     assert "Remedy: " in str(caught.value)
+    check_refusal(path, caught.value)
 
 
 def test_the_checksum_that_is_tested_can_be_right(tmp_path: Path) -> None:
@@ -126,8 +129,9 @@ def test_unreadable_topic_is_refused_with_its_reason(
 ) -> None:
     topic, payload, message = TOPICS[case]
     path = write_mcap(tmp_path / "a.mcap", {"/road_height": topic}, [("/road_height", START, payload)])
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(InputError, match=message) as caught:
         read_campaign(path)
+    check_refusal(path, caught.value)
 
 
 def test_a_text_where_a_number_belongs_is_named_with_its_time(
