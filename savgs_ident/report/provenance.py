@@ -12,7 +12,11 @@ _PACKAGES = ("jax", "optimistix", "numpy", "scipy")
 
 
 def provenance(fit: Fit, campaign: Campaign, command: Sequence[str]) -> dict[str, object]:
-    """The table ``[provenance]`` of a ``model.toml``; the covariance is in the order of its names, SI."""
+    """The table ``[provenance]`` of a ``model.toml``.
+
+    ``before`` holds the values that the estimated parameters had before the fit, the centres of their priors;
+    the covariance is in the order of its names. SI.
+    """
     return {
         "command": " ".join(command),
         "data": campaign.source,
@@ -26,6 +30,7 @@ def provenance(fit: Fit, campaign: Campaign, command: Sequence[str]) -> dict[str
         "dof": int(fit.dof),
         "status": fit.status.name.lower(),
         "trusted": bool(fit.trusted),
+        "before": {each.name: each.prior for each in fit.estimates},
         "versions": {"savgs_ident": __version__, "python": platform.python_version()} | _versions(),
         "covariance": {
             "names": [each.name for each in fit.estimates],

@@ -12,6 +12,7 @@ What the truncation to a finite number of nodes costs is stated by :func:`trunca
 more on twice as many nodes.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -208,24 +209,49 @@ def harmonic_sensitivities(
 
     One factorisation, that of the last Newton step, serves all parameters.
     """
+    at, mesh = solution.trajectory, solution.mesh
+    moved_along = _linear_motion(model, p, solution)
+
+    def along(direction: Array) -> Array:
+        tangent = _tangent(p, names, direction)
+        _, signals = jax.jvp(_readings, (dict(p), at), (tangent, moved_along(tangent)))
+        return _analyse(signals, mesh, orders)
+
+    return jax.lax.map(along, jnp.eye(len(names)))
+
+
+def trajectory_sensitivities(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, names: tuple[str, ...]
+) -> Trajectory:
+    """Derivatives of the trajectory itself in the named parameters, each field with a leading axis (n,)."""
+    moved_along = _linear_motion(model, p, solution)
+    directions = jnp.eye(len(names))
+    return jax.lax.map(lambda direction: moved_along(_tangent(p, names, direction)), directions)
+
+
+def _tangent(p: Values, names: tuple[str, ...], direction: Array) -> dict[str, Array]:
+    return {name: jnp.zeros_like(p[name]) for name in p} | dict(zip(names, direction, strict=True))
+
+
+def _linear_motion(
+    model: QuarterCar, p: Values, solution: PeriodicSolution
+) -> Callable[[dict[str, Array]], Trajectory]:
+    """The change of the trajectory that a change of the parameters brings about."""
     lin, at, mesh = solution.linearised, solution.trajectory, solution.mesh
     inputs, layout = inputs_at(solution.excitation, mesh), mesh.layout
     steps = _steps(solution.excitation, mesh)
     parts = (*at.x, *at.y)
     still = Trajectory(jnp.zeros_like(at.x), jnp.zeros_like(at.y))
 
-    def along(direction: Array) -> Array:
-        tangent = {name: jnp.zeros_like(p[name]) for name in p} | dict(zip(names, direction, strict=True))
+    def moved(tangent: dict[str, Array]) -> Trajectory:
         _, change = jax.jvp(
             lambda q: residual_at_nodes(model, q, section_curves(q), parts, inputs), (dict(p),), (tangent,)
         )
         imbalance = -solve_nodes(lin.mass, change[:, None])[:, 0]
         rate = jnp.concatenate([jnp.zeros_like(at.x[2:4]), imbalance])
-        moved = solve_linearised(layout, lin, step_defects(model, still, rate, layout, steps), imbalance)
-        _, signals = jax.jvp(_readings, (dict(p), at), (tangent, moved))
-        return _analyse(signals, mesh, orders)
+        return solve_linearised(layout, lin, step_defects(model, still, rate, layout, steps), imbalance)
 
-    return jax.lax.map(along, jnp.eye(len(names)))
+    return moved
 
 
 def truncation_error(

@@ -1,0 +1,1 @@
+"""The posterior of the identified parameters: log density, samplers, convergence, what it says."""
