@@ -27,6 +27,16 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 SHARED = REPOSITORY.parent / "shared" / "data"
 
 
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """One line where reports were not opened in a browser, because there is none: a green run must not hide it."""
+    reasons = [str(report.longrepr) for report in terminalreporter.stats.get("skipped", [])]
+    left_out = sum("no browser" in reason for reason in reasons)
+    if left_out:
+        terminalreporter.write_line(
+            f"{left_out} browser tests were LEFT OUT: chromium or chromedriver was not found"
+        )
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The folder of recordings beside the repository; the test is skipped where there is none."""

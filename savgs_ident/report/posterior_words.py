@@ -1,0 +1,198 @@
+"""What reports say about a posterior beside its own sentences: the same words in the terminal and on the page."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from math import isfinite, sqrt
+from types import MappingProxyType
+
+import numpy as np
+
+from savgs_ident.posterior.result import Marginal, Posterior
+from savgs_ident.report.numerals import DASH, count, numeral, percentage
+
+NUISANCE_WORDS: Mapping[str, str] = MappingProxyType(
+    {
+        "noise_scale": (
+            "Factor on the noise that was estimated from what does not repeat from period to period;"
+            " 1 if that estimate is right."
+        ),
+        "discrepancy": (
+            "Relative rms by which the model is allowed to miss the first harmonic of each channel beyond noise,"
+            " and order k by 1/k of it; 0 for a perfect model. It keeps intervals from becoming absurdly narrow"
+            " where the model is not perfect."
+        ),
+    }
+)
+"""What the scales of the likelihood mean."""
+
+SAMPLERS: Mapping[str, str] = MappingProxyType(
+    {"emcee": "emcee (an ensemble of walkers)", "nuts": "NUTS (Hamiltonian, gradient-based)"}
+)
+"""The samplers in words."""
+
+GOOD_R_HAT = 1.01
+"""R-hat below which chains agree."""
+
+_NORMAL_95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of the convergence table: a quantity, its value, what it should be, what it means."""
+
+    name: str
+    value: str
+    wanted: str
+    meaning: str
+
+
+def verdict_line(posterior: Posterior) -> str:
+    """Whether the numbers may be used, first of all."""
+    if posterior.convergence.converged:
+        return "Converged: these numbers may be used."
+    return "Not converged: these numbers must not be used."
+
+
+def reasons(posterior: Posterior) -> tuple[str, ...]:
+    """Why not, at least one sentence where it did not converge."""
+    given = posterior.convergence.reasons
+    return () if posterior.convergence.converged else given or ("The sampler gave no reason.",)
+
+
+def scope_sentence(posterior: Posterior) -> str:
+    """What was estimated from what."""
+    measured, used = posterior.measured, posterior.predictive.used
+    identified, tolerated = (len(posterior.of_role(role)) for role in ("identified", "tolerated"))
+    orders = np.flatnonzero(np.any(used, axis=(0, 1)))
+    span = f"orders {orders[0]} to {orders[-1]}" if orders.size > 1 else f"order {' '.join(map(str, orders))}"
+    along = (
+        f"; {tolerated} more that are known to a tolerance were estimated along and averaged over"
+        if tolerated
+        else "; everything else was held at its value"
+    )
+    were = "was" if identified == 1 else "were"
+    return (
+        f"{_counted(identified, 'parameter')} {were} identified from {_counted(len(measured.tests), 'dwell')}"
+        f" between {measured.frequency[0]:.2f} and {measured.frequency[-1]:.2f} Hz"
+        f" ({np.sum(used)} harmonics, {span}){along}."
+    )
+
+
+def predictive_sentence(posterior: Posterior) -> str:
+    """How many measured phasors the posterior would have predicted."""
+    inside, total = posterior.predictive.count_inside
+    if not total:
+        return "No measured harmonic was compared with a prediction."
+    expected, scatter = 0.95 * total, 2.0 * sqrt(0.95 * 0.05 * total)
+    low, high = max(expected - scatter, 0.0), min(expected + scatter, total)
+    return (
+        f"Of {total} measured harmonics {inside} ({percentage(inside / total)}) lie where 95 % of the repetitions"
+        f" lie that the posterior predicts; of a perfect model {low:.0f} to {high:.0f} would."
+    )
+
+
+def correlation_sentence(posterior: Posterior) -> str | None:
+    """The identified parameters that trade off most; None for fewer than two, or where none moves."""
+    names = tuple(
+        each.name for each in posterior.of_role("identified") if np.ptp(posterior.draws[each.name]) > 0.0
+    )
+    if len(names) < 2:
+        return None
+    matrix = posterior.correlation(names)
+    one, other = max(combinations(range(len(names)), 2), key=lambda pair: abs(matrix[pair]))
+    return f"Strongest correlation: {names[one]} with {names[other]}, {matrix[one, other]:+.2f}."
+
+
+def shift_in_sd(each: Marginal) -> float:
+    """How far the median has moved from the middle of the prior interval, in prior standard deviations [1]."""
+    low, high = each.prior
+    return (each.median - 0.5 * (low + high)) / ((high - low) / (2.0 * _NORMAL_95))
+
+
+def checks(posterior: Posterior) -> tuple[Check, ...]:
+    """How the sampling went, line by line."""
+    c = posterior.convergence
+    chains, length = next(iter(posterior.draws.values())).shape
+    slowest = max(posterior.of_role("identified"), key=lambda each: each.autocorrelation)
+    gradient = posterior.sampler == "nuts"
+    return (
+        Check(
+            "Chains",
+            f"{chains} of {count(length)} draws",
+            DASH,
+            "Independent walks through the posterior; they must all tell the same.",
+        ),
+        Check(
+            "Largest R-hat",
+            f"{c.r_hat_max:.3f}",
+            f"below {GOOD_R_HAT}",
+            "Spread of all chains together over the spread within each, by ranks; 1 when they agree.",
+        ),
+        Check(
+            "Smallest effective sample size",
+            count(c.ess_min),
+            f"at least {count(c.target_ess)}",
+            "How many independent draws the correlated ones are worth, for the middle (bulk) and for the ends of"
+            " the 90 % interval (tail), whichever is less, over the identified parameters.",
+        ),
+        Check(
+            "Autocorrelation time",
+            f"{slowest.autocorrelation:.1f} draws ({slowest.name})",
+            "far below the length of a chain",
+            "After so many draws a chain has forgotten where it was; the largest of the identified parameters.",
+        ),
+        Check(
+            "Acceptance",
+            percentage(c.acceptance),
+            "not near 0",
+            "Share of proposed moves that the exact model accepted.",
+        ),
+        Check(
+            "Divergences",
+            count(c.divergences) if gradient else "not applicable",
+            "0",
+            "Trajectories of the gradient-based sampler that broke down: regions it could not enter.",
+        ),
+        Check(
+            "Pareto k",
+            f"{c.pareto_k:.2f}" if isfinite(c.pareto_k) else DASH,
+            "below 0.7",
+            "Heaviness of the tail of exact over approximate density at the proposals; above 0.7 the proposals"
+            " do not cover the posterior.",
+        ),
+        Check(
+            "Exact evaluations",
+            count(c.evaluations),
+            DASH,
+            "How often the full model was solved, all dwells each time.",
+        ),
+        Check(
+            "Not solved",
+            count(c.unsolved),
+            "few",
+            "Proposals at which the model has no periodic motion that the solver found; they were rejected.",
+        ),
+        Check(
+            "Time taken",
+            f"{posterior.wall_s:.1f} s",
+            DASH,
+            "From the measured response to the last draw.",
+        ),
+    )
+
+
+def short(about: str) -> str:
+    """What a parameter is, in a few words."""
+    return about.split(",")[0]
+
+
+def interval_words(each: Marginal) -> str:
+    """A marginal in a few words, for those who cannot see a picture."""
+    return (
+        f"{each.name}: median {numeral(each.median, each.sd)}, standard deviation {numeral(each.sd, each.sd)}"
+    )
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

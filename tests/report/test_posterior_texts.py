@@ -1,0 +1,233 @@
+"""Page, record and terminal text say the numbers of the posterior, its failure first, and hostile names as text."""
+
+import base64
+import io
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from jinja2 import UndefinedError
+from rich.console import Console
+
+from savgs_ident.core.errors import DataWarning
+from savgs_ident.posterior.result import Posterior
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.report.files import to_json
+from savgs_ident.report.html import render_page
+from savgs_ident.report.numerals import DASH
+from savgs_ident.report.origin import Origin, origin_of
+from savgs_ident.report.posterior_html import posterior_html
+from savgs_ident.report.posterior_record import posterior_record
+from savgs_ident.report.posterior_text import posterior_text
+from savgs_ident.report.posterior_words import checks, predictive_sentence, shift_in_sd
+
+from .posterior_synthetic import SENTENCES, nominal_response, renamed, synthetic_posterior, unconverged
+
+HOSTILE = "<script>x</script>\"'&[bold red]\x1b[2J"
+ORIGIN = Origin(
+    ("savgs-ident", "posterior", "m & m.toml"), "runs/a<b>.csv", "ab" * 32, "m & m.toml", {"savgs-ident": "0.1.0"},
+    (DataWarning("odd", "something", test="dwell_2"),),
+)  # fmt: skip
+
+
+class Reader(HTMLParser):
+    """Texts and tags of a page, in order."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: list[str] = []
+        self._styling = False
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self._styling = tag in ("style", "title")
+
+    def handle_endtag(self, tag: str) -> None:
+        self._styling = self._styling and tag not in ("style", "title")
+
+    def handle_data(self, data: str) -> None:
+        if data.strip() and not self._styling:
+            self.texts.append(data.strip())
+
+
+@pytest.fixture(scope="module")
+def posterior(nominal_campaign: Path) -> Posterior:
+    return synthetic_posterior(nominal_response(nominal_campaign), length=400)
+
+
+@pytest.fixture(scope="module")
+def source(posterior: Posterior) -> str:
+    return posterior_html(posterior, ORIGIN)
+
+
+@pytest.fixture(scope="module")
+def page(source: str) -> Reader:
+    return Reader(source)
+
+
+def rendered(posterior: Posterior, width: int = 100) -> str:
+    stream = io.StringIO()
+    Console(file=stream, width=width, highlight=False).print(posterior_text(posterior))
+    return stream.getvalue()
+
+
+def record_of(posterior: Posterior) -> dict[str, Any]:
+    return dict(json.loads(to_json(posterior_record(posterior, ORIGIN))))
+
+
+def test_the_page_has_its_sections_in_order(page: Reader) -> None:
+    sections = [attributes["id"] for tag, attributes in page.tags if tag == "section"]
+    assert sections == [
+        "summary", "parameters", "pairs", "chains", "profiles", "prediction", "convergence", "origin"
+    ]  # fmt: skip
+    assert not any(tag in ("script", "iframe", "object") for tag, _ in page.tags)
+
+
+def test_the_page_fetches_nothing(page: Reader) -> None:
+    for _, attributes in page.tags:
+        for name in ("src", "href", "action", "data"):
+            assert (attributes.get(name) or "#").startswith(("data:", "#"))
+
+
+def test_pictures_are_drawings_that_execute_nothing(page: Reader) -> None:
+    pictures = [attributes for tag, attributes in page.tags if tag == "img"]
+    assert len(pictures) == 13
+    for attributes in pictures:
+        drawing = base64.b64decode(
+            (attributes["src"] or "").removeprefix("data:image/svg+xml;base64,")
+        ).decode()
+        assert "<svg" in drawing
+        assert not re.search(r"<script|\son\w+=|javascript:|<foreignObject", drawing, re.IGNORECASE)
+        assert not re.search(r'href="(?!#|data:image/png)', drawing)
+
+
+def test_the_page_tells_numbers_sentences_and_origin(posterior: Posterior, page: Reader) -> None:
+    text = " ".join(page.texts)
+    damping = posterior.by_name["c_sd"]
+    numbers = (f"{damping.median:.0f}", f"{damping.q025:.0f} to {damping.q975:.0f}", "99.5 %")
+    for part in (*SENTENCES, *numbers, "N s/m", "runs/a<b>.csv", "ab" * 32, "m & m.toml", "[odd]"):
+        assert part in text
+    assert "Not converged" not in text
+
+
+def test_a_posterior_that_did_not_converge_says_so_first_and_hostile_names_stay_text(
+    posterior: Posterior,
+) -> None:
+    named = renamed(replace(posterior, sentences=(HOSTILE,)), HOSTILE, HOSTILE, HOSTILE)
+    failed = unconverged(named, "The chains do not agree.", "Too few draws.")
+    page = Reader(posterior_html(failed, replace(ORIGIN, data=HOSTILE)))
+    assert page.texts[:3] == [
+        "Not converged: these numbers must not be used.",
+        "The chains do not agree.",
+        "Too few draws.",
+    ]
+    assert sum(HOSTILE.replace("\x1b", "\\x1b") in text for text in page.texts) >= 5
+    assert not any(tag == "script" for tag, _ in page.tags)
+    told = rendered(failed, width=200)
+    assert told.splitlines()[:3] == [page.texts[0], f"- {page.texts[1]}", f"- {page.texts[2]}"]
+    assert "[bold red]\\x1b[2J" in told
+
+
+def test_the_same_posterior_gives_the_same_bytes(posterior: Posterior, source: str) -> None:
+    assert posterior_html(posterior, ORIGIN) == source
+
+
+def test_a_posterior_without_tolerances_profiles_or_nuisance_has_a_page(posterior: Posterior) -> None:
+    kept = tuple(replace(each, profile=None) for each in posterior.of_role("identified")[:1])
+    bare = replace(posterior, marginals=kept, sentences=(), effects=(), sampler="emcee")
+    text = " ".join(Reader(posterior_html(bare, replace(ORIGIN, warnings=()))).texts)
+    assert "No profiles were computed." in text
+    assert "Everything else was held at its value" in text
+    assert "no friction" in text
+    assert "not applicable" in text
+    assert "mu_r" in rendered(bare)
+    assert record_of(bare)["correlation"] == {"mu_r": {"mu_r": pytest.approx(1.0)}}
+
+
+def test_a_value_that_a_template_does_not_get_is_an_error() -> None:
+    with pytest.raises(UndefinedError):
+        render_page("posterior.html.j2", {})
+
+
+def test_the_record_has_the_keys_of_the_contract_first(posterior: Posterior) -> None:
+    record = record_of(posterior)
+    assert list(record)[:7] == [
+        "parameters", "sampler", "wall_s", "ess_min", "converged", "divergences", "acceptance"
+    ]  # fmt: skip
+    assert list(record["parameters"])[:6] == [
+        "mu_r",
+        "mu_t",
+        "ydot_Hth",
+        "c_sd",
+        "noise_scale",
+        "discrepancy",
+    ]
+    entry = record["parameters"]["c_sd"]
+    assert list(entry)[:8] == ["median", "sd", "q025", "q975", "unit", "ess_bulk", "ess_tail", "r_hat"]
+    draws = posterior.draws["c_sd"]
+    assert entry["median"] == pytest.approx(np.median(draws), rel=1e-12)
+    assert [entry["q025"], entry["q975"]] == pytest.approx(
+        np.quantile(draws, [0.025, 0.975]).tolist(), rel=1e-12
+    )
+    assert entry["unit"] == "N s/m"
+    assert len(entry["profile"]["values"]) == len(entry["profile"]["rise"]) == 13
+    assert record["parameters"]["noise_scale"]["profile"] is None
+    assert record["predictive"]["inside"] == posterior.predictive.count_inside[0]
+    assert record["correlation"]["mu_t"]["ydot_Hth"] == pytest.approx(0.85, abs=0.03)
+    assert record["origin"]["data_sha256"] == "ab" * 32
+    assert record["warnings"][0]["code"] == "odd"
+
+
+def test_numbers_that_are_not_known_are_null_in_the_record(posterior: Posterior) -> None:
+    unknown = replace(posterior, convergence=replace(posterior.convergence, pareto_k=float("nan")))
+    assert record_of(unknown)["pareto_k"] is None
+    assert [check.value for check in checks(unknown) if check.name == "Pareto k"] == [DASH]
+
+
+def test_the_terminal_tells_the_numbers_in_80_columns(posterior: Posterior) -> None:
+    text = rendered(posterior, width=80)
+    assert re.search(r"c_sd +5\d{3} ± \d+ +5\d{3} to 5\d{3} N s/m +99\.[45] +427", text)
+    assert "Strongest correlation: mu_t with ydot_Hth, +0.8" in text
+    assert all(sentence in " ".join(text.split()) for sentence in SENTENCES)
+    assert (
+        text.index("Identified parameters")
+        < text.index("Scales of the likelihood")
+        < text.index("What the data")
+    )
+
+
+def test_the_predictive_sentence_counts_and_says_what_chance_would_do(posterior: Posterior) -> None:
+    inside, total = posterior.predictive.count_inside
+    assert total == 504
+    sentence = predictive_sentence(posterior)
+    assert f"Of 504 measured harmonics {inside} (" in sentence
+    # 0.95 * 504 = 478.8, and twice sqrt(0.95 * 0.05 * 504) is 9.8.
+    assert "469 to 489" in sentence
+
+
+def test_a_parameter_at_the_end_of_its_prior_interval_has_moved_by_two_deviations(
+    posterior: Posterior,
+) -> None:
+    each = posterior.of_role("tolerated")[0]
+    assert shift_in_sd(replace(each, median=each.prior[1])) == pytest.approx(1.96, abs=1e-3)
+    assert shift_in_sd(replace(each, median=sum(each.prior) / 2.0)) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_origin_of_a_result_names_data_versions_and_warnings() -> None:
+    found, later = DataWarning("one", "x"), DataWarning("two", "y")
+    campaign = Campaign("runs/c.csv", (), (found,), "cd" * 32)
+    origin = origin_of(
+        campaign, Path("model.toml"), ["savgs-ident", "posterior"], ["numpy", "no-such-package"], [later]
+    )
+    assert origin.data_sha256 == "cd" * 32
+    assert origin.model == "model.toml"
+    assert origin.versions["numpy"] == np.__version__
+    assert origin.versions["no-such-package"] == "unknown"
+    assert [warning.code for warning in origin.warnings] == ["one", "two"]
