@@ -18,6 +18,7 @@ from savgs_ident.report.posterior_traces import MOST_TRACES, SURPLUS_SHOWN, rank
 from savgs_ident.report.posterior_words import (
     GOOD_R_HAT,
     SAMPLERS,
+    chance_of_inside,
     checks,
     interval_words,
     predictive_sentence,
@@ -89,7 +90,12 @@ def _facts(posterior: Posterior) -> tuple[dict[str, object], ...]:
             "then": "1 is perfect",
             "bad": not c.r_hat_max < GOOD_R_HAT,
         },
-        {"name": "Inside the 95 % band", "value": share, "then": f"{inside} of {total}", "bad": False},
+        {
+            "name": "Inside the 95 % band",
+            "value": share,
+            "then": f"{inside} of {total}",
+            "bad": inside < chance_of_inside(total)[0],
+        },
     )
 
 

@@ -79,16 +79,26 @@ def scope_sentence(posterior: Posterior) -> str:
     )
 
 
+def chance_of_inside(total: int) -> tuple[int, int]:
+    """How many of ``total`` harmonics lie inside 95 % regions if the model is right, two standard deviations."""
+    middle, scatter = 0.95 * total, 2.0 * sqrt(0.95 * 0.05 * total)
+    return round(max(middle - scatter, 0.0)), round(min(middle + scatter, total))
+
+
 def predictive_sentence(posterior: Posterior) -> str:
-    """How many measured phasors the posterior would have predicted."""
+    """How many measured harmonics the posterior would have predicted, and what that says about the model."""
     inside, total = posterior.predictive.count_inside
     if not total:
         return "No measured harmonic was compared with a prediction."
-    expected, scatter = 0.95 * total, 2.0 * sqrt(0.95 * 0.05 * total)
-    low, high = max(expected - scatter, 0.0), min(expected + scatter, total)
+    low, high = chance_of_inside(total)
+    verdict = ""
+    if inside < low:
+        verdict = " That is fewer than chance allows: the model misses something."
+    if inside > high:
+        verdict = " That is more than chance allows: the predicted spread is too wide."
     return (
         f"Of {total} measured harmonics {inside} ({percentage(inside / total)}) lie where 95 % of the repetitions"
-        f" lie that the posterior predicts; of a perfect model {low:.0f} to {high:.0f} would."
+        f" lie that the posterior predicts; for a perfect model it would be {low} to {high}.{verdict}"
     )
 
 

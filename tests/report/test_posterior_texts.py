@@ -209,7 +209,15 @@ def test_the_predictive_sentence_counts_and_says_what_chance_would_do(posterior:
     sentence = predictive_sentence(posterior)
     assert f"Of 504 measured harmonics {inside} (" in sentence
     # 0.95 * 504 = 478.8, and twice sqrt(0.95 * 0.05 * 504) is 9.8.
-    assert "469 to 489" in sentence
+    assert sentence.endswith("for a perfect model it would be 469 to 489.")
+
+
+def test_too_few_harmonics_inside_is_said_to_be_the_models_fault(posterior: Posterior) -> None:
+    inside = posterior.predictive.inside & (np.arange(28) % 5 > 0)[:, None, None]
+    missed = replace(posterior, predictive=replace(posterior.predictive, inside=inside))
+    assert predictive_sentence(missed).endswith("fewer than chance allows: the model misses something.")
+    every = replace(posterior.predictive, inside=posterior.predictive.used)
+    assert "more than chance allows" in predictive_sentence(replace(posterior, predictive=every))
 
 
 def test_a_parameter_at_the_end_of_its_prior_interval_has_moved_by_two_deviations(
