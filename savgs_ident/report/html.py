@@ -22,7 +22,9 @@ from savgs_ident.report.style import styled
 
 _RASTER_DPI = 160
 _CSS_PIXELS_PER_INCH = 96
-_UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
+_UNPRINTABLE = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+)
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ def embed(figure: Figure, alt: str) -> Picture:
 def render_page(template: str, values: Mapping[str, object]) -> str:
     """The page that ``template`` makes of ``values``; a value that it asks for and does not get is an error.
 
-    Control characters and lone surrogates, which HTML does not have, are spelled out.
+    Characters that HTML does not have, and those that turn the direction of reading, are spelled out.
     """
     page = _environment().get_template(template).render(values)
     return _UNPRINTABLE.sub(lambda found: found.group().encode("unicode_escape").decode(), page)

@@ -73,9 +73,9 @@ def predictive_figure(posterior: Posterior, c: int) -> Figure:
     band, shown = predictive_band(posterior, c), tuple(READINGS.values())[c]
     curve = _curve(band)
     with styled():
-        figure = new_figure(5.0, 7.6)
+        figure = new_figure(4.5, 7.2)
         figure.set_layout_engine("none")
-        places = {"left": 0.145, "right": 0.985, "bottom": 0.065, "top": 0.965, "hspace": 0.17}
+        places = {"left": 0.155, "right": 0.985, "bottom": 0.065, "top": 0.965, "hspace": 0.17}
         panels = figure.subplots(3, 1, height_ratios=(1.25, 0.9, 1.0), gridspec_kw=places)
         magnitude, phase, misses = panels
         magnitude.set_title(shown.title)
@@ -90,7 +90,7 @@ def predictive_figure(posterior: Posterior, c: int) -> Figure:
         for axes in panels:
             lowest, highest = float(band.frequency[0]), float(band.frequency[-1])
             frequency_axis(axes, lowest, highest, labelled=axes is misses)
-            axes.yaxis.set_label_coords(-0.13, 0.5)
+            axes.yaxis.set_label_coords(-0.145, 0.5)
         magnitude.legend(loc="best")
         misses.legend(
             loc="upper center", bbox_to_anchor=(0.5, 1.17), ncols=3, handletextpad=0.1, columnspacing=1.0
@@ -143,8 +143,8 @@ def _draw_misses(axes: Axes, band: Band) -> None:
             band.frequency[out], values[out], marker=marker, s=40, linewidths=1.6,
             color=ORANGE, facecolors="white" if marker == "o" else ORANGE, zorder=5,
         )  # fmt: skip
-    axes.scatter([], [], marker="s", s=40, color=ORANGE, label="the two together outside")
-    axes.set_ylabel("distance [half-widths of the band]")
+    axes.scatter([], [], marker="s", s=40, color=ORANGE, label="together outside")
+    axes.set_ylabel("distance [band half-widths]")
     finite = np.concatenate([np.abs(values[np.isfinite(values)]) for values in band.misses])
     reach = 1.12 * max(float(np.max(finite, initial=0.0)), _LEAST_SHOWN)
     axes.set_ylim(-reach, reach)

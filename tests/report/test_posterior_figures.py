@@ -136,7 +136,7 @@ def test_the_bode_figure_draws_every_compared_dwell_inside_its_panels(posterior:
     assert [axes.get_ylabel().split("[")[1] for axes in figure.axes] == [
         "m per m of road]",
         "deg]",
-        "half-widths of the band]",
+        "band half-widths]",
     ]
     points = sum(
         len(np.asarray(line.get_xdata())) for line in figure.axes[0].get_lines() if line.get_marker() == "o"

@@ -28,7 +28,7 @@ from savgs_ident.report.posterior_words import checks, predictive_sentence, shif
 
 from .posterior_synthetic import SENTENCES, nominal_response, renamed, synthetic_posterior, unconverged
 
-HOSTILE = "<script>x</script>\"'&[bold red]\x1b[2J"
+HOSTILE = "<script>x</script>\"'&[bold red]\x1b[2J\u202etxt"
 ORIGIN = Origin(
     ("savgs-ident", "posterior", "m & m.toml"), "runs/a<b>.csv", "ab" * 32, "m & m.toml", {"savgs-ident": "0.1.0"},
     (DataWarning("odd", "something", test="dwell_2"),),
@@ -128,7 +128,9 @@ def test_a_posterior_that_did_not_converge_says_so_first_and_hostile_names_stay_
         "The chains do not agree.",
         "Too few draws.",
     ]
-    assert sum(HOSTILE.replace("\x1b", "\\x1b") in text for text in page.texts) >= 5
+    assert (
+        sum(HOSTILE.replace("\x1b", "\\x1b").replace("\u202e", "\\u202e") in text for text in page.texts) >= 5
+    )
     assert not any(tag == "script" for tag, _ in page.tags)
     told = rendered(failed, width=200)
     assert told.splitlines()[:3] == [page.texts[0], f"- {page.texts[1]}", f"- {page.texts[2]}"]
