@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from savgs_ident.core.rig import Rig
-from savgs_ident.fit.collocation.program import Program, assemble_objective, assemble_program
+from savgs_ident.fit.collocation.objective import assemble_objective
+from savgs_ident.fit.collocation.program import Program, assemble_program
 from savgs_ident.fit.collocation.radau import Points, radau_points
 from savgs_ident.fit.collocation.result import CollocationFit, assemble_result
 from savgs_ident.fit.collocation.samples import Misfit, find_recordings, misfit_of, samples_of
@@ -95,7 +96,7 @@ def _misfits(campaign: Campaign, measured: HarmonicResponse, points: Points) -> 
         sd = {
             name: float(measured.noise_sd[dwell, measured.channel(name)])
             for name in RESPONSE_CHANNELS
-            if name in measured.channels
+            if name in measured.channels and measured.noise_sd[dwell, measured.channel(name)] > 0.0
         }
         samples = samples_of(recording, float(measured.frequency[dwell]), sd)
         misfits.append({RESPONSE_CHANNELS.index(name): misfit_of(s, nodes) for name, s in samples.items()})

@@ -1,9 +1,8 @@
-"""The whole optimisation: its objective, its constraints and their exact derivatives.
+"""The whole optimisation: an objective, constraints and their exact derivatives.
 
-The objective is quadratic in the unknowns (:mod:`savgs_ident.fit.collocation.samples`); constraints are the
-equations of the points and the rule of the steps, which is linear. As Hessian IPOPT is given that of the
-objective alone (Gauss-Newton): where residuals are noise, the curvature of the constraints weighs little, and
-the reduced Hessian is positive definite from the start, so that every step leads downhill.
+Constraints are the equations of the points, and the rule of the steps, which is linear. The equations of a point
+know the parameters and the unknowns of that point only: so one small dense Jacobian, told to CasADi once and
+evaluated at all points, is put in its places of the large sparse one.
 """
 
 from typing import NamedTuple
@@ -13,21 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 
+from savgs_ident.fit.collocation.objective import Objective
 from savgs_ident.fit.collocation.point import point_equations
 from savgs_ident.fit.collocation.radau import Points, step_rule
-from savgs_ident.fit.collocation.samples import Misfit
-from savgs_ident.fit.collocation.unknowns import READINGS, Unknowns
+from savgs_ident.fit.collocation.unknowns import Unknowns
 from savgs_ident.fit.problem import Problem
 from savgs_ident.simulate.excitation import Excitation, inputs_at
 
-
-class Objective(NamedTuple):
-    """1/2 w' H w - c' w + rest over all unknowns w: half of chi2 of data and priors."""
-
-    curvature: csc_array
-    slope: NDArray[np.float64]
-    rest: float
-    samples: int
+THREADS = 2
+"""The points are evaluated in so many threads."""
 
 
 class Program(NamedTuple):
@@ -37,45 +30,6 @@ class Program(NamedTuple):
     quadratic: Objective
     constraints: ca.Function
     jacobian: ca.Function
-
-
-def assemble_objective(
-    unknowns: Unknowns, points: Points, misfits: list[dict[int, Misfit]], priors: NDArray[np.intp]
-) -> Objective:
-    """The objective of the misfits of all dwells by channel and of unit normal ``priors`` on some parameters."""
-    first = unknowns.states + unknowns.partners
-    rows, columns, values = [priors], [priors], [np.ones(priors.size)]
-    slope, rest, count = np.zeros(unknowns.size), 0.0, 0
-    for dwell, channels in enumerate(misfits):
-        here = np.flatnonzero(points.mesh.layout.dwell == dwell)
-        for channel, misfit in channels.items():
-            zero = unknowns.zeros[dwell, channel]
-            places = np.append(unknowns.at_points[here, first + channel], zero)
-            entries = coo_array(misfit.curvature)
-            rows.append(places[entries.row])
-            columns.append(places[entries.col])
-            values.append(READINGS[channel] ** 2 * entries.data)
-            slope[places] += READINGS[channel] * misfit.slope
-            rest += misfit.rest
-            count += misfit.samples
-    unused = _unseen(unknowns, misfits)
-    rows, columns, values = [*rows, unused], [*columns, unused], [*values, np.ones(unused.size)]
-    joined = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    size = (unknowns.size, unknowns.size)
-    return Objective(csc_array(coo_array(joined, shape=size)), slope, rest, count)
-
-
-def _unseen(unknowns: Unknowns, misfits: list[dict[int, Misfit]]) -> NDArray[np.intp]:
-    """Zeros of sensors that were not recorded: nothing else would hold them."""
-    return np.array(
-        [
-            zero
-            for channels, zeros in zip(misfits, unknowns.zeros, strict=True)
-            for channel, zero in enumerate(zeros)
-            if channel not in channels
-        ],
-        np.intp,
-    )
 
 
 def assemble_program(
@@ -93,10 +47,10 @@ def assemble_program(
     )
     u = ca.repmat(w[: unknowns.parameters], 1, unknowns.points)
     linear = as_casadi(rule)
-    equations = point.map(unknowns.points, "thread", 2)(z, u, drive)
+    equations = point.map(unknowns.points, "thread", THREADS)(z, u, drive)
     constraints = ca.Function("constraints", [w], [ca.vertcat(ca.vec(equations), ca.mtimes(linear, w))])
     slopes, pattern = _point_slopes(point)
-    found = slopes.map(unknowns.points, "thread", 2)(z, u, drive)
+    found = slopes.map(unknowns.points, "thread", THREADS)(z, u, drive)
     jacobian = _placed(unknowns, pattern, ca.vec(found), rule, w)
     return Program(unknowns, quadratic, constraints, jacobian)
 

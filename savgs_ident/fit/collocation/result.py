@@ -5,12 +5,14 @@ from dataclasses import dataclass
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.core.status import Status
 from savgs_ident.fit.collocation.program import Program
 from savgs_ident.fit.collocation.solve import Solution
-from savgs_ident.fit.collocation.spread import information
+from savgs_ident.fit.collocation.spread import spread_at
+from savgs_ident.fit.covariance import UNTOLD, Spread
 from savgs_ident.fit.result import Estimate
 from savgs_ident.fit.task import Task
 
@@ -53,24 +55,16 @@ class CollocationFit:
 
 
 def assemble_result(task: Task, program: Program, end: Solution, wall_s: float) -> CollocationFit:
-    """The whole, frozen result."""
+    """The whole, frozen result; without a solution there is no covariance."""
     problem, n = task.problem, program.unknowns.parameters
     u = jnp.asarray(end.w[:n])
-    values, slope = problem.parameters(u), np.asarray(problem.slopes(u))
-    spread = np.linalg.pinv(information(program, end.w)) if end.status.ok else np.full((n, n), np.nan)
-    covariance = spread * np.outer(slope, slope)
-    estimates = []
-    for place, name in enumerate(problem.free.names):
-        known, free = task.table[name], name in problem.free.identified
-        stderr = float(np.sqrt(covariance[place, place]))
-        estimates.append(
-            Estimate(name, float(values[name]), stderr, known.unit, free, known.value, known.tolerance)
-        )
+    spread = spread_at(program, end.w) if end.status.ok else Spread(np.full((n, n), np.nan))
+    slope = np.asarray(problem.slopes(u))
     prior = float(np.sum(np.asarray(problem.free.prior_residuals(u)) ** 2))
     told = len(problem.free.identified) + program.unknowns.zeros.size
     return CollocationFit(
-        estimates=tuple(estimates),
-        covariance=np.asarray(covariance, np.float64),
+        estimates=_estimates(task, u, slope * _told(spread)),
+        covariance=np.asarray(spread.covariance * np.outer(slope, slope), np.float64),
         chi2=2.0 * end.objective - prior,
         dof=program.quadratic.samples - told,
         prior_chi2=prior,
@@ -80,3 +74,22 @@ def assemble_result(task: Task, program: Program, end: Solution, wall_s: float) 
         unknowns=program.unknowns.size,
         wall_s=wall_s,
     )
+
+
+def _told(spread: Spread) -> NDArray[np.float64]:
+    """Standard deviations, infinite where there is nothing to tell."""
+    return np.where(spread.sd >= 0.1 * UNTOLD, np.inf, spread.sd)
+
+
+def _estimates(task: Task, u: Array, stderr: NDArray[np.float64]) -> tuple[Estimate, ...]:
+    free, values = task.problem.free, task.problem.parameters(u)
+    estimates = []
+    for name, sd in zip(free.names, stderr, strict=True):
+        known = task.table[name]
+        identified = name in free.identified
+        estimates.append(
+            Estimate(
+                name, float(values[name]), float(sd), known.unit, identified, known.value, known.tolerance
+            )
+        )
+    return tuple(estimates)

@@ -10,6 +10,7 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 from savgs_ident.fit.collocation.program import Program
+from savgs_ident.fit.covariance import Spread, spread_of
 
 
 def information(program: Program, w: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -32,3 +33,9 @@ def information(program: Program, w: NDArray[np.float64]) -> NDArray[np.float64]
     coupling, of_zeros = whole[:n, n:], whole[n:, n:]
     reduced: NDArray[np.float64] = whole[:n, :n] - coupling @ np.linalg.solve(of_zeros, coupling.T)
     return reduced
+
+
+def spread_at(program: Program, w: NDArray[np.float64]) -> Spread:
+    """The spread of the parameters' coordinates; directions that the samples do not tell as in a fit."""
+    values, axes = np.linalg.eigh(information(program, w))
+    return spread_of((axes * np.sqrt(np.maximum(values, 0.0))).T)
