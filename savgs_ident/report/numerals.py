@@ -64,6 +64,11 @@ def percentage(share: float, places: int = 1) -> str:
     return f"{100.0 * share:.{places}f} %".replace("-", MINUS) if isfinite(share) else DASH
 
 
+def decimal(number: float, places: int) -> str:
+    """A number with so many decimals; a dash where there is none."""
+    return _grouped(number, places) if isfinite(number) else DASH
+
+
 def count(number: float) -> str:
     """A whole number in groups of three; a dash where there is none."""
     return _grouped(round(number), 0) if isfinite(number) else DASH

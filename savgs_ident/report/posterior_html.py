@@ -8,7 +8,7 @@ import numpy as np
 
 from savgs_ident.posterior.result import Marginal, Posterior
 from savgs_ident.report.html import Picture, embed, render_page
-from savgs_ident.report.numerals import DASH, count, interval, percentage
+from savgs_ident.report.numerals import DASH, count, decimal, interval, percentage
 from savgs_ident.report.origin import Origin
 from savgs_ident.report.posterior_bode import predictive_band, predictive_figure
 from savgs_ident.report.posterior_corner import corner_figure
@@ -57,7 +57,7 @@ def posterior_html(posterior: Posterior, origin: Origin) -> str:
             "traces": [_trace(posterior, each) for each in (*identified, *nuisance)],
             "profiles": _profiles(posterior),
             "predictive": predictive_sentence(posterior),
-            "bode": [_bode(posterior, c) for c in range(len(READINGS))],
+            "bode": [_bode(posterior, c) for c in _compared(posterior)],
             "channels": [shown.title for shown in READINGS.values()],
             "orders": order_rows(posterior),
             "checks": checks(posterior),
@@ -86,7 +86,7 @@ def _facts(posterior: Posterior) -> tuple[dict[str, object], ...]:
         },
         {
             "name": "Largest R-hat",
-            "value": f"{c.r_hat_max:.3f}",
+            "value": decimal(c.r_hat_max, 3),
             "then": "1 is perfect",
             "bad": not c.r_hat_max < GOOD_R_HAT,
         },
@@ -126,6 +126,11 @@ def _profiles(posterior: Posterior) -> list[Picture]:
             words = f"Profile, marginal and Laplace parabola of {each.name} from {ends}; it rises to {highest:.1f}."
             pictures.append(embed(profile_figure(posterior, each, each.profile), words))
     return pictures
+
+
+def _compared(posterior: Posterior) -> list[int]:
+    """The channels whose first harmonic is compared anywhere."""
+    return [c for c in range(len(READINGS)) if np.any(posterior.predictive.used[:, c, 1])]
 
 
 def _bode(posterior: Posterior, c: int) -> Picture:

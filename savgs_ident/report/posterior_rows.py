@@ -9,6 +9,7 @@ from savgs_ident.posterior.result import Marginal, Posterior
 from savgs_ident.report.numerals import (
     DASH,
     count,
+    decimal,
     interval,
     numeral,
     percentage,
@@ -116,11 +117,11 @@ def diagnostic_row(each: Marginal) -> DiagnosticRow:
     """One line of the table of convergence by parameter."""
     return DiagnosticRow(
         name=each.name,
-        r_hat=f"{each.r_hat:.3f}",
+        r_hat=decimal(each.r_hat, 3),
         ess_bulk=count(each.ess_bulk),
         ess_tail=count(each.ess_tail),
-        autocorrelation=f"{each.autocorrelation:.1f}",
-        over_laplace=f"{each.sd / each.laplace_sd:.2f}" if each.laplace_sd > 0.0 else DASH,
+        autocorrelation=decimal(each.autocorrelation, 1),
+        over_laplace=decimal(each.sd / each.laplace_sd, 2) if each.laplace_sd > 0.0 else DASH,
     )
 
 

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
-from math import isfinite, sqrt
+from math import sqrt
 from types import MappingProxyType
 
 import numpy as np
 
 from savgs_ident.posterior.result import Marginal, Posterior
-from savgs_ident.report.numerals import DASH, count, numeral, percentage
+from savgs_ident.report.numerals import DASH, count, decimal, numeral, percentage
 
 NUISANCE_WORDS: Mapping[str, str] = MappingProxyType(
     {
@@ -135,7 +135,7 @@ def checks(posterior: Posterior) -> tuple[Check, ...]:
         ),
         Check(
             "Largest R-hat",
-            f"{c.r_hat_max:.3f}",
+            decimal(c.r_hat_max, 3),
             f"below {GOOD_R_HAT}",
             "Spread of all chains together over the spread within each, by ranks; 1 when they agree.",
         ),
@@ -148,7 +148,7 @@ def checks(posterior: Posterior) -> tuple[Check, ...]:
         ),
         Check(
             "Autocorrelation time",
-            f"{slowest.autocorrelation:.1f} draws ({slowest.name})",
+            f"{decimal(slowest.autocorrelation, 1)} draws ({slowest.name})",
             "far below the length of a chain",
             "After so many draws a chain has forgotten where it was; the largest of the identified parameters.",
         ),
@@ -166,7 +166,7 @@ def checks(posterior: Posterior) -> tuple[Check, ...]:
         ),
         Check(
             "Pareto k",
-            f"{c.pareto_k:.2f}" if isfinite(c.pareto_k) else DASH,
+            decimal(c.pareto_k, 2),
             "below 0.7",
             "Heaviness of the tail of exact over approximate density at the proposals; above 0.7 the proposals"
             " do not cover the posterior.",
@@ -185,7 +185,7 @@ def checks(posterior: Posterior) -> tuple[Check, ...]:
         ),
         Check(
             "Time taken",
-            f"{posterior.wall_s:.1f} s",
+            f"{decimal(posterior.wall_s, 1)} s",
             DASH,
             "From the measured response to the last draw.",
         ),

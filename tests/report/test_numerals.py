@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from savgs_ident.report.numerals import (
     MINUS,
     count,
+    decimal,
     interval,
     numeral,
     percentage,
@@ -68,6 +69,8 @@ def test_intervals_percentages_and_counts() -> None:
     assert percentage(float("nan")) == "\u2013"
     assert count(12345.4) == "12\u202f345"
     assert count(float("nan")) == "\u2013"
+    assert decimal(1.0034, 3) == "1.003"
+    assert decimal(float("nan"), 3) == decimal(float("inf"), 3) == "\u2013"
     assert (signed(0.004, 2), signed(-0.004, 2), signed(-0.87, 2), signed(0.87, 1)) == (
         "0.00",
         "0.00",

@@ -141,10 +141,17 @@ def test_the_same_posterior_gives_the_same_bytes(posterior: Posterior, source: s
     assert posterior_html(posterior, ORIGIN) == source
 
 
-def test_a_posterior_without_tolerances_profiles_or_nuisance_has_a_page(posterior: Posterior) -> None:
+def test_a_posterior_of_one_parameter_and_one_channel_has_a_page(posterior: Posterior) -> None:
     kept = tuple(replace(each, profile=None) for each in posterior.of_role("identified")[:1])
-    bare = replace(posterior, marginals=kept, sentences=(), effects=(), sampler="emcee")
-    text = " ".join(Reader(posterior_html(bare, replace(ORIGIN, warnings=()))).texts)
+    used = posterior.predictive.used & np.array([True, False])[:, None]
+    predictive = replace(posterior.predictive, used=used)
+    bare = replace(
+        posterior, marginals=kept, predictive=predictive, sentences=(), effects=(), sampler="emcee"
+    )
+    page = Reader(posterior_html(bare, replace(ORIGIN, warnings=())))
+    # A corner plot, a trace and the one channel that was compared.
+    assert sum(tag == "img" for tag, _ in page.tags) == 3
+    text = " ".join(page.texts)
     assert "No profiles were computed." in text
     assert "Everything else was held at its value" in text
     assert "no friction" in text
