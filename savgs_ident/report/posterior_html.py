@@ -88,7 +88,7 @@ def _facts(posterior: Posterior) -> tuple[dict[str, object], ...]:
             "name": "Largest R-hat",
             "value": decimal(c.r_hat_max, 3),
             "then": "1 is perfect",
-            "bad": not c.r_hat_max < GOOD_R_HAT,
+            "bad": not (c.converged or c.r_hat_max <= GOOD_R_HAT),
         },
         {
             "name": "Inside the 95 % band",

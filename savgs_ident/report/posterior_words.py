@@ -32,7 +32,7 @@ SAMPLERS: Mapping[str, str] = MappingProxyType(
 """The samplers in words."""
 
 GOOD_R_HAT = 1.01
-"""R-hat below which chains agree."""
+"""R-hat up to which chains agree."""
 
 _NORMAL_95 = 1.959964
 
@@ -56,8 +56,8 @@ def verdict_line(posterior: Posterior) -> str:
 
 def reasons(posterior: Posterior) -> tuple[str, ...]:
     """Why not, at least one sentence where it did not converge."""
-    given = posterior.convergence.reasons
-    return () if posterior.convergence.converged else given or ("The sampler gave no reason.",)
+    given = posterior.convergence.reasons or ("The sampler gave no reason.",)
+    return () if posterior.convergence.converged else tuple(map(_as_sentence, given))
 
 
 def scope_sentence(posterior: Posterior) -> str:
@@ -136,7 +136,7 @@ def checks(posterior: Posterior) -> tuple[Check, ...]:
         Check(
             "Largest R-hat",
             decimal(c.r_hat_max, 3),
-            f"below {GOOD_R_HAT}",
+            f"at most {GOOD_R_HAT}, a little more for what is known to a tolerance",
             "Spread of all chains together over the spread within each, by ranks; 1 when they agree.",
         ),
         Check(
@@ -202,6 +202,11 @@ def interval_words(each: Marginal) -> str:
     return (
         f"{each.name}: median {numeral(each.median, each.sd)}, standard deviation {numeral(each.sd, each.sd)}"
     )
+
+
+def _as_sentence(text: str) -> str:
+    """``text`` with a capital at its head and a full stop at its end."""
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 
 
 def _counted(number: int, noun: str) -> str:

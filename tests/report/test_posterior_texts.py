@@ -121,7 +121,7 @@ def test_a_posterior_that_did_not_converge_says_so_first_and_hostile_names_stay_
     posterior: Posterior,
 ) -> None:
     named = renamed(replace(posterior, sentences=(HOSTILE,)), HOSTILE, HOSTILE, HOSTILE)
-    failed = unconverged(named, "The chains do not agree.", "Too few draws.")
+    failed = unconverged(named, "the chains do not agree", "Too few draws.")
     page = Reader(posterior_html(failed, replace(ORIGIN, data=HOSTILE)))
     assert page.texts[:3] == [
         "Not converged: these numbers must not be used.",
