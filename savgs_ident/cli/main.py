@@ -15,6 +15,7 @@ from savgs_ident.cli.arguments import spread_values
 from savgs_ident.cli.bode_command import bode
 from savgs_ident.cli.fit_command import demo, fit
 from savgs_ident.cli.inspect_command import inspect
+from savgs_ident.cli.posterior_command import posterior
 from savgs_ident.cli.simulate_command import simulate
 
 app = typer.Typer(
@@ -45,7 +46,7 @@ def _root(
     """
 
 
-for _command in (demo, inspect, fit, bode, simulate):
+for _command in (demo, inspect, fit, bode, simulate, posterior):
     app.command()(_command)
 
 

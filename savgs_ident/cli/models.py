@@ -1,6 +1,6 @@
 """Which model a command works with: the names on the command line, and what a rig file remembers."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
@@ -65,3 +65,45 @@ def free_parameters(wanted: Sequence[str], model: ModelName, known: "ParameterTa
                 f"there is no parameter '{name}'", source="--free", remedy="choose among: " + ", ".join(known)
             )
     return tuple(dict.fromkeys(wanted))
+
+
+def identified_in(
+    rig: "Rig", effects: tuple[str, ...], source: object
+) -> tuple[tuple[str, ...], dict[str, float]]:
+    """The parameters that an identified rig left free, and the values of all that its fit moved.
+
+    Those of the paper and the rig's own values for a drawing. Raises :class:`InputError` if the list in the
+    file is none of known parameters.
+    """
+    from savgs_ident.effects.registry import model_parameters
+
+    table = model_parameters(rig, effects)
+    by_default = free_parameters((), ModelName.simtr if effects else ModelName.simqc, table)
+    named = rig.provenance.get("free", by_default)
+    if not isinstance(named, list | tuple) or not named or any(name not in table for name in named):
+        raise InputError(
+            f"provenance.free is {named!r}", source=source, remedy="list parameters of the model"
+        )
+    return tuple(named), {name: table[name].value for name in (*named, *_before(rig, source))}
+
+
+def rig_before(rig: "Rig", effects: tuple[str, ...], source: object) -> "Rig":
+    """An identified rig with the values that were known before its fit: the centres of their priors.
+
+    A drawing is returned as it is. Raises :class:`InputError` if the file's table of them is not of numbers.
+    """
+    from dataclasses import replace
+
+    from savgs_ident.effects.registry import model_parameters
+
+    before = _before(rig, source)
+    return replace(rig, parameters=model_parameters(rig, effects).with_values(before)) if before else rig
+
+
+def _before(rig: "Rig", source: object) -> dict[str, float]:
+    before = rig.provenance.get("before", {})
+    if not isinstance(before, Mapping) or not all(isinstance(each, int | float) for each in before.values()):
+        raise InputError(
+            "provenance.before is no table of numbers", source=source, remedy="identify the rig again"
+        )
+    return {str(name): float(value) for name, value in before.items()}

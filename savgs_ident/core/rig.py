@@ -14,8 +14,6 @@ more table, ``[provenance]``.
     (320.0, 'kg')
 """
 
-import os
-import tempfile
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,6 +23,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.files import write_bytes
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.rig_compose import compose_rig
 from savgs_ident.core.rig_parse import parse_damper, parse_name, parse_parameters, parse_provenance
@@ -109,19 +108,7 @@ def write_rig(rig: Rig, path: str | Path) -> None:
     cannot say.
     """
     text = compose_rig(rig.name, rig.parameters, rig.damper_velocity, rig.damper_force, rig.provenance)
-    target = Path(path)
-    try:
-        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".part")
-    except OSError as error:
-        raise _cannot_write(target, error) from error
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(target)
-    except OSError as error:
-        Path(temporary).unlink(missing_ok=True)
-        raise _cannot_write(target, error) from error
+    write_bytes(Path(path), text.encode())
 
 
 def _shipped(relative: str) -> Path:
@@ -130,12 +117,6 @@ def _shipped(relative: str) -> Path:
         if (root / relative).is_file():
             return root / relative
     raise InputError(f"the shipped file data/{relative} is missing", remedy="install the package again")
-
-
-def _cannot_write(path: Path, error: OSError) -> InputError:
-    return InputError(
-        f"cannot be written: {error.strerror}", source=path, remedy="choose an existing, writable folder"
-    )
 
 
 def _load(path: str | Path) -> dict[str, object]:

@@ -35,7 +35,7 @@ def judge(task: Task, minimiser: Minimiser, best: Minimum, tell: Progress) -> Ve
             bound = lower_bound(minimiser, best, name, tell)
             bounds |= {} if bound is None else {name: bound}
         tell("looking for a test that would help")
-        advice = _advice(task, minimiser, best)
+        advice = advice_of(task, minimiser, best)
     verdict = verdict_of(names, values, units, covariance, bounds, advice)
     return replace(verdict, sentences=(*_misfit(problem, best), *verdict.sentences))
 
@@ -51,7 +51,8 @@ def _misfit(problem: Problem, best: Minimum) -> tuple[str, ...]:
     )
 
 
-def _advice(task: Task, minimiser: Minimiser, best: Minimum) -> tuple[str, ...]:
+def advice_of(task: Task, minimiser: Minimiser, best: Minimum) -> tuple[str, ...]:
+    """In words, which further dwells would tell every free parameter; one sentence."""
     proposals = propose_dwells(minimiser, best, task.settings.periodic)
     if not proposals:
         return ("No single further dwell that was considered would help.",)

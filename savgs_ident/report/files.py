@@ -1,18 +1,16 @@
-"""Results on disk, each file whole or not at all: written beside its place and then moved there.
-
-Whoever stops a command, or runs out of disk, keeps what was finished and finds no half of a file.
-"""
+"""Results on disk: JSON and tables, each file whole or not at all."""
 
 import csv
 import io
 import json
-import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 
-from savgs_ident.core.errors import InputError
+from savgs_ident.core.files import cannot_write, write_bytes
+
+__all__ = ["Json", "prepare_folder", "to_json", "write_bytes", "write_json", "write_table"]
 
 Json = dict[str, object] | list[object] | str | int | float | bool | None
 """What a JSON file can say."""
@@ -28,26 +26,7 @@ def prepare_folder(folder: Path) -> Path:
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError as error:
-        raise _cannot_write(folder, error) from error
-
-
-def write_bytes(path: Path, content: bytes) -> Path:
-    """Write a file whole or not at all; raises :class:`InputError` if it cannot be written."""
-    try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    except OSError as error:
-        raise _cannot_write(path, error) from error
-    part = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-        part.chmod(0o644)
-        part.replace(path)
-    except OSError as error:
-        raise _cannot_write(path, error) from error
-    finally:
-        part.unlink(missing_ok=True)
-    return path
+        raise cannot_write(folder, error) from error
 
 
 def to_json(record: object) -> str:
@@ -81,11 +60,3 @@ def _plain(value: object) -> Json:
     if value is None or isinstance(value, str | int | float | bool):
         return value
     raise TypeError(f"{type(value).__name__} has no place in JSON")
-
-
-def _cannot_write(path: Path, error: OSError) -> InputError:
-    return InputError(
-        f"cannot be written: {error.strerror or error}",
-        source=path,
-        remedy="choose a writable folder with space left: --out DIR",
-    )

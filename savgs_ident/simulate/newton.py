@@ -99,8 +99,9 @@ def solve_newton(
     steps: Float[Array, " P"],
     scale: Float[Array, "m P"],
     limit: Int[Array, ""],
+    enough: Float[Array, ""],
 ) -> NewtonResult:
-    """Iterate until every dwell's step is below :data:`TOLERANCE` or ``limit`` iterations are used."""
+    """Iterate until every dwell's step is below ``enough`` or ``limit`` iterations are used."""
 
     def advance(progress: _Progress) -> _Progress:
         before = progress.result
@@ -115,7 +116,7 @@ def solve_newton(
 
     def unfinished(progress: _Progress) -> Array:
         step = progress.result.last_step
-        return jnp.any(step > TOLERANCE) & jnp.all(jnp.isfinite(step)) & (progress.result.iterations < limit)
+        return jnp.any(step > enough) & jnp.all(jnp.isfinite(step)) & (progress.result.iterations < limit)
 
     blank = blank_linearised(model, layout)
     far = jnp.full(len(layout.counts), np.finfo(np.float64).max)

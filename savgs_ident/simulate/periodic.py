@@ -92,8 +92,9 @@ def solve_on_mesh(
     model: QuarterCar, p: Values, excitation: Excitation, mesh: Mesh, start: Trajectory, limit: int
 ) -> PeriodicSolution:
     """Newton's method on given nodes from a given start."""
-    p, excitation, mesh, start, most = placed((p, excitation, mesh, start, jnp.asarray(limit)))
-    parts = _solved(model, p, excitation, mesh, start, most)
+    bounds = jnp.asarray(limit), jnp.asarray(TOLERANCE)
+    p, excitation, mesh, start, bounds = placed((p, excitation, mesh, start, bounds))
+    parts = _solved(model, p, excitation, mesh, start, *bounds)
     return PeriodicSolution(excitation, mesh, *jax.tree.unflatten(newton_structure(), parts))
 
 
@@ -103,12 +104,30 @@ def _solved(*args: Any) -> tuple[Array, ...]:
 
 
 def _solve(
-    model: QuarterCar, p: Values, excitation: Excitation, mesh: Mesh, start: Trajectory, limit: Array
+    model: QuarterCar,
+    p: Values,
+    excitation: Excitation,
+    mesh: Mesh,
+    start: Trajectory,
+    limit: Array,
+    enough: Array,
 ) -> tuple[Array, ...]:
     inputs = inputs_at(excitation, mesh)
     layout, steps = mesh.layout, _steps(excitation, mesh)
     scale = motion_scale(model, inputs, excitation.frequency, layout)
-    return tuple(jax.tree.leaves(solve_newton(model, p, start, inputs, layout, steps, scale, limit)))
+    return tuple(jax.tree.leaves(solve_newton(model, p, start, inputs, layout, steps, scale, limit, enough)))
+
+
+def solve_near(
+    model: QuarterCar, p: Values, known: PeriodicSolution, start: Trajectory, limit: int, enough: float
+) -> PeriodicSolution:
+    """The same on the nodes of a ``known`` solution, as a part of a larger program that is to be compiled.
+
+    Iterates until the last relative step is below ``enough``.
+    """
+    bounds = jnp.asarray(limit), jnp.asarray(enough)
+    parts = _solve(model, p, known.excitation, known.mesh, start, *bounds)
+    return PeriodicSolution(known.excitation, known.mesh, *jax.tree.unflatten(newton_structure(), parts))
 
 
 @eqx.filter_jit

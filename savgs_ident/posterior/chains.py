@@ -1,0 +1,28 @@
+"""What a sampler hands over, whichever it is."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+
+class Chains(NamedTuple):
+    """Draws so far, in S steps of C chains.
+
+    Attributes:
+        points: (S, C, n + 2).
+        log_density: of the exact model, (S, C).
+        accepted: whether the step moved, (S, C).
+        log_ratio: exact over surrogate density at the proposals; empty where proposals depend on each other.
+        divergences: of the gradient-based sampler.
+        evaluations: responses of the exact model.
+        unsolved: of these without a periodic motion.
+    """
+
+    points: Float[np.ndarray, "S C n+2"]
+    log_density: Float[np.ndarray, "S C"]
+    accepted: Bool[np.ndarray, "S C"]
+    log_ratio: Float[np.ndarray, " k"]
+    divergences: int
+    evaluations: int
+    unsolved: int

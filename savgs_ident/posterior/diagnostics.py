@@ -1,0 +1,106 @@
+"""Whether chains have converged: rank-normalised R-hat, effective sample sizes, autocorrelation, Pareto k.
+
+R-hat and effective sample sizes follow Vehtari, Gelman, Simpson, Carpenter and Buerkner, Bayesian Analysis 16
+(2021); the autocorrelation time is emcee's, of all chains together.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from arviz_stats.base.array import array_stats
+from emcee.autocorr import integrated_time
+from jaxtyping import Float
+
+from savgs_ident.posterior.chains import Chains
+from savgs_ident.posterior.result import Convergence
+
+LEAST_DRAWS = 8
+"""Steps of a chain below which nothing can be said."""
+
+TAILS = (0.05, 0.95)
+"""Quantiles of which the tail's effective sample size is the lesser."""
+
+R_HAT = 1.01
+"""R-hat up to which an identified parameter counts as mixed."""
+
+R_HAT_OTHERS = 1.05
+"""The same for the tolerated parameters and the nuisance scales, of which nobody reads quantiles."""
+
+PARETO_K = 0.7
+"""Pareto index of the weights up to which the surrogate covers the posterior."""
+
+DIVERGING = 0.01
+"""Share of trajectories that may diverge."""
+
+
+class Mixing(NamedTuple):
+    """How well one parameter's draws mix; NaN where chains are too short or do not move."""
+
+    ess_bulk: float
+    ess_tail: float
+    r_hat: float
+    autocorrelation: float
+
+
+def mixing_of(draws: Float[np.ndarray, "S C"]) -> Mixing:
+    """The mixing of one parameter's draws, steps by chains."""
+    if draws.shape[0] < LEAST_DRAWS or np.ptp(draws) == 0.0:
+        return Mixing(np.nan, np.nan, np.nan, np.nan)
+    axes = {"chain_axis": 1, "draw_axis": 0}
+    bulk = float(array_stats.ess(draws, method="bulk", **axes))
+    tail = float(array_stats.ess(draws, method="tail", prob=TAILS, **axes))
+    return Mixing(bulk, tail, float(array_stats.rhat(draws, **axes)), _autocorrelation(draws))
+
+
+def least_ess(mixing: Sequence[Mixing]) -> float:
+    """The least of bulk and tail over several parameters; 0 where nothing can be said."""
+    least = min((min(each.ess_bulk, each.ess_tail) for each in mixing), default=np.nan)
+    return float(least) if np.isfinite(least) else 0.0
+
+
+def judge_chains(
+    chains: Chains,
+    identified: Sequence[Mixing],
+    others: Sequence[Mixing],
+    target: float,
+    doubts: Sequence[str],
+) -> Convergence:
+    """Whether the draws may be used; ``doubts`` are reasons against it that are known already."""
+    ess = least_ess(identified)
+    r_hat = max((each.r_hat for each in identified), default=np.nan)
+    r_hat_others = max((each.r_hat for each in others), default=1.0)
+    k = float(array_stats.psislw(chains.log_ratio)[1]) if chains.log_ratio.size > 20 else np.nan
+    diverging = chains.divergences / max(chains.evaluations, 1)
+    acceptance = float(np.mean(chains.accepted)) if chains.accepted.size else 0.0
+    reasons = list(doubts)
+    if not ess >= target:
+        reasons.append(f"the least effective sample size is {ess:.0f}, {target:.0f} were asked for")
+    if not r_hat <= R_HAT:
+        reasons.append(f"the chains disagree: R-hat is {r_hat:.3f}, above {R_HAT}")
+    if not r_hat_others <= R_HAT_OTHERS:
+        reasons.append(
+            f"the chains disagree in a tolerated parameter: R-hat is {r_hat_others:.3f}, above {R_HAT_OTHERS}"
+        )
+    if k > PARETO_K:
+        reasons.append(f"the surrogate does not cover the posterior: Pareto k is {k:.2f}, above {PARETO_K}")
+    if diverging > DIVERGING:
+        reasons.append(f"{chains.divergences} trajectories diverged")
+    worst = float(np.nanmax([r_hat, r_hat_others]))
+    return Convergence(
+        converged=not reasons,
+        reasons=tuple(reasons),
+        target_ess=target,
+        ess_min=ess,
+        r_hat_max=worst,
+        acceptance=acceptance,
+        divergences=chains.divergences,
+        pareto_k=k,
+        evaluations=chains.evaluations,
+        unsolved=chains.unsolved,
+    )
+
+
+def _autocorrelation(draws: Float[np.ndarray, "S C"]) -> float:
+    # Short chains are said to be so by the effective sample size; a warning here would only repeat it.
+    return float(integrated_time(draws[:, :, None], tol=0, quiet=True)[0])

@@ -1,0 +1,143 @@
+"""The exact model near a known solution: what decides about every proposal.
+
+A periodic motion at nearby parameters starts from the linear prediction X + dX/du (u - u0), on the same time
+nodes, and is solved to the same tolerance as any other. Solutions do not depend on each other, so that a
+chain is the same however its proposals are grouped or interrupted.
+"""
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Complex, Float
+
+from savgs_ident.fit.problem import Problem
+from savgs_ident.posterior.likelihood import Likelihood
+from savgs_ident.simulate.collocation import Trajectory
+from savgs_ident.simulate.periodic import (
+    PeriodicSolution,
+    harmonic_sensitivities,
+    harmonics,
+    resolve,
+    solve_near,
+    trajectory_sensitivities,
+)
+from savgs_ident.simulate.stored import placed, stored
+
+ENOUGH = 1e-5
+"""Last relative Newton step at which a motion near the anchor counts as solved. Newton's method squares it:
+what is left is a thousandth of what the noise hides."""
+
+
+class Anchor(eqx.Module):
+    """A point u (n,) where the model is known: its motions and their derivatives in u, (n, ...) each."""
+
+    u: Float[Array, " n"]
+    solution: PeriodicSolution
+    slopes: Trajectory
+
+
+class Responses(NamedTuple):
+    """Harmonics (W, D, 2, K) of the model at W points, and whether all dwells were solved, (W,)."""
+
+    harmonics: Complex[np.ndarray, "W D C K"]
+    solved: np.ndarray
+
+
+class ExactModel(eqx.Module):
+    """The model about an anchor."""
+
+    problem: Problem
+    likelihood: Likelihood
+    anchor: Anchor
+
+    def responses(self, us: Float[np.ndarray, "W n"]) -> Responses:
+        """The model at several parameter sets, on as many cores as there are."""
+        found = in_parallel(lambda u: _response(self.problem, self.anchor, placed(jnp.asarray(u))), us)
+        harmonics = np.stack([np.asarray(each[0]) for each in found])
+        step = np.array([float(each[1]) for each in found])
+        return Responses(harmonics, (step <= ENOUGH) & np.isfinite(harmonics).all(axis=(1, 2, 3)))
+
+    def rows(self, us: Float[np.ndarray, "W n"]) -> tuple[Float[np.ndarray, "W m"], np.ndarray]:
+        """Their rows of the likelihood, (W, m), and whether they were solved, (W,)."""
+        found = self.responses(us)
+        return np.asarray(_rows_of(self.likelihood, placed(jnp.asarray(found.harmonics)))), found.solved
+
+
+def in_parallel(work: Any, items: Sequence[Any] | np.ndarray) -> list[Any]:
+    """``work`` on every item, in their order; a solver leaves Python free while it runs."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    with ThreadPoolExecutor(cores) as pool:
+        return list(pool.map(work, items))
+
+
+def anchor_at(problem: Problem, u: Float[Array, " n"], solution: PeriodicSolution) -> Anchor:
+    """The anchor at ``u`` (n,), where the model has ``solution``."""
+    u = placed(u)
+    slopes = Trajectory(*_slopes_of(problem, u, problem.parameters(u), solution))
+    return Anchor(u, solution, slopes)
+
+
+def rows_and_slopes(
+    problem: Problem, likelihood: Likelihood, u: Float[Array, " n"], near: PeriodicSolution
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m n"], PeriodicSolution]:
+    """The rows (m,) of the model at ``u``, their derivatives in u (m, n), and its motions there."""
+    u = placed(u)
+    p = problem.parameters(u)
+    solution = resolve(problem.model, p, near, problem.iterations)
+    rows, slopes = _linear_rows(problem, likelihood, u, p, solution)
+    return np.asarray(rows), np.asarray(slopes), solution
+
+
+@eqx.filter_jit
+def _linear_rows(*args: Any) -> tuple[Array, ...]:
+    return stored(_rows_and_derivatives, *args)
+
+
+def _rows_and_derivatives(
+    problem: Problem, likelihood: Likelihood, u: Array, p: Any, solution: PeriodicSolution
+) -> tuple[Array, Array]:
+    by_name = harmonic_sensitivities(problem.model, p, solution, problem.free.names, problem.orders)
+    slopes = jax.vmap(likelihood.rows)(by_name).T * problem.slopes(u)
+    return likelihood.rows(harmonics(p, solution, problem.orders)), slopes
+
+
+@eqx.filter_jit
+def _slopes_of(*args: Any) -> tuple[Array, ...]:
+    return stored(_trajectory_slopes, *args)
+
+
+def _trajectory_slopes(problem: Problem, u: Array, p: Any, solution: PeriodicSolution) -> tuple[Array, ...]:
+    moved = trajectory_sensitivities(problem.model, p, solution, problem.free.names)
+    scale = problem.slopes(u)[:, None, None]
+    return moved.x * scale, moved.y * scale
+
+
+def _response(problem: Problem, anchor: Anchor, u: Array) -> tuple[Array, ...]:
+    return _solved_near(problem, anchor.u, anchor.solution, anchor.slopes, u)
+
+
+@eqx.filter_jit
+def _solved_near(*args: Any) -> tuple[Array, ...]:
+    return stored(_harmonics_near, *args)
+
+
+def _harmonics_near(
+    problem: Problem, at: Array, known: PeriodicSolution, slopes: Trajectory, u: Array
+) -> tuple[Array, Array]:
+    p, change = problem.parameters(u), u - at
+    linear = (
+        value + jnp.tensordot(change, slope, 1) for value, slope in zip(known.trajectory, slopes, strict=True)
+    )
+    solution = solve_near(problem.model, p, known, Trajectory(*linear), problem.iterations, ENOUGH)
+    return harmonics(p, solution, problem.orders), jnp.max(solution.last_step)
+
+
+@eqx.filter_jit
+def _rows_of(likelihood: Likelihood, harmonics: Array) -> Array:
+    return jax.vmap(likelihood.rows)(harmonics)

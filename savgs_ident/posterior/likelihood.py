@@ -1,0 +1,84 @@
+"""How likely measured harmonics are, given a model that is not perfect.
+
+A harmonic X_k (Re, Im) of a channel in a dwell is taken as normal about the model's H_k, with covariance
+
+    s^2 C_k + (d a_k)^2 I,      a_k = |X_1| / (sqrt(2) k),
+
+where C_k is its measured noise covariance, s the noise scale and d the model discrepancy: the relative rms
+error of the model's first harmonic. The error of order k is taken as k times smaller, as that of a force that
+jumps. Errors of different orders, channels and dwells count as independent: a discrepancy that many dwells
+share is not covered by the intervals, it is what a diagnosis looks for. With d = 0 the intervals are those of
+the noise alone, which for a model that misses by more than the noise are absurdly narrow.
+
+In the principal axes of C_k every real part is a row of its own, independent of all others.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Complex, Float
+
+from savgs_ident.fit.target import HarmonicTarget
+from savgs_ident.posterior.prior import discrepancy, noise_scale
+
+
+class Likelihood(eqx.Module):
+    """Measured harmonics as m independent rows.
+
+    ``axes`` (D, 2, K, 2, 2) turns (Re, Im) of every harmonic into its principal axes, ``place`` (m,) picks the
+    rows that are compared; ``measured`` (m,) is what they are, ``variance`` (m,) their noise, ``reach`` (m,)
+    their a_k.
+    """
+
+    axes: Float[Array, "D C K 2 2"]
+    place: np.ndarray
+    measured: Float[Array, " m"]
+    variance: Float[Array, " m"]
+    reach: Float[Array, " m"]
+
+    def rows(self, harmonics: Complex[Array, "D C K"]) -> Float[Array, " m"]:
+        """Predicted harmonics as rows [units of the channels], (m,)."""
+        parts = jnp.stack([harmonics.real, harmonics.imag], axis=-1)
+        return jnp.einsum("dckij,dckj->dcki", self.axes, parts).ravel()[self.place]
+
+    def spread(self, point: Float[Array, " n+2"]) -> Float[Array, " m"]:
+        """Variance of the rows about the model's, noise and discrepancy together."""
+        return noise_scale(point) ** 2 * self.variance + (discrepancy(point) * self.reach) ** 2
+
+    def __call__(self, rows: Float[Array, " m"], point: Float[Array, " n+2"]) -> Float[Array, ""]:
+        """Log likelihood of the model's ``rows``, up to a constant."""
+        spread = self.spread(point)
+        return -0.5 * jnp.sum((rows - self.measured) ** 2 / spread + jnp.log(spread / self.variance))
+
+    def harmonics(
+        self, rows: Float[np.ndarray, "S m"], shape: tuple[int, ...]
+    ) -> Complex[np.ndarray, "S D C K"]:
+        """Rows as complex harmonics (S, *shape); zero where nothing is compared."""
+        parts = np.zeros((rows.shape[0], 2 * int(np.prod(shape))))
+        parts[:, self.place] = rows
+        turned = np.einsum("dckij,sdcki->sdckj", np.asarray(self.axes), parts.reshape(-1, *shape, 2))
+        return np.asarray(turned[..., 0] + 1j * turned[..., 1])
+
+
+def likelihood_of(target: HarmonicTarget) -> Likelihood:
+    """The likelihood of the harmonics that a fit compares."""
+    used = np.asarray(target.used)
+    whitening = np.asarray(target.whitening)
+    precision = np.einsum("dckji,dckjl->dckil", whitening, whitening)
+    values, vectors = np.linalg.eigh(np.where(used[..., None, None], precision, np.eye(2)))
+    axes = np.swapaxes(vectors, -1, -2)
+    place = np.flatnonzero(np.repeat(used.ravel(), 2))
+    harmonics = np.asarray(target.measured)
+    parts = np.stack([harmonics.real, harmonics.imag], axis=-1)
+    rows = np.einsum("dckij,dckj->dcki", axes, parts).ravel()[place]
+    reach = np.repeat(_reach(harmonics, used)[..., None], 2, axis=-1).ravel()[place]
+    variance = (1.0 / values).ravel()[place]
+    return Likelihood(jnp.asarray(axes), place, jnp.asarray(rows), jnp.asarray(variance), jnp.asarray(reach))
+
+
+def _reach(harmonics: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """a_k of every harmonic; the largest compared one stands in for a first one that is not."""
+    sizes = np.abs(harmonics) * used
+    first = np.where(used[..., 1], sizes[..., 1], sizes.max(axis=-1))
+    order = np.maximum(np.arange(harmonics.shape[-1]), 1)
+    return np.asarray(first[..., None] / (np.sqrt(2.0) * order))
