@@ -60,8 +60,12 @@ def _grouped(value: float, places: int) -> str:
 
 
 def percentage(share: float, places: int = 1) -> str:
-    """A share as a percentage; a dash where there is none."""
-    return f"{100.0 * share:.{places}f} %".replace("-", MINUS) if isfinite(share) else DASH
+    """A share as a percentage, 100 only if it is the whole; a dash where there is none."""
+    if not isfinite(share):
+        return DASH
+    if share < 1.0 and round(100.0 * share, places) == 100.0:
+        return f"> {100.0 - 10.0**-places:.{places}f} %"
+    return f"{100.0 * share:.{places}f} %".replace("-", MINUS)
 
 
 def decimal(number: float, places: int) -> str:

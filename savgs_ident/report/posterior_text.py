@@ -1,11 +1,12 @@
 """A posterior in the terminal: whether it converged, the parameters, what it predicts, what it tells in words."""
 
-from math import floor, isfinite, log10
+from math import floor, log10
 
 from rich.console import Group, RenderableType
 
 from savgs_ident.posterior.result import Marginal, Posterior
 from savgs_ident.report.fit_text import value_with_error
+from savgs_ident.report.numerals import count, decimal, percentage
 from savgs_ident.report.posterior_words import (
     correlation_sentence,
     predictive_sentence,
@@ -48,22 +49,23 @@ def _identified(posterior: Posterior) -> RenderableType:
             value_with_error(each.median, each.sd),
             _interval(each),
             "" if each.unit == "1" else each.unit,
-            _percent(each.contraction),
-            f"{min(each.ess_bulk, each.ess_tail):.0f}",
+            percentage(each.contraction),
+            count(min(each.ess_bulk, each.ess_tail)),
         )
         for each in posterior.of_role("identified")
     ]
-    headers = ("parameter", "median ± 1 sd", "95 % interval", "unit", "shrunk\n[%]", "ESS")
+    headers = ("parameter", "median ± 1 sd", "95 % interval", "unit", "shrunk", "ESS")
     return table("Identified parameters", headers, rows, texts=(0, 3))
 
 
 def _sampling(posterior: Posterior) -> str:
     c = posterior.convergence
+    state = "converged" if c.converged else "NOT converged"
     return (
-        f"{posterior.sampler}: {'converged' if c.converged else 'NOT converged'}, largest R-hat {c.r_hat_max:.3f},"
-        f" smallest ESS {c.ess_min:.0f} of {c.target_ess:.0f} asked, acceptance {100.0 * c.acceptance:.0f} %,"
-        f" {c.divergences} divergences, Pareto k {c.pareto_k:.2f}, {c.evaluations} exact evaluations"
-        f" ({posterior.wall_s:.1f} s)"
+        f"{posterior.sampler}: {state}, largest R-hat {decimal(c.r_hat_max, 3)},"
+        f" smallest ESS {count(c.ess_min)} of {count(c.target_ess)} asked,"
+        f" acceptance {percentage(c.acceptance, 0)}, {c.divergences} divergences,"
+        f" Pareto k {decimal(c.pareto_k, 2)}, {c.evaluations} exact evaluations ({posterior.wall_s:.1f} s)"
     )
 
 
@@ -108,7 +110,3 @@ def _before(each: Marginal) -> str:
 def _interval(each: Marginal) -> str:
     places = min(max(1 - floor(log10(each.sd)), 0), 12) if each.sd > 0.0 else 6
     return f"{each.q025:.{places}f} to {each.q975:.{places}f}"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.1f}" if isfinite(share) else "-"

@@ -66,6 +66,7 @@ def test_intervals_percentages_and_counts() -> None:
     assert interval(-0.0025, 0.0113, 0.0031) == "\u22120.0025 to 0.0113"
     assert interval(1.1e7, 1.3e7, 5e5) == "(1.100 to 1.300) \u00d7 10⁷"
     assert percentage(0.994) == "99.4 %"
+    assert (percentage(0.9998), percentage(1.0), percentage(0.997, 0)) == ("> 99.9 %", "100.0 %", "> 99 %")
     assert percentage(float("nan")) == "\u2013"
     assert count(12345.4) == "12\u202f345"
     assert count(float("nan")) == "\u2013"

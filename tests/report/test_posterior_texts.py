@@ -198,11 +198,12 @@ def test_numbers_that_are_not_known_are_null_in_the_record(posterior: Posterior)
     unknown = replace(posterior, convergence=replace(posterior.convergence, pareto_k=float("nan")))
     assert record_of(unknown)["pareto_k"] is None
     assert [check.value for check in checks(unknown) if check.name == "Pareto k"] == [DASH]
+    assert "nan" not in rendered(unknown)
 
 
 def test_the_terminal_tells_the_numbers_in_80_columns(posterior: Posterior) -> None:
     text = rendered(posterior, width=80)
-    assert re.search(r"c_sd +5\d{3} ± \d+ +5\d{3} to 5\d{3} N s/m +99\.[45] +427", text)
+    assert re.search(r"c_sd +5\d{3} ± \d+ +5\d{3} to 5\d{3} N s/m +99\.[45] % +427", text)
     assert "Strongest correlation: mu_t with ydot_Hth, +0.8" in text
     assert all(sentence in " ".join(text.split()) for sentence in SENTENCES)
     assert (
