@@ -96,10 +96,8 @@ def _kind(variable: Any) -> np.dtype[np.generic]:
 
 
 def _apply(equation: Any, operands: list[Operand]) -> Sequence[Operand]:
-    if not any(isinstance(operand, Grid) for operand in operands):
-        return _computed(equation, operands)
     try:
-        return _translated(equation, operands)
+        return _results(equation, operands)
     except TranslationError as error:
         if error.place:
             raise
@@ -107,18 +105,13 @@ def _apply(equation: Any, operands: list[Operand]) -> Sequence[Operand]:
         raise TranslationError(error.what, source_info_util.summarize(equation.source_info)) from None
 
 
-def _computed(equation: Any, values: list[Operand]) -> Sequence[Operand]:
-    name = equation.primitive.name
-    if name in NESTING:
-        return evaluate(equation.params[NESTING[name]], values)
-    found = equation.primitive.bind(*values, **equation.params)
-    return [np.asarray(each) for each in (found if equation.primitive.multiple_results else [found])]
-
-
-def _translated(equation: Any, operands: list[Operand]) -> Sequence[Operand]:
+def _results(equation: Any, operands: list[Operand]) -> Sequence[Operand]:
     name = equation.primitive.name
     if name in NESTING:
         return evaluate(equation.params[NESTING[name]], operands)
+    if not any(isinstance(operand, Grid) for operand in operands):
+        found = equation.primitive.bind(*operands, **equation.params)
+        return [np.asarray(each) for each in (found if equation.primitive.multiple_results else [found])]
     if name not in RULES:
         raise TranslationError(f"'{name}' has no translation to CasADi")
     for variable in equation.outvars:

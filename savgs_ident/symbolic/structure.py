@@ -91,7 +91,7 @@ def _move_to_unknown(equation: Any, operands: list[Operand], unknown: int) -> li
 
 def _slice_from_unknown(equation: Any, operands: list[Operand], unknown: int) -> list[Grid]:
     axis = unknown - 1
-    last = _shape(operands[0])[axis] - equation.params["slice_sizes"][axis]
+    last = operands[0].shape[axis] - equation.params["slice_sizes"][axis]
     start = as_grid(operands[unknown]).items[0]
     nearest = ca.fmin(ca.fmax(start, 0.0), float(last))
     return [
@@ -105,7 +105,7 @@ def _gather_from_unknown(equation: Any, operands: list[Operand]) -> list[Grid]:
     if indices.shape[-1] != 1:
         raise TranslationError("'gather' has several indices that depend on the inputs")
     axis = dimensions.start_index_map[0]
-    last = _shape(operands[0])[axis] - equation.params["slice_sizes"][axis]
+    last = operands[0].shape[axis] - equation.params["slice_sizes"][axis]
     at = [_moved_with(equation, operands, 1, np.full(indices.shape, k)) for k in range(last + 1)]
     rows = np.expand_dims(indices.places[..., 0], dimensions.offset_dims)
     row_of: NDArray[np.int64] = np.broadcast_to(rows, at[0].shape).ravel()
@@ -128,7 +128,3 @@ def _moved_with(equation: Any, operands: list[Operand], which: int, value: NDArr
 def _one_of(which: SX, grids: list[Grid]) -> Grid:
     columns = zip(*(grid.items for grid in grids), strict=True)
     return Grid(tuple(chosen(which, column) for column in columns), grids[0].shape)
-
-
-def _shape(operand: Operand) -> tuple[int, ...]:
-    return operand.shape

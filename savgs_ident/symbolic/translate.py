@@ -11,7 +11,8 @@
 
 The function is traced once, at the shapes of the examples given, and its trace is evaluated on symbols
 (:mod:`savgs_ident.symbolic.interpret`). Arrays become columns, last index fastest. Integers and truth values
-become numbers. Where JAX gives the mean of two slopes at a kink, CasADi gives one of them.
+become numbers. CasADi differentiates what is computed: slopes that JAX was told otherwise (``stop_gradient``,
+``custom_jvp``) are not carried over, and where JAX gives the mean of two slopes at a kink, it gives one of them.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -28,6 +28,10 @@ THERE = {"mu_r": 0.034, "mu_t": 0.28, "ydot_Hth": 0.045, "c_sd": 5300.0}
 DWELLS = (2.0, 4.5, 6.0)
 """Slow enough to stick and fast enough to saturate the tyre's friction [Hz]."""
 
+PRESLIDING = {"k_pre": 1e7, "c_pre": 3e4}
+"""The bristle, as it truly is [SI]. The samples tell it two to three times as well as nine orders do, which see
+little of the milliseconds of a reversal: there the two are not comparable in standard errors of the latter."""
+
 EXACT = CollocationSettings(fixed_tolerances=True)
 
 
@@ -133,16 +137,17 @@ def test_on_the_shipped_campaign_it_agrees_with_the_fit(nominal: Fit, crosscheck
         by_harmonics, by_samples = nominal.by_name[name], crosschecked.by_name[name]
         assert abs(by_samples.value - by_harmonics.value) < 0.5 * by_harmonics.stderr
         assert 0.85 < by_samples.stderr / by_harmonics.stderr <= 1.01
-    for estimate in nominal.estimates:
-        assert abs(crosschecked.by_name[estimate.name].value - estimate.value) < 1.5 * estimate.stderr
+    for name in set(nominal.by_name) - set(PRESLIDING):
+        by_harmonics = nominal.by_name[name]
+        assert abs(crosschecked.by_name[name].value - by_harmonics.value) < 1.5 * by_harmonics.stderr
 
 
 @pytest.mark.slow
 def test_on_the_shipped_campaign_it_finds_the_truth(crosschecked: CollocationFit) -> None:
     assert crosschecked.chi2 / crosschecked.dof == pytest.approx(1.0, abs=0.01)
-    for name in FREE:
+    for name, value in {**TRUTH, **PRESLIDING}.items():
         estimate = crosschecked.by_name[name]
-        assert abs(estimate.value - TRUTH[name]) < 3.0 * estimate.stderr
+        assert abs(estimate.value - value) < 3.0 * estimate.stderr
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from hypothesis.extra.numpy import arrays
 from jax import lax
 from jaxtyping import Array
 
+from savgs_ident.symbolic.elementwise import BY_EQUATION, ELEMENTWISE
 from savgs_ident.symbolic.interpret import NESTING, RULES
 from savgs_ident.symbolic.translate import to_casadi
 
@@ -130,7 +131,7 @@ CASES: dict[str, Case] = {
     "reshape": Case(lambda x: jnp.reshape(x, (3, 2))),
     "rev": Case(lambda x: x[::-1, ::-1]),
     "rsqrt": Case(lax.rsqrt, POSITIVE),
-    "scatter": Case(lambda x, y: x.at[:, np.array([2, 0])].set(y[:, :2]), TWO),
+    "scatter": Case(lambda x, y: jnp.asarray(x).at[:, np.array([2, 0])].set(y[:, :2]), TWO),
     "select_n": Case(lambda x, y: jnp.where(x > y, x, y * 2.0), TWO),
     "sign": Case(jnp.sign),
     "sin": Case(jnp.sin),
@@ -158,7 +159,7 @@ ALIASES = {"checkpoint": "remat2", "jit": "pjit"}
 def _both(name: str) -> tuple[ca.Function, Callable[..., Array]]:
     case = CASES[name]
     inputs = {f"x{place}": np.zeros(SHAPE) for place in range(len(case.ranges))}
-    return to_casadi("told", case.function, inputs, ["y"]), jax.jit(case.function)
+    return to_casadi("told", case.function, inputs, ["y"]), case.function
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -170,7 +171,7 @@ def test_it_says_what_jax_says(name: str) -> None:
         for limits in case.ranges
     ]
 
-    @settings(max_examples=25)
+    @settings(max_examples=20)
     @given(st.tuples(*drawn))
     def check(values: tuple[np.ndarray, ...]) -> None:
         expected = np.asarray(function(*values), np.float64).ravel()
@@ -192,47 +193,26 @@ def test_every_rule_has_a_case() -> None:
     assert set(RULES) | set(NESTING) == set(CASES) | set(ALIASES.values())
 
 
-SMOOTH = [
-    name
-    for name in CASES
-    if name
-    not in {
-        "ceil",
-        "clamp",
-        "cond",
-        "convert_element_type",
-        "copy",
-        "custom_jvp_call",
-        "custom_vjp_call",
-        "div",
-    }
-    | {
-        "dynamic_slice",
-        "floor",
-        "gather",
-        "optimization_barrier",
-        "stop_gradient",
-        "rem",
-        "sign",
-        "reduce_sum",
-    }
-    and jax.eval_shape(CASES[name].function, *[np.zeros(SHAPE)] * len(CASES[name].ranges)).dtype != bool
-]
-"""Cases without jumps and without slopes of their own making."""
+JUMPING = {"ceil", "clamp", "convert_element_type", "div", "floor", "is_finite", "rem", "select_n", "sign"}
+OF_THEIR_OWN = {"stop_gradient", "optimization_barrier", "copy"}
+TRUTHS = {"and", "eq", "ge", "gt", "le", "lt", "ne", "not", "or", "xor"}
+SMOOTH = sorted({*ELEMENTWISE, *BY_EQUATION, "dot_general", "reduce_prod"} - JUMPING - OF_THEIR_OWN - TRUTHS)
+"""What computes without jumps; what moves elements about has the slopes of what it moves."""
 
 
 @pytest.mark.parametrize("name", SMOOTH)
 def test_its_slopes_are_those_of_jax(name: str) -> None:
-    """At one place, off all kinks."""
+    """At one place, off all kinks, along one direction."""
     case = CASES[name]
     told, function = _both(name)
     rng = np.random.default_rng(5)
-    values = [rng.uniform(low, high, SHAPE) for low, high in case.ranges]
+    values = tuple(rng.uniform(low, high, SHAPE) for low, high in case.ranges)
+    along = tuple(rng.standard_normal(SHAPE) for _ in values)
     slopes = told.jacobian()(*(value.ravel() for value in values), np.zeros(told.size1_out(0)))
-    found = np.hstack([np.array(each) for each in (slopes if isinstance(slopes, tuple) else (slopes,))])
-    expected = jax.jacfwd(function, argnums=tuple(range(len(values))))(*values)
-    wanted = np.hstack([np.asarray(each).reshape(found.shape[0], -1) for each in expected])
-    np.testing.assert_allclose(found, wanted, rtol=1e-11, atol=1e-11)
+    matrix = np.hstack([np.array(each) for each in (slopes if isinstance(slopes, tuple) else (slopes,))])
+    expected = np.asarray(jax.jvp(function, values, along)[1]).ravel()
+    found = matrix @ np.concatenate([direction.ravel() for direction in along])
+    np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
 
 
 def test_a_place_that_an_input_decides_is_held_in_the_table_as_jax_holds_it() -> None:
