@@ -13,6 +13,7 @@ import typer
 from savgs_ident import __version__
 from savgs_ident.cli.arguments import spread_values
 from savgs_ident.cli.bode_command import bode
+from savgs_ident.cli.calibrate_command import calibrate
 from savgs_ident.cli.fit_command import demo, fit
 from savgs_ident.cli.inspect_command import inspect
 from savgs_ident.cli.posterior_command import posterior
@@ -46,7 +47,7 @@ def _root(
     """
 
 
-for _command in (demo, inspect, fit, bode, simulate, posterior):
+for _command in (demo, inspect, fit, bode, simulate, posterior, calibrate):
     app.command()(_command)
 
 

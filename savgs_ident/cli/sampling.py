@@ -24,7 +24,6 @@ from savgs_ident.responses.estimate import estimate_response
 from savgs_ident.simulate.compilation import use_persistent_cache
 from savgs_ident.simulate.measured import MODELLED_CHANNELS
 
-
 PACKAGES = ("jax", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
 """Whose version matters to a chain."""
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.responses.harmonic_response import HarmonicResponse
@@ -27,6 +28,16 @@ def up_to_frequency(response: HarmonicResponse, highest: float | None) -> Harmon
             source="--max-frequency",
             remedy=f"the slowest dwell is at {response.frequency[0]:.3g} Hz",
         )
+    return _only(response, kept)
+
+
+def every_so_many(response: HarmonicResponse, step: int) -> HarmonicResponse:
+    """Every ``step``-th dwell, the last one among them: it is the fastest."""
+    count = response.frequency.size
+    return _only(response, np.arange((count - 1) % step, count, step))
+
+
+def _only(response: HarmonicResponse, kept: NDArray[np.int64]) -> HarmonicResponse:
     dof = None if response.covariance_dof is None else response.covariance_dof[kept]
     return replace(
         response,

@@ -23,6 +23,7 @@ from savgs_ident.simulate.periodic import (
     PeriodicSolution,
     harmonic_sensitivities,
     harmonics,
+    harmonics_of,
     resolve,
     solve_near,
     trajectory_sensitivities,
@@ -30,8 +31,11 @@ from savgs_ident.simulate.periodic import (
 from savgs_ident.simulate.stored import placed, stored
 
 ENOUGH = 1e-5
-"""Last relative Newton step at which a motion near the anchor counts as solved. Newton's method squares it:
-what is left is a thousandth of what the noise hides."""
+"""Last relative Newton step at which a motion near the anchor counts as solved; what is left is far smaller, and that
+is a hundredth of what the noise hides."""
+
+LIMIT = 30
+"""Most Newton steps; two or three are the rule."""
 
 
 class Anchor(eqx.Module):
@@ -40,6 +44,11 @@ class Anchor(eqx.Module):
     u: Float[Array, " n"]
     solution: PeriodicSolution
     slopes: Trajectory
+
+    def predicted(self, u: Float[Array, " n"]) -> Trajectory:
+        """The motions at ``u``, to first order."""
+        parts = zip(self.solution.trajectory, self.slopes, strict=True)
+        return Trajectory(*(value + jnp.tensordot(u - self.u, slope, 1) for value, slope in parts))
 
 
 class Responses(NamedTuple):
@@ -84,12 +93,19 @@ def anchor_at(problem: Problem, u: Float[Array, " n"], solution: PeriodicSolutio
 
 
 def rows_and_slopes(
-    problem: Problem, likelihood: Likelihood, u: Float[Array, " n"], near: PeriodicSolution
+    problem: Problem,
+    likelihood: Likelihood,
+    u: Float[Array, " n"],
+    near: PeriodicSolution,
+    start: Trajectory | None = None,
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m n"], PeriodicSolution]:
-    """The rows (m,) of the model at ``u``, their derivatives in u (m, n), and its motions there."""
+    """The rows (m,) of the model at ``u``, their derivatives in u (m, n), and its motions there.
+
+    Solved on the nodes of ``near``, from its motions or a better ``start``.
+    """
     u = placed(u)
     p = problem.parameters(u)
-    solution = resolve(problem.model, p, near, problem.iterations)
+    solution = resolve(problem.model, p, near, problem.iterations, start)
     rows, slopes = _linear_rows(problem, likelihood, u, p, solution)
     return np.asarray(rows), np.asarray(slopes), solution
 
@@ -118,24 +134,15 @@ def _trajectory_slopes(problem: Problem, u: Array, p: Any, solution: PeriodicSol
     return moved.x * scale, moved.y * scale
 
 
-def _response(problem: Problem, anchor: Anchor, u: Array) -> tuple[Array, ...]:
-    return _solved_near(problem, anchor.u, anchor.solution, anchor.slopes, u)
-
-
 @eqx.filter_jit
-def _solved_near(*args: Any) -> tuple[Array, ...]:
+def _response(*args: Any) -> tuple[Array, ...]:
     return stored(_harmonics_near, *args)
 
 
-def _harmonics_near(
-    problem: Problem, at: Array, known: PeriodicSolution, slopes: Trajectory, u: Array
-) -> tuple[Array, Array]:
-    p, change = problem.parameters(u), u - at
-    linear = (
-        value + jnp.tensordot(change, slope, 1) for value, slope in zip(known.trajectory, slopes, strict=True)
-    )
-    solution = solve_near(problem.model, p, known, Trajectory(*linear), problem.iterations, ENOUGH)
-    return harmonics(p, solution, problem.orders), jnp.max(solution.last_step)
+def _harmonics_near(problem: Problem, anchor: Anchor, u: Array) -> tuple[Array, Array]:
+    p, known = problem.parameters(u), anchor.solution
+    motions, step = solve_near(problem.model, p, known, anchor.predicted(u), LIMIT, ENOUGH)
+    return harmonics_of(p, motions, known.mesh, problem.orders), step
 
 
 @eqx.filter_jit

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from savgs_ident.posterior.exact import ExactModel, anchor_at, in_parallel, rows_and_slopes
+from savgs_ident.posterior.exact import Anchor, ExactModel, anchor_at, in_parallel, rows_and_slopes
 from savgs_ident.posterior.mode import Case, Foothold, Progress, linear_surrogate
 from savgs_ident.posterior.shear import shear_of
 from savgs_ident.posterior.surrogate import Surrogate, bend_of
@@ -29,15 +29,15 @@ def expand(case: Case, at: Foothold, tell: Progress) -> Expansion:
     axes = np.asarray(linear.scale)[:-2, :-2]
     weight = 1.0 / np.sqrt(np.asarray(case.likelihood.spread(linear.centre)))
     tell(f"second derivatives of the response along {axes.shape[1]} axes")
-    second = _second_derivatives(case, at, axes, weight)
+    anchor = anchor_at(case.problem, jnp.asarray(at.point[:-2]), at.solution)
+    second = _second_derivatives(case, at, anchor, axes, weight)
     bent = (bend_of(second, weight), shear_of(second, np.asarray(linear.slope), weight))
     surrogate = eqx.tree_at(lambda each: (each.bend, each.shear), linear, bent)
-    anchor = anchor_at(case.problem, jnp.asarray(at.point[:-2]), at.solution)
     return Expansion(ExactModel(case.problem, case.likelihood, anchor), surrogate)
 
 
 def _second_derivatives(
-    case: Case, at: Foothold, axes: Float[np.ndarray, "n n"], weight: Float[np.ndarray, " m"]
+    case: Case, at: Foothold, anchor: Anchor, axes: Float[np.ndarray, "n n"], weight: Float[np.ndarray, " m"]
 ) -> Float[np.ndarray, "n n m"]:
     """Differences of the slopes one standard deviation ahead; of both sides where an axis bends much.
 
@@ -46,7 +46,9 @@ def _second_derivatives(
 
     def slopes_at(shift: np.ndarray) -> np.ndarray:
         u = jnp.asarray(at.point[:-2] + shift)
-        _, slopes, solution = rows_and_slopes(case.problem, case.likelihood, u, at.solution)
+        _, slopes, solution = rows_and_slopes(
+            case.problem, case.likelihood, u, at.solution, anchor.predicted(u)
+        )
         solved = all(status.ok for status in solution.status())
         return np.asarray((slopes @ axes).T if solved else np.full((axes.shape[1], at.rows.size), np.nan))
 

@@ -10,6 +10,9 @@ from savgs_ident.fit.covariance import UNTOLD
 from savgs_ident.posterior.likelihood import Likelihood
 from savgs_ident.posterior.prior import Prior
 
+LEAST = 1e-4
+"""Least standard deviation of a scale's coordinate."""
+
 _NOISE_GRID = np.linspace(-4.0, 4.0, 161)
 _MISS_GRID = np.concatenate([[0.0], np.geomspace(1e-5, 30.0, 300)])
 
@@ -41,7 +44,8 @@ def nuisance_scale(
         mass = np.exp(logs - logs.max()) * np.gradient(grid)
         mass /= mass.sum()
         mean = float(mass @ grid)
-        return mean, float(np.sqrt(mass @ (grid - mean) ** 2))
+        # A density narrower than the grid still has a width.
+        return mean, max(float(np.sqrt(mass @ (grid - mean) ** 2)), LEAST)
 
     noise, miss = moments(-2, _NOISE_GRID), moments(-1, _MISS_GRID)
     if miss[0] < 3.0 * miss[1]:

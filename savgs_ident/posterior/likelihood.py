@@ -2,16 +2,19 @@
 
 A harmonic X_k (Re, Im) of a channel in a dwell is taken as normal about the model's H_k, with covariance
 
-    s^2 C_k + (d a_k)^2 I,      a_k = |X_1| / (sqrt(2) k),
+    s^2 C_k + (d a_k)^2 I,      a_k = |X_1| / (sqrt(2) k^m),
 
 where C_k is its measured noise covariance, s the noise scale and d the model discrepancy: the relative rms
-error of the model's first harmonic. The error of order k is taken as k times smaller, as that of a force that
-jumps. Errors of different orders, channels and dwells count as independent: a discrepancy that many dwells
-share is not covered by the intervals, it is what a diagnosis looks for. With d = 0 the intervals are those of
-the noise alone, which for a model that misses by more than the noise are absurdly narrow.
+error of the model's first harmonic. Higher orders err less, with m = 1 for the acceleration, which follows a
+force that jumps, and m = 2 for the deflection, which lies between following it and being moved by it. Errors
+of different orders, channels and dwells count as independent: a discrepancy that many dwells share is not
+covered by the intervals, it is what a diagnosis looks for. With d = 0 the intervals are those of the noise
+alone, which for a model that misses by more than the noise are absurdly narrow.
 
 In the principal axes of C_k every real part is a row of its own, independent of all others.
 """
+
+from collections.abc import Mapping
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -19,7 +22,11 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from savgs_ident.fit.target import HarmonicTarget
-from savgs_ident.posterior.prior import discrepancy, noise_scale
+from savgs_ident.model.sensors import RESPONSE_CHANNELS
+from savgs_ident.posterior.scales import Scales
+
+FALL: Mapping[str, int] = {"sprung_accel": 1, "susp_deflection": 2}
+"""The power m of the order with which the discrepancy of a channel falls."""
 
 
 class Likelihood(eqx.Module):
@@ -27,7 +34,7 @@ class Likelihood(eqx.Module):
 
     ``axes`` (D, 2, K, 2, 2) turns (Re, Im) of every harmonic into its principal axes, ``place`` (m,) picks the
     rows that are compared; ``measured`` (m,) is what they are, ``variance`` (m,) their noise, ``reach`` (m,)
-    their a_k.
+    their a_k. ``scales`` says what a point's last two coordinates mean.
     """
 
     axes: Float[Array, "D C K 2 2"]
@@ -35,6 +42,7 @@ class Likelihood(eqx.Module):
     measured: Float[Array, " m"]
     variance: Float[Array, " m"]
     reach: Float[Array, " m"]
+    scales: Scales
 
     def rows(self, harmonics: Complex[Array, "D C K"]) -> Float[Array, " m"]:
         """Predicted harmonics as rows [units of the channels], (m,)."""
@@ -43,7 +51,8 @@ class Likelihood(eqx.Module):
 
     def spread(self, point: Float[Array, " n+2"]) -> Float[Array, " m"]:
         """Variance of the rows about the model's, noise and discrepancy together."""
-        return noise_scale(point) ** 2 * self.variance + (discrepancy(point) * self.reach) ** 2
+        noise, miss = self.scales.noise_scale(point), self.scales.miss(point)
+        return noise**2 * self.variance + (miss * self.reach) ** 2
 
     def __call__(self, rows: Float[Array, " m"], point: Float[Array, " n+2"]) -> Float[Array, ""]:
         """Log likelihood of the model's ``rows``, up to a constant."""
@@ -60,7 +69,7 @@ class Likelihood(eqx.Module):
         return np.asarray(turned[..., 0] + 1j * turned[..., 1])
 
 
-def likelihood_of(target: HarmonicTarget) -> Likelihood:
+def likelihood_of(target: HarmonicTarget, scales: Scales | None = None) -> Likelihood:
     """The likelihood of the harmonics that a fit compares."""
     used = np.asarray(target.used)
     whitening = np.asarray(target.whitening)
@@ -73,12 +82,20 @@ def likelihood_of(target: HarmonicTarget) -> Likelihood:
     rows = np.einsum("dckij,dckj->dcki", axes, parts).ravel()[place]
     reach = np.repeat(_reach(harmonics, used)[..., None], 2, axis=-1).ravel()[place]
     variance = (1.0 / values).ravel()[place]
-    return Likelihood(jnp.asarray(axes), place, jnp.asarray(rows), jnp.asarray(variance), jnp.asarray(reach))
+    return Likelihood(
+        axes=jnp.asarray(axes),
+        place=place,
+        measured=jnp.asarray(rows),
+        variance=jnp.asarray(variance),
+        reach=jnp.asarray(reach),
+        scales=scales or Scales(),
+    )
 
 
 def _reach(harmonics: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """a_k of every harmonic; the largest compared one stands in for a first one that is not."""
+    """a_k of every harmonic; the largest compared one stands in for a first one that is not compared."""
     sizes = np.abs(harmonics) * used
     first = np.where(used[..., 1], sizes[..., 1], sizes.max(axis=-1))
     order = np.maximum(np.arange(harmonics.shape[-1]), 1)
-    return np.asarray(first[..., None] / (np.sqrt(2.0) * order))
+    power = np.array([FALL[name] for name in RESPONSE_CHANNELS])[:, None]
+    return np.asarray(first[..., None] / (np.sqrt(2.0) * order**power))

@@ -14,9 +14,9 @@ from savgs_ident.posterior.ascend import Top, ascend
 from savgs_ident.posterior.chains import Chains
 from savgs_ident.posterior.diagnostics import Mixing
 from savgs_ident.posterior.mode import Case
-from savgs_ident.posterior.prior import NUISANCE
 from savgs_ident.posterior.profile import profile_of
 from savgs_ident.posterior.result import Marginal, Role
+from savgs_ident.posterior.scales import NUISANCE
 from savgs_ident.posterior.surrogate import Surrogate
 from savgs_ident.posterior.values import values_of
 
@@ -37,11 +37,11 @@ def marginals_of(
     case: Case, surrogate: Surrogate, chains: Chains, mixing: Mapping[str, Mixing]
 ) -> tuple[Marginal, ...]:
     """The marginal of every parameter, identified ones with their profiles."""
-    free = case.problem.free
-    draws = values_of(free, chains.points)
+    free, scales = case.problem.free, case.likelihood.scales
+    draws = values_of(free, scales, chains.points)
     low, high = (_prior_values(case, share) for share in (0.025, 0.975))
-    top = ascend(surrogate, np.zeros(surrogate.centre.size))
-    mode = values_of(free, surrogate.points(top.t)[None])
+    top = ascend(surrogate, surrogate.start)
+    mode = values_of(free, scales, surrogate.points(top.t)[None])
     laplace = _laplace_sd(case, surrogate, top)
     about = {each.name: (each.unit, each.about) for each in free.parameters}
     about |= {name: ("1", text) for name, text in _ABOUT.items()}
@@ -76,7 +76,10 @@ def _prior_values(case: Case, share: float) -> dict[str, float]:
     # The discrepancy is half-normal: its quantile is one of the upper half of the normal.
     half = float(ndtri(0.5 + 0.5 * share))
     point = np.concatenate([case.prior.quantile(share), [normal, half]])
-    return {name: float(value[0]) for name, value in values_of(case.problem.free, point[None]).items()}
+    return {
+        name: float(value[0])
+        for name, value in values_of(case.problem.free, case.likelihood.scales, point[None]).items()
+    }
 
 
 def _laplace_sd(case: Case, surrogate: Surrogate, top: Top) -> dict[str, float]:
@@ -90,7 +93,9 @@ def _laplace_sd(case: Case, surrogate: Surrogate, top: Top) -> dict[str, float]:
     found = {}
     for place, name in enumerate((*case.problem.free.names, *NUISANCE)):
         step = 1e-4 * np.eye(1, point.size, place)
-        moved = values_of(case.problem.free, np.concatenate([point - step, point + step]))
+        moved = values_of(
+            case.problem.free, case.likelihood.scales, np.concatenate([point - step, point + step])
+        )
         found[name] = float(abs(np.diff(moved[name])[0]) / 2e-4 * deviation[place])
     return found
 

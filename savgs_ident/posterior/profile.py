@@ -29,7 +29,7 @@ def profile_of(free: FreeVector, surrogate: Surrogate, name: str) -> ProfileLine
     flat = eqx.tree_at(lambda each: each.shear, surrogate, no_shear(len(free.names)))
     place = free.names.index(name)
     row, centre = np.asarray(flat.scale)[place], float(np.asarray(flat.centre)[place])
-    top = ascend(flat, np.zeros(flat.centre.size))
+    top = ascend(flat, flat.start)
     middle = float(flat.points(top.t)[place])
     found = {middle: 0.0}
     for reach in (-SPAN, SPAN):
@@ -42,4 +42,6 @@ def profile_of(free: FreeVector, surrogate: Surrogate, name: str) -> ProfileLine
     levels = np.array(sorted(found))
     points = np.tile(flat.points(top.t), (levels.size, 1))
     points[:, place] = levels
-    return ProfileLine(values_of(free, points)[name], np.array([found[each] for each in levels]))
+    return ProfileLine(
+        values_of(free, flat.likelihood.scales, points)[name], np.array([found[each] for each in levels])
+    )

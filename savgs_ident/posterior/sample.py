@@ -170,7 +170,7 @@ def _run(
 def _summed_up(answer: _Answer, question: Question, settings: SamplingSettings, wall_s: float) -> Posterior:
     case, chains = answer.case, answer.chains
     roles = names_by_role(case.problem.free)
-    values = values_of(case.problem.free, chains.points)
+    values = values_of(case.problem.free, case.likelihood.scales, chains.points)
     mixing = {name: mixing_of(values[name]) for name in roles}
     identified = [mixing[name] for name, role in roles.items() if role == "identified"]
     others = [mixing[name] for name, role in roles.items() if role != "identified"]

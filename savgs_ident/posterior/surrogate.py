@@ -19,7 +19,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from savgs_ident.posterior.likelihood import Likelihood
-from savgs_ident.posterior.prior import NUISANCE, Prior
+from savgs_ident.posterior.prior import Prior
+from savgs_ident.posterior.scales import NUISANCE
 from savgs_ident.posterior.shear import Shear
 
 LEFT_OUT = 0.02
@@ -61,6 +62,13 @@ class Surrogate(eqx.Module):
         """The log density, up to a constant."""
         point = self.point(t)
         return self.likelihood(self.predicted(t), point) + self.prior(point)
+
+    @property
+    def start(self) -> Float[np.ndarray, " n+2"]:
+        """Where to look for the top from: off the symmetry plane of the discrepancy, which is a saddle."""
+        t = np.zeros(self.centre.size)
+        t[-1] = 1.0
+        return t
 
     def points(self, ts: Float[np.ndarray, "*w n+2"]) -> Float[np.ndarray, "*w n+2"]:
         """The points at several t."""

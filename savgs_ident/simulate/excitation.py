@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from savgs_ident.model.quarter_car import Inputs
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
-from savgs_ident.simulate.mesh import Mesh
+from savgs_ident.simulate.mesh import Mesh, turns
 
 
 class Excitation(NamedTuple):
@@ -39,7 +39,7 @@ def cam_excitation(frequency: ArrayLike, peak_to_peak: float, link_angle: float)
 def _synthesise(harmonics: Array, omega: Array, phase: Array) -> tuple[Array, Array]:
     """Value and time derivative at the nodes, both (P,), from harmonics (P, K)."""
     order = jnp.arange(harmonics.shape[1])
-    terms = harmonics * jnp.exp(1j * order * phase[:, None])
+    terms = harmonics * turns(phase, harmonics.shape[1] - 1)
     return jnp.sum(terms.real, axis=1), jnp.sum((1j * order * terms).real, axis=1) * omega
 
 

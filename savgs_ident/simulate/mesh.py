@@ -9,8 +9,9 @@ the map's own derivative, converge as fast as they do on equal steps.
 
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Complex, Float
 from numpy.typing import NDArray
 
 from savgs_ident.simulate.layout import Layout
@@ -37,6 +38,15 @@ class Mesh(NamedTuple):
     phase: Float[Array | np.ndarray, " P"]
     gap: Float[Array | np.ndarray, " P"]
     weight: Float[Array | np.ndarray, " P"]
+
+
+def turns(phase: Float[Array | np.ndarray, " P"], orders: int) -> Complex[Array, "P K"]:
+    """exp(i k phase) of orders k = 0..``orders``, by multiplication: exponentials would cost as much as a motion."""
+    once = jnp.exp(1j * jnp.asarray(phase))
+    powers = [jnp.ones_like(once)]
+    for _ in range(orders):
+        powers.append(powers[-1] * once)
+    return jnp.stack(powers, axis=1)
 
 
 def uniform_mesh(layout: Layout) -> Mesh:

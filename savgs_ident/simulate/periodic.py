@@ -38,7 +38,7 @@ from savgs_ident.simulate.collocation import (
 from savgs_ident.simulate.cyclic import solve_nodes
 from savgs_ident.simulate.excitation import Excitation, inputs_at
 from savgs_ident.simulate.layout import Layout, layout_for
-from savgs_ident.simulate.mesh import Mesh, adapted_mesh, uniform_mesh
+from savgs_ident.simulate.mesh import Mesh, adapted_mesh, turns, uniform_mesh
 from savgs_ident.simulate.newton import TOLERANCE, motion_scale, newton_structure, solve_newton
 from savgs_ident.simulate.stored import placed, stored
 
@@ -120,14 +120,16 @@ def _solve(
 
 def solve_near(
     model: QuarterCar, p: Values, known: PeriodicSolution, start: Trajectory, limit: int, enough: float
-) -> PeriodicSolution:
-    """The same on the nodes of a ``known`` solution, as a part of a larger program that is to be compiled.
+) -> tuple[Trajectory, Float[Array, ""]]:
+    """Motions on the nodes of a ``known`` solution from a close ``start``, and their last relative step.
 
-    Iterates until the last relative step is below ``enough``.
+    To be a part of a larger program that is compiled. Look at the step: it is above ``enough`` where ``limit``
+    iterations were too few.
     """
     bounds = jnp.asarray(limit), jnp.asarray(enough)
     parts = _solve(model, p, known.excitation, known.mesh, start, *bounds)
-    return PeriodicSolution(known.excitation, known.mesh, *jax.tree.unflatten(newton_structure(), parts))
+    found = jax.tree.unflatten(newton_structure(), parts)
+    return found.trajectory, jnp.max(found.last_step)
 
 
 @eqx.filter_jit
@@ -192,10 +194,15 @@ def simulate_periodic(
 
 
 def resolve(
-    model: QuarterCar, p: Values, solution: PeriodicSolution, limit: int = PeriodicSettings.iterations
+    model: QuarterCar,
+    p: Values,
+    solution: PeriodicSolution,
+    limit: int = PeriodicSettings.iterations,
+    start: Trajectory | None = None,
 ) -> PeriodicSolution:
-    """The solution at other parameters, on the same nodes, started from ``solution``."""
-    return solve_on_mesh(model, as_values(p), solution.excitation, solution.mesh, solution.trajectory, limit)
+    """The solution at other parameters, on the same nodes, started from ``solution`` or a better ``start``."""
+    begin = solution.trajectory if start is None else start
+    return solve_on_mesh(model, as_values(p), solution.excitation, solution.mesh, begin, limit)
 
 
 def _readings(p: Values, trajectory: Trajectory) -> Float[Array, "P C"]:
@@ -204,8 +211,8 @@ def _readings(p: Values, trajectory: Trajectory) -> Float[Array, "P C"]:
 
 
 def _analyse(signals: Float[Array, "P C"], mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
-    order = jnp.arange(orders + 1)
-    kernel = jnp.where(order == 0, 1.0, 2.0) * jnp.exp(-1j * order * jnp.asarray(mesh.phase)[:, None])
+    twice = jnp.full(orders + 1, 2.0).at[0].set(1.0)
+    kernel = twice * jnp.conj(turns(mesh.phase, orders))
     terms = signals[:, :, None] * (kernel * jnp.asarray(mesh.weight)[:, None])[:, None, :]
     layout = mesh.layout
     return jax.ops.segment_sum(terms, layout.dwell, len(layout.counts), indices_are_sorted=True)
@@ -217,7 +224,12 @@ def harmonics(p: Values, solution: PeriodicSolution, orders: int) -> Complex[Arr
 
     Channels are those of :data:`savgs_ident.model.sensors.RESPONSE_CHANNELS`.
     """
-    return _analyse(_readings(p, solution.trajectory), solution.mesh, orders)
+    return harmonics_of(p, solution.trajectory, solution.mesh, orders)
+
+
+def harmonics_of(p: Values, motions: Trajectory, mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
+    """The same of motions on the nodes of a mesh, as a part of a larger program that is compiled."""
+    return _analyse(_readings(p, motions), mesh, orders)
 
 
 @eqx.filter_jit

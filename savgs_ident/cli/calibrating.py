@@ -1,0 +1,114 @@
+"""Trials one after the other, each kept as soon as it is there."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from savgs_ident.cli.console import Progress, Voice, complain
+from savgs_ident.cli.guard import NOT_TRUSTED, OK
+from savgs_ident.cli.models import effects_in, identified_in, rig_before
+from savgs_ident.cli.selection import every_so_many
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.rig import read_rig
+from savgs_ident.posterior.calibration import Trial, calibrator
+from savgs_ident.posterior.result import Sampler
+from savgs_ident.posterior.sample import Question
+from savgs_ident.posterior.settings import SamplingSettings
+from savgs_ident.recordings.read import read_campaign
+from savgs_ident.report.calibration import calibration_figure, calibration_record, calibration_text
+from savgs_ident.report.files import prepare_folder, write_json
+from savgs_ident.report.picture import write_figure
+from savgs_ident.report.terminal import plain
+from savgs_ident.responses.estimate import estimate_response
+from savgs_ident.simulate.compilation import use_persistent_cache
+from savgs_ident.simulate.measured import MODELLED_CHANNELS
+
+DRAWS = 200.0
+"""Effective sample size of a trial's posterior: enough for its ranks and the ends of its intervals."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to calibrate, and how."""
+
+    model: Path
+    campaign: Path
+    channels: Path | None
+    trials: int
+    sampler: Sampler
+    every: int
+    seed: int
+    resume: bool
+    command: Sequence[str]
+
+    def marks(self) -> dict[str, object]:
+        """What trials must have in common to be counted together."""
+        return {
+            "model": str(self.model),
+            "campaign": str(self.campaign),
+            "sampler": self.sampler,
+            "every": self.every,
+            "seed": self.seed,
+        }
+
+
+def calibrate_by_trials(job: Job, voice: Voice, out: Path) -> int:
+    """Run the trials, write and tell what they say; the exit code."""
+    prepare_folder(out)
+    use_persistent_cache()
+    kept = out / "trials.jsonl"
+    done = _known(kept, job) if job.resume else []
+    if not done:
+        kept.write_text(json.dumps(job.marks()) + "\n")
+    with voice.working() as progress:
+        trials = _run(job, kept, done, progress)
+        names = list(next((each.rank for each in trials if each.rank), {}))
+        record = calibration_record(trials, names, job.command)
+        files = [write_json(out / "calibration.json", record), kept]
+        files += write_figure(out, "calibration", calibration_figure(trials, names))
+    voice.show(calibration_text(record), plain("Written: " + ", ".join(str(file) for file in files)))
+    voice.hand_over(record)
+    if record["calibrated"]:
+        return OK
+    complain("Not to be trusted: coverage or ranks are not what they should be.")
+    return NOT_TRUSTED
+
+
+def _run(job: Job, kept: Path, done: list[Trial], progress: Progress) -> list[Trial]:
+    rig = read_rig(job.model)
+    effects = effects_in(rig, job.model)
+    progress(f"reading {job.campaign}")
+    campaign = read_campaign(
+        job.campaign, job.channels, progress=progress.fraction(f"reading {job.campaign}")
+    )
+    measured = every_so_many(estimate_response(campaign.only(MODELLED_CHANNELS), 9), job.every)
+    free, values = identified_in(rig, effects, job.model)
+    question = Question(measured, rig_before(rig, effects, job.model), values, effects, free)
+    progress("preparing")
+    work = calibrator(question, SamplingSettings(job.sampler, target_ess=DRAWS, seed=job.seed))
+    trials = list(done)
+    for number in range(len(done), job.trials):
+        progress(f"trial {number + 1} of {job.trials}")
+        trials.append(work.trial(number))
+        with kept.open("a") as stream:
+            stream.write(json.dumps(asdict(trials[-1])) + "\n")
+    return trials[: job.trials]
+
+
+def _known(kept: Path, job: Job) -> list[Trial]:
+    """The whole trials of an earlier run; a last line that was cut off is left out and the file mended.
+
+    Raises :class:`InputError` for trials of another job.
+    """
+    if not kept.exists():
+        return []
+    lines = kept.read_text().split("\n")[:-1]
+    if not lines or json.loads(lines[0]) != json.loads(json.dumps(job.marks())):
+        raise InputError(
+            "holds trials of another model, campaign, sampler or seed",
+            source=kept,
+            remedy="leave out --resume, or name another --out DIR",
+        )
+    kept.write_text("\n".join(lines) + "\n")
+    return [Trial(**json.loads(line)) for line in lines[1:]]

@@ -1,0 +1,100 @@
+"""What trials of the calibration say: coverage, ranks, a verdict; as JSON, in the terminal and as a picture."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from rich.console import Group, RenderableType
+from scipy.stats import binom
+
+from savgs_ident.posterior.calibration import INTERVAL, RANKED, Trial, uniformity
+from savgs_ident.report.style import BLUE, INK, PALE, label_of, new_figure, styled
+from savgs_ident.report.terminal import plain, table
+
+BINS = 8
+
+LEAST, MOST = 0.90, 0.99
+"""Coverage of 95 % intervals, all parameters together, that counts as right."""
+
+UNEVEN = 1e-3
+"""Probability of an uneven rank histogram, times the number of parameters, below which ranks are wrong."""
+
+
+def calibration_record(
+    trials: Sequence[Trial], names: Sequence[str], command: Sequence[str]
+) -> dict[str, object]:
+    """Coverage and rank statistics by parameter, how many trials failed, and whether all is as it should be.
+
+    A trial whose mode was not found counts as one whose intervals miss.
+    """
+    solved = [trial for trial in trials if trial.solved]
+    ranked = [trial for trial in solved if trial.found]
+    parameters = {
+        name: {
+            "coverage": sum(trial.inside[name] for trial in ranked) / max(len(solved), 1),
+            "uniformity": uniformity([trial.rank[name] for trial in ranked], BINS),
+            "ranks": [trial.rank[name] for trial in ranked],
+        }
+        for name in names
+    }
+    held = sum(sum(trial.inside.values()) for trial in ranked)
+    coverage = held / max(len(solved) * len(names), 1)
+    even = all(each["uniformity"] > UNEVEN / len(names) for each in parameters.values())
+    return {
+        "schema": 1,
+        "calibrated": bool(names) and LEAST <= coverage <= MOST and even,
+        "coverage": coverage,
+        "interval": INTERVAL,
+        "ranks_even": even,
+        "trials": len(trials),
+        "not_solved": len(trials) - len(solved),
+        "mode_not_found": len(solved) - len(ranked),
+        "places": RANKED + 1,
+        "parameters": parameters,
+        "command": " ".join(command),
+    }
+
+
+def calibration_text(record: Mapping[str, Any]) -> RenderableType:
+    """Coverage of every parameter in a table, and the sum of it in words."""
+    rows = [
+        [name, f"{100.0 * each['coverage']:.0f}", f"{each['uniformity']:.2g}"]
+        for name, each in record["parameters"].items()
+    ]
+    counted = record["trials"] - record["not_solved"]
+    words = (
+        f"{100.0 * record['interval']:.0f} % intervals held the truth in {100.0 * record['coverage']:.1f} % of "
+        f"{counted} campaigns times {len(rows)} parameters; {record['not_solved']} campaigns could not be "
+        f"simulated, of {record['mode_not_found']} the mode was not found (counted as missed)."
+    )
+    headers = ["parameter", "inside\n[%]", "ranks even\n(p value)"]
+    return Group(table("Calibration", headers, rows, texts=(0,)), plain(words))
+
+
+def calibration_figure(trials: Sequence[Trial], names: Sequence[str]) -> Figure:
+    """Rank histograms of all parameters; the band holds 95 % of the bars of an even one."""
+    ranked = [trial for trial in trials if trial.found]
+    columns = 6
+    rows = max(1, -(-len(names) // columns))
+    with styled():
+        figure = new_figure(11.0, 1.0 + 1.35 * rows)
+        figure.suptitle(
+            f"Ranks of true values among {RANKED} posterior draws, {len(ranked)} synthetic campaigns",
+            fontsize=11,
+        )
+        axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+        low, high = binom.ppf([0.025, 0.975], len(ranked), 1.0 / BINS)
+        for place, each in enumerate(axes.ravel()):
+            if place >= len(names):
+                each.set_visible(False)
+                continue
+            name = names[place]
+            each.axhspan(low, high, color=PALE, linewidth=0.0)
+            each.axhline(len(ranked) / BINS, color=INK, linewidth=0.8)
+            edges = np.linspace(0, RANKED + 1, BINS + 1)
+            each.hist([trial.rank[name] for trial in ranked], bins=edges, color=BLUE, alpha=0.75, rwidth=0.9)
+            each.set_title(label_of(name), fontsize=8.5)
+        figure.supxlabel(f"rank of the true value [0 to {RANKED}]", fontsize=9)
+        figure.supylabel("campaigns", fontsize=9)
+    return figure
