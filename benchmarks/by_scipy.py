@@ -5,10 +5,12 @@ is ours, compiled; what such a call costs beside what it computes is measured to
 """
 
 import time
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 from scipy.integrate import odeint
 
 from benchmarks.motion import SAMPLES, STATE_SCALE, period_harmonics, settling_periods, state_rates
@@ -38,17 +40,8 @@ def measure(task: Task, reference: Harmonics, tell: Tell) -> Outcome:
     began = time.perf_counter()
     for frequency, periods in zip(task.frequency, settling_periods(task.frequency, SETTLING_S), strict=True):
         tell(f"scipy: {frequency:g} Hz")
-        instants = np.append(0.0, (periods + np.arange(SAMPLES + 1) / SAMPLES) / frequency)
-        found = odeint(
-            right_side,
-            task.rest,
-            instants,
-            args=(2.0 * np.pi * frequency,),
-            rtol=TOLERANCE,
-            atol=TOLERANCE * STATE_SCALE,
-            mxstep=MOST_STEPS,
-        )
-        states.append(found[1:])
+        omega = 2.0 * np.pi * frequency
+        states.append(integrate_dwell(right_side, task.rest, frequency, periods, (omega,)))
     seconds, dwells = time.perf_counter() - began, task.frequency.size
     errors = errors_percent(period_harmonics(task, np.stack(states)), reference)
     inside_us = _cost_inside(task)
@@ -68,6 +61,30 @@ def measure(task: Task, reference: Harmonics, tell: Tell) -> Outcome:
             "that alone, times the calls.",
         ),
     )
+
+
+def integrate_dwell(
+    right_side: Callable[..., NDArray[np.float64]],
+    rest: NDArray[np.float64],
+    frequency: float,
+    periods: float,
+    given: tuple[object, ...],
+) -> NDArray[np.float64]:
+    """States over one period after so many ``periods`` from ``rest``, (1 + SAMPLES, x).
+
+    ``right_side`` (state, t, *given) is d(state)/dt in a dwell at ``frequency`` [Hz].
+    """
+    instants = np.append(0.0, (periods + np.arange(SAMPLES + 1) / SAMPLES) / frequency)
+    found: NDArray[np.float64] = odeint(
+        right_side,
+        rest,
+        instants,
+        args=given,
+        rtol=TOLERANCE,
+        atol=TOLERANCE * STATE_SCALE,
+        mxstep=MOST_STEPS,
+    )
+    return found[1:]
 
 
 def _cost_inside(task: Task) -> float:

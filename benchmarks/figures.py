@@ -61,6 +61,31 @@ FIGURES: dict[str, Figure] = {
     "fit_cold_s": Figure("s", ".1f", "`savgs-ident fit` on the shipped campaign, whole process, first time."),
     "fit_cached_s": Figure("s", ".1f", "The same again, with the compiled programs on disk."),
     "fit_peak_mb": Figure("MB", ".0f", "Most memory that either took."),
+    "posterior_ess_per_s_emcee": Figure(
+        "1/s",
+        ".2f",
+        "Effective draws per second of `savgs-ident posterior` by emcee, whole process, programs on disk.",
+    ),
+    "posterior_ess_per_s_nuts": Figure("1/s", ".2f", "The same by NUTS."),
+    "posterior_wall_s": Figure("s", ".1f", "The slower of these two processes."),
+    "posterior_ess_per_s_scipy": Figure(
+        "1/s", ".2g", "The same by emcee's own move and a likelihood that integrates by scipy, extrapolated."
+    ),
+    "speedup_posterior_scipy": Figure(
+        "x", ",.0f", "How many times longer that takes for an effective draw than our emcee (extrapolated)."
+    ),
+    "scipy_likelihood_s": Figure(
+        "s", ".1f", "An evaluation of that likelihood, all dwells, from single dwells at posterior draws."
+    ),
+    "stretch_autocorrelation": Figure(
+        "", ".0f", "Evaluations that emcee's own move needs for an effective draw, on the surrogate."
+    ),
+    "collocation_s": Figure(
+        "s", ".1f", "The fit's cross-check: the same parameters from the samples, by CasADi and IPOPT."
+    ),
+    "collocation_worst_sd": Figure(
+        "", ".2f", "Furthest that one of the four parameters is from the fit, in standard errors of the fit."
+    ),
     "mcap_samples_per_s": Figure(
         "1/s", ",.0f", "Samples (of six channels) read per second from a long MCAP file."
     ),

@@ -5,7 +5,17 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-_PACKAGES = ("savgs-ident", "jax", "numpy", "scipy", "diffrax", "harmonicbalance")
+_PACKAGES = (
+    "savgs-ident",
+    "jax",
+    "numpy",
+    "scipy",
+    "diffrax",
+    "harmonicbalance",
+    "emcee",
+    "blackjax",
+    "casadi",
+)
 
 
 def describe_machine() -> dict[str, str | float]:

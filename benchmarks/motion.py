@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from benchmarks.task import ORDERS, Harmonics, Task
 from savgs_ident.model.dynamics import Coordinates
 from savgs_ident.model.kinematics import suspension_travel
-from savgs_ident.model.quarter_car import Inputs
+from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.model.section import SectionCurves
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
+from savgs_ident.model.values import Values
 from savgs_ident.simulate.rates import solve_rates
 
 STATE_SCALE = np.array([1e-2, 3e-2, 1e-1, 3e-1, 1e-2])
@@ -31,8 +33,15 @@ def state_rates(
     """d(state)/dt at a phase of the cam [rad] that turns with ``omega`` [rad/s]."""
     road = Road(task.amplitude * jnp.cos(phase), -task.amplitude * omega * jnp.sin(phase))
     link = Link(jnp.full_like(phase, task.link_angle), jnp.zeros_like(phase))
+    return driven_rates(task.model, task.values, task.curves, state, Inputs(road, link))
+
+
+def driven_rates(
+    model: QuarterCar, values: Values, curves: SectionCurves, state: Float[Array, " x"], inputs: Inputs
+) -> Float[Array, " x"]:
+    """d(state)/dt of a rig that road and link drive."""
     q, qd, s = Coordinates(state[0], state[1]), Coordinates(state[2], state[3]), state[4:]
-    rates = solve_rates(task.model, task.values, q, qd, s, Inputs(road, link), task.curves)
+    rates = solve_rates(model, values, q, qd, s, inputs, curves)
     return jnp.concatenate([state[2:4], jnp.stack(rates.qdd), rates.sd])
 
 

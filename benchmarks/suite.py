@@ -5,32 +5,64 @@ from typing import NamedTuple
 
 from benchmarks.outcome import Outcome, Tell
 
-NAMES = ("response", "harmonicbalance", "scipy", "diffrax", "fit", "mcap")
+NAMES = (
+    "response", "harmonicbalance", "scipy", "diffrax", "fit", "posterior", "posterior-scipy", "collocation", "mcap",
+)  # fmt: skip
 """What can be asked for."""
 
 PEERS = ("harmonicbalance", "scipy", "diffrax")
 
 
 class Size(NamedTuple):
-    """How much is run: dwells [Hz] and minutes of MCAP."""
+    """How much is run.
+
+    Attributes:
+        dwells_hz: dwells [Hz].
+        mcap_minutes: length of the MCAP file.
+        target_ess: effective sample size that the posterior's samplers are to reach.
+        integrations: of single dwells by scipy, for the time of a likelihood.
+        stretch_steps: of emcee's own move, at most.
+    """
 
     dwells_hz: tuple[float, ...]
     mcap_minutes: float
+    target_ess: float
+    integrations: int
+    stretch_steps: int
 
 
 def run_suite(names: Sequence[str], size: Size, tell: Tell) -> Outcome:
-    """Run the named benchmarks; a peer brings our own response along, to be compared with."""
-    outcome = Outcome()
-    if "fit" in names or "mcap" in names:
-        from benchmarks.processes import measure_fit, measure_mcap
-
-        if "fit" in names:
-            outcome += measure_fit(tell)
-        if "mcap" in names:
-            outcome += measure_mcap(size.mcap_minutes, tell)
+    """Run the named benchmarks; a peer brings our own figures along, to be compared with."""
+    outcome = _processes(names, size, tell)
     if {"response", *PEERS} & set(names):
         outcome += _responses(names, size.dwells_hz, tell)
+    # What follows compiles, and what times compilation has gone before.
+    if "posterior-scipy" in names:
+        from benchmarks import posterior_by_scipy
+
+        outcome += posterior_by_scipy.measure(size.dwells_hz, size.integrations, size.stretch_steps, tell)
+    if "collocation" in names:
+        from benchmarks import cross_check
+
+        outcome += cross_check.measure(size.dwells_hz, tell)
     return outcome + Outcome(speedups(outcome.figures))
+
+
+def _processes(names: Sequence[str], size: Size, tell: Tell) -> Outcome:
+    outcome = Outcome()
+    if "fit" in names:
+        from benchmarks.processes import measure_fit
+
+        outcome += measure_fit(tell)
+    if {"posterior", "posterior-scipy"} & set(names):
+        from benchmarks.posterior_process import measure_posterior
+
+        outcome += measure_posterior(size.target_ess, tell)
+    if "mcap" in names:
+        from benchmarks.processes import measure_mcap
+
+        outcome += measure_mcap(size.mcap_minutes, tell)
+    return outcome
 
 
 def _responses(names: Sequence[str], dwells_hz: tuple[float, ...], tell: Tell) -> Outcome:
@@ -56,7 +88,8 @@ def _responses(names: Sequence[str], dwells_hz: tuple[float, ...], tell: Tell) -
 def speedups(figures: Mapping[str, float]) -> dict[str, float]:
     """How many times longer each measured peer takes than this package, for value and for gradient.
 
-    A peer's gradient is taken as one run and four more, by finite differences.
+    A peer's gradient is taken as one run and four more, by finite differences; the posterior's peer is emcee
+    with a likelihood by scipy.
     """
     ratios = {}
     for peer in PEERS:
@@ -65,4 +98,7 @@ def speedups(figures: Mapping[str, float]) -> dict[str, float]:
             ratios[f"speedup_{peer}"] = theirs / figures["response_ms_per_frequency"]
             ours = figures["response_ms_per_frequency"] * figures["gradient_over_value_cold"]
             ratios[f"speedup_gradient_{peer}"] = 5.0 * theirs / ours
+    draws, fewer = (figures.get(f"posterior_ess_per_s_{each}") for each in ("emcee", "scipy"))
+    if draws is not None and fewer is not None:
+        ratios["speedup_posterior_scipy"] = draws / fewer
     return ratios

@@ -10,7 +10,7 @@ from rich.console import Console
 from benchmarks import __main__ as program
 from benchmarks.figures import FIGURES
 from benchmarks.outcome import Outcome
-from benchmarks.suite import NAMES, Size, speedups
+from benchmarks.suite import NAMES, Size, run_suite, speedups
 from benchmarks.table import make_table
 
 CONTRACT = (
@@ -23,6 +23,9 @@ CONTRACT = (
     "fit_cold_s",
     "fit_cached_s",
     "fit_peak_mb",
+    "posterior_ess_per_s_emcee",
+    "posterior_ess_per_s_nuts",
+    "posterior_wall_s",
     "mcap_samples_per_s",
     "mcap_peak_mb",
 )
@@ -41,6 +44,34 @@ def test_speedups_are_ratios_to_the_cold_start() -> None:
         "scipy_ms_per_frequency": 400.0,
     }
     assert speedups(figures) == pytest.approx({"speedup_scipy": 40.0, "speedup_gradient_scipy": 160.0})
+
+
+def test_speedup_of_the_posterior_is_a_ratio_of_draws_per_second() -> None:
+    figures = {"posterior_ess_per_s_emcee": 25.0, "posterior_ess_per_s_nuts": 20.0}
+    assert speedups(figures) == {}
+    both = figures | {"posterior_ess_per_s_scipy": 5e-5}
+    assert speedups(both) == pytest.approx({"speedup_posterior_scipy": 5e5})
+
+
+def test_what_is_asked_for_runs_with_what_it_is_compared_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The posterior's peer brings the package's own processes along, and nothing else."""
+
+    def stands_in(place: str, name: str, outcome: Outcome) -> None:
+        monkeypatch.setattr(f"benchmarks.{place}.{name}", lambda *size: outcome)
+
+    stands_in("posterior_process", "measure_posterior", Outcome({"posterior_ess_per_s_emcee": 20.0}))
+    stands_in("posterior_by_scipy", "measure", Outcome({"posterior_ess_per_s_scipy": 0.5}))
+    stands_in("cross_check", "measure", Outcome({"collocation_s": 30.0}))
+    wanted = {"posterior": 1, "posterior-scipy": 3, "collocation": 1}
+    for name, count in wanted.items():
+        figures = run_suite((name,), program.QUICK, lambda line: None).figures
+        assert len(figures) == count
+    assert run_suite(tuple(wanted), program.QUICK, lambda line: None).figures == {
+        "posterior_ess_per_s_emcee": 20.0,
+        "posterior_ess_per_s_scipy": 0.5,
+        "speedup_posterior_scipy": 40.0,
+        "collocation_s": 30.0,
+    }
 
 
 def test_outcomes_add_up() -> None:

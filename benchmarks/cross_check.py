@@ -1,0 +1,36 @@
+"""The cross-check of the fit by collocation in CasADi: how long it takes, and how well the two agree."""
+
+from collections.abc import Mapping, Sequence
+
+from benchmarks.campaign import read_dwells, response_of
+from benchmarks.outcome import Outcome, Tell
+from savgs_ident.core.rig import default_rig_path, read_rig
+from savgs_ident.effects.registry import MODELS
+from savgs_ident.fit.collocation.crosscheck import fit_by_collocation
+from savgs_ident.fit.least_squares import FREE, fit_least_squares
+from savgs_ident.fit.result import Estimate
+
+
+def measure(dwells_hz: Sequence[float], tell: Tell) -> Outcome:
+    """The paper's four parameters from the samples by IPOPT, beside those from the harmonics."""
+    campaign, rig, effects = read_dwells(dwells_hz), read_rig(default_rig_path()), MODELS["simtr"]
+    measured = response_of(campaign)
+    tell("collocation: the fit to compare with")
+    by_harmonics = fit_least_squares(measured, rig, effects=effects, free=FREE)
+    tell("collocation")
+    by_samples = fit_by_collocation(campaign, measured, rig, effects=effects, free=FREE, progress=tell)
+    apart = distances(by_samples.by_name, by_harmonics.by_name)
+    notes = [
+        f"collocation: {by_samples.unknowns} unknowns, {by_samples.iterations} iterations of IPOPT; furthest "
+        f"from the fit is {max(apart, key=apart.__getitem__)}."
+    ]
+    if not by_samples.status.ok:
+        notes.append(f"collocation: not solved ({by_samples.status.advice}), so its figures mean nothing.")
+    return Outcome(
+        {"collocation_s": by_samples.wall_s, "collocation_worst_sd": max(apart.values())}, tuple(notes)
+    )
+
+
+def distances(found: Mapping[str, Estimate], known: Mapping[str, Estimate]) -> dict[str, float]:
+    """How far the paper's four parameters are from known ones, in standard errors of the latter."""
+    return {name: abs(found[name].value - known[name].value) / known[name].stderr for name in FREE}
