@@ -21,8 +21,8 @@ from benchmarks.suite import NAMES, Size, run_suite
 from benchmarks.table import make_table, print_table
 from benchmarks.task import DWELLS_HZ, QUICK_HZ
 
-FULL = Size(DWELLS_HZ, 60.0, target_ess=1000.0, integrations=308, stretch_steps=120_000)
-QUICK = Size(QUICK_HZ, 2.0, target_ess=100.0, integrations=24, stretch_steps=4000)
+FULL = Size(DWELLS_HZ, 60.0, target_ess=1000.0, integrations=308, stretch_steps=150_000)
+QUICK = Size(QUICK_HZ, 2.0, target_ess=100.0, integrations=24, stretch_steps=5000)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -22,7 +22,7 @@ from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.posterior.surrogate import Surrogate
 
 LONG_ENOUGH = 50.0
-"""Autocorrelation times that a run must last for emcee to trust its estimate of them."""
+"""Autocorrelation times that a run must last, as emcee asks for."""
 
 WINDOW = 5.0
 """Autocorrelation times over which correlations are summed."""
@@ -44,7 +44,7 @@ class Stretching(NamedTuple):
 
     @property
     def trusted(self) -> bool:
-        """Whether the run was long enough; the autocorrelation time of a short one is a lower bound."""
+        """Whether the run was long enough for more than a rough figure."""
         return self.steps >= LONG_ENOUGH * self.autocorrelation
 
 
@@ -64,7 +64,8 @@ def stretch(posed: PosteriorProblem, most_steps: int, tell: Tell) -> Stretching:
     while True:
         walkers = []
         for reached in sampler.sample(state, iterations=BLOCK, thin_by=THINNING, store=False):
-            walkers.append(reached.coords)
+            # emcee moves its walkers in place.
+            walkers.append(reached.coords.copy())
             state = reached
         seen.append(_identified(free, surrogate.points(np.stack(walkers))))
         found = Stretching(

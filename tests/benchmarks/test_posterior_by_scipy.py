@@ -132,5 +132,5 @@ def test_the_stretch_move_needs_hundreds_of_evaluations(posed: PosteriorProblem)
     """In forty dimensions one step of a walker is worth little; a short run says so too."""
     found = stretch(posed, 5000, lambda line: None)
     assert found.steps == 5000
-    assert found.autocorrelation > 100.0
+    assert 100.0 < found.autocorrelation < 0.5 * found.steps
     assert not found.trusted
