@@ -19,16 +19,15 @@ def measure(dwells_hz: Sequence[float], tell: Tell) -> Outcome:
     by_harmonics = fit_least_squares(measured, rig, effects=effects, free=FREE)
     tell("collocation")
     by_samples = fit_by_collocation(campaign, measured, rig, effects=effects, free=FREE, progress=tell)
+    took = Outcome({"collocation_s": by_samples.wall_s})
+    if not by_samples.status.ok:
+        return took + Outcome({}, (f"collocation: NOT SOLVED: {by_samples.status.advice}.",))
     apart = distances(by_samples.by_name, by_harmonics.by_name)
-    notes = [
+    note = (
         f"collocation: {by_samples.unknowns} unknowns, {by_samples.iterations} iterations of IPOPT; furthest "
         f"from the fit is {max(apart, key=apart.__getitem__)}."
-    ]
-    if not by_samples.status.ok:
-        notes.append(f"collocation: not solved ({by_samples.status.advice}), so its figures mean nothing.")
-    return Outcome(
-        {"collocation_s": by_samples.wall_s, "collocation_worst_sd": max(apart.values())}, tuple(notes)
     )
+    return took + Outcome({"collocation_worst_sd": max(apart.values())}, (note,))
 
 
 def distances(found: Mapping[str, Estimate], known: Mapping[str, Estimate]) -> dict[str, float]:

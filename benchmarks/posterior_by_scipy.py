@@ -1,7 +1,7 @@
 """emcee as most would set it up: its own move, and a likelihood that integrates every dwell by scipy.
 
-A run of any use would take months, so its figure is put together from its two parts: how long an evaluation of the likelihood
-takes (:mod:`benchmarks.scipy_likelihood`) and how many evaluations make an independent draw
+A run of any use would take months, so its figure is put together from its two parts: how long an evaluation
+of the likelihood takes (:mod:`benchmarks.scipy_likelihood`) and how many evaluations make an independent draw
 (:mod:`benchmarks.stretch_moves`).
 """
 

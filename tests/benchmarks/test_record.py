@@ -10,8 +10,9 @@ from rich.console import Console
 from benchmarks import __main__ as program
 from benchmarks.figures import FIGURES
 from benchmarks.outcome import Outcome
-from benchmarks.suite import NAMES, Size, run_suite, speedups
+from benchmarks.suite import NAMES, Size, posterior_speedup, run_suite, speedups
 from benchmarks.table import make_table
+from benchmarks.task import DWELLS_HZ, QUICK_HZ
 
 CONTRACT = (
     "response_ms_per_frequency",
@@ -47,10 +48,12 @@ def test_speedups_are_ratios_to_the_cold_start() -> None:
 
 
 def test_speedup_of_the_posterior_is_a_ratio_of_draws_per_second() -> None:
+    """Of the same posterior: a peer that sampled fewer dwells than our processes did is not compared."""
     figures = {"posterior_ess_per_s_emcee": 25.0, "posterior_ess_per_s_nuts": 20.0}
-    assert speedups(figures) == {}
+    assert posterior_speedup(figures, DWELLS_HZ) == {}
     both = figures | {"posterior_ess_per_s_scipy": 5e-5}
-    assert speedups(both) == pytest.approx({"speedup_posterior_scipy": 5e5})
+    assert posterior_speedup(both, DWELLS_HZ) == pytest.approx({"speedup_posterior_scipy": 5e5})
+    assert posterior_speedup(both, QUICK_HZ) == {}
 
 
 def test_what_is_asked_for_runs_with_what_it_is_compared_with(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,9 +67,9 @@ def test_what_is_asked_for_runs_with_what_it_is_compared_with(monkeypatch: pytes
     stands_in("cross_check", "measure", Outcome({"collocation_s": 30.0}))
     wanted = {"posterior": 1, "posterior-scipy": 3, "collocation": 1}
     for name, count in wanted.items():
-        figures = run_suite((name,), program.QUICK, lambda line: None).figures
+        figures = run_suite((name,), program.FULL, lambda line: None).figures
         assert len(figures) == count
-    assert run_suite(tuple(wanted), program.QUICK, lambda line: None).figures == {
+    assert run_suite(tuple(wanted), program.FULL, lambda line: None).figures == {
         "posterior_ess_per_s_emcee": 20.0,
         "posterior_ess_per_s_scipy": 0.5,
         "speedup_posterior_scipy": 40.0,
