@@ -26,3 +26,9 @@ class Chains(NamedTuple):
     divergences: int
     evaluations: int
     unsolved: int
+
+
+def unsettled(log_density: Float[np.ndarray, "S C"]) -> int:
+    """Leading steps at which some chain has been nowhere yet where the model is solved."""
+    solved = np.isfinite(log_density).all(axis=1)
+    return int(np.argmax(solved)) if solved.any() else len(solved)

@@ -20,7 +20,7 @@ import numpy as np
 from emcee.backends import HDFBackend
 from jaxtyping import Float
 
-from savgs_ident.posterior.chains import Chains
+from savgs_ident.posterior.chains import Chains, unsettled
 from savgs_ident.posterior.decide import decide
 from savgs_ident.posterior.exact import ExactModel
 from savgs_ident.posterior.keep import Keep
@@ -30,7 +30,7 @@ from savgs_ident.posterior.walk import walk
 WALKERS = 8
 
 BURN_IN = 4
-"""Steps left out: the walkers begin on the surrogate, a step or two from the posterior."""
+"""Steps left out at least: the walkers begin on the surrogate, a step or two from the posterior."""
 
 _FIRST_WALK = 20
 _STRIDE = 4
@@ -48,10 +48,12 @@ def sample_by_emcee(exact: ExactModel, surrogate: Surrogate, seed: int, keep: Ke
         )
         state = sampler.get_last_sample() if backend.iteration else _first_state(surrogate, seed)
         while True:
-            # The walkers move each by itself: that there are fewer than dimensions does not matter to them.
-            for reached in sampler.sample(state, iterations=_STRIDE, skip_initial_state_check=True):
-                keep.publish(scratch, tally.counts)
-                state = reached
+            # A walker that began where the model is not solved compares minus infinity with itself.
+            with np.errstate(invalid="ignore"):
+                # The walkers move each by itself: that there are fewer than dimensions does not matter to them.
+                for reached in sampler.sample(state, iterations=_STRIDE, skip_initial_state_check=True):
+                    keep.publish(scratch, tally.counts)
+                    state = reached
             yield _chains(sampler, tally)
 
 
@@ -62,10 +64,11 @@ def _first_state(surrogate: Surrogate, seed: int) -> emcee.State:
 
 
 def _chains(sampler: emcee.EnsembleSampler, tally: "_Tally") -> Chains:
-    points = sampler.get_chain(discard=BURN_IN)
-    moved = np.any(np.diff(sampler.get_chain(discard=BURN_IN - 1), axis=0) != 0.0, axis=2)
+    points, log_density = sampler.get_chain(), sampler.get_log_prob()
+    begin = max(BURN_IN, unsettled(log_density))
+    moved = np.any(np.diff(points[begin - 1 :], axis=0) != 0.0, axis=2)
     evaluations, unsolved = tally.counts
-    return Chains(points, sampler.get_log_prob(discard=BURN_IN), moved, np.zeros(0), 0, evaluations, unsolved)
+    return Chains(points[begin:], log_density[begin:], moved, np.zeros(0), 0, evaluations, unsolved)
 
 
 class _Tally:

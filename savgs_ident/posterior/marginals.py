@@ -25,6 +25,9 @@ _ABOUT = {
     "discrepancy": "relative rms by which the model misses, beyond the noise",
 }
 
+_STEP = 1e-5
+"""Step of a coordinate for the slope of a value."""
+
 
 def names_by_role(free: FreeVector) -> dict[str, Role]:
     """All names with their roles: identified, nuisance, tolerated."""
@@ -92,11 +95,12 @@ def _laplace_sd(case: Case, surrogate: Surrogate, top: Top) -> dict[str, float]:
     point = surrogate.points(top.t)
     found = {}
     for place, name in enumerate((*case.problem.free.names, *NUISANCE)):
-        step = 1e-4 * np.eye(1, point.size, place)
+        # Away from zero, where the discrepancy, a magnitude, has a kink.
+        step = np.copysign(_STEP, point[place]) * np.eye(1, point.size, place)
         moved = values_of(
-            case.problem.free, case.likelihood.scales, np.concatenate([point - step, point + step])
+            case.problem.free, case.likelihood.scales, np.concatenate([point[None], point + step])
         )
-        found[name] = float(abs(np.diff(moved[name])[0]) / 2e-4 * deviation[place])
+        found[name] = float(abs(np.diff(moved[name])[0]) / _STEP * deviation[place])
     return found
 
 

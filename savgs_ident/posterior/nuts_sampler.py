@@ -23,7 +23,7 @@ import numpy as np
 from blackjax.adaptation.step_size import dual_averaging_adaptation
 from jaxtyping import Array, Float
 
-from savgs_ident.posterior.chains import Chains
+from savgs_ident.posterior.chains import Chains, unsettled
 from savgs_ident.posterior.decide import decide
 from savgs_ident.posterior.exact import ExactModel
 from savgs_ident.posterior.keep import Keep
@@ -110,11 +110,13 @@ def _chains(state: _State, seed: int, evaluations: int, unsolved: int) -> Chains
             moved[step] = ~(np.log(uniform.random(chains)) >= state.log_ratio[step] - before)
         taken[step] = np.where(moved[step], step, taken[step - 1])
     chain = np.arange(chains)
+    log_density = state.log_density[taken, chain]
+    begin = unsettled(log_density)
     ratios = state.log_ratio[np.isfinite(state.log_ratio)]
     return Chains(
-        state.proposals[taken, chain],
-        state.log_density[taken, chain],
-        moved,
+        state.proposals[taken, chain][begin:],
+        log_density[begin:],
+        moved[begin:],
         ratios,
         int(state.divergences),
         evaluations,
