@@ -24,7 +24,7 @@ from savgs_ident.responses.estimate import estimate_response
 from savgs_ident.simulate.compilation import use_persistent_cache
 from savgs_ident.simulate.measured import MODELLED_CHANNELS
 
-DRAWS = 200.0
+DRAWS = 100.0
 """Effective sample size of a trial's posterior: enough for its ranks and the ends of its intervals."""
 
 

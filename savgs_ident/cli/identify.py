@@ -12,7 +12,7 @@ import numpy as np
 from savgs_ident.cli.compare import draw_comparison
 from savgs_ident.cli.console import Progress, Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
-from savgs_ident.cli.models import ModelName, effects_of, free_parameters
+from savgs_ident.cli.models import ModelName, effects_of, free_parameters, rig_before
 from savgs_ident.cli.selection import up_to_frequency
 from savgs_ident.core.rig import Rig, read_rig, write_rig
 from savgs_ident.core.status import Status
@@ -51,8 +51,9 @@ def identify(job: Job, voice: Voice, out: Path) -> int:
     """Fit, write fit.json, model.toml, bode.png and bode.pdf to ``out``, and tell; the exit code."""
     prepare_folder(out)
     use_persistent_cache()
-    drawing = read_rig(job.rig)
     effects = effects_of(job.model)
+    # A rig that was identified before brings what was known then; its values would count the data twice.
+    drawing = rig_before(read_rig(job.rig), effects, job.rig)
     free = free_parameters(job.free, job.model, model_parameters(drawing, effects))
     with voice.working() as progress:
         progress(f"reading {job.campaign}")

@@ -40,6 +40,15 @@ def posterior(
     time_limit: Annotated[
         float, typer.Option("--time-limit", metavar="SECONDS", min=1.0, help="Stop sampling after this.")
     ] = 600.0,
+    patience: Annotated[
+        float,
+        typer.Option(
+            "--patience",
+            metavar="SECONDS",
+            min=0.0,
+            help="Go on beyond the target up to this, for medians to a fortieth of their sd.",
+        ),
+    ] = 85.0,
     max_frequency: Annotated[
         float | None, typer.Option("--max-frequency", metavar="HZ", help="Leave out faster dwells.")
     ] = None,
@@ -70,6 +79,7 @@ def posterior(
         sampler=sampler.value,
         target_ess=target_ess,
         time_limit_s=time_limit,
+        patience_s=patience,
         fixed_tolerances=fixed_tolerances,
         orders=orders,
         seed=seed,

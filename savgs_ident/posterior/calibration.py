@@ -6,7 +6,8 @@ of every true value among its posterior's draws is uniform, and 95 % intervals h
 (Talts, Betancourt, Simpson, Vehtari and Gelman, 2018).
 
 The priors are narrower than those of an identification, which reach to where the rig does not move at all:
-identified parameters lie within :data:`ROOM` of the given values, the discrepancy is a tenth of the usual.
+identified parameters lie within :data:`ROOM` of the given values, and the discrepancy is about as large as the
+noise.
 """
 
 from dataclasses import dataclass, replace
@@ -37,7 +38,7 @@ from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, simulate_
 ROOM = 0.35
 """How far the identified parameters are drawn to either side of the given values, relative."""
 
-SCALES = Scales(discrepancy=0.005)
+SCALES = Scales(discrepancy=0.001)
 
 INTERVAL = 0.95
 

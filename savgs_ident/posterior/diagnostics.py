@@ -27,6 +27,9 @@ R_HAT = 1.01
 R_HAT_OTHERS = 1.05
 """The same for the tolerated parameters and the nuisance scales, of which nobody reads quantiles."""
 
+PRECISE = 0.025
+"""Monte-Carlo error of a median, in standard deviations of the posterior, below which more draws are no use."""
+
 PARETO_K = 0.7
 """Pareto index of the weights up to which the surrogate covers the posterior."""
 
@@ -55,8 +58,19 @@ def mixing_of(draws: Float[np.ndarray, "S C"]) -> Mixing:
 
 def least_ess(mixing: Sequence[Mixing]) -> float:
     """The least of bulk and tail over several parameters; 0 where nothing can be said."""
-    least = min((min(each.ess_bulk, each.ess_tail) for each in mixing), default=np.nan)
+    # NumPy's minimum is NaN if one of them is; Python's depends on their order.
+    least = np.min([(each.ess_bulk, each.ess_tail) for each in mixing]) if mixing else np.nan
     return float(least) if np.isfinite(least) else 0.0
+
+
+def enough(mixing: Sequence[Mixing], target: float) -> bool:
+    """Whether identified parameters have mixed and reached the effective sample size asked for."""
+    return least_ess(mixing) >= target and all(each.r_hat <= R_HAT for each in mixing)
+
+
+def precise(mixing: Sequence[Mixing]) -> bool:
+    """Whether medians are known to :data:`PRECISE`: that of a normal has the error sqrt(pi / 2) / sqrt(ess)."""
+    return least_ess(mixing) >= 0.5 * np.pi / PRECISE**2
 
 
 def judge_chains(
@@ -68,9 +82,10 @@ def judge_chains(
 ) -> Convergence:
     """Whether the draws may be used; ``doubts`` are reasons against it that are known already."""
     ess = least_ess(identified)
-    r_hat = max((each.r_hat for each in identified), default=np.nan)
-    r_hat_others = max((each.r_hat for each in others), default=1.0)
-    k = float(array_stats.psislw(chains.log_ratio)[1]) if chains.log_ratio.size > 20 else np.nan
+    r_hat = _greatest_r_hat(identified) if identified else np.nan
+    r_hat_others = _greatest_r_hat(others) if others else 1.0
+    # ArviZ takes log likelihoods, of which the logarithms of the weights are the negatives.
+    k = float(array_stats.psislw(-chains.log_ratio)[1]) if chains.log_ratio.size > 20 else np.nan
     diverging = chains.divergences / max(chains.evaluations, 1)
     acceptance = float(np.mean(chains.accepted)) if chains.accepted.size else 0.0
     reasons = list(doubts)
@@ -86,19 +101,23 @@ def judge_chains(
         reasons.append(f"the surrogate does not cover the posterior: Pareto k is {k:.2f}, above {PARETO_K}")
     if diverging > DIVERGING:
         reasons.append(f"{chains.divergences} trajectories diverged")
-    worst = float(np.nanmax([r_hat, r_hat_others]))
     return Convergence(
         converged=not reasons,
         reasons=tuple(reasons),
         target_ess=target,
         ess_min=ess,
-        r_hat_max=worst,
+        r_hat_max=float(np.fmax(r_hat, r_hat_others)),
         acceptance=acceptance,
         divergences=chains.divergences,
         pareto_k=k,
         evaluations=chains.evaluations,
         unsolved=chains.unsolved,
     )
+
+
+def _greatest_r_hat(mixing: Sequence[Mixing]) -> float:
+    """NaN if one of them is."""
+    return float(np.max([each.r_hat for each in mixing]))
 
 
 def _autocorrelation(draws: Float[np.ndarray, "S C"]) -> float:

@@ -30,7 +30,7 @@ from savgs_ident.simulate.periodic import (
 )
 from savgs_ident.simulate.stored import placed, stored
 
-ENOUGH = 1e-5
+ENOUGH = 1e-4
 """Last relative Newton step at which a motion near the anchor counts as solved; what is left is far smaller, and that
 is a hundredth of what the noise hides."""
 

@@ -20,7 +20,7 @@ from savgs_ident.fit.target import harmonic_target
 from savgs_ident.fit.task import Task, plan_task
 from savgs_ident.posterior.advice import advise
 from savgs_ident.posterior.chains import Chains
-from savgs_ident.posterior.diagnostics import R_HAT, judge_chains, least_ess, mixing_of
+from savgs_ident.posterior.diagnostics import enough, judge_chains, least_ess, mixing_of, precise
 from savgs_ident.posterior.expand import Expansion, expand
 from savgs_ident.posterior.keep import Keep, digest_of, new_keep, open_keep
 from savgs_ident.posterior.likelihood import likelihood_of
@@ -140,7 +140,9 @@ def _keep(question: Question, settings: SamplingSettings, chain: Path | None, re
             "damper": (question.rig.damper_velocity, question.rig.damper_force),
             "values": sorted(question.values.items()),
             "model": (question.effects, question.free),
-            "settings": replace(settings, target_ess=0.0, time_limit_s=0.0, predictive_draws=0),
+            "settings": replace(
+                settings, target_ess=0.0, time_limit_s=0.0, patience_s=0.0, predictive_draws=0
+            ),
             "version": __version__,
         }
     )
@@ -150,7 +152,10 @@ def _keep(question: Question, settings: SamplingSettings, chain: Path | None, re
 def _run(
     expansion: Expansion, settings: SamplingSettings, keep: Keep, began: float, tell: Progress
 ) -> Chains:
-    """Chains until they are long enough or time is up."""
+    """Chains until they are long enough or time is up.
+
+    Raises :class:`InputError` if by then the model was solved at no proposal.
+    """
     count = len(expansion.exact.problem.free.identified)
     sampler = SAMPLERS[settings.sampler](*expansion, settings.seed, keep)
     while True:
@@ -161,10 +166,17 @@ def _run(
             f"{settings.sampler}: {len(chains.points)} steps of {chains.points.shape[1]} chains, effective "
             f"sample size {ess:.0f} of {settings.target_ess:.0f}, {spent:.0f} s"
         )
-        mixed = all(each.r_hat <= R_HAT for each in mixing)
-        if (ess >= settings.target_ess and mixed) or spent > settings.time_limit_s:
+        done = enough(mixing, settings.target_ess) and (precise(mixing) or spent > settings.patience_s)
+        late = spent > settings.time_limit_s
+        # The first steps are left out: until there is a draw there is nothing to sum up.
+        if done or (late and len(chains.points)):
             sampler.close()
             return chains
+        if late and chains.unsolved == chains.evaluations:
+            raise InputError(
+                "the model has a periodic motion at none of the points that the surrogate proposes",
+                remedy="identify it first: savgs-ident fit",
+            )
 
 
 def _summed_up(answer: _Answer, question: Question, settings: SamplingSettings, wall_s: float) -> Posterior:
@@ -190,6 +202,6 @@ def _summed_up(answer: _Answer, question: Question, settings: SamplingSettings, 
         convergence=convergence,
         predictive=predict(answer.expansion.exact, chains, settings.predictive_draws, settings.seed),
         measured=question.measured,
-        sentences=sentences_of(marginals, draws, convergence, advise(answer.task, answer.mode, draws)),
+        sentences=sentences_of(marginals, draws, advise(answer.task, answer.mode, draws)),
         wall_s=wall_s,
     )

@@ -14,6 +14,8 @@ class SamplingSettings:
         sampler: "emcee" or "nuts".
         target_ess: effective sample size, bulk and tail, that every identified parameter is to reach [1].
         time_limit_s: time after which sampling ends without [s].
+        patience_s: time up to which sampling goes on beyond the target [s], until the Monte-Carlo error of every
+            median is below :data:`savgs_ident.posterior.diagnostics.PRECISE`.
         fixed_tolerances: take the parameters with a tolerance as exact instead of marginalising over them.
         orders: highest harmonic order that is compared.
         seed: of all random numbers.
@@ -24,6 +26,7 @@ class SamplingSettings:
     sampler: Sampler = "emcee"
     target_ess: float = 1000.0
     time_limit_s: float = 600.0
+    patience_s: float = 85.0
     fixed_tolerances: bool = False
     orders: int = 9
     seed: int = 1

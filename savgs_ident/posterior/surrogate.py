@@ -6,8 +6,7 @@ With v one standard deviation along the principal axes, point = centre + scale v
 
 and a shear (:mod:`savgs_ident.posterior.shear`) leads to coordinates t in which the posterior is nearly a unit
 normal. The slopes are exact, the second derivatives their differences one standard deviation away. They are kept in a
-few shapes only (a singular value decomposition): what is left out is less than :data:`LEFT_OUT` standard
-deviations of noise. A surrogate proposes; the exact model decides.
+few shapes only (the leading ones of a singular value decomposition). A surrogate proposes; the exact model decides.
 """
 
 from typing import NamedTuple
@@ -23,8 +22,8 @@ from savgs_ident.posterior.prior import Prior
 from savgs_ident.posterior.scales import NUISANCE
 from savgs_ident.posterior.shear import Shear
 
-LEFT_OUT = 0.02
-"""Root of the summed squares of the second derivatives that are left out [noise sd]."""
+SHAPES = 48
+"""Most shapes that are kept. Their number does not depend on the data, so that programs serve for all."""
 
 
 class Bend(NamedTuple):
@@ -103,7 +102,5 @@ def bend_of(second: Float[np.ndarray, "n n m"], weight: Float[np.ndarray, " m"])
     first, other = np.triu_indices(symmetric.shape[0])
     pairs = symmetric[first, other] * np.where(first == other, 0.5, 1.0)[:, None] * weight
     left, sizes, right = np.linalg.svd(pairs, full_matrices=False)
-    below = np.sqrt(np.cumsum(sizes[::-1] ** 2))[::-1]
-    kept = int(np.sum(below > LEFT_OUT))
-    share = left[:, :kept] * sizes[:kept]
-    return Bend(first, other, jnp.asarray(share), jnp.asarray(right[:kept] / weight))
+    share = left[:, :SHAPES] * sizes[:SHAPES]
+    return Bend(first, other, jnp.asarray(share), jnp.asarray(right[:SHAPES] / weight))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.fit.identifiability import TOLD, known_combination, untold_groups, verdict_of
-from savgs_ident.posterior.result import Convergence, Marginal
+from savgs_ident.posterior.result import Marginal
 
 TIED = 0.8
 """Correlation of logarithms from which two parameters are said to trade off."""
@@ -21,7 +21,6 @@ CLOSE = 0.15
 def sentences_of(
     marginals: Sequence[Marginal],
     draws: Mapping[str, NDArray[np.float64]],
-    convergence: Convergence,
     advice: tuple[str, ...],
 ) -> tuple[str, ...]:
     """The statements of a report, the most important first."""
@@ -32,7 +31,6 @@ def sentences_of(
     units = {each.name: each.unit for each in identified}
     verdict = verdict_of(names, values, units, covariance, {}, advice)
     return (
-        *([] if convergence.converged else [f"Not converged: {'; '.join(convergence.reasons)}."]),
         *verdict.sentences,
         *_tied(names, covariance, untold_groups(names, covariance)),
         *_discrepancy(marginals),

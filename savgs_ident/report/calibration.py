@@ -30,7 +30,7 @@ def calibration_record(
     """
     solved = [trial for trial in trials if trial.solved]
     ranked = [trial for trial in solved if trial.found]
-    parameters = {
+    parameters: dict[str, dict[str, Any]] = {
         name: {
             "coverage": sum(trial.inside[name] for trial in ranked) / max(len(solved), 1),
             "uniformity": uniformity([trial.rank[name] for trial in ranked], BINS),

@@ -18,8 +18,9 @@ NUISANCE_WORDS: Mapping[str, str] = MappingProxyType(
             " 1 if that estimate is right."
         ),
         "discrepancy": (
-            "Relative rms by which the model is allowed to miss the first harmonic of each channel beyond noise,"
-            " and order k by 1/k of it; 0 for a perfect model. It keeps intervals from becoming absurdly narrow"
+            "Relative rms by which the model is allowed to miss the first harmonic of each channel beyond noise"
+            " (order k by 1/k of it in the acceleration, by 1/k² in the deflection); 0 for a perfect model."
+            " It keeps intervals from becoming absurdly narrow"
             " where the model is not perfect."
         ),
     }

@@ -5,57 +5,13 @@ from typing import Any
 
 import jax
 
-ARITHMETIC = frozenset(
-    [
-        "abs",
-        "add",
-        "add_any",
-        "atan2",
-        "cos",
-        "div",
-        "dot_general",
-        "exp",
-        "integer_pow",
-        "log",
-        "max",
-        "min",
-        "mul",
-        "neg",
-        "pow",
-        "sign",
-        "sin",
-        "sqrt",
-        "square",
-        "sub",
-        "tanh",
-    ]
-)
-COMPARISON = frozenset(["and", "eq", "ge", "gt", "le", "lt", "ne", "not", "or", "select_n"])
-SHAPE = frozenset(
-    [
-        "broadcast_in_dim",
-        "concatenate",
-        "convert_element_type",
-        "expand_dims",
-        "pad",
-        "reduce_sum",
-        "reshape",
-        "rev",
-        "slice",
-        "split",
-        "squeeze",
-        "stack",
-        "transpose",
-        "unstack",
-    ]
-)
-NESTING = frozenset({"jit", "pjit"})
+from savgs_ident.symbolic.interpret import NESTING, RULES
 
 TABLE_LOOK_UP = frozenset({"dynamic_slice"})
 """Reads the piece of the damper's table: a translation makes a chain of conditions of it."""
 
-MAPPABLE = ARITHMETIC | COMPARISON | SHAPE | NESTING | TABLE_LOOK_UP
-"""Everything a symbolic translation, primitive by primitive, has to know. No loop, no sort, no gather."""
+MAPPABLE = frozenset({*RULES, *NESTING})
+"""Everything that the symbolic translation knows."""
 
 
 def _inner(value: Any) -> Iterator[Any]:

@@ -1,0 +1,238 @@
+"""``posterior`` on a few dwells, end to end, and ``calibrate`` by its trials; on the whole campaign where slow."""
+
+import json
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import Result
+
+from savgs_ident.cli.models import identified_in, rig_before
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.rig import default_campaign_path, default_rig_path, read_rig, write_rig
+from savgs_ident.effects.registry import MODELS
+
+TRUTH = {"mu_r": 0.03, "mu_t": 0.25, "ydot_Hth": 0.05, "c_sd": 0.93 * 5792.0}
+CONTRACT = {"median", "sd", "q025", "q975", "unit", "ess_bulk", "ess_tail", "r_hat"}
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A rig as the nominal recordings were made with, as if it had been identified from the drawing."""
+    drawing = read_rig(default_rig_path())
+    true = {"k_sd": 0.985 * 157614.0, "k_t": 0.96 * 2.75e5}
+    rig = replace(
+        drawing,
+        parameters=drawing.parameters.with_values(true),
+        provenance={"free": ["mu_r", "c_sd"], "effects": list(MODELS["simtr"])},
+    )
+    path = tmp_path_factory.mktemp("model") / "model.toml"
+    write_rig(rig, path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def sampled(
+    model: Path,
+    short_campaign: Path,
+    cache: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    as_users_have_it: Callable[[Sequence[str]], Result],
+) -> tuple[Path, Result]:
+    """A finished run on four dwells, tolerances held."""
+    folder = tmp_path_factory.mktemp("posterior")
+    words = [
+        "posterior",
+        str(model),
+        str(short_campaign),
+        "--fixed-tolerances",
+        "--target-ess",
+        "150",
+        "--patience",
+        "0",
+    ]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SAVGS_IDENT_CACHE", str(cache))
+        done = as_users_have_it([*words, "--json", "--out", str(folder)])
+    return folder, done
+
+
+def test_the_run_converges_and_hands_over_what_it_writes(sampled: tuple[Path, Result]) -> None:
+    folder, done = sampled
+    assert done.exit_code == 0, done.stderr
+    assert {path.name for path in folder.iterdir()} == {
+        "chain-emcee.h5",
+        "posterior.html",
+        "posterior.json",
+        "posterior.nc",
+    }
+    assert done.stdout == (folder / "posterior.json").read_text()
+    record = json.loads(done.stdout)
+    assert list(record["parameters"])[:2] == ["mu_r", "c_sd"]
+    assert all(set(each) >= CONTRACT for each in record["parameters"].values())
+    assert record["sampler"] == "emcee"
+    assert record["converged"] is True
+    assert record["ess_min"] >= 150.0
+
+
+def test_the_truth_is_not_far(sampled: tuple[Path, Result]) -> None:
+    """Within what the damper's table, a coarse print of the true curve, leaves open when all else is held."""
+    parameters = json.loads(sampled[1].stdout)["parameters"]
+    assert parameters["mu_r"]["median"] == pytest.approx(TRUTH["mu_r"], rel=0.01)
+    assert parameters["c_sd"]["median"] == pytest.approx(TRUTH["c_sd"], rel=0.005)
+    for name in ("mu_r", "c_sd"):
+        assert parameters[name]["laplace"]["sd"] == pytest.approx(parameters[name]["sd"], rel=0.35)
+
+
+def test_progress_tells_the_effective_sample_size(sampled: tuple[Path, Result]) -> None:
+    assert "effective sample size" in sampled[1].stderr
+
+
+def test_the_inference_data_holds_the_draws_that_the_record_sums_up(sampled: tuple[Path, Result]) -> None:
+    folder, done = sampled
+    median = json.loads(done.stdout)["parameters"]["mu_r"]["median"]
+    with xr.open_datatree(folder / "posterior.nc", engine="h5netcdf") as tree:
+        assert set(tree.children) == {"posterior", "posterior_predictive", "sample_stats", "observed_data"}
+        assert np.median(tree["posterior"]["mu_r"]) == pytest.approx(median, rel=1e-12)
+        assert tree["observed_data"]["harmonics_re"].dims == ("dwell", "channel", "order")
+
+
+def test_a_chain_is_continued_only_with_what_it_was_begun_with(
+    sampled: tuple[Path, Result], model: Path, short_campaign: Path, invoke: Callable[..., Result]
+) -> None:
+    kept = (sampled[0] / "chain-emcee.h5").read_bytes()
+    other = ("--fixed-tolerances", "--seed", "7", "--resume", "--out", sampled[0])
+    done = invoke("posterior", model, short_campaign, *other)
+    assert done.exit_code == 2
+    assert "another model" in done.stderr
+    assert (sampled[0] / "chain-emcee.h5").read_bytes() == kept
+
+
+def test_a_run_out_of_time_is_not_to_be_trusted(
+    model: Path,
+    short_campaign: Path,
+    cache: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    as_users_have_it: Any,
+) -> None:
+    monkeypatch.setenv("SAVGS_IDENT_CACHE", str(cache))
+    words = [
+        "posterior",
+        str(model),
+        str(short_campaign),
+        "--fixed-tolerances",
+        "--time-limit",
+        "1",
+        "--quiet",
+    ]
+    done = as_users_have_it([*words, "--sampler", "nuts", "--out", str(tmp_path)])
+    assert done.exit_code == 1
+    assert "Not to be trusted: " in done.stderr
+    assert "effective sample size" in done.stderr
+
+
+def test_priors_are_those_from_before_the_fit() -> None:
+    drawing = read_rig(default_rig_path())
+    before = {"k_sd": drawing.parameters["k_sd"].value, "mu_r": drawing.parameters["mu_r"].value}
+    moved = drawing.parameters.with_values({"k_sd": 1.5e5, "mu_r": 0.04})
+    identified = replace(drawing, parameters=moved, provenance={"free": ["mu_r"], "before": before})
+    assert rig_before(identified, MODELS["simtr"], "x").parameters["k_sd"].value == before["k_sd"]
+    free, values = identified_in(identified, MODELS["simtr"], "x")
+    assert free == ("mu_r",)
+    assert values == {"mu_r": 0.04, "k_sd": 1.5e5}
+
+
+@pytest.mark.parametrize(
+    "broken", [{"before": 3}, {"before": {"k_sd": "much"}}, {"free": ["nonsense"]}, {"free": []}]
+)
+def test_a_model_file_that_remembers_nonsense_is_refused(broken: dict[str, object]) -> None:
+    rig = replace(read_rig(default_rig_path()), provenance=broken)
+    with pytest.raises(InputError, match="provenance"):
+        identified_in(rig, MODELS["simtr"], "x")
+
+
+def _steps(chain: Path) -> int:
+    try:
+        with h5py.File(chain, "r") as file:
+            return int(file["mcmc"].attrs["iteration"])
+    except FileNotFoundError:
+        return 0
+
+
+@pytest.mark.slow
+def test_killed_and_resumed_the_chain_is_the_same(
+    model: Path, short_campaign: Path, tmp_path: Path, environment: dict[str, str]
+) -> None:
+    """Killed with SIGKILL again and again, at any moment, against a run that nobody disturbed."""
+    from .conftest import COMMAND
+
+    def words(out: str, *more: str) -> list[str]:
+        options = (
+            "--fixed-tolerances",
+            "--target-ess",
+            "300",
+            "--patience",
+            "0",
+            "--quiet",
+            "--out",
+            str(tmp_path / out),
+        )
+        return [*COMMAND, "posterior", str(model), str(short_campaign), *options, *more]
+
+    subprocess.run(words("calm"), env=environment, check=True)
+    killed, random = tmp_path / "killed" / "chain-emcee.h5", np.random.default_rng(5)
+    for _ in range(4):
+        before = _steps(killed)
+        process = subprocess.Popen(words("killed", "--resume"), env=environment)
+        while _steps(killed) <= before and process.poll() is None:
+            time.sleep(0.01)
+        time.sleep(float(random.uniform(0.0, 0.3)))
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+    subprocess.run(words("killed", "--resume"), env=environment, check=True)
+    with h5py.File(killed) as one, h5py.File(tmp_path / "calm" / "chain-emcee.h5") as other:
+        steps = min(one["mcmc"].attrs["iteration"], other["mcmc"].attrs["iteration"])
+        np.testing.assert_array_equal(one["mcmc"]["chain"][:steps], other["mcmc"]["chain"][:steps])
+
+
+@pytest.mark.slow
+def test_both_samplers_find_the_same_posterior_of_the_shipped_campaign(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    """Enough draws that Monte-Carlo error (sd of a difference of medians: 0.03) does not decide."""
+    from .conftest import COMMAND
+
+    campaign = str(default_campaign_path())
+    subprocess.run(
+        [*COMMAND, "fit", campaign, "--quiet", "--out", str(tmp_path)], env=environment, check=True
+    )
+    found = {}
+    for sampler in ("emcee", "nuts"):
+        words = [
+            "posterior",
+            str(tmp_path / "model.toml"),
+            campaign,
+            "--sampler",
+            sampler,
+            "--target-ess",
+            "3500",
+        ]
+        out = tmp_path / sampler
+        subprocess.run([*COMMAND, *words, "--quiet", "--out", str(out)], env=environment, check=True)
+        found[sampler] = json.loads((out / "posterior.json").read_text())["parameters"]
+    for name, true in TRUTH.items():
+        one, other = found["emcee"][name], found["nuts"][name]
+        assert abs(one["median"] - other["median"]) < 0.1 * one["sd"], name
+        assert (one["q975"] - one["q025"]) == pytest.approx(other["q975"] - other["q025"], rel=0.1), name
+        assert one["q025"] < true < one["q975"], name
+        assert other["q025"] < true < other["q975"], name
