@@ -121,5 +121,7 @@ def _greatest_r_hat(mixing: Sequence[Mixing]) -> float:
 
 
 def _autocorrelation(draws: Float[np.ndarray, "S C"]) -> float:
-    # Short chains are said to be so by the effective sample size; a warning here would only repeat it.
-    return float(integrated_time(draws[:, :, None], tol=0, quiet=True)[0])
+    # Short chains are said to be so by the effective sample size; a warning here would only repeat it. One that
+    # has not moved has no autocorrelation.
+    with np.errstate(invalid="ignore"):
+        return float(integrated_time(draws[:, :, None], tol=0, quiet=True)[0])

@@ -1,0 +1,42 @@
+"""Densities over t that are known: what a surrogate is to those who only climb it or walk on it."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+
+class NormalHill(eqx.Module):
+    """A normal density with ``centre`` (n,) and ``precision`` (n, n), ``height`` at its top."""
+
+    centre: Float[Array, " n"]
+    precision: Float[Array, "n n"]
+    height: float = 0.0
+
+    def __call__(self, t: Float[Array, " n"]) -> Float[Array, ""]:
+        """The log density."""
+        off = t - self.centre
+        return self.height - 0.5 * off @ self.precision @ off
+
+
+class SkewHill(eqx.Module):
+    """First coordinate the logarithm of a gamma variate of index ``index``, the second normal about it."""
+
+    index: float
+
+    def __call__(self, t: Float[Array, " 2"]) -> Float[Array, ""]:
+        """The log density."""
+        return self.index * t[0] - jnp.exp(t[0]) - 0.5 * ((t[1] - t[0]) / 0.6) ** 2
+
+    def draws(self, random: np.random.Generator, count: int) -> np.ndarray:
+        """Independent draws, (count, 2)."""
+        first = np.log(random.gamma(self.index, size=count))
+        return np.stack([first, first + 0.6 * random.standard_normal(count)], axis=1)
+
+
+def a_normal_hill(size: int, seed: int = 8) -> NormalHill:
+    """A tilted one, off the origin."""
+    random = np.random.default_rng(seed)
+    axes, _ = np.linalg.qr(random.standard_normal((size, size)))
+    precision = axes @ np.diag(np.geomspace(0.5, 4.0, size)) @ axes.T
+    return NormalHill(jnp.asarray(random.uniform(-1.0, 1.0, size)), jnp.asarray(precision), 7.5)
