@@ -8,6 +8,7 @@ from pathlib import Path
 from savgs_ident.cli.console import Progress, Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
 from savgs_ident.cli.models import effects_in, identified_in, rig_before
+from savgs_ident.cli.reading import read_response
 from savgs_ident.cli.selection import every_so_many
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.rig import read_rig
@@ -15,14 +16,11 @@ from savgs_ident.posterior.calibration import Trial, calibrator
 from savgs_ident.posterior.result import Sampler
 from savgs_ident.posterior.sample import Question
 from savgs_ident.posterior.settings import SamplingSettings
-from savgs_ident.recordings.read import read_campaign
 from savgs_ident.report.calibration import calibration_figure, calibration_record, calibration_text
 from savgs_ident.report.files import prepare_folder, write_json
 from savgs_ident.report.picture import write_figure
 from savgs_ident.report.terminal import plain
-from savgs_ident.responses.estimate import estimate_response
 from savgs_ident.simulate.compilation import use_persistent_cache
-from savgs_ident.simulate.measured import MODELLED_CHANNELS
 
 DRAWS = 100.0
 """Effective sample size of a trial's posterior: enough for its ranks and the ends of its intervals."""
@@ -78,15 +76,13 @@ def calibrate_by_trials(job: Job, voice: Voice, out: Path) -> int:
 def _run(job: Job, kept: Path, done: list[Trial], progress: Progress) -> list[Trial]:
     rig = read_rig(job.model)
     effects = effects_in(rig, job.model)
-    progress(f"reading {job.campaign}")
-    campaign = read_campaign(
-        job.campaign, job.channels, progress=progress.fraction(f"reading {job.campaign}")
-    )
-    measured = every_so_many(estimate_response(campaign.only(MODELLED_CHANNELS), 9), job.every)
+    _, response = read_response(job.campaign, job.channels, SamplingSettings.orders, None, progress)
+    measured = every_so_many(response, job.every)
     free, values = identified_in(rig, effects, job.model)
     question = Question(measured, rig_before(rig, effects, job.model), values, effects, free)
     progress("preparing")
-    work = calibrator(question, SamplingSettings(job.sampler, target_ess=DRAWS, seed=job.seed))
+    settings = SamplingSettings(job.sampler, target_ess=DRAWS, seed=job.seed)
+    work = calibrator(question, settings)
     trials = list(done)
     for number in range(len(done), job.trials):
         progress(f"trial {number + 1} of {job.trials}")

@@ -13,14 +13,13 @@ from savgs_ident.cli.compare import draw_comparison
 from savgs_ident.cli.console import Progress, Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
 from savgs_ident.cli.models import ModelName, effects_of, free_parameters, rig_before
-from savgs_ident.cli.selection import up_to_frequency
+from savgs_ident.cli.reading import read_response
 from savgs_ident.core.rig import Rig, read_rig, write_rig
 from savgs_ident.core.status import Status
 from savgs_ident.effects.registry import model_parameters
 from savgs_ident.fit.least_squares import fit_least_squares
 from savgs_ident.fit.result import Fit
 from savgs_ident.fit.settings import FitSettings
-from savgs_ident.recordings.read import read_campaign
 from savgs_ident.report.bode_record import Compared
 from savgs_ident.report.files import prepare_folder, write_json
 from savgs_ident.report.fit_record import fit_record
@@ -28,9 +27,8 @@ from savgs_ident.report.fit_text import fit_text
 from savgs_ident.report.provenance import provenance
 from savgs_ident.report.solving import Solved
 from savgs_ident.report.terminal import plain
-from savgs_ident.responses.estimate import estimate_response
 from savgs_ident.simulate.compilation import use_persistent_cache
-from savgs_ident.simulate.measured import MODELLED_CHANNELS, measured_excitation
+from savgs_ident.simulate.measured import measured_excitation
 
 
 @dataclass(frozen=True)
@@ -56,12 +54,9 @@ def identify(job: Job, voice: Voice, out: Path) -> int:
     drawing = rig_before(read_rig(job.rig), effects, job.rig)
     free = free_parameters(job.free, job.model, model_parameters(drawing, effects))
     with voice.working() as progress:
-        progress(f"reading {job.campaign}")
-        told = progress.fraction(f"reading {job.campaign}")
-        campaign = read_campaign(job.campaign, job.channels, progress=told)
-        progress("estimating responses")
-        response = estimate_response(campaign.only(MODELLED_CHANNELS), job.settings.orders)
-        measured = up_to_frequency(response, job.max_frequency)
+        campaign, measured = read_response(
+            job.campaign, job.channels, job.settings.orders, job.max_frequency, progress
+        )
         fit = fit_least_squares(
             measured, drawing, effects=effects, free=free, settings=job.settings, progress=progress
         )

@@ -7,22 +7,19 @@ from pathlib import Path
 from savgs_ident.cli.console import Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
 from savgs_ident.cli.models import effects_in, identified_in, rig_before
-from savgs_ident.cli.selection import up_to_frequency
+from savgs_ident.cli.reading import read_response
 from savgs_ident.core.files import write_bytes
 from savgs_ident.core.rig import read_rig
 from savgs_ident.posterior.inference_data import write_inference_data
 from savgs_ident.posterior.sample import Question, sample_posterior
 from savgs_ident.posterior.settings import SamplingSettings
-from savgs_ident.recordings.read import read_campaign
 from savgs_ident.report.files import prepare_folder, write_json
 from savgs_ident.report.origin import origin_of
 from savgs_ident.report.posterior_html import posterior_html
 from savgs_ident.report.posterior_record import posterior_record
 from savgs_ident.report.posterior_text import posterior_text
 from savgs_ident.report.terminal import plain
-from savgs_ident.responses.estimate import estimate_response
 from savgs_ident.simulate.compilation import use_persistent_cache
-from savgs_ident.simulate.measured import MODELLED_CHANNELS
 
 PACKAGES = ("jax", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
 """Whose version matters to a chain."""
@@ -50,12 +47,9 @@ def sample(job: Job, voice: Voice, out: Path) -> int:
     chain = out / f"chain-{job.settings.sampler}.h5"
     try:
         with voice.working() as progress:
-            progress(f"reading {job.campaign}")
-            told = progress.fraction(f"reading {job.campaign}")
-            campaign = read_campaign(job.campaign, job.channels, progress=told)
-            progress("estimating responses")
-            response = estimate_response(campaign.only(MODELLED_CHANNELS), job.settings.orders)
-            measured = up_to_frequency(response, job.max_frequency)
+            campaign, measured = read_response(
+                job.campaign, job.channels, job.settings.orders, job.max_frequency, progress
+            )
             free, values = identified_in(rig, effects, job.model)
             question = Question(measured, rig_before(rig, effects, job.model), values, effects, free)
             posterior = sample_posterior(question, job.settings, chain, job.resume, progress)

@@ -48,13 +48,14 @@ def origin_of(
         data=campaign.source,
         data_sha256=campaign.sha256,
         model=str(model),
-        versions={"savgs-ident": __version__, "python": platform.python_version()} | _versions(packages),
+        versions=versions_of(packages),
         warnings=(*campaign.warnings, *warnings),
     )
 
 
-def _versions(packages: Sequence[str]) -> dict[str, str]:
-    found = {}
+def versions_of(packages: Sequence[str]) -> dict[str, str]:
+    """The versions of this package, of Python and of ``packages``, by name."""
+    found = {"savgs_ident": __version__, "python": platform.python_version()}
     for package in packages:
         try:
             found[package] = version(package)

@@ -1,12 +1,10 @@
 """Where an identified rig comes from: data, program, options, and how well its numbers are known."""
 
-import platform
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
 
-from savgs_ident import __version__
 from savgs_ident.fit.result import Fit
 from savgs_ident.recordings.recording import Campaign
+from savgs_ident.report.origin import versions_of
 
 _PACKAGES = ("jax", "optimistix", "numpy", "scipy")
 
@@ -31,19 +29,9 @@ def provenance(fit: Fit, campaign: Campaign, command: Sequence[str]) -> dict[str
         "status": fit.status.name.lower(),
         "trusted": bool(fit.trusted),
         "before": {each.name: each.prior for each in fit.estimates},
-        "versions": {"savgs_ident": __version__, "python": platform.python_version()} | _versions(),
+        "versions": versions_of(_PACKAGES),
         "covariance": {
             "names": [each.name for each in fit.estimates],
             "matrix": fit.covariance.tolist(),
         },
     }
-
-
-def _versions() -> dict[str, str]:
-    found = {}
-    for package in _PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "unknown"
-    return found
