@@ -1,6 +1,6 @@
 """A sampler on the toy that keeps its chain, as a process of its own that a test can kill.
 
-Arguments: sampler, chain file, evaluations after which it ends, a pickled toy with its surrogate. A line is
+Arguments: sampler, evaluations after which it ends, a pickled toy with its surrogate, chain files. A line is
 printed before the first step and after every step that is on disk, with the evaluations so far.
 """
 
@@ -36,18 +36,19 @@ class Told(Keep):
             raise _EnoughError
 
 
-def main(name: str, path: str, last: str, inputs: str) -> None:
-    """Continue what is at ``path``."""
+def main(name: str, last: str, inputs: str, *paths: str) -> None:
+    """Continue what is at ``paths``, one after the other."""
     jax.config.update("jax_enable_x64", True)
     use_persistent_cache()
     toy, surrogate = pickle.loads(Path(inputs).read_bytes())
-    keep = open_keep(Path(path), CASE)
-    told = Told(keep.path, keep.case, keep.content, keep.counts)
-    told.last = int(last)
-    print(keep.counts[0], flush=True)
-    with suppress(_EnoughError):
-        for _ in SAMPLERS[name](toy, surrogate, SEED, told):  # type: ignore[index]
-            pass
+    for path in paths:
+        keep = open_keep(Path(path), CASE)
+        told = Told(keep.path, keep.case, keep.content, keep.counts)
+        told.last = int(last)
+        print(keep.counts[0], flush=True)
+        with suppress(_EnoughError):
+            for _ in SAMPLERS[name](toy, surrogate, SEED, told):  # type: ignore[index]
+                pass
 
 
 if __name__ == "__main__":

@@ -66,7 +66,7 @@ def _assert_same(chains: Chains, other: Chains) -> None:
         np.testing.assert_array_equal(one, two)
 
 
-@pytest.mark.parametrize("calls", [(1,), (2,), (3,), (4,), (7,), (2, 1, 3, 4), (1, 1, 1, 1, 1)], ids=str)
+@pytest.mark.parametrize("calls", [(1,), (4,), (7,), (2, 1, 3)], ids=str)
 @pytest.mark.parametrize("name", SAMPLERS)
 def test_a_chain_that_was_stopped_is_the_same(
     name: str, calls: tuple[int, ...], partly: Toy, rough: Stand, tmp_path: Path
