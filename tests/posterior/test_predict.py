@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -68,7 +69,7 @@ def test_repetitions_have_the_spread_of_the_likelihood(toy: Toy) -> None:
     found = predict(toy, same, 4000, 1)
     assert len(found.model) == 4000
     np.testing.assert_array_equal(found.model, np.broadcast_to(found.model[0], found.model.shape))
-    rows = np.stack([np.asarray(toy.likelihood.rows(each)) for each in jnp.asarray(found.replicated[:2000])])
+    rows = np.asarray(jax.vmap(toy.likelihood.rows)(jnp.asarray(found.replicated[:2000])))
     off = rows - np.asarray(toy.likelihood.rows(jnp.asarray(found.model[0])))
     spread = np.asarray(toy.likelihood.spread(jnp.asarray(same.points[0, 0])))
     assert np.abs(off.var(axis=0) / spread - 1.0).max() < 4.5 * np.sqrt(2.0 / 2000)
