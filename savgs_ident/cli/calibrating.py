@@ -11,7 +11,7 @@ from savgs_ident.cli.models import effects_in, identified_in, rig_before
 from savgs_ident.cli.reading import read_response
 from savgs_ident.cli.selection import every_so_many
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.rig import read_rig
+from savgs_ident.core.rig import Rig, read_rig
 from savgs_ident.posterior.calibration import Trial, calibrator
 from savgs_ident.posterior.result import Sampler
 from savgs_ident.posterior.sample import Question
@@ -60,8 +60,11 @@ def calibrate_by_trials(job: Job, voice: Voice, out: Path) -> int:
     if not done:
         kept.write_text(json.dumps(job.marks()) + "\n")
     with voice.working() as progress:
-        trials = _run(job, kept, done, progress)
-        names = list(next((each.rank for each in trials if each.rank), {}))
+        rig = read_rig(job.model)
+        trials = _run(job, rig, kept, done, progress)
+        first = identified_in(rig, effects_in(rig, job.model), job.model)[0]
+        ranked = next((each.rank for each in trials if each.rank), {})
+        names = sorted(ranked, key=lambda name: name not in first)
         record = calibration_record(trials, names, job.command)
         files = [write_json(out / "calibration.json", record), kept]
         files += write_figure(out, "calibration", calibration_figure(trials, names))
@@ -73,8 +76,7 @@ def calibrate_by_trials(job: Job, voice: Voice, out: Path) -> int:
     return NOT_TRUSTED
 
 
-def _run(job: Job, kept: Path, done: list[Trial], progress: Progress) -> list[Trial]:
-    rig = read_rig(job.model)
+def _run(job: Job, rig: Rig, kept: Path, done: list[Trial], progress: Progress) -> list[Trial]:
     effects = effects_in(rig, job.model)
     _, response = read_response(job.campaign, job.channels, SamplingSettings.orders, None, progress)
     measured = every_so_many(response, job.every)

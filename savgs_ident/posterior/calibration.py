@@ -6,8 +6,8 @@ of every true value among its posterior's draws is uniform, and 95 % intervals h
 (Talts, Betancourt, Simpson, Vehtari and Gelman, 2018).
 
 The priors are narrower than those of an identification, which reach to where the rig does not move at all:
-identified parameters lie within :data:`ROOM` of the given values, and the discrepancy is about as large as the
-noise.
+identified parameters are normal about the given values, with :data:`SPREAD`, and the discrepancy is about as
+large as the noise. What the solver's own nodes leave open counts as discrepancy too.
 """
 
 from dataclasses import dataclass, replace
@@ -19,6 +19,7 @@ from jaxtyping import Float
 from scipy.stats import chi2
 
 from savgs_ident.core.parameter import Parameter, ParameterTable
+from savgs_ident.effects.registry import model_parameters
 from savgs_ident.fit.target import harmonic_target
 from savgs_ident.fit.task import Task
 from savgs_ident.posterior.diagnostics import least_ess, mixing_of
@@ -35,10 +36,10 @@ from savgs_ident.posterior.settings import SamplingSettings
 from savgs_ident.posterior.values import values_of
 from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, simulate_periodic
 
-ROOM = 0.35
-"""How far the identified parameters are drawn to either side of the given values, relative."""
+SPREAD = 0.15
+"""Relative standard deviation of the identified parameters."""
 
-SCALES = Scales(discrepancy=0.001)
+SCALES = Scales(discrepancy=0.002)
 
 INTERVAL = 0.95
 
@@ -64,12 +65,16 @@ class Trial:
 
 
 class Calibrator(eqx.Module):
-    """A case whose data are drawn anew for every trial, and the model at the middle of its priors."""
+    """A case whose data are drawn anew for every trial, and the model at the middle of its priors.
+
+    ``asked`` are the parameters whose effective sample size counts.
+    """
 
     task: Task
     case: Case
     settings: SamplingSettings
     middle: PeriodicSolution
+    asked: tuple[str, ...] = eqx.field(static=True)
 
     def trial(self, number: int) -> Trial:
         """The trial with this number; the same every time."""
@@ -87,9 +92,7 @@ class Calibrator(eqx.Module):
         return self._ranked(case, expand(case, mode.foothold, _silent), number, truth)
 
     def _draw(self, random: np.random.Generator) -> Float[np.ndarray, " n+2"]:
-        identified = random.logistic(size=self.case.prior.offset.size) - self.case.prior.offset
-        others = len(self.case.problem.free.tolerated) + 2
-        return np.concatenate([identified, random.standard_normal(others)])
+        return random.standard_normal(len(self.case.problem.free.names) + 2)
 
     def _simulate(
         self, truth: Float[np.ndarray, " n+2"], random: np.random.Generator
@@ -109,10 +112,10 @@ class Calibrator(eqx.Module):
     ) -> Trial:
         free, scales = case.problem.free, case.likelihood.scales
         sampler = SAMPLERS[self.settings.sampler](*expansion, 1 + number, new_keep(None, ""))
-        count, ess = len(free.identified), 0.0
+        asked = [free.names.index(name) for name in self.asked]
         while True:
             chains = next(sampler)
-            ess = least_ess([mixing_of(chains.points[:, :, place]) for place in range(count)])
+            ess = least_ess([mixing_of(chains.points[:, :, place]) for place in asked])
             if ess >= self.settings.target_ess or chains.evaluations > 8 * self.settings.target_ess:
                 break
         sampler.close()
@@ -122,7 +125,8 @@ class Calibrator(eqx.Module):
         ends = [0.5 * (1.0 - INTERVAL), 0.5 * (1.0 + INTERVAL)]
         inside, rank = {}, {}
         for name in names_by_role(free):
-            low, high = np.quantile(values[name], ends)
+            # The k-th of n draws has k / (n + 1) of the posterior below it on average.
+            low, high = np.quantile(values[name], ends, method="weibull")
             inside[name] = bool(low <= true[name][0] <= high)
             rank[name] = int(np.sum(values[name][spaced] < true[name][0]))
         return Trial(number, True, True, ess, rank, inside)
@@ -130,14 +134,15 @@ class Calibrator(eqx.Module):
 
 def calibrator(question: Question, settings: SamplingSettings) -> Calibrator:
     """The calibrator for campaigns like the one in ``question``, about its values."""
-    narrow = replace(question, rig=replace(question.rig, parameters=_narrowed(question)))
+    known = replace(question.rig, parameters=_known(question))
+    narrow = replace(question, rig=known, values={}, free=())
     task = plan(narrow, settings)
     problem = task.problem
     likelihood = likelihood_of(harmonic_target(question.measured, settings.orders), SCALES)
     case = Case(problem, likelihood, prior_of(problem.free))
     values = problem.parameters(jnp.zeros(len(problem.free.names)))
     middle = simulate_periodic(problem.model, values, task.excitation, settings.periodic)
-    return Calibrator(task, case, settings, middle)
+    return Calibrator(task, case, settings, middle, question.free)
 
 
 def uniformity(ranks: list[int], bins: int = 8) -> float:
@@ -147,16 +152,17 @@ def uniformity(ranks: list[int], bins: int = 8) -> float:
     return float(chi2.sf(np.sum((counts - expected) ** 2) / expected, bins - 1))
 
 
-def _narrowed(question: Question) -> ParameterTable:
-    """The rig's parameters, identified ones at the question's values and within reach of them."""
+def _known(question: Question) -> ParameterTable:
+    """The rig's parameters, those that are identified known about the question's values."""
 
-    def near(entry: Parameter) -> Parameter:
+    def about(entry: Parameter) -> Parameter:
         if entry.name not in question.free:
             return entry
         value = question.values.get(entry.name, entry.value)
-        return replace(entry, value=value, lower=(1.0 - ROOM) * value, upper=(1.0 + ROOM) * value)
+        return replace(entry, value=value, tolerance=SPREAD * abs(value))
 
-    return ParameterTable(tuple(near(entry) for entry in question.rig.parameters.entries))
+    table = model_parameters(question.rig, question.effects)
+    return ParameterTable(tuple(about(entry) for entry in table.entries))
 
 
 def _silent(line: str) -> None:

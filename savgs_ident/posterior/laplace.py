@@ -6,9 +6,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from savgs_ident.fit.covariance import UNTOLD
 from savgs_ident.posterior.likelihood import Likelihood
 from savgs_ident.posterior.prior import Prior
+
+LONGEST = 1.0
+"""Longest axis [unconstrained coordinates]: an e-fold of an identified parameter, a tolerance of the others. A
+direction that the data do not tell is explored by as much."""
 
 LEAST = 1e-4
 """Least standard deviation of a scale's coordinate."""
@@ -20,13 +23,13 @@ _MISS_GRID = np.concatenate([[0.0], np.geomspace(1e-5, 30.0, 300)])
 def parameter_scale(
     likelihood: Likelihood, prior: Prior, point: Float[Array, " n+2"], slopes: Float[np.ndarray, "m n"]
 ) -> Float[np.ndarray, "n n"]:
-    """Columns along the principal axes of the parameters' information at ``point``, one sd long each."""
+    """Columns along the principal axes of the parameters' information at ``point``, one sd long each, or shorter."""
     count = slopes.shape[1]
     weight = 1.0 / np.sqrt(np.asarray(likelihood.spread(point)))
     curvature = -np.diag(np.asarray(jax.hessian(prior)(point)))[:count]
     stacked = np.concatenate([slopes * weight[:, None], np.diag(np.sqrt(np.maximum(curvature, 0.0)))])
     _, sizes, axes = np.linalg.svd(stacked, full_matrices=False)
-    return np.asarray(axes.T / np.maximum(sizes, 1.0 / UNTOLD))
+    return np.asarray(axes.T / np.maximum(sizes, 1.0 / LONGEST))
 
 
 def nuisance_scale(

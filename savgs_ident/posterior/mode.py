@@ -36,6 +36,10 @@ LEVEL = 0.01
 """Rise of the log density that a further step promises below which the mode is found."""
 
 
+ROUGH = 1.0
+"""Rise that is promised, but not found, up to which the mode is as good: friction makes the density rough."""
+
+
 class Foothold(NamedTuple):
     """The model at a point: rows (m,), their slopes (m, n) in u, motions, and the exact log density."""
 
@@ -119,7 +123,7 @@ def _climb(case: Case, at: Foothold, tell: Progress) -> Mode:
             return Mode(at, Status.CONVERGED)
         higher = _first_rise(case, at, linear, here, top.t)
         if higher is None:
-            return Mode(at, Status.STALLED)
+            return Mode(at, Status.CONVERGED if top.value - at.value < ROUGH else Status.STALLED)
         at = higher
     return Mode(at, Status.MAX_ITERATIONS)
 

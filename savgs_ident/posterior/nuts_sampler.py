@@ -38,6 +38,9 @@ THINNING = 2
 ACCEPTANCE = 0.8
 """Acceptance within a trajectory that the step size aims at."""
 
+DOUBLINGS = 6
+"""Most doublings of a trajectory: on a round density three or four are the rule."""
+
 _STRIDE = 8
 _ADAPTING = 200
 _SETTLING = 15
@@ -154,7 +157,7 @@ def _adapt(surrogate: Surrogate, key: Array) -> tuple[Array, ...]:
     def step(carry: tuple[Any, Any], key: Array) -> tuple[tuple[Any, Any], None]:
         state, averaging = carry
         size = jnp.exp(averaging.log_step_size)
-        state, info = kernel(key, state, surrogate, size, unit)
+        state, info = kernel(key, state, surrogate, size, unit, DOUBLINGS)
         return (state, update(averaging, info.acceptance_rate)), None
 
     first = blackjax.nuts.init(jnp.zeros_like(unit), surrogate)
@@ -168,7 +171,7 @@ def _draw(surrogate: Surrogate, key: Array, start: Array, step_size: Array, coun
     unit = jnp.ones_like(surrogate.centre)
 
     def transition(state: Any, key: Array) -> tuple[Any, Array]:
-        state, info = kernel(key, state, surrogate, step_size, unit)
+        state, info = kernel(key, state, surrogate, step_size, unit, DOUBLINGS)
         return state, info.is_divergent
 
     def thinned(state: Any, key: Array) -> tuple[Any, tuple[Array, Array, Array]]:

@@ -1,0 +1,115 @@
+"""The posterior's ingredients on the model itself, on a few dwells of the shipped campaign."""
+
+from pathlib import Path
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from savgs_ident.core.rig import Rig
+from savgs_ident.effects.registry import MODELS
+from savgs_ident.fit.least_squares import FREE
+from savgs_ident.posterior.expand import Expansion, expand
+from savgs_ident.posterior.mode import Case, Mode, find_mode
+from savgs_ident.posterior.sample import Question, case_of, locate, plan
+from savgs_ident.posterior.settings import SamplingSettings
+from savgs_ident.recordings.read import read_campaign
+from savgs_ident.responses.estimate import estimate_response
+from savgs_ident.simulate.periodic import harmonics, resolve
+
+from ..fit.bench import only, silent, true_rig
+
+DWELLS = (1.4, 2.35, 4.5, 6.0)
+
+
+@pytest.fixture(scope="module")
+def question(nominal_campaign: Path, rig: Rig) -> Question:
+    measured = estimate_response(read_campaign(nominal_campaign), 9)
+    kept = only(measured, np.isin(np.round(measured.frequency, 2), DWELLS))
+    return Question(kept, true_rig(rig), {}, MODELS["simtr"], FREE)
+
+
+@pytest.fixture(scope="module")
+def case(question: Question) -> Case:
+    return case_of(plan(question, SETTINGS))
+
+
+@pytest.fixture(scope="module")
+def mode(case: Case, question: Question) -> Mode:
+    return locate(case, plan(question, SETTINGS), question, silent)
+
+
+@pytest.fixture(scope="module")
+def expansion(case: Case, mode: Mode) -> Expansion:
+    return expand(case, mode.foothold, silent)
+
+
+SETTINGS = SamplingSettings(fixed_tolerances=True)
+
+
+def test_the_mode_is_found_from_the_drawing(mode: Mode) -> None:
+    assert mode.status.ok
+
+
+def test_the_density_falls_away_from_the_mode_in_every_direction(
+    case: Case, mode: Mode, expansion: Expansion
+) -> None:
+    middle = mode.foothold.point[:-2]
+    steps = np.asarray(expansion.surrogate.scale)[:-2, :-2].T
+    around = np.concatenate([middle + 0.5 * steps, middle - 0.5 * steps])
+    rows, solved = expansion.exact.rows(around)
+    assert solved.all()
+    points = np.concatenate([around, np.tile(mode.foothold.point[-2:], (len(around), 1))], axis=1)
+    assert all(
+        case.density(row, point) < mode.foothold.value for row, point in zip(rows, points, strict=True)
+    )
+
+
+def test_the_model_near_its_anchor_is_the_model(expansion: Expansion) -> None:
+    """Predicted to first order and solved to a looser tolerance, against the solver of every fit."""
+    problem, anchor = expansion.exact.problem, expansion.exact.anchor
+    points = expansion.surrogate.points(np.random.default_rng(2).standard_normal((4, 6)))[:, :-2]
+    found = expansion.exact.responses(points)
+    assert found.solved.all()
+    for u, response in zip(points, found.harmonics, strict=True):
+        p = problem.parameters(jnp.asarray(u))
+        expected = np.asarray(harmonics(p, resolve(problem.model, p, anchor.solution), problem.orders))
+        first = np.abs(expected[..., 1:2])
+        assert np.max(np.abs(response - expected) / first) < 1e-6
+
+
+def test_slopes_are_those_of_finite_differences(mode: Mode, expansion: Expansion) -> None:
+    """In standard deviations of the noise, over half a standard deviation to either side."""
+    axes = np.asarray(expansion.surrogate.scale)[:-2, :-2].T
+    ahead, _ = expansion.exact.rows(mode.foothold.point[:-2] + 0.25 * axes)
+    behind, _ = expansion.exact.rows(mode.foothold.point[:-2] - 0.25 * axes)
+    weight = 1.0 / np.sqrt(np.asarray(expansion.exact.likelihood.variance))
+    slopes = (mode.foothold.slopes @ axes.T).T
+    np.testing.assert_allclose((ahead - behind) / 0.5 * weight, slopes * weight, atol=0.02)
+
+
+def test_the_surrogate_is_of_second_order(expansion: Expansion) -> None:
+    """What it leaves out is a small part of what a linear one leaves out, and of the noise."""
+    ts = np.random.default_rng(3).standard_normal((8, 6))
+    points = expansion.surrogate.points(ts)
+    exact, _ = expansion.exact.rows(points[:, :-2])
+    weight = 1.0 / np.sqrt(np.asarray(expansion.exact.likelihood.variance))
+    stand_in = np.stack([np.asarray(expansion.surrogate.predicted(jnp.asarray(t))) for t in ts])
+    assert np.linalg.norm((stand_in - exact) * weight, axis=1).max() < 0.3
+
+
+@pytest.mark.parametrize("miss", [0.01, 0.03])
+def test_a_model_that_misses_is_found_to_miss_by_as_much(
+    case: Case, mode: Mode, question: Question, miss: float
+) -> None:
+    """The mode of the discrepancy, from 144 rows of which it moves most: its own error is about a tenth."""
+    likelihood = case.likelihood
+    errors = np.random.default_rng(4).standard_normal(mode.foothold.rows.size) * np.asarray(likelihood.reach)
+    off = eqx.tree_at(
+        lambda each: each.measured, likelihood, likelihood.measured + jnp.asarray(miss * errors)
+    )
+    u = jnp.asarray(mode.foothold.point[:-2])
+    found = find_mode(case._replace(likelihood=off), u, mode.foothold.solution, silent)
+    assert found.status.ok
+    assert float(likelihood.scales.miss(jnp.asarray(found.foothold.point))) == pytest.approx(miss, rel=0.3)
