@@ -56,7 +56,7 @@ def calibrate_by_trials(job: Job, voice: Voice, out: Path) -> int:
     prepare_folder(out)
     use_persistent_cache()
     kept = out / "trials.jsonl"
-    done = _known(kept, job) if job.resume else []
+    done = known_trials(kept, job) if job.resume else []
     if not done:
         kept.write_text(json.dumps(job.marks()) + "\n")
     with voice.working() as progress:
@@ -94,19 +94,24 @@ def _run(job: Job, rig: Rig, kept: Path, done: list[Trial], progress: Progress) 
     return trials[: job.trials]
 
 
-def _known(kept: Path, job: Job) -> list[Trial]:
+def known_trials(kept: Path, job: Job) -> list[Trial]:
     """The whole trials of an earlier run; a last line that was cut off is left out and the file mended.
 
-    Raises :class:`InputError` for trials of another job.
+    Raises :class:`InputError` for trials of another job, and for a file that is no list of trials.
     """
     if not kept.exists():
         return []
     lines = kept.read_text().split("\n")[:-1]
-    if not lines or json.loads(lines[0]) != json.loads(json.dumps(job.marks())):
+    try:
+        marks, *trials = (json.loads(line) for line in lines)
+        found = [Trial(**each) for each in trials]
+    except (ValueError, TypeError) as error:
+        raise InputError("is no list of trials", source=kept, remedy="leave out --resume") from error
+    if marks != job.marks():
         raise InputError(
             "holds trials of another model, campaign, sampler or seed",
             source=kept,
             remedy="leave out --resume, or name another --out DIR",
         )
     kept.write_text("\n".join(lines) + "\n")
-    return [Trial(**json.loads(line)) for line in lines[1:]]
+    return found
