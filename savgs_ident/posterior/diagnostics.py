@@ -68,6 +68,13 @@ def enough(mixing: Sequence[Mixing], target: float) -> bool:
     return least_ess(mixing) >= target and all(each.r_hat <= R_HAT for each in mixing)
 
 
+def others_mixed(chains: Chains, count: int) -> bool:
+    """Whether all coordinates but the first ``count``, those of the identified parameters, have mixed."""
+    # The discrepancy is the size of the last coordinate, whose sign means nothing.
+    sized = np.concatenate([chains.points[:, :, count:-1], np.abs(chains.points[:, :, -1:])], axis=2)
+    return all(mixing_of(each).r_hat <= R_HAT_OTHERS for each in np.moveaxis(sized, 2, 0))
+
+
 def precise(mixing: Sequence[Mixing]) -> bool:
     """Whether medians are known to :data:`PRECISE`: that of a normal has the error sqrt(pi / 2) / sqrt(ess)."""
     return least_ess(mixing) >= 0.5 * np.pi / PRECISE**2

@@ -6,6 +6,7 @@ posterior.by_name["mu_r"].q025, posterior.convergence.converged
 
 import time
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -20,7 +21,14 @@ from savgs_ident.fit.target import harmonic_target
 from savgs_ident.fit.task import Task, plan_task
 from savgs_ident.posterior.advice import advise
 from savgs_ident.posterior.chains import Chains
-from savgs_ident.posterior.diagnostics import enough, judge_chains, least_ess, mixing_of, precise
+from savgs_ident.posterior.diagnostics import (
+    enough,
+    judge_chains,
+    least_ess,
+    mixing_of,
+    others_mixed,
+    precise,
+)
 from savgs_ident.posterior.expand import Expansion, expand
 from savgs_ident.posterior.keep import Keep, digest_of, new_keep, open_keep
 from savgs_ident.posterior.likelihood import likelihood_of
@@ -157,26 +165,25 @@ def _run(
     Raises :class:`InputError` if by then the model was solved at no proposal.
     """
     count = len(expansion.exact.problem.free.identified)
-    sampler = SAMPLERS[settings.sampler](*expansion, settings.seed, keep)
-    while True:
-        chains = next(sampler)
-        mixing = [mixing_of(chains.points[:, :, place]) for place in range(count)]
-        ess, spent = least_ess(mixing), time.perf_counter() - began
-        tell(
-            f"{settings.sampler}: {len(chains.points)} steps of {chains.points.shape[1]} chains, effective "
-            f"sample size {ess:.0f} of {settings.target_ess:.0f}, {spent:.0f} s"
-        )
-        done = enough(mixing, settings.target_ess) and (precise(mixing) or spent > settings.patience_s)
-        late = spent > settings.time_limit_s
-        # The first steps are left out: until there is a draw there is nothing to sum up.
-        if done or (late and len(chains.points)):
-            sampler.close()
-            return chains
-        if late and chains.unsolved == chains.evaluations:
-            raise InputError(
-                "the model has a periodic motion at none of the points that the surrogate proposes",
-                remedy="identify it first: savgs-ident fit",
+    with closing(SAMPLERS[settings.sampler](*expansion, settings.seed, keep)) as sampler:
+        while True:
+            chains = next(sampler)
+            mixing = [mixing_of(chains.points[:, :, place]) for place in range(count)]
+            ess, spent = least_ess(mixing), time.perf_counter() - began
+            tell(
+                f"{settings.sampler}: {len(chains.points)} steps of {chains.points.shape[1]} chains, effective "
+                f"sample size {ess:.0f} of {settings.target_ess:.0f}, {spent:.0f} s"
             )
+            done = enough(mixing, settings.target_ess) and (precise(mixing) or spent > settings.patience_s)
+            late = spent > settings.time_limit_s
+            # The first steps are left out: until there is a draw there is nothing to sum up.
+            if (done and others_mixed(chains, count)) or (late and len(chains.points)):
+                return chains
+            if late and chains.unsolved == chains.evaluations:
+                raise InputError(
+                    "the model has a periodic motion at none of the points that the surrogate proposes",
+                    remedy="identify it first: savgs-ident fit",
+                )
 
 
 def _summed_up(answer: _Answer, question: Question, settings: SamplingSettings, wall_s: float) -> Posterior:
