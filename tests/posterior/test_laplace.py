@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from savgs_ident.posterior.laplace import nuisance_scale, parameter_scale
+from savgs_ident.posterior.laplace import LONGEST, nuisance_scale, parameter_scale
 from savgs_ident.posterior.prior import prior_of
 from savgs_ident.posterior.scales import Scales
 
@@ -21,14 +21,14 @@ def test_its_axes_make_up_the_covariance() -> None:
     assert np.all(np.diff(np.linalg.norm(axes, axis=0)) >= 0.0)
 
 
-def test_a_direction_without_data_keeps_its_prior() -> None:
+def test_a_direction_without_data_keeps_its_prior_as_far_as_axes_reach() -> None:
     toy = straight_toy(scales=FIXED_SCALES)
     slope = toy.slope.copy()
     slope[:, 1:] = 0.0
     axes = parameter_scale(toy.likelihood, prior_of(FREE), jnp.zeros(5), slope)
     covariance = axes @ axes.T
-    # The logistic density has curvature 1/2 at its middle, the normal one 1.
-    assert covariance[1, 1] == pytest.approx(2.0)
+    # The logistic density has curvature 1/2 at its middle, and so a longer axis than there is; the normal one 1.
+    assert covariance[1, 1] == pytest.approx(LONGEST**2)
     assert covariance[2, 2] == pytest.approx(1.0)
 
 
