@@ -1,8 +1,8 @@
 """The exact model near a known solution: what decides about every proposal.
 
 A periodic motion at nearby parameters starts from the linear prediction X + dX/du (u - u0), on the same time
-nodes, and is solved to the same tolerance as any other. Solutions do not depend on each other, so that a
-chain is the same however its proposals are grouped or interrupted.
+nodes, and is solved until what is left is far below the noise. Solutions do not depend on each other, so that
+a chain is the same however its proposals are grouped or interrupted.
 """
 
 import os

@@ -35,7 +35,6 @@ HALVINGS = 6
 LEVEL = 0.01
 """Rise of the log density that a further step promises below which the mode is found."""
 
-
 ROUGH = 1.0
 """Rise that is promised, but not found, up to which the mode is as good: friction makes the density rough."""
 

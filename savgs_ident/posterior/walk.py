@@ -2,7 +2,8 @@
 
 Preconditioned Crank-Nicolson steps t' = sqrt(1 - b^2) t + b xi are reversible with respect to the unit
 normal; accepting them by the ratio of the surrogate to that normal makes them reversible with respect to the
-surrogate. So is any number of them one after the other.
+surrogate. The length b of every step is drawn anew: all steps are then the same kernel, and any number of them
+one after the other is reversible too. (Lengths in a fixed order would not be: backwards is another order.)
 """
 
 from typing import Any
@@ -20,7 +21,7 @@ STEPS = 60
 """Steps of one walk: enough to forget where it began."""
 
 LENGTHS = (0.2, 0.5, 0.8)
-"""The b of steps in turn: long ones travel, short ones get through where the surrogate is not normal."""
+"""The b of steps, drawn at random: long ones travel, short ones get through where the surrogate is not normal."""
 
 
 def walk(
@@ -46,8 +47,8 @@ def _walk(surrogate: Surrogate, key: Array, start: Array, steps: Array) -> tuple
 
     def step(count: Array, at: tuple[Array, Array]) -> tuple[Array, Array]:
         t, value = at
-        to_move, to_decide = jax.random.split(jax.random.fold_in(key, count))
-        length = jnp.asarray(LENGTHS)[count % len(LENGTHS)]
+        to_choose, to_move, to_decide = jax.random.split(jax.random.fold_in(key, count), 3)
+        length = jax.random.choice(to_choose, jnp.asarray(LENGTHS), (value.size, 1))
         moved = jnp.sqrt(1.0 - length**2) * t + length * jax.random.normal(to_move, t.shape)
         there = density(moved)
         ratio = there - value + 0.5 * (jnp.sum(moved**2, axis=1) - jnp.sum(t**2, axis=1))

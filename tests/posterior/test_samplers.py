@@ -17,7 +17,7 @@ from .toy import Toy
 from .toy_reference import Reference, reference_of
 from .toy_surrogate import Stand
 
-STEPS = {"emcee": 400, "nuts": 800}
+STEPS = {"emcee": 500, "nuts": 800}
 """Steps of the 8 and the 4 chains."""
 
 SHARES = (0.025, 0.5, 0.975)
