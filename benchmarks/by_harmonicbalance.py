@@ -114,7 +114,7 @@ def compile_force(task: Task) -> Callable[..., Array]:
         road = Road(task.amplitude * jnp.cos(phase), -task.amplitude * omega * jnp.sin(phase))
         inputs = Inputs(road, Link(jnp.full_like(phase, task.link_angle), jnp.zeros_like(phase)))
         still = jnp.zeros(1)
-        load = jax.vmap(lambda *at: model.loads(values, at[0], still, at[1]).carriage)(motion, inputs)
+        load = jax.vmap(lambda *at: model.loads(values, at[0], still, still, at[1]).carriage)(motion, inputs)
         anchor = anchors(motion.q.z_s, motion.qd.z_s, load, 2.0 * jnp.pi / (omega * count))
         return jax.vmap(lambda *at: model.residual(values, at[0], at[1], still, at[2], curves)[:2])(
             motion, anchor[:, None], inputs

@@ -28,7 +28,7 @@ def measure(task: Task, reference: Harmonics) -> Outcome:
 
     def cold() -> tuple[PeriodicSolution, object]:
         solution = simulate_periodic(task.model, task.values, excitation)
-        return solution, harmonics(task.values, solution, ORDERS)
+        return solution, harmonics(task.model, task.values, solution, ORDERS)
 
     (start, response), first_s = timed(cold)
     cold_s = median_time(cold, REPEATS)

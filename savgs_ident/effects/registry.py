@@ -9,14 +9,30 @@ from types import MappingProxyType
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.rig import Rig, merge_parameters
+from savgs_ident.effects.accel_lag import AccelLag
+from savgs_ident.effects.cam_scale import CamScale
+from savgs_ident.effects.mount_compliance import MountCompliance
 from savgs_ident.effects.rail_coulomb import RailCoulomb
+from savgs_ident.effects.rail_stribeck import RailStribeck
+from savgs_ident.effects.spring_rate import SpringRate
 from savgs_ident.effects.tyre_friction import TyreFriction
 from savgs_ident.model.damper import damper_curve
 from savgs_ident.model.effect import AbstractEffect
 from savgs_ident.model.quarter_car import QuarterCar
 
 CATALOGUE: Mapping[str, AbstractEffect] = MappingProxyType(
-    {effect.name: effect for effect in (RailCoulomb(), TyreFriction())}
+    {
+        effect.name: effect
+        for effect in (
+            RailCoulomb(),
+            RailStribeck(),
+            MountCompliance(),
+            SpringRate(),
+            TyreFriction(),
+            CamScale(),
+            AccelLag(),
+        )
+    }
 )
 """All effects by name."""
 

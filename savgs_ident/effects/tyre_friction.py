@@ -16,11 +16,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.model.effect import AbstractEffect, InternalState, Port, PortSignals
+from savgs_ident.model.effect import AbstractForce, InternalState, Port, PortSignals
 from savgs_ident.model.values import Values
 
 
-class TyreFriction(AbstractEffect):
+class TyreFriction(AbstractForce):
     """Lateral tyre friction with a shaping velocity."""
 
     name: ClassVar[str] = "tyre_friction"

@@ -48,7 +48,7 @@ def assemble_fit(task: Task, outcome: Outcome) -> Fit:
         measured=task.measured,
         orders=problem.orders,
         used=np.array(problem.target.used),
-        predicted=np.array(harmonics(p, best.solution, problem.orders)),
+        predicted=np.array(harmonics(problem.model, p, best.solution, problem.orders)),
         frictionless=_frictionless(task, best),
         as_given=np.array(outcome.as_given),
         starts=tuple((each.cost, each.status) for each in outcome.tried),
@@ -82,5 +82,5 @@ def _frictionless(task: Task, best: Minimum) -> np.ndarray:
     p = dict(problem.parameters(best.u)) | as_values(nulls)
     solution = simulate_periodic(problem.model, p, task.excitation, task.settings.periodic)
     ok = np.array([status.ok for status in solution.status()])
-    response = np.asarray(harmonics(p, solution, problem.orders))
+    response = np.asarray(harmonics(problem.model, p, solution, problem.orders))
     return np.where(ok[:, None, None], response, np.nan)

@@ -57,7 +57,7 @@ def fit_least_squares(
 
     tell("solving the model as given")
     first = simulate_periodic(problem.model, problem.fixed, task.excitation, task.settings.periodic)
-    as_given = np.asarray(harmonics(problem.fixed, first, problem.orders))
+    as_given = np.asarray(harmonics(problem.model, problem.fixed, first, problem.orders))
     tell("preparing the fit")
     minimiser = Minimiser(problem)
     first_u, *others = _starts(task)

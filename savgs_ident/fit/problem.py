@@ -17,7 +17,6 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.fit.target import Target
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.quarter_car import Inputs, QuarterCar
-from savgs_ident.model.sensors import read_sensors
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
 from savgs_ident.model.values import Values, as_values
@@ -72,7 +71,7 @@ def used_parameters(model: QuarterCar, table: ParameterTable) -> frozenset[str]:
         inputs = Inputs(Road(zero, zero), Link(zero, zero))
         state = jnp.zeros(size)
         residual = model.residual(p, Motion(pair, pair, pair), state, state, inputs)
-        return residual, *read_sensors(p, zero, zero)
+        return residual, *model.read(p, zero, zero), model.transfers(p, zero)
 
     values = as_values(table.as_dict())
     jaxpr = jax.make_jaxpr(response)(values).jaxpr
@@ -144,7 +143,7 @@ def _compared(*args: Any) -> tuple[Array, ...]:
 def _residual_and_jacobian(
     problem: Problem, pins: Pins, u: Array, p: Values, solution: PeriodicSolution
 ) -> tuple[Array, Array]:
-    predicted = harmonics(p, solution, problem.orders)
+    predicted = harmonics(problem.model, p, solution, problem.orders)
     by_name = harmonic_sensitivities(problem.model, p, solution, problem.free.names, problem.orders)
     columns = jax.vmap(lambda change: jax.jvp(problem.target, (predicted,), (change,))[1])(by_name)
     priors = jax.jacfwd(problem.free.prior_residuals)(u)
@@ -154,5 +153,5 @@ def _residual_and_jacobian(
 
 @eqx.filter_jit
 def _residual_at(problem: Problem, pins: Pins, u: Array, p: Values, solution: PeriodicSolution) -> Array:
-    data = problem.target(harmonics(p, solution, problem.orders))
+    data = problem.target(harmonics(problem.model, p, solution, problem.orders))
     return jnp.concatenate([data, problem.free.prior_residuals(u), pins.weight * (u - pins.at)])

@@ -1,8 +1,16 @@
 """What an effect is: one physical mechanism, acting at one port of the rig.
 
-The rig without friction (SimQC) has ports where something more may act. An effect takes the signals of its
-port and returns a force along the port's coordinate; it may carry internal states with their rates. SimTR is
-literally SimQC plus two effects:
+The rig without friction (SimQC) has ports where something more may act. An effect is one of a few kinds, each
+with one law:
+
+    AbstractForce          a force at its port, beside what is there           (a spring, a friction)
+    AbstractGrip           what the rail's carriages hold before they slide    (Coulomb, Stribeck, preload)
+    AbstractSeries         something that gives way in the path of a load      (a mount, a carcass, a frame)
+    AbstractChange         a number of the rig that is another                 (a spring rate, a mass)
+    AbstractRoadError      a plate that does not do what its encoder says      (a cam of another shape)
+    AbstractSensorError    a sensor that does not show what is there           (a lag, a gain)
+
+SimTR is literally SimQC plus two effects:
 
     SimTR = SimQC + rail_coulomb + tyre_friction
 
@@ -16,9 +24,10 @@ from enum import Enum
 from typing import NamedTuple
 
 import equinox as eqx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Complex, Float
 
 from savgs_ident.core.parameter import Parameter
+from savgs_ident.model.tyre import Road
 from savgs_ident.model.values import Values
 
 
@@ -39,19 +48,19 @@ class Port(Enum):
 
 
 class PortSignals(NamedTuple):
-    """What an effect sees at its port.
+    """What a force sees at its port.
 
     ``displacement`` [m] and ``velocity`` [m/s] are the pair conjugate to the force that the effect returns;
-    ``load`` [N] is what a friction at this port is proportional to:
+    ``load`` [N] is what the port carries and a friction there is proportional to:
 
     ============== ===================================== ============================ =====================
     port           displacement, velocity                positive force acts on       load
     ============== ===================================== ============================ =====================
-    rail           sprung mass, up                       sprung mass, up              |F_Nt| + |F_Nb|
-    strut          strut length, growing in extension    strut, pushing it apart      0
+    rail           sprung mass over the frame, up        sprung mass, up              |F_Nt| + |F_Nb|
+    strut          strut length, growing in extension    strut, pushing it apart      the damper's push
     suspension     suspension deflection l_s, bump       wheel, up, against the body  0
     tyre_radial    tyre compression                      wheel, away from the plate   0
-    tyre_lateral   upright at the contact point, outward upright, outward             F_tz
+    tyre_lateral   upright over the patch, outward       upright, outward             F_tz
     ============== ===================================== ============================ =====================
 
     Force times velocity is power into the rig, but for ``tyre_radial``, where it is power out of it. The
@@ -78,8 +87,15 @@ class InternalState(NamedTuple):
     slips: bool = False
 
 
+class Cam(NamedTuple):
+    """Angle [rad] and speed [rad/s] of the cam; the angle is 0 where the first order of its lift is highest."""
+
+    angle: Float[Array, ""]
+    speed: Float[Array, ""]
+
+
 class AbstractEffect(eqx.Module):
-    """Base of all effects; each one is final and lives in its own file under ``effects``."""
+    """Base of all effects; each one is final, of one of the kinds below, and lives in its own file."""
 
     name: eqx.AbstractClassVar[str]
     port: eqx.AbstractClassVar[Port]
@@ -89,6 +105,10 @@ class AbstractEffect(eqx.Module):
     symptom: eqx.AbstractClassVar[str]
     reference: eqx.AbstractClassVar[str]
 
+
+class AbstractForce(AbstractEffect):
+    """A force at ``rail``, ``strut``, ``suspension``, ``tyre_radial`` or ``tyre_lateral``."""
+
     @abstractmethod
     def force(self, p: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, ""]:
         """The force [N] along the port's coordinate (sign: see :class:`PortSignals`)."""
@@ -96,3 +116,88 @@ class AbstractEffect(eqx.Module):
     @abstractmethod
     def rate(self, p: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:
         """Time derivatives of the internal states, shape (s,); empty for an effect without states."""
+
+
+class Grip(NamedTuple):
+    """Friction [N] with which the carriages resist sliding up and sliding down, both positive."""
+
+    against_up: Float[Array, ""]
+    against_down: Float[Array, ""]
+
+
+class AbstractGrip(AbstractEffect):
+    """A share of what the rail's carriages hold before they slide.
+
+    All grips load one bristle (:mod:`savgs_ident.model.bristle`), for there is one contact.
+    """
+
+    @abstractmethod
+    def grip(self, p: Values, signals: PortSignals) -> Grip:
+        """The share [N]; it may be negative, the sum of all is held at zero or above."""
+
+
+class AbstractSeries(AbstractEffect):
+    """Something that gives way in the path of a load: its first state is by how much [m or rad].
+
+    =============== ============================ =============================================================
+    port            gives way (positive)         under the load (positive)
+    =============== ============================ =============================================================
+    strut           mount, shortening            push of the whole strut [N]
+    damper (strut)  spring at the damper's end   push of the damper [N], if ``in_damper``
+    link            link, to greater angles      torque to greater angles [N m]
+    road            plate, down                  F_tz [N]
+    tyre_lateral    upright over the patch, out  force on the plate, outward [N]
+    frame           plate and rail, up           force on the frame, up [N]
+    =============== ============================ =============================================================
+    """
+
+    in_damper: eqx.AbstractClassVar[bool]
+
+    @abstractmethod
+    def balance(
+        self, p: Values, load: Float[Array, ""], state: Float[Array, " s"], rate: Float[Array, " s"]
+    ) -> Float[Array, " s"]:
+        """What vanishes for the right ``rate`` of the states, shape (s,), growing with it."""
+
+
+class AbstractChange(AbstractEffect):
+    """A number of the rig that is another than the sheet's."""
+
+    @abstractmethod
+    def changes(self, p: Values) -> Mapping[str, Float[Array, ""]]:
+        """The parameters that it changes, by name, SI."""
+
+
+class AbstractRoadError(AbstractEffect):
+    """A plate that does not do what its encoder says."""
+
+    @abstractmethod
+    def shift(self, p: Values, road: Road, cam: Cam) -> Road:
+        """Height [m] and velocity [m/s] that come on top of the recorded ones."""
+
+
+class AbstractSensorError(AbstractEffect):
+    """A sensor that does not show what is there; linear in what it measures."""
+
+    @abstractmethod
+    def transfer(self, p: Values, frequency: Float[Array, " f"]) -> Complex[Array, " f"]:
+        """Reading over truth at frequencies [Hz]."""
+
+
+SETTLING = 1e-4
+"""Time [s] in which a series element without a damper of its own gives way: short beside a reversal. It keeps
+the element's law regular where its compliance vanishes."""
+
+
+def linear_series(
+    compliance: Float[Array, ""],
+    damping: Float[Array, ""],
+    load: Float[Array, ""],
+    state: Float[Array, " 1"],
+    rate: Float[Array, " 1"],
+) -> Float[Array, " 1"]:
+    """Balance of a spring [m/N or rad/(N m)] with a damper beside it [N s/m or N m s/rad], any compliance >= 0.
+
+    C (load - c xd) - x vanishes in the course of :data:`SETTLING`.
+    """
+    return (SETTLING + compliance * damping) * rate + state - compliance * load

@@ -62,7 +62,8 @@ def static_equilibrium(
     scale = jnp.asarray([*COORDINATE_SCALE, *states])
     x = find_root(residual, jnp.zeros(2 + len(states)), scale, PRECISION)
     q = Coordinates(x[0], x[1])
-    return Equilibrium(q, x[2:], model.loads(p, _at_rest(q), x[2:], inputs).strut)
+    still = jnp.zeros_like(x[2:])
+    return Equilibrium(q, x[2:], model.loads(p, _at_rest(q), x[2:], still, inputs, curves).strut)
 
 
 def deflection_zero(model: QuarterCar, p: Values, curves: SectionCurves | None = None) -> Float[Array, ""]:

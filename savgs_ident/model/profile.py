@@ -87,12 +87,26 @@ class LinearSweep(AbstractProfile):
 
     def value(self, t: Scalar) -> Scalar:
         """The quantity at time ``t`` [s]."""
+        return self.amplitude * jnp.sin(SweptAngle(self.start, self.end, self.duration, 0.0).value(t))
+
+
+class SweptAngle(AbstractProfile):
+    """An angle [rad] from ``offset`` on, turning at a frequency that runs linearly and then stays.
+
+    From ``start`` [Hz] at t = 0 to ``end`` [Hz] at t = ``duration`` [s].
+    """
+
+    start: Number = eqx.field(converter=jnp.asarray)
+    end: Number = eqx.field(converter=jnp.asarray)
+    duration: Number = eqx.field(converter=jnp.asarray)
+    offset: Number = eqx.field(converter=jnp.asarray)
+
+    def value(self, t: Scalar) -> Scalar:
+        """The angle at time ``t`` [s]."""
         running = jnp.clip(t, 0.0, self.duration)
         slope = (self.end - self.start) / self.duration
-        turns = (self.start + 0.5 * slope * running) * running + self.end * jnp.maximum(
-            t - self.duration, 0.0
-        )
-        return self.amplitude * jnp.sin(2.0 * jnp.pi * turns)
+        turns = (self.start + 0.5 * slope * running) * running + self.end * (t - running)
+        return 2.0 * jnp.pi * turns + self.offset
 
 
 class Tabulated(AbstractProfile):

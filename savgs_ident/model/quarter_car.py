@@ -3,7 +3,7 @@
     r(q, qd, qdd, s, sd, input; p) = 0
 
 with q = (z_s, theta_LW), s the internal states of the effects and the road and the link angle as inputs. The
-first two rows are the equations of motion, the others say sd - rate = 0. Periodic solutions use the residual
+first two rows are the equations of motion, the others those of the states. Periodic solutions use the residual
 as it stands; time integration solves it for (qdd, sd); nothing is written twice.
 
     simqc = QuarterCar(damper_curve(rig))
@@ -15,26 +15,28 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Complex, Float
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.model.bristle import ANCHOR, Presliding, bristle
 from savgs_ident.model.damper import DamperCurve
 from savgs_ident.model.dynamics import GeneralisedForce, Motion, carriage_load, point_force
-from savgs_ident.model.effect import AbstractEffect, InternalState, Port, PortSignals
-from savgs_ident.model.section import Section, SectionCurves, section
+from savgs_ident.model.effect import (
+    AbstractChange,
+    AbstractEffect,
+    AbstractGrip,
+    AbstractSensorError,
+    InternalState,
+    Port,
+    PortSignals,
+)
+from savgs_ident.model.inputs import Imposed, Inputs
+from savgs_ident.model.parts import Part, force_at, gives_way, grip_of, put_under_load, true_road
+from savgs_ident.model.section import Section, SectionCurves, section, section_curves
+from savgs_ident.model.sensors import RESPONSE_CHANNELS, Readings, read_sensors
 from savgs_ident.model.strut import Link, strut
 from savgs_ident.model.tyre import Contact, Road, contact, radial_force
 from savgs_ident.model.values import Values
-
-HANDLED_PORTS = (Port.STRUT, Port.SUSPENSION, Port.TYRE_RADIAL, Port.TYRE_LATERAL, Port.RAIL)
-"""Ports at which a force may act, in the order in which they are evaluated: the rail's load comes last."""
-
-
-class Inputs(NamedTuple):
-    """What drives the rig: road and link."""
-
-    road: Road
-    link: Link
 
 
 class Loads(NamedTuple):
@@ -42,7 +44,8 @@ class Loads(NamedTuple):
 
     ``strut`` pushes apart and ``strut_rate`` [m/s] is the rate of its length; ``vertical`` is F_tz;
     ``lateral`` the tyre friction on the upright; ``rail`` the friction on the sprung mass; ``carriage``
-    |F_Nt| + |F_Nb|; ``reaction`` F_Ny [N] and M_Nx [N m]; ``touch`` the tyre's contact.
+    |F_Nt| + |F_Nb|; ``reaction`` F_Ny [N] and M_Nx [N m]; ``touch`` the tyre's contact; ``ports`` what the
+    forces at each port see.
     """
 
     strut: Float[Array, ""]
@@ -53,73 +56,136 @@ class Loads(NamedTuple):
     carriage: Float[Array, ""]
     reaction: Float[Array, "2"]
     touch: Contact
+    ports: dict[str, PortSignals]
 
 
 class QuarterCar(eqx.Module):
     """The rig without friction, plus the effects that were added to it with ``+``.
 
-    Adding raises :class:`InputError` for an effect at a port where no force can act, or one that is in the
-    model already.
+    Adding raises :class:`InputError` for an effect that is in the model already.
     """
 
     damper: DamperCurve
     effects: tuple[AbstractEffect, ...] = ()
 
     def __add__(self, effect: AbstractEffect) -> "QuarterCar":
-        if effect.port not in HANDLED_PORTS:
-            raise InputError(f"no force can act at port '{effect.port.value}'", source=effect.name)
         if effect.name in (present.name for present in self.effects):
             raise InputError(f"effect '{effect.name}' is in the model already")
         return QuarterCar(self.damper, (*self.effects, effect))
 
     @property
-    def states(self) -> tuple[InternalState, ...]:
-        """Internal states of all effects, in the order of the vector s."""
-        return tuple(state for effect in self.effects for state in effect.states)
+    def grips(self) -> bool:
+        """Whether the rail's carriages hold at all."""
+        return any(isinstance(effect, AbstractGrip) for effect in self.effects)
 
-    def _at(self, port: Port, p: Values, signals: PortSignals, s: Array) -> tuple[Array, dict[str, Array]]:
-        """Force of all effects at a port, and the rates of their states by effect name."""
-        total, rates, start = jnp.zeros_like(signals.displacement), {}, 0
+    @property
+    def states(self) -> tuple[InternalState, ...]:
+        """Internal states: the rail's anchor if it holds, then those of all effects in their order."""
+        own = tuple(state for effect in self.effects for state in effect.states)
+        return (ANCHOR, *own) if self.grips else own
+
+    @property
+    def sensors_have_dynamics(self) -> bool:
+        """Whether a sensor shows anything but the present truth."""
+        return any(isinstance(effect, AbstractSensorError) for effect in self.effects)
+
+    def effective(self, p: Values) -> Values:
+        """The rig's numbers with all changes made."""
         for effect in self.effects:
-            mine = s[start : start + len(effect.states)]
-            start += len(effect.states)
-            if effect.port is port:
-                total = total + effect.force(p, signals, mine)
-                rates[effect.name] = effect.rate(p, signals, mine)
-        return total, rates
+            if isinstance(effect, AbstractChange):
+                p = dict(p) | dict(effect.changes(p))
+        return p
+
+    def curves(self, p: Values) -> SectionCurves:
+        """Kinematics and inertia of a parameter set, for many evaluations of it."""
+        return section_curves(self.effective(p))
+
+    def read(self, p: Values, theta_LW: Float[Array, ""], acceleration: Float[Array, ""]) -> Readings:
+        """What the sensors would show if none had dynamics: see :meth:`transfers`."""
+        return read_sensors(self.effective(p), theta_LW, acceleration)
+
+    def transfers(self, p: Values, frequency: Float[Array, "*f"]) -> Complex[Array, "C *f"]:
+        """Reading over truth of the response channels at frequencies [Hz], errors of the sensors alone."""
+        rows = []
+        for channel in RESPONSE_CHANNELS:
+            row = jnp.ones_like(frequency, dtype=jnp.complex128)
+            for effect in self.effects:
+                if isinstance(effect, AbstractSensorError) and effect.port.value == f"sensor.{channel}":
+                    row = row * effect.transfer(p, frequency)
+            rows.append(row)
+        return jnp.stack(rows)
+
+    def _parts(self, s: Array, sd: Array) -> tuple[Part, ...]:
+        """The effects with their states."""
+        parts, start = [], int(self.grips)
+        for effect in self.effects:
+            mine = slice(start, start + len(effect.states))
+            parts.append(Part(effect, s[mine], sd[mine]))
+            start = mine.stop
+        return tuple(parts)
 
     def _evaluate(
-        self, p: Values, at: Section, motion: Motion, s: Array, inputs: Inputs
+        self, p: Values, at: Section, motion: Motion, s: Array, sd: Array, inputs: Inputs
     ) -> tuple[GeneralisedForce, Array, Loads]:
+        """Generalised forces (4,), the balances of the states (s,), and the loads."""
         zero = jnp.zeros_like(motion.q.z_s)
         omega = motion.qd.theta_LW
+        parts = self._parts(s, sd)
+        push_from = inputs.imposed or Imposed(*[zero] * 5)
+        balances: dict[str, Array] = {}
+        ports: dict[str, PortSignals] = {}
 
-        leg = strut(p, at, omega, inputs.link)
-        extra, rates = self._at(Port.STRUT, p, PortSignals(leg.length, leg.rate, zero), s)
-        push = p["k_sd"] * (p["l_free"] - leg.length) + p["c_sd"] * self.damper(-leg.rate) + extra
+        link_way, mount = gives_way(parts, Port.LINK, zero), gives_way(parts, Port.STRUT, zero)
+        link = Link(inputs.link.angle + link_way[0], inputs.link.velocity + link_way[1])
+        leg = strut(p, at, omega, link)
+        end = gives_way(parts, Port.STRUT, zero, in_damper=True)
+        length, length_rate = leg.length + mount[0], leg.rate + mount[1]
+        damping = p["c_sd"] * self.damper(-(length_rate + end[1]))
+        ports["strut"] = PortSignals(length, length_rate, damping)
+        extra = force_at(parts, Port.STRUT, p, ports["strut"], balances) + push_from.strut
+        push = p["k_sd"] * (p["l_free"] - length) + damping + extra
+        put_under_load(parts, Port.STRUT, p, push, balances)
+        put_under_load(parts, Port.STRUT, p, damping, balances, in_damper=True)
+        put_under_load(parts, Port.LINK, p, push * leg.link_slope, balances)
 
-        travel = PortSignals(at.W_z - p["W_z"], at.W_z_slope * omega, zero)
-        joint, more = self._at(Port.SUSPENSION, p, travel, s)
-        rates |= more
+        ports["suspension"] = PortSignals(at.W_z - p["W_z"], at.W_z_slope * omega, zero)
+        joint = force_at(parts, Port.SUSPENSION, p, ports["suspension"], balances) + push_from.suspension
 
-        touch = contact(p, at, motion, inputs.road)
-        pressing = PortSignals(touch.compression, touch.compression_rate, zero)
-        extra, more = self._at(Port.TYRE_RADIAL, p, pressing, s)
-        rates |= more
+        plate, frame = gives_way(parts, Port.ROAD, zero), gives_way(parts, Port.FRAME, zero)
+        road = true_road(parts, p, inputs)
+        road = Road(road.height - plate[0] + frame[0], road.velocity - plate[1] + frame[1])
+        touch = contact(p, at, motion, road)
+        ports["tyre_radial"] = PortSignals(touch.compression, touch.compression_rate, zero)
+        extra = force_at(parts, Port.TYRE_RADIAL, p, ports["tyre_radial"], balances) + push_from.tyre_radial
         vertical = radial_force(p, touch, extra) / touch.cos_tilt
-        scrub = PortSignals(touch.place[0], touch.lateral_velocity, vertical)
-        lateral, more = self._at(Port.TYRE_LATERAL, p, scrub, s)
-        rates |= more
+        put_under_load(parts, Port.ROAD, p, vertical, balances)
+        carcass = gives_way(parts, Port.TYRE_LATERAL, zero)
+        ports["tyre_lateral"] = PortSignals(
+            touch.place[0] - carcass[0], touch.lateral_velocity - carcass[1], vertical
+        )
+        lateral = force_at(parts, Port.TYRE_LATERAL, p, ports["tyre_lateral"], balances)
+        lateral += push_from.tyre_lateral
+        put_under_load(parts, Port.TYRE_LATERAL, p, -lateral, balances)
 
         inertia = at.inertia @ jnp.stack([motion.qdd.z_s + p["g"], motion.qdd.theta_LW, omega**2])
         total = inertia + point_force(p, touch.place, touch.place_slope, (lateral, vertical))
         total += jnp.stack([zero, push * leg.slope + joint * at.W_z_slope, zero, zero])
         carriage = carriage_load(p, total)
-        rail, more = self._at(Port.RAIL, p, PortSignals(motion.q.z_s, motion.qd.z_s, carriage), s)
-        rates |= more
+        ports["rail"] = PortSignals(motion.q.z_s - frame[0], motion.qd.z_s - frame[1], carriage)
+        rail = force_at(parts, Port.RAIL, p, ports["rail"], balances) + push_from.rail
+        anchor = []
+        if self.grips:
+            held = bristle(
+                Presliding(p["k_pre"], p["c_pre"]), ports["rail"], grip_of(parts, p, ports["rail"]), s[0]
+            )
+            rail += held.force
+            anchor = [sd[:1] - held.rate]
+        put_under_load(parts, Port.FRAME, p, -vertical - rail, balances)
         total += jnp.stack([rail, zero, zero, zero])
-        rate = jnp.concatenate([rates[effect.name] for effect in self.effects] or [jnp.zeros(0)])
-        return total, rate, Loads(push, leg.rate, vertical, lateral, rail, carriage, -total[2:], touch)
+        states = anchor + [balances[part.effect.name] for part in parts if part.effect.name in balances]
+        balance = jnp.concatenate(states or [jnp.zeros(0)])
+        loads = Loads(push, leg.rate, vertical, lateral, rail, carriage, -total[2:], touch, ports)
+        return total, balance, loads
 
     def residual(
         self,
@@ -130,16 +196,27 @@ class QuarterCar(eqx.Module):
         inputs: Inputs,
         curves: SectionCurves | None = None,
     ) -> Array:
-        """The residual, shape (2 + s,): force [N] and moment [N m] out of balance, rates out of balance.
+        """The residual, shape (2 + s,): force [N] and moment [N m] out of balance, states out of balance.
 
         ``s`` and ``sd`` (s,) are the internal states and their rates, in the order of :attr:`states`.
-        ``curves`` of the same parameters serve where many points share them; without, the kinematics are
+        :meth:`curves` of the same parameters serve where many points share them; without, the kinematics are
         evaluated in closed form.
         """
+        p = self.effective(p)
         at = (curves or partial(section, p))(motion.q.theta_LW)
-        total, rate, _ = self._evaluate(p, at, motion, s, inputs)
-        return jnp.concatenate([total[:2], sd - rate])
+        total, balance, _ = self._evaluate(p, at, motion, s, sd, inputs)
+        return jnp.concatenate([total[:2], balance])
 
-    def loads(self, p: Values, motion: Motion, s: Array, inputs: Inputs) -> Loads:
+    def loads(
+        self,
+        p: Values,
+        motion: Motion,
+        s: Array,
+        sd: Array,
+        inputs: Inputs,
+        curves: SectionCurves | None = None,
+    ) -> Loads:
         """Forces and reactions along a motion."""
-        return self._evaluate(p, section(p, motion.q.theta_LW), motion, s, inputs)[2]
+        p = self.effective(p)
+        at = (curves or partial(section, p))(motion.q.theta_LW)
+        return self._evaluate(p, at, motion, s, sd, inputs)[2]

@@ -12,15 +12,20 @@ from jaxtyping import Array, Float
 from numpy.typing import ArrayLike
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.model.profile import AbstractProfile, Constant, LinearSweep, Sine, tabulated
+from savgs_ident.model.effect import Cam
+from savgs_ident.model.profile import AbstractProfile, Constant, LinearSweep, Sine, SweptAngle, tabulated
 from savgs_ident.model.tyre import Road
 from savgs_ident.recordings.recording import Recording
 
 
 class RoadMotion(eqx.Module):
-    """The plate's height over time, ``profile`` in [m], up positive, 0 at standstill."""
+    """The plate's height over time, ``profile`` in [m], up positive, 0 at standstill.
+
+    ``turning`` is the angle of the cam behind it [rad], if there is one.
+    """
 
     profile: AbstractProfile
+    turning: AbstractProfile | None = None
 
     def height(self, t: Float[Array, ""]) -> Float[Array, ""]:
         """Height of the plate [m] at time ``t`` [s]."""
@@ -34,6 +39,10 @@ class RoadMotion(eqx.Module):
         """Height and velocity at time ``t`` [s], as the model takes them."""
         return Road(self.height(t), self.velocity(t))
 
+    def cam_at(self, t: Float[Array, ""]) -> Cam | None:
+        """Angle and speed of the cam at time ``t`` [s]; None if nothing turns."""
+        return None if self.turning is None else Cam(self.turning.value(t), self.turning.rate(t))
+
 
 def flat_road() -> RoadMotion:
     """A plate that stands still."""
@@ -45,12 +54,14 @@ def cam_road(peak_to_peak: float, frequency: float, settle: float = 0.0) -> Road
 
     Its lift grows smoothly from nothing during the first ``settle`` [s].
     """
-    return RoadMotion(Sine(peak_to_peak / 2.0, frequency, 0.0, 0.0, settle))
+    angle = SweptAngle(frequency, frequency, 1.0, 0.0)
+    return RoadMotion(Sine(peak_to_peak / 2.0, frequency, 0.0, 0.0, settle), angle)
 
 
 def sweep_road(peak_to_peak: float, start: float, end: float, duration: float) -> RoadMotion:
     """A cam [m] whose frequency runs from ``start`` to ``end`` [Hz] in ``duration`` [s], upwards first."""
-    return RoadMotion(LinearSweep(peak_to_peak / 2.0, start, end, duration))
+    angle = SweptAngle(start, end, duration, -np.pi / 2.0)
+    return RoadMotion(LinearSweep(peak_to_peak / 2.0, start, end, duration), angle)
 
 
 def tabulated_road(time: ArrayLike, height: ArrayLike, source: str = "") -> RoadMotion:

@@ -1,14 +1,20 @@
 """What the instruments see of a motion: sprung-mass accelerometer and suspension potentiometer."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
-from jaxtyping import Array, Float
+import jax.numpy as jnp
+from jaxtyping import Array, Complex, Float
 
 from savgs_ident.model.kinematics import suspension_travel
 from savgs_ident.model.values import Values
 
 RESPONSE_CHANNELS = ("sprung_accel", "susp_deflection")
 """The channels that a model predicts, in the order of :class:`Readings`."""
+
+
+TINY = 1e-12
+"""Shortest time between two readings [s]: a record of one instant has none."""
 
 
 class Readings(NamedTuple):
@@ -25,3 +31,20 @@ class Readings(NamedTuple):
 def read_sensors(p: Values, theta_LW: Float[Array, ""], acceleration: Float[Array, ""]) -> Readings:
     """Indicated values at a wishbone angle [rad] and a sprung-mass acceleration [m/s^2], gains included."""
     return Readings(p["accel_gain"] * acceleration, p["deflection_gain"] * suspension_travel(p, theta_LW))
+
+
+def pass_through(
+    transfer: Callable[[Float[Array, " f"]], Complex[Array, "C f"]], times: Float[Array, " n"], seen: Readings
+) -> Readings:
+    """Readings at evenly spaced ``times`` [s], (n,) each, after the dynamics of the sensors.
+
+    ``transfer`` is reading over truth of both channels at frequencies [Hz]. Before and after the record the truth
+    counts as what it was at its ends.
+    """
+    count = times.shape[0]
+    rest = count // 2
+    step = (times[-1] - times[0]) / max(count - 1, 1)
+    padded = jnp.pad(jnp.stack(seen), ((0, 0), (rest, rest)), mode="edge")
+    frequency = jnp.arange((count + 2 * rest) // 2 + 1) / (jnp.maximum(step, TINY) * (count + 2 * rest))
+    shown = jnp.fft.irfft(jnp.fft.rfft(padded) * transfer(frequency), count + 2 * rest)
+    return Readings(*shown[:, rest : rest + count])

@@ -103,7 +103,7 @@ class Calibrator(eqx.Module):
         solution = simulate_periodic(problem.model, p, self.task.excitation, self.settings.periodic, layout)
         if not all(status.ok for status in solution.status()):
             return None
-        rows = np.asarray(likelihood.rows(harmonics(p, solution, problem.orders)))
+        rows = np.asarray(likelihood.rows(harmonics(problem.model, p, solution, problem.orders)))
         spread = np.asarray(likelihood.spread(jnp.asarray(truth)))
         return rows + np.sqrt(spread) * random.standard_normal(rows.size)
 

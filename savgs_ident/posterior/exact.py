@@ -120,7 +120,7 @@ def _rows_and_derivatives(
 ) -> tuple[Array, Array]:
     by_name = harmonic_sensitivities(problem.model, p, solution, problem.free.names, problem.orders)
     slopes = jax.vmap(likelihood.rows)(by_name).T * problem.slopes(u)
-    return likelihood.rows(harmonics(p, solution, problem.orders)), slopes
+    return likelihood.rows(harmonics(problem.model, p, solution, problem.orders)), slopes
 
 
 @eqx.filter_jit
@@ -142,7 +142,7 @@ def _response(*args: Any) -> tuple[Array, ...]:
 def _harmonics_near(problem: Problem, anchor: Anchor, u: Array) -> tuple[Array, Array]:
     p, known = problem.parameters(u), anchor.solution
     motions, step = solve_near(problem.model, p, known, anchor.predicted(u), LIMIT, ENOUGH)
-    return harmonics_of(p, motions, known.mesh, problem.orders), step
+    return harmonics_of(problem.model, p, motions, known, problem.orders), step
 
 
 @eqx.filter_jit

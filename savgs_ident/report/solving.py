@@ -67,8 +67,9 @@ def solve(
     """The periodic motions of a rig with the named effects; the rest as in :func:`simulate_periodic`."""
     table = model_parameters(rig, effects)
     p = as_values(table.as_dict())
-    solution = simulate_periodic(build_model(rig, effects), p, excitation, settings, layout)
-    return Solved(excitation, np.asarray(harmonics(p, solution, orders)), solution.status())
+    model = build_model(rig, effects)
+    solution = simulate_periodic(model, p, excitation, settings, layout)
+    return Solved(excitation, np.asarray(harmonics(model, p, solution, orders)), solution.status())
 
 
 def solve_between(rig: Rig, effects: Sequence[str], known: Solved) -> Solved:

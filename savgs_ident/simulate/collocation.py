@@ -24,7 +24,7 @@ from jaxtyping import Array, Float
 
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.quarter_car import Inputs, QuarterCar
-from savgs_ident.model.section import SectionCurves, section_curves
+from savgs_ident.model.section import SectionCurves
 from savgs_ident.model.values import Values
 from savgs_ident.simulate import cyclic
 from savgs_ident.simulate.layout import CHUNK, Layout
@@ -122,7 +122,7 @@ def linearise(
 ) -> Linearised:
     """Linearise residual and steps about a trajectory; ``steps`` [s] from each node to the next."""
     parts = (*at.x, *at.y)
-    curves = section_curves(p)
+    curves = model.curves(p)
     residual, jacobian = _residual_and_columns(
         lambda *z: residual_at_nodes(model, p, curves, z, inputs), parts
     )

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 from numpy.typing import ArrayLike
 
+from savgs_ident.model.effect import Cam
 from savgs_ident.model.quarter_car import Inputs
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
@@ -47,7 +48,9 @@ def inputs_at(excitation: Excitation, mesh: Mesh) -> Inputs:
     """Road and link at the nodes of a mesh; every field is of shape (P,)."""
     dwell, phase = mesh.layout.dwell, jnp.asarray(mesh.phase)
     omega = 2.0 * jnp.pi * excitation.frequency[dwell]
+    turned = jnp.angle(excitation.road[:, 1]) if excitation.road.shape[1] > 1 else jnp.zeros(())
     return Inputs(
         Road(*_synthesise(excitation.road[dwell], omega, phase)),
         Link(*_synthesise(excitation.link[dwell], omega, phase)),
+        Cam(phase + jnp.broadcast_to(turned, excitation.frequency.shape)[dwell], omega),
     )

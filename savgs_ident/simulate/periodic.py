@@ -6,7 +6,7 @@ where the accelerations change, the nodes move there, and the solution is repeat
 serve any nearby parameter set, which is how fits warm-start.
 
     solution = simulate_periodic(model, p, cam_excitation([2.0, 2.35], 0.0275, np.pi / 2))
-    response = harmonics(p, solution, orders=9)          # complex, (2 dwells, 2 channels, 10)
+    response = harmonics(model, p, solution, orders=9)   # complex, (2 dwells, 2 channels, 10)
 
 What the truncation to a finite number of nodes costs is stated by :func:`truncation_error`, which solves once
 more on twice as many nodes.
@@ -25,8 +25,7 @@ from jaxtyping import Array, Complex, Float, Int
 
 from savgs_ident.core.status import Status
 from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.section import TRAVEL, section_curves
-from savgs_ident.model.sensors import read_sensors
+from savgs_ident.model.section import TRAVEL
 from savgs_ident.model.values import Values, as_values
 from savgs_ident.simulate.collocation import (
     Linearised,
@@ -205,8 +204,8 @@ def resolve(
     return solve_on_mesh(model, as_values(p), solution.excitation, solution.mesh, begin, limit)
 
 
-def _readings(p: Values, trajectory: Trajectory) -> Float[Array, "P C"]:
-    at_nodes = jax.vmap(partial(read_sensors, p))
+def _readings(model: QuarterCar, p: Values, trajectory: Trajectory) -> Float[Array, "P C"]:
+    at_nodes = jax.vmap(partial(model.read, p))
     return jnp.stack(at_nodes(trajectory.x[1], trajectory.y[0]), axis=-1)
 
 
@@ -219,17 +218,29 @@ def _analyse(signals: Float[Array, "P C"], mesh: Mesh, orders: int) -> Complex[A
 
 
 @eqx.filter_jit
-def harmonics(p: Values, solution: PeriodicSolution, orders: int) -> Complex[Array, "D C K"]:
+def harmonics(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, orders: int
+) -> Complex[Array, "D C K"]:
     """Complex harmonics 0..orders of the sensor readings, (D, 2, orders + 1), in the channels' SI units.
 
     Channels are those of :data:`savgs_ident.model.sensors.RESPONSE_CHANNELS`.
     """
-    return harmonics_of(p, solution.trajectory, solution.mesh, orders)
+    return harmonics_of(model, p, solution.trajectory, solution, orders)
 
 
-def harmonics_of(p: Values, motions: Trajectory, mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
-    """The same of motions on the nodes of a mesh, as a part of a larger program that is compiled."""
-    return _analyse(_readings(p, motions), mesh, orders)
+def harmonics_of(
+    model: QuarterCar, p: Values, motions: Trajectory, known: PeriodicSolution, orders: int
+) -> Complex[Array, "D C K"]:
+    """The same of motions on the nodes of a ``known`` solution, as a part of a larger program that is compiled."""
+    seen = _analyse(_readings(model, p, motions), known.mesh, orders)
+    return seen * _sensors(model, p, known.excitation.frequency, orders)
+
+
+def _sensors(
+    model: QuarterCar, p: Values, frequency: Float[Array, " D"], orders: int
+) -> Complex[Array, "D C K"]:
+    """What the sensors make of each order."""
+    return jnp.moveaxis(model.transfers(p, frequency[:, None] * jnp.arange(orders + 1)), 0, 1)
 
 
 @eqx.filter_jit
@@ -240,15 +251,25 @@ def harmonic_sensitivities(
 
     One factorisation, that of the last Newton step, serves all parameters.
     """
-    at, mesh = solution.trajectory, solution.mesh
+    return jax.lax.map(directional(model, p, solution, names, orders), jnp.eye(len(names)))
+
+
+def directional(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
+) -> Callable[[Float[Array, " n"]], Complex[Array, "D C K"]]:
+    """Derivatives of :func:`harmonics` along directions (n,) of the named parameters, to be mapped over."""
+    at = solution.trajectory
     moved_along = _linear_motion(model, p, solution)
 
-    def along(direction: Array) -> Array:
-        tangent = _tangent(p, names, direction)
-        _, signals = jax.jvp(_readings, (dict(p), at), (tangent, moved_along(tangent)))
-        return _analyse(signals, mesh, orders)
+    def seen(q: dict[str, Array], motions: Trajectory) -> Array:
+        return harmonics_of(model, q, motions, solution, orders)
 
-    return jax.lax.map(along, jnp.eye(len(names)))
+    def along(direction: Float[Array, " n"]) -> Complex[Array, "D C K"]:
+        tangent = _tangent(p, names, direction)
+        change: Array = jax.jvp(seen, (dict(p), at), (tangent, moved_along(tangent)))[1]
+        return change
+
+    return along
 
 
 def trajectory_sensitivities(
@@ -276,7 +297,7 @@ def _linear_motion(
 
     def moved(tangent: dict[str, Array]) -> Trajectory:
         _, change = jax.jvp(
-            lambda q: residual_at_nodes(model, q, section_curves(q), parts, inputs), (dict(p),), (tangent,)
+            lambda q: residual_at_nodes(model, q, model.curves(q), parts, inputs), (dict(p),), (tangent,)
         )
         imbalance = -solve_nodes(lin.mass, change[:, None])[:, 0]
         rate = jnp.concatenate([jnp.zeros_like(at.x[2:4]), imbalance])
@@ -294,5 +315,5 @@ def truncation_error(
     """
     doubled = Layout(tuple(2 * count for count in solution.mesh.layout.counts))
     finer = adapt(model, p, solution, doubled, PeriodicSettings.iterations)
-    coarse, fine = (harmonics(p, each, orders) for each in (solution, finer))
+    coarse, fine = (harmonics(model, p, each, orders) for each in (solution, finer))
     return jnp.max(jnp.abs(coarse - fine)[..., 1:], axis=-1) / jnp.abs(fine[..., 1])

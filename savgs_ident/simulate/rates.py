@@ -1,9 +1,7 @@
 """The residual solved for what time integration asks: accelerations and rates of internal states.
 
-The first two rows of r(q, qd, qdd, s, sd, input) = 0 are balances of force that know nothing of sd, and the
-others read sd - rate = 0. So two unknowns are left to solve for, the accelerations: piecewise affine, because
-the rail's friction depends on its load and the load on the accelerations. The rates follow from one more
-evaluation, at sd = 0.
+They are the root of r(q, qd, qdd, s, sd, input) = 0 in (qdd, sd): piecewise affine but for the damper, because
+the rail's friction depends on its load and the load on the accelerations.
 """
 
 from typing import NamedTuple
@@ -19,6 +17,9 @@ from savgs_ident.model.values import Values
 
 ACCELERATION_SCALE = (1.0, 3.0)
 """Typical accelerations of z_s [m/s^2] and theta_LW [rad/s^2]."""
+
+STATE_TIME = 1e-2
+"""Time [s] in which an internal state typically changes by its scale."""
 
 
 class Rates(NamedTuple):
@@ -42,12 +43,11 @@ def solve_rates(
     ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`. Differentiable in everything,
     exactly, by the implicit function theorem.
     """
-    still = jnp.zeros_like(s)
 
-    def residual(accelerations: Array) -> Array:
-        motion = Motion(q, qd, Coordinates(accelerations[0], accelerations[1]))
-        return model.residual(p, motion, s, still, inputs, curves)
+    def residual(y: Array) -> Array:
+        motion = Motion(q, qd, Coordinates(y[0], y[1]))
+        return model.residual(p, motion, s, y[2:], inputs, curves)
 
-    scale = jnp.asarray(ACCELERATION_SCALE)
-    accelerations = find_root(lambda y: residual(y)[:2], jnp.zeros(2), scale)
-    return Rates(Coordinates(accelerations[0], accelerations[1]), -residual(accelerations)[2:])
+    rates = [state.scale / STATE_TIME for state in model.states]
+    y = find_root(residual, jnp.zeros(2 + len(rates)), jnp.asarray([*ACCELERATION_SCALE, *rates]))
+    return Rates(Coordinates(y[0], y[1]), y[2:])

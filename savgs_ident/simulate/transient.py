@@ -26,8 +26,8 @@ from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.equilibrium import deflection_zero, static_equilibrium
 from savgs_ident.model.quarter_car import Inputs, Loads, QuarterCar
 from savgs_ident.model.road import RoadMotion
-from savgs_ident.model.section import TRAVEL, SectionCurves, section_curves
-from savgs_ident.model.sensors import Readings, read_sensors
+from savgs_ident.model.section import TRAVEL, SectionCurves
+from savgs_ident.model.sensors import Readings, pass_through
 from savgs_ident.model.values import Values
 from savgs_ident.simulate.rates import Rates, solve_rates
 
@@ -66,6 +66,7 @@ class TransientSolution(eqx.Module):
         times: [s], (n,).
         motion: coordinates, velocities and accelerations, each (n,).
         s: internal states of the effects, (n, s).
+        sd: their rates, (n, s).
         actuation: states of what moves the link, (n, k).
         inputs: what the road and the link did, each (n,).
         readings: what the sensors show, each (n,); the deflection counts from standstill at the nominal link
@@ -77,6 +78,7 @@ class TransientSolution(eqx.Module):
     times: Float[Array, " n"]
     motion: Motion
     s: Float[Array, "n s"]
+    sd: Float[Array, "n s"]
     actuation: Float[Array, "n k"]
     inputs: Inputs
     readings: Readings
@@ -128,7 +130,7 @@ def _inputs_and_rates(
     now: RigState,
     curves: SectionCurves | None = None,
 ) -> tuple[Inputs, Rates]:
-    inputs = Inputs(road.at(t), link.link(t, now.actuation))
+    inputs = Inputs(road.at(t), link.link(t, now.actuation), road.cam_at(t))
     return inputs, solve_rates(model, p, now.q, now.qd, now.s, inputs, curves)
 
 
@@ -146,7 +148,7 @@ def state_rates(
     ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`.
     """
     inputs, rates = _inputs_and_rates(model, p, road, link, t, now, curves)
-    strut = model.loads(p, Motion(now.q, now.qd, rates.qdd), now.s, inputs).strut
+    strut = model.loads(p, Motion(now.q, now.qd, rates.qdd), now.s, rates.sd, inputs, curves).strut
     load = link_torque(p, strut, now.q.theta_LW, inputs.link.angle)
     return RigState(now.qd, rates.qdd, rates.sd, link.rate(p, t, now.actuation, load))
 
@@ -218,17 +220,22 @@ def _observe(
     zero: Float[Array, ""],
     curves: SectionCurves,
 ) -> TransientSolution:
-    def one(at: tuple[Array, Array]) -> tuple[RigState, Inputs, Motion, Readings]:
+    def one(at: tuple[Array, Array]) -> tuple[RigState, Inputs, Motion, Array, Readings]:
         t, now = at[0], _unpack(model, at[1])
         inputs, rates = _inputs_and_rates(model, p, road, link, t, now, curves)
-        seen = read_sensors(p, now.q.theta_LW, rates.qdd.z_s)
-        shown = seen._replace(susp_deflection=seen.susp_deflection - p["deflection_gain"] * zero)
-        return now, inputs, Motion(now.q, now.qd, rates.qdd), shown
+        seen = model.read(p, now.q.theta_LW, rates.qdd.z_s)
+        shown = seen._replace(
+            susp_deflection=seen.susp_deflection - model.effective(p)["deflection_gain"] * zero
+        )
+        return now, inputs, Motion(now.q, now.qd, rates.qdd), rates.sd, shown
 
     # One after the other: compiling the Newton iteration for all instants side by side takes far longer.
-    now, inputs, motion, readings = jax.lax.map(one, (found.ts, found.ys))
+    now, inputs, motion, sd, seen = jax.lax.map(one, (found.ts, found.ys))
     steps, times = found.stats["num_steps"], cast(Array, found.ts)
-    return TransientSolution(times, motion, now.s, now.actuation, inputs, readings, steps, found.result)
+    readings = seen
+    if model.sensors_have_dynamics:
+        readings = pass_through(lambda frequency: model.transfers(p, frequency), times, seen)
+    return TransientSolution(times, motion, now.s, sd, now.actuation, inputs, readings, steps, found.result)
 
 
 def simulate_transient(
@@ -247,7 +254,7 @@ def simulate_transient(
     whose states are then part of the motion. ``tolerance`` is relative, per step. Look at ``status()`` of the
     result before using it. Differentiable in forward mode (``jax.jvp``, ``jax.jacfwd``).
     """
-    instants, curves = jnp.asarray(times, dtype=jnp.float64), section_curves(p)
+    instants, curves = jnp.asarray(times, dtype=jnp.float64), model.curves(p)
     start = rest_state(model, p, road, link, instants[0], curves) if initial is None else initial
     found = _integrate(model, p, road, link, instants, start, jnp.asarray(tolerance), curves)
     return _observe(model, p, road, link, found, _zero(model, p, curves), curves)
@@ -256,4 +263,6 @@ def simulate_transient(
 @eqx.filter_jit
 def transient_loads(model: QuarterCar, p: Values, solution: TransientSolution) -> Loads:
     """Forces and reactions along a motion, each (n,) or (n, 2)."""
-    return jax.vmap(lambda *at: model.loads(p, *at))(solution.motion, solution.s, solution.inputs)
+    return jax.vmap(lambda *at: model.loads(p, *at))(
+        solution.motion, solution.s, solution.sd, solution.inputs
+    )

@@ -53,10 +53,10 @@ def test_scipy_integrates_the_recorded_dwell_that_the_package_solves(task: Task)
     )
     found = period_harmonics(work, states[None])
     solution = simulate_periodic(problem.model, values, task.excitation)
-    solved = np.asarray(harmonics(values, solution, problem.orders))[[dwell]]
+    solved = np.asarray(harmonics(problem.model, values, solution, problem.orders))[[dwell]]
     assert errors_percent(found, solved)[0] < TOLERANCE_PERCENT
     given = simulate_periodic(problem.model, problem.fixed, task.excitation)
-    elsewhere = np.asarray(harmonics(problem.fixed, given, problem.orders))[[dwell]]
+    elsewhere = np.asarray(harmonics(problem.model, problem.fixed, given, problem.orders))[[dwell]]
     assert errors_percent(found, elsewhere)[0] > 10.0 * TOLERANCE_PERCENT
 
 

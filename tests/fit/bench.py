@@ -78,7 +78,7 @@ class Bench:
         """Harmonics of the model with some values in place of the rig's, on the nodes of the first solution."""
         problem = self.task.problem
         p = dict(problem.fixed) | {name: jnp.asarray(value) for name, value in values.items()}
-        return np.asarray(harmonics(p, resolve(problem.model, p, self.first), problem.orders))
+        return np.asarray(harmonics(problem.model, p, resolve(problem.model, p, self.first), problem.orders))
 
     def noise(self, seed: int) -> NDArray[np.complex128]:
         """A draw of the measurement's own noise, 0 where nothing was measured."""

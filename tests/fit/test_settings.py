@@ -40,7 +40,7 @@ def _simqc_data(response: HarmonicResponse, rig: Rig, damping: float) -> Harmoni
     assert all(status.ok for status in solution.status())
     found = response.harmonics.copy()
     places = [response.channel("sprung_accel"), response.channel("susp_deflection")]
-    found[:, places] = np.asarray(harmonics(p, solution, response.orders))
+    found[:, places] = np.asarray(harmonics(task.problem.model, p, solution, response.orders))
     return replace(response, harmonics=found)
 
 

@@ -89,7 +89,7 @@ def _look(model: QuarterCar) -> Look:
         s = jnp.stack([motion.q.z_s - stretch] * states) if states else jnp.zeros(0)
         return Seen(
             model.residual(p, motion, s, jnp.zeros(states), inputs),
-            model.loads(p, motion, s, inputs),
+            model.loads(p, motion, s, jnp.zeros_like(s), inputs),
             linkage(p, motion.q.theta_LW),
             strut_length(p, motion.q.theta_LW, inputs.link.angle),
         )

@@ -46,7 +46,7 @@ def small(simqc: QuarterCar, numbers: dict[str, float]) -> Callable[[NDArray[np.
     @jax.jit
     def linearise(p: Values, instant: Array) -> tuple[Array, Array, Loads]:
         moved = instant[jnp.array([0, 1, 4, 5])]
-        loads = simqc.loads(p, motion_of(instant), jnp.zeros(0), inputs_of(instant))
+        loads = simqc.loads(p, motion_of(instant), jnp.zeros(0), jnp.zeros(0), inputs_of(instant))
         # The curves are the closed form to 1e-11 and much less to differentiate once more.
         curves = section_curves(p)
         value, slope = jax.linearize(lambda x: residual(x, p, curves, instant), moved)

@@ -56,7 +56,7 @@ def _powers(
         (motion.q, motion.qd, road.height, link.angle),
         (motion.qd, motion.qdd, road.velocity, link.velocity),
     )
-    loads = model.loads(p, motion, anchor, inputs)
+    loads = model.loads(p, motion, anchor, jnp.zeros_like(anchor), inputs)
     residual = model.residual(p, motion, anchor, jnp.zeros(1), inputs)
     touch, length = loads.touch, strut_length(p, motion.q.theta_LW, link.angle)
     per_link = jax.grad(strut_length, argnums=2)(p, motion.q.theta_LW, link.angle)

@@ -37,7 +37,7 @@ def altered(values: Values, changes: Mapping[str, float]) -> Values:
 
 def orders(p: Values, solution: PeriodicSolution, highest: int = 9) -> NDArray[np.complex128]:
     """Harmonics 0..``highest``, (D, 2, ``highest`` + 1)."""
-    return np.asarray(harmonics(p, solution, highest))
+    return np.asarray(harmonics(model, p, solution, highest))
 
 
 def distance(found: NDArray[np.complex128], wanted: NDArray[np.complex128]) -> NDArray[np.float64]:

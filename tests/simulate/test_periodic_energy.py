@@ -32,7 +32,7 @@ class Works(NamedTuple):
 def _powers(model: QuarterCar, p: Values, x: Array, y: Array, inputs: Inputs) -> Array:
     """Powers [W] at one node, in the order of :class:`Works`; springs and weight are not among them."""
     motion = Motion(Coordinates(*x[:2]), Coordinates(*x[2:4]), Coordinates(*y[:2]))
-    loads = model.loads(p, motion, x[4:], inputs)
+    loads = model.loads(p, motion, x[4:], jnp.zeros_like(x[4:]), inputs)
     spring = p["k_sd"] * (p["l_free"] - strut_length(p, x[1], inputs.link.angle))
     elastic = p["k_t"] * jnp.maximum(loads.touch.compression, 0.0)
     return jnp.stack(

@@ -29,7 +29,7 @@ jax.monitoring.register_event_duration_secs_listener(
 )
 settings = PeriodicSettings(nodes=32)
 solution = simulate_periodic(model, p, cam_excitation([2.0, 3.0], 0.0275, np.pi / 2), settings)
-print("jit(of_arrays)" in lowered, np.asarray(harmonics(p, solution, 5)).tobytes().hex())
+print("jit(of_arrays)" in lowered, np.asarray(harmonics(model, p, solution, 5)).tobytes().hex())
 """
 
 

@@ -86,7 +86,7 @@ def largest_difference(bench: Bench, frequencies: tuple[float, ...]) -> np.ndarr
     """Between transient and periodic harmonics, relative to the first, (D, 2)."""
     periodic = simulate_periodic(bench.model, bench.p, cam_excitation(frequencies, LIFT, NOMINAL))
     assert all(status.ok for status in periodic.status())
-    expected = np.asarray(harmonics(bench.p, periodic, 9))[:, :, 1:]
+    expected = np.asarray(harmonics(bench.model, bench.p, periodic, 9))[:, :, 1:]
     found = np.stack([orders_1_to_9(steady_period(bench, frequency)) for frequency in frequencies])
     return np.max(np.abs(found - expected), axis=2) / np.abs(found[:, :, 0])
 

@@ -9,7 +9,6 @@ from savgs_ident.fit.collocation.unknowns import Unknowns
 from savgs_ident.fit.problem import Problem
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.quarter_car import Inputs
-from savgs_ident.model.sensors import read_sensors
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
 from savgs_ident.symbolic.translate import to_casadi
@@ -30,7 +29,7 @@ def point_equations(problem: Problem, unknowns: Unknowns) -> ca.Function:
         motion = Motion(Coordinates(x[0], x[1]), Coordinates(x[2], x[3]), Coordinates(y[0], y[1]))
         inputs = Inputs(Road(drive[0], drive[1]), Link(drive[2], drive[3]))
         balance = problem.model.residual(p, motion, x[4:], y[2:], inputs)
-        seen = jnp.stack(read_sensors(p, x[1], y[0]))
+        seen = jnp.stack(problem.model.read(p, x[1], y[0]))
         return jnp.concatenate([balance, seen - readings]) / jnp.asarray(unknowns.residual_scale)
 
     inputs = {"z": np.zeros(unknowns.width), "u": np.zeros(unknowns.parameters), "drive": np.zeros(4)}
