@@ -12,11 +12,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.model.effect import AbstractSensorError, InternalState, Port
+from savgs_ident.model.effect import AbstractSensorFault, InternalState, Port
 from savgs_ident.model.values import Values
 
 
-class AccelLag(AbstractSensorError):
+class AccelLag(AbstractSensorFault):
     """An accelerometer that follows late."""
 
     name: ClassVar[str] = "accel_lag"

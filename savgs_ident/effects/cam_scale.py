@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.model.effect import AbstractRoadError, Cam, InternalState, Port
+from savgs_ident.model.effect import AbstractRoadFault, Cam, InternalState, Port
 from savgs_ident.model.tyre import Road
 from savgs_ident.model.values import Values
 
 
-class CamScale(AbstractRoadError):
+class CamScale(AbstractRoadFault):
     """A scale error of the plate's height."""
 
     name: ClassVar[str] = "cam_scale"

@@ -7,8 +7,8 @@ with one law:
     AbstractGrip           what the rail's carriages hold before they slide    (Coulomb, Stribeck, preload)
     AbstractSeries         something that gives way in the path of a load      (a mount, a carcass, a frame)
     AbstractChange         a number of the rig that is another                 (a spring rate, a mass)
-    AbstractRoadError      a plate that does not do what its encoder says      (a cam of another shape)
-    AbstractSensorError    a sensor that does not show what is there           (a lag, a gain)
+    AbstractRoadFault      a plate that does not do what its encoder says      (a cam of another shape)
+    AbstractSensorFault    a sensor that does not show what is there           (a lag, a gain)
 
 SimTR is literally SimQC plus two effects:
 
@@ -168,7 +168,7 @@ class AbstractChange(AbstractEffect):
         """The parameters that it changes, by name, SI."""
 
 
-class AbstractRoadError(AbstractEffect):
+class AbstractRoadFault(AbstractEffect):
     """A plate that does not do what its encoder says."""
 
     @abstractmethod
@@ -176,7 +176,7 @@ class AbstractRoadError(AbstractEffect):
         """Height [m] and velocity [m/s] that come on top of the recorded ones."""
 
 
-class AbstractSensorError(AbstractEffect):
+class AbstractSensorFault(AbstractEffect):
     """A sensor that does not show what is there; linear in what it measures."""
 
     @abstractmethod

@@ -13,7 +13,7 @@ from savgs_ident.model.effect import (
     AbstractEffect,
     AbstractForce,
     AbstractGrip,
-    AbstractRoadError,
+    AbstractRoadFault,
     AbstractSeries,
     Cam,
     Grip,
@@ -90,7 +90,7 @@ def true_road(parts: tuple[Part, ...], p: Values, inputs: Inputs) -> Road:
     height, velocity = inputs.road
     cam = inputs.cam or Cam(jnp.zeros_like(height), jnp.zeros_like(height))
     for effect, _, _ in parts:
-        if isinstance(effect, AbstractRoadError):
+        if isinstance(effect, AbstractRoadFault):
             shift = effect.shift(p, inputs.road, cam)
             height, velocity = height + shift.height, velocity + shift.velocity
     return Road(height, velocity)

@@ -25,7 +25,7 @@ from savgs_ident.model.effect import (
     AbstractChange,
     AbstractEffect,
     AbstractGrip,
-    AbstractSensorError,
+    AbstractSensorFault,
     InternalState,
     Port,
     PortSignals,
@@ -87,7 +87,7 @@ class QuarterCar(eqx.Module):
     @property
     def sensors_have_dynamics(self) -> bool:
         """Whether a sensor shows anything but the present truth."""
-        return any(isinstance(effect, AbstractSensorError) for effect in self.effects)
+        return any(isinstance(effect, AbstractSensorFault) for effect in self.effects)
 
     def effective(self, p: Values) -> Values:
         """The rig's numbers with all changes made."""
@@ -110,7 +110,7 @@ class QuarterCar(eqx.Module):
         for channel in RESPONSE_CHANNELS:
             row = jnp.ones_like(frequency, dtype=jnp.complex128)
             for effect in self.effects:
-                if isinstance(effect, AbstractSensorError) and effect.port.value == f"sensor.{channel}":
+                if isinstance(effect, AbstractSensorFault) and effect.port.value == f"sensor.{channel}":
                     row = row * effect.transfer(p, frequency)
             rows.append(row)
         return jnp.stack(rows)
