@@ -28,8 +28,8 @@ from benchmarks.task import ORDERS, TOLERANCE_PERCENT, Harmonics, Task, errors_p
 from savgs_ident.effects.rail_coulomb import RailCoulomb
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.effect import PortSignals
+from savgs_ident.model.inputs import Inputs
 from savgs_ident.model.kinematics import suspension_travel
-from savgs_ident.model.quarter_car import Inputs
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from benchmarks.task import ORDERS, Harmonics, Task
 from savgs_ident.model.dynamics import Coordinates
+from savgs_ident.model.inputs import Inputs
 from savgs_ident.model.kinematics import suspension_travel
-from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.section import SectionCurves
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road

@@ -23,7 +23,7 @@ from benchmarks.outcome import Tell
 from benchmarks.posterior_problem import PosteriorProblem
 from savgs_ident.fit.problem import Problem
 from savgs_ident.model.equilibrium import static_equilibrium
-from savgs_ident.model.quarter_car import Inputs
+from savgs_ident.model.inputs import Inputs
 from savgs_ident.model.section import SectionCurves, section_curves
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road

@@ -16,7 +16,8 @@ from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.fit.target import Target
 from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.model.inputs import Inputs
+from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
 from savgs_ident.model.values import Values, as_values

@@ -11,8 +11,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.model.dynamics import Coordinates, Motion
+from savgs_ident.model.inputs import Inputs
 from savgs_ident.model.kinematics import suspension_travel
-from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.section import SectionCurves
 from savgs_ident.model.small_root import find_root
 from savgs_ident.model.strut import Link

@@ -18,6 +18,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.model.acting import Acting, Part, Way
 from savgs_ident.model.bristle import ANCHOR, Presliding, bristle
 from savgs_ident.model.damper import DamperCurve
 from savgs_ident.model.dynamics import GeneralisedForce, Motion, carriage_load, point_force
@@ -30,11 +31,10 @@ from savgs_ident.model.effect import (
     Port,
     PortSignals,
 )
-from savgs_ident.model.inputs import Imposed, Inputs
-from savgs_ident.model.parts import Part, force_at, gives_way, grip_of, put_under_load, true_road
+from savgs_ident.model.inputs import Imposed, Inputs, nothing_imposed
 from savgs_ident.model.section import Section, SectionCurves, section, section_curves
 from savgs_ident.model.sensors import RESPONSE_CHANNELS, Readings, read_sensors
-from savgs_ident.model.strut import Link, strut
+from savgs_ident.model.strut import Link, Strut, strut
 from savgs_ident.model.tyre import Contact, Road, contact, radial_force
 from savgs_ident.model.values import Values
 
@@ -45,7 +45,7 @@ class Loads(NamedTuple):
     ``strut`` pushes apart and ``strut_rate`` [m/s] is the rate of its length; ``vertical`` is F_tz;
     ``lateral`` the tyre friction on the upright; ``rail`` the friction on the sprung mass; ``carriage``
     |F_Nt| + |F_Nb|; ``reaction`` F_Ny [N] and M_Nx [N m]; ``touch`` the tyre's contact; ``ports`` what the
-    forces at each port see.
+    forces at each port see, ``carried`` the load under which something may give way there.
     """
 
     strut: Float[Array, ""]
@@ -57,6 +57,7 @@ class Loads(NamedTuple):
     reaction: Float[Array, "2"]
     touch: Contact
     ports: dict[str, PortSignals]
+    carried: dict[str, Float[Array, ""]]
 
 
 class QuarterCar(eqx.Module):
@@ -128,64 +129,54 @@ class QuarterCar(eqx.Module):
         self, p: Values, at: Section, motion: Motion, s: Array, sd: Array, inputs: Inputs
     ) -> tuple[GeneralisedForce, Array, Loads]:
         """Generalised forces (4,), the balances of the states (s,), and the loads."""
-        zero = jnp.zeros_like(motion.q.z_s)
-        omega = motion.qd.theta_LW
-        parts = self._parts(s, sd)
-        push_from = inputs.imposed or Imposed(*[zero] * 5)
-        balances: dict[str, Array] = {}
-        ports: dict[str, PortSignals] = {}
+        acting = Acting(self._parts(s, sd), p)
+        given = inputs.imposed or nothing_imposed(motion.q.z_s)
+        leg, push = self._strut(acting, at, motion, inputs, given)
+        frame = acting.way(Port.FRAME, given.frame_way)
+        touch, vertical, lateral = _wheel(acting, at, motion, inputs, given, frame)
+        travel = PortSignals(at.W_z - p["W_z"], at.W_z_slope * motion.qd.theta_LW, jnp.zeros_like(push))
+        joint = acting.force(Port.SUSPENSION, travel, given.suspension)
 
-        link_way, mount = gives_way(parts, Port.LINK, zero), gives_way(parts, Port.STRUT, zero)
-        link = Link(inputs.link.angle + link_way[0], inputs.link.velocity + link_way[1])
-        leg = strut(p, at, omega, link)
-        end = gives_way(parts, Port.STRUT, zero, in_damper=True)
-        length, length_rate = leg.length + mount[0], leg.rate + mount[1]
-        damping = p["c_sd"] * self.damper(-(length_rate + end[1]))
-        ports["strut"] = PortSignals(length, length_rate, damping)
-        extra = force_at(parts, Port.STRUT, p, ports["strut"], balances) + push_from.strut
-        push = p["k_sd"] * (p["l_free"] - length) + damping + extra
-        put_under_load(parts, Port.STRUT, p, push, balances)
-        put_under_load(parts, Port.STRUT, p, damping, balances, in_damper=True)
-        put_under_load(parts, Port.LINK, p, push * leg.link_slope, balances)
-
-        ports["suspension"] = PortSignals(at.W_z - p["W_z"], at.W_z_slope * omega, zero)
-        joint = force_at(parts, Port.SUSPENSION, p, ports["suspension"], balances) + push_from.suspension
-
-        plate, frame = gives_way(parts, Port.ROAD, zero), gives_way(parts, Port.FRAME, zero)
-        road = true_road(parts, p, inputs)
-        road = Road(road.height - plate[0] + frame[0], road.velocity - plate[1] + frame[1])
-        touch = contact(p, at, motion, road)
-        ports["tyre_radial"] = PortSignals(touch.compression, touch.compression_rate, zero)
-        extra = force_at(parts, Port.TYRE_RADIAL, p, ports["tyre_radial"], balances) + push_from.tyre_radial
-        vertical = radial_force(p, touch, extra) / touch.cos_tilt
-        put_under_load(parts, Port.ROAD, p, vertical, balances)
-        carcass = gives_way(parts, Port.TYRE_LATERAL, zero)
-        ports["tyre_lateral"] = PortSignals(
-            touch.place[0] - carcass[0], touch.lateral_velocity - carcass[1], vertical
-        )
-        lateral = force_at(parts, Port.TYRE_LATERAL, p, ports["tyre_lateral"], balances)
-        lateral += push_from.tyre_lateral
-        put_under_load(parts, Port.TYRE_LATERAL, p, -lateral, balances)
-
+        omega, zero = motion.qd.theta_LW, jnp.zeros_like(push)
         inertia = at.inertia @ jnp.stack([motion.qdd.z_s + p["g"], motion.qdd.theta_LW, omega**2])
         total = inertia + point_force(p, touch.place, touch.place_slope, (lateral, vertical))
         total += jnp.stack([zero, push * leg.slope + joint * at.W_z_slope, zero, zero])
         carriage = carriage_load(p, total)
-        ports["rail"] = PortSignals(motion.q.z_s - frame[0], motion.qd.z_s - frame[1], carriage)
-        rail = force_at(parts, Port.RAIL, p, ports["rail"], balances) + push_from.rail
+        sliding = PortSignals(motion.q.z_s - frame.displacement, motion.qd.z_s - frame.velocity, carriage)
+        rail = acting.force(Port.RAIL, sliding, given.rail)
         anchor = []
         if self.grips:
-            held = bristle(
-                Presliding(p["k_pre"], p["c_pre"]), ports["rail"], grip_of(parts, p, ports["rail"]), s[0]
-            )
+            held = bristle(Presliding(p["k_pre"], p["c_pre"]), sliding, acting.grip(sliding), s[0])
             rail += held.force
             anchor = [sd[:1] - held.rate]
-        put_under_load(parts, Port.FRAME, p, -vertical - rail, balances)
+        acting.carry(Port.FRAME, -vertical - rail)
         total += jnp.stack([rail, zero, zero, zero])
-        states = anchor + [balances[part.effect.name] for part in parts if part.effect.name in balances]
-        balance = jnp.concatenate(states or [jnp.zeros(0)])
-        loads = Loads(push, leg.rate, vertical, lateral, rail, carriage, -total[2:], touch, ports)
+        states = [acting.balances[part.effect.name] for part in acting.parts if part.effect.states]
+        balance = jnp.concatenate([*anchor, *states] or [jnp.zeros(0)])
+        reaction = -total[2:]
+        loads = Loads(
+            push, leg.rate, vertical, lateral, rail, carriage, reaction, touch, acting.ports, acting.carried
+        )
         return total, balance, loads
+
+    def _strut(
+        self, acting: Acting, at: Section, motion: Motion, inputs: Inputs, given: Imposed
+    ) -> tuple[Strut, Array]:
+        """The leg from eye to crank pin, and the force with which it pushes apart."""
+        p = acting.p
+        way = acting.way(Port.LINK, given.link_way)
+        link = Link(inputs.link.angle + way.displacement, inputs.link.velocity + way.velocity)
+        leg = strut(p, at, motion.qd.theta_LW, link)
+        mount = acting.way(Port.STRUT, given.mount_way)
+        end = acting.way(Port.STRUT, given.damper_way, in_damper=True)
+        length, rate = leg.length + mount.displacement, leg.rate + mount.velocity
+        damping = p["c_sd"] * self.damper(-(rate + end.velocity))
+        extra = acting.force(Port.STRUT, PortSignals(length, rate, damping), given.strut)
+        push = p["k_sd"] * (p["l_free"] - length) + damping + extra
+        acting.carry(Port.STRUT, push)
+        acting.carry(Port.STRUT, damping, in_damper=True)
+        acting.carry(Port.LINK, push * leg.link_slope)
+        return leg, push
 
     def residual(
         self,
@@ -220,3 +211,27 @@ class QuarterCar(eqx.Module):
         p = self.effective(p)
         at = (curves or partial(section, p))(motion.q.theta_LW)
         return self._evaluate(p, at, motion, s, sd, inputs)[2]
+
+
+def _wheel(
+    acting: Acting, at: Section, motion: Motion, inputs: Inputs, given: Imposed, frame: Way
+) -> tuple[Contact, Array, Array]:
+    """The tyre's contact, its vertical load F_tz and the lateral force on the upright."""
+    p = acting.p
+    sunk = acting.way(Port.ROAD, given.plate_way)
+    plate = acting.plate(inputs)
+    road = Road(
+        plate.height - sunk.displacement + frame.displacement, plate.velocity - sunk.velocity + frame.velocity
+    )
+    touch = contact(p, at, motion, road)
+    pressing = PortSignals(touch.compression, touch.compression_rate, jnp.zeros_like(touch.compression))
+    extra = acting.force(Port.TYRE_RADIAL, pressing, given.tyre_radial)
+    vertical = radial_force(p, touch, extra) / touch.cos_tilt
+    acting.carry(Port.ROAD, vertical)
+    carcass = acting.way(Port.TYRE_LATERAL, given.carcass_way)
+    scrub = PortSignals(
+        touch.place[0] - carcass.displacement, touch.lateral_velocity - carcass.velocity, vertical
+    )
+    lateral = acting.force(Port.TYRE_LATERAL, scrub, given.tyre_lateral)
+    acting.carry(Port.TYRE_LATERAL, -lateral)
+    return touch, vertical, lateral

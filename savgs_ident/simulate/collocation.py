@@ -23,7 +23,8 @@ from jax.extend.core import jaxpr_as_fun
 from jaxtyping import Array, Float
 
 from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.model.inputs import Inputs
+from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.section import SectionCurves
 from savgs_ident.model.values import Values
 from savgs_ident.simulate import cyclic

@@ -8,7 +8,7 @@ from jaxtyping import Array, Complex, Float
 from numpy.typing import ArrayLike
 
 from savgs_ident.model.effect import Cam
-from savgs_ident.model.quarter_car import Inputs
+from savgs_ident.model.inputs import Inputs
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
 from savgs_ident.simulate.mesh import Mesh, turns

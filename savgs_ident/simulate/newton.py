@@ -12,7 +12,8 @@ import numpy as np
 from jax.tree_util import PyTreeDef
 from jaxtyping import Array, Float, Int
 
-from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.model.inputs import Inputs
+from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values
 from savgs_ident.simulate.collocation import (
     Linearised,

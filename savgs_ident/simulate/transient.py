@@ -24,7 +24,8 @@ from savgs_ident.core.status import Status
 from savgs_ident.model.actuation import AbstractActuation, link_torque
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.equilibrium import deflection_zero, static_equilibrium
-from savgs_ident.model.quarter_car import Inputs, Loads, QuarterCar
+from savgs_ident.model.inputs import Inputs
+from savgs_ident.model.quarter_car import Loads, QuarterCar
 from savgs_ident.model.road import RoadMotion
 from savgs_ident.model.section import TRAVEL, SectionCurves
 from savgs_ident.model.sensors import Readings, pass_through

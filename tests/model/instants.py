@@ -14,7 +14,8 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.rig import Rig, merge_parameters
 from savgs_ident.effects.registry import CATALOGUE
 from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.quarter_car import Inputs, Link
+from savgs_ident.model.inputs import Inputs
+from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
 from savgs_ident.model.values import Values
 

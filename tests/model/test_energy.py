@@ -9,8 +9,9 @@ import pytest
 from jaxtyping import Array
 
 from savgs_ident.model.dynamics import Coordinates, Motion, upright_mass
+from savgs_ident.model.inputs import Inputs
 from savgs_ident.model.kinematics import linkage, strut_length
-from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values
 
 from .instants import draw_instants, inputs_of, motion_of, shifted

@@ -10,8 +10,9 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.model.dynamics import Coordinates, Motion
+from savgs_ident.model.inputs import Inputs
 from savgs_ident.model.kinematics import strut_length
-from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values
 from savgs_ident.simulate.excitation import inputs_at
 from savgs_ident.simulate.periodic import PeriodicSolution

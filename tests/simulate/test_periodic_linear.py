@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from savgs_ident.core.rig import Rig
 from savgs_ident.effects.registry import build_model
 from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.quarter_car import Inputs, QuarterCar
+from savgs_ident.model.inputs import Inputs
+from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.sensors import read_sensors
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road

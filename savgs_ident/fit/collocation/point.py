@@ -8,7 +8,7 @@ from jaxtyping import Array
 from savgs_ident.fit.collocation.unknowns import Unknowns
 from savgs_ident.fit.problem import Problem
 from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.quarter_car import Inputs
+from savgs_ident.model.inputs import Inputs
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
 from savgs_ident.symbolic.translate import to_casadi
