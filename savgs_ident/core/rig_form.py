@@ -17,7 +17,7 @@ SCHEMA = 1
 KNOWN_UNITS = frozenset(
     {
         "1", "m", "1/m", "m/s", "s/m", "m/s^2", "rad", "rad/m", "rad/s", "s", "Hz",
-        "kg", "kg m^2", "N", "N/m", "N/m^2", "N/m^3", "m/N", "N s/m", "m/(N s)", "N s^2/m^2", "Pa",
+        "kg", "1/kg", "kg m^2", "N", "N/m", "N/m^2", "N/m^3", "m/N", "N s/m", "m/(N s)", "N s^2/m^2", "Pa",
         "N m", "N m/rad", "N m s/rad", "rad/(N m)", "J", "W",
         "A", "V", "ohm", "H", "Wb", "N m/A", "V/A", "V/(A s)",
     }

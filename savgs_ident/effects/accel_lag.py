@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
+from jax import lax
 from jaxtyping import Array, Complex, Float
 
 from savgs_ident.core.parameter import Parameter
@@ -33,4 +34,5 @@ class AccelLag(AbstractSensorFault):
 
     def transfer(self, p: Values, frequency: Float[Array, "*f"]) -> Complex[Array, "*f"]:
         """Reading over truth at frequencies [Hz]."""
-        return 1.0 / (1.0 + 2j * jnp.pi * frequency * p["accel_lag_time"])
+        lag = 2.0 * jnp.pi * frequency * p["accel_lag_time"]
+        return jnp.reciprocal(lax.complex(jnp.ones_like(lag), lag))

@@ -9,13 +9,39 @@ from types import MappingProxyType
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.rig import Rig, merge_parameters
+from savgs_ident.effects.accel_gain import AccelGain
 from savgs_ident.effects.accel_lag import AccelLag
+from savgs_ident.effects.accel_tilt import AccelTilt
+from savgs_ident.effects.bump_stop import BumpStop
+from savgs_ident.effects.bushing_stiffness import BushingStiffness
+from savgs_ident.effects.cam_harmonic import CamHarmonic
 from savgs_ident.effects.cam_scale import CamScale
+from savgs_ident.effects.damper_hysteresis import DamperHysteresis
+from savgs_ident.effects.damper_rebound_fade import DamperReboundFade
+from savgs_ident.effects.damper_scale import DamperScale
+from savgs_ident.effects.deflection_delay import DeflectionDelay
+from savgs_ident.effects.deflection_gain import DeflectionGain
+from savgs_ident.effects.frame_mode import FrameMode
+from savgs_ident.effects.gear_backlash import GearBacklash
+from savgs_ident.effects.gear_compliance import GearCompliance
+from savgs_ident.effects.joint_friction import JointFriction
+from savgs_ident.effects.link_offset import LinkOffset
 from savgs_ident.effects.mount_compliance import MountCompliance
+from savgs_ident.effects.plate_compliance import PlateCompliance
+from savgs_ident.effects.rail_asymmetry import RailAsymmetry
 from savgs_ident.effects.rail_coulomb import RailCoulomb
+from savgs_ident.effects.rail_preload import RailPreload
 from savgs_ident.effects.rail_stribeck import RailStribeck
+from savgs_ident.effects.rail_viscous import RailViscous
 from savgs_ident.effects.spring_rate import SpringRate
+from savgs_ident.effects.sprung_mass import SprungMass
+from savgs_ident.effects.strut_friction import StrutFriction
+from savgs_ident.effects.tyre_damping import TyreDamping
 from savgs_ident.effects.tyre_friction import TyreFriction
+from savgs_ident.effects.tyre_lateral_compliance import TyreLateralCompliance
+from savgs_ident.effects.tyre_stiffening import TyreStiffening
+from savgs_ident.effects.tyre_stiffness import TyreStiffness
+from savgs_ident.effects.unsprung_mass import UnsprungMass
 from savgs_ident.model.damper import damper_curve
 from savgs_ident.model.effect import AbstractEffect
 from savgs_ident.model.quarter_car import QuarterCar
@@ -25,12 +51,38 @@ CATALOGUE: Mapping[str, AbstractEffect] = MappingProxyType(
         effect.name: effect
         for effect in (
             RailCoulomb(),
+            RailPreload(),
             RailStribeck(),
+            RailViscous(),
+            RailAsymmetry(),
+            JointFriction(),
+            BushingStiffness(),
+            StrutFriction(),
             MountCompliance(),
             SpringRate(),
+            DamperScale(),
+            DamperReboundFade(),
+            DamperHysteresis(),
+            BumpStop(),
             TyreFriction(),
+            TyreStiffness(),
+            TyreStiffening(),
+            TyreDamping(),
+            TyreLateralCompliance(),
+            GearBacklash(),
+            GearCompliance(),
+            LinkOffset(),
+            CamHarmonic(),
             CamScale(),
+            PlateCompliance(),
+            FrameMode(),
+            SprungMass(),
+            UnsprungMass(),
+            AccelGain(),
             AccelLag(),
+            AccelTilt(),
+            DeflectionGain(),
+            DeflectionDelay(),
         )
     }
 )

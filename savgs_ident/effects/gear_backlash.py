@@ -1,0 +1,48 @@
+"""Backlash of the link's gear: the link lies against one flank or the other.
+
+    x = b / 2 tanh(T / T_0)
+
+with the backlash b [rad] at the link, the torque T [N m] and T_0 = 1 N m, over which it changes flanks. While
+the strut carries the body its load keeps the gear against one flank: then backlash is a constant offset of
+the link's angle and hardly shows. It shows where the torque changes its sign: with the link near 0 or 180
+deg, and in hard rebounds.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.model.effect import SETTLING, AbstractSeries, InternalState, Port
+from savgs_ident.model.values import Values
+
+CHANGE_OVER = 1.0
+"""Torque within which the link changes flanks [N m]: small beside the tens of N m of the strut."""
+
+
+class GearBacklash(AbstractSeries):
+    """Play of the link's gear."""
+
+    name: ClassVar[str] = "gear_backlash"
+    port: ClassVar[Port] = Port.LINK
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            "gear_backlash", 0.01, "rad", lower=0.0, upper=0.2, about="backlash of the gear, at the link"
+        ),
+    )
+    null: ClassVar[Mapping[str, float]] = {"gear_backlash": 0.0}
+    states: ClassVar[tuple[InternalState, ...]] = (InternalState("gear_play", "rad", 1e-2),)
+    symptom: ClassVar[str] = (
+        "the link knocks where its torque changes sign; where it does not, its angle is off by a constant"
+    )
+    reference: ClassVar[str] = "Nordin and Gutman 2002, Automatica 38(10), survey of backlash"
+    in_damper: ClassVar[bool] = False
+
+    def balance(
+        self, p: Values, load: Float[Array, ""], state: Float[Array, " s"], rate: Float[Array, " s"]
+    ) -> Float[Array, " s"]:
+        """The way off the middle [rad] under the torque to greater angles."""
+        flank = p["gear_backlash"] / 2.0 * jnp.tanh(load / CHANGE_OVER)
+        return SETTLING * rate + state - flank
