@@ -75,13 +75,19 @@ def node_residual(
     model: QuarterCar, p: Values, curves: SectionCurves, parts: tuple[Array, ...], inputs: Inputs
 ) -> Array:
     """The model's residual at one node from its scalar unknowns (x then y)."""
+    motion, states, rates = node_motion(model, parts)
+    return model.residual(p, motion, states, rates, inputs, curves)
+
+
+def node_motion(model: QuarterCar, parts: tuple[Array, ...]) -> tuple[Motion, Array, Array]:
+    """Motion, internal states (s,) and their rates (s,) at one node from its scalar unknowns (x then y)."""
     size = len(model.states)
     states = jnp.stack(parts[4 : 4 + size]) if size else jnp.zeros(0)
     rates = jnp.stack(parts[6 + size :]) if size else jnp.zeros(0)
     motion = Motion(
         Coordinates(*parts[:2]), Coordinates(*parts[2:4]), Coordinates(*parts[4 + size : 6 + size])
     )
-    return model.residual(p, motion, states, rates, inputs, curves)
+    return motion, states, rates
 
 
 def residual_at_nodes(

@@ -289,21 +289,32 @@ def _linear_motion(
     model: QuarterCar, p: Values, solution: PeriodicSolution
 ) -> Callable[[dict[str, Array]], Trajectory]:
     """The change of the trajectory that a change of the parameters brings about."""
-    lin, at, mesh = solution.linearised, solution.trajectory, solution.mesh
-    inputs, layout = inputs_at(solution.excitation, mesh), mesh.layout
-    steps = _steps(solution.excitation, mesh)
-    parts = (*at.x, *at.y)
-    still = Trajectory(jnp.zeros_like(at.x), jnp.zeros_like(at.y))
+    at, inputs = solution.trajectory, inputs_at(solution.excitation, solution.mesh)
+    parts, respond = (*at.x, *at.y), linear_response(model, p, solution)
 
     def moved(tangent: dict[str, Array]) -> Trajectory:
         _, change = jax.jvp(
             lambda q: residual_at_nodes(model, q, model.curves(q), parts, inputs), (dict(p),), (tangent,)
         )
+        return respond(change)
+
+    return moved
+
+
+def linear_response(
+    model: QuarterCar, p: Values, solution: PeriodicSolution
+) -> Callable[[Float[Array, "k P"]], Trajectory]:
+    """The change of the trajectory that a change of the residual at the nodes, (2 + s, P), brings about."""
+    lin, at, layout = solution.linearised, solution.trajectory, solution.mesh.layout
+    steps = _steps(solution.excitation, solution.mesh)
+    still = Trajectory(jnp.zeros_like(at.x), jnp.zeros_like(at.y))
+
+    def respond(change: Float[Array, "k P"]) -> Trajectory:
         imbalance = -solve_nodes(lin.mass, change[:, None])[:, 0]
         rate = jnp.concatenate([jnp.zeros_like(at.x[2:4]), imbalance])
         return solve_linearised(layout, lin, step_defects(model, still, rate, layout, steps), imbalance)
 
-    return moved
+    return respond
 
 
 def truncation_error(

@@ -1,0 +1,1 @@
+"""The quarter-car rig as a plant of the engine."""

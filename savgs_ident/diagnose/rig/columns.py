@@ -1,0 +1,208 @@
+"""What an effect would do to the response, to first order at its null, without a model that has it.
+
+An effect without states is in the model already, at its null: its columns are derivatives of the response. An
+effect with states is marched along the port signals of the motion as it is until it repeats, at a typical size;
+what it would do at its port is then imposed on the linearised rig.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from numpy.typing import NDArray
+
+from savgs_ident.diagnose.engine.prediction import Term
+from savgs_ident.model.effect import AbstractEffect, AbstractForce, AbstractSeries, Port, PortSignals
+from savgs_ident.model.inputs import Imposed, nothing_imposed
+from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.values import Values, as_values
+from savgs_ident.posterior.likelihood import Likelihood
+from savgs_ident.simulate.imposed import answers, loads_at_nodes
+from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.stored import placed, stored
+
+SHAPES = (0.4, 1.0, 2.5)
+"""Shapes are tried at these multiples of their typical values."""
+
+SAMPLES = 512
+"""Instants of a period along which states are marched."""
+
+PERIODS = 3
+"""Periods until they repeat."""
+
+BATCH = 32
+"""Signals that are imposed at a time."""
+
+WAYS: Mapping[Port, str] = {
+    Port.STRUT: "mount_way",
+    Port.LINK: "link_way",
+    Port.ROAD: "plate_way",
+    Port.TYRE_LATERAL: "carcass_way",
+    Port.FRAME: "frame_way",
+}
+"""Where what gives way at a port is imposed."""
+
+
+def shaped(candidates: Sequence[Term], choice: float) -> dict[str, float]:
+    """The shapes of all candidates at a multiple of their typical values, within their bounds."""
+    shapes = (shape for term in candidates for shape in term.shapes)
+    return {each.name: float(np.clip(choice * each.centre, each.lower, each.upper)) for each in shapes}
+
+
+def columns_with_states(
+    model: QuarterCar,
+    likelihood: Likelihood,
+    orders: int,
+    p: Values,
+    solution: PeriodicSolution,
+    effects: Sequence[AbstractEffect],
+    typical: Sequence[Mapping[str, float]],
+) -> NDArray[np.float64]:
+    """Change of the rows by each effect at its ``typical`` parameters, (effects, m)."""
+    signals, steps = _evenly(model, p, solution)
+    fields = []
+    for effect, given in zip(effects, typical, strict=True):
+        there = as_values({name: float(value) for name, value in p.items()} | dict(given))
+        along = np.asarray(_marched(effect, placed(there), signals, steps))
+        fields.append((field_of(effect), _at_nodes(along, solution)))
+    return impose(model, likelihood, orders, p, solution, fields)
+
+
+def field_of(effect: AbstractEffect) -> str:
+    """The field of :class:`Imposed` through which an effect acts."""
+    if isinstance(effect, AbstractSeries):
+        return "damper_way" if effect.in_damper else WAYS[effect.port]
+    return effect.port.value
+
+
+def impose(
+    model: QuarterCar,
+    likelihood: Likelihood,
+    orders: int,
+    p: Values,
+    solution: PeriodicSolution,
+    fields: Sequence[tuple[str, NDArray[np.float64]]],
+) -> NDArray[np.float64]:
+    """Change of the rows by signals at the nodes, (P,) or (P, 2) each, imposed one at a time; (signals, m)."""
+    found = []
+    nodes = solution.mesh.layout.total
+    blank = nothing_imposed(np.zeros(nodes))
+    for first in range(0, len(fields), BATCH):
+        some = fields[first : first + BATCH]
+        stacked = {name: np.zeros((BATCH, *part.shape)) for name, part in blank._asdict().items()}
+        for place, (field, values) in enumerate(some):
+            stacked[field][place] = values
+        imposed = placed(jax.tree.map(jnp.asarray, Imposed(**stacked)))
+        (rows,) = _answered(model, likelihood, placed(dict(p)), solution, imposed, orders)
+        found.append(np.asarray(rows)[: len(some)])
+    return np.concatenate(found)
+
+
+@eqx.filter_jit
+def _answered(*args: Any) -> tuple[Array, ...]:
+    return stored(_answer_rows, *args)
+
+
+def _answer_rows(
+    model: QuarterCar,
+    likelihood: Likelihood,
+    p: Values,
+    solution: PeriodicSolution,
+    imposed: Imposed,
+    orders: int,
+) -> tuple[Array]:
+    along = answers(model, p, solution, orders)
+    return (jax.lax.map(lambda one: likelihood.rows(along(one)), imposed),)
+
+
+PortTable = dict[str, NDArray[np.float64]]
+
+
+def _evenly(
+    model: QuarterCar, p: Values, solution: PeriodicSolution
+) -> tuple[dict[str, PortSignals], NDArray[np.float64]]:
+    """Port signals, or loads as those of a series element, (D, SAMPLES) each, and the time steps [s], (D,)."""
+    ports, carried = _loads(model, placed(dict(p)), solution)
+    layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
+    grid = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+
+    def even(values: Array) -> NDArray[np.float64]:
+        flat = np.asarray(values)
+        rows = [
+            np.interp(grid, phase[layout.dwell == dwell], flat[layout.dwell == dwell], period=2.0 * np.pi)
+            for dwell in range(len(layout.counts))
+        ]
+        return np.stack(rows)
+
+    signals = {name: PortSignals(*(even(part) for part in each)) for name, each in ports.items()}
+    for name, load in carried.items():
+        zero = np.zeros((len(layout.counts), SAMPLES))
+        signals[f"load.{name}"] = PortSignals(zero, zero, even(load))
+    return signals, 1.0 / (SAMPLES * np.asarray(solution.excitation.frequency))
+
+
+@eqx.filter_jit
+def _loads(model: QuarterCar, p: Values, solution: PeriodicSolution) -> tuple[Any, Any]:
+    loads = loads_at_nodes(model, p, solution)
+    return loads.ports, loads.carried
+
+
+def _marched(
+    effect: AbstractEffect,
+    p: Values,
+    signals: Mapping[str, PortSignals],
+    steps: NDArray[np.float64],
+) -> Float[Array, "D n k"]:
+    """What the effect does at its port along the last period: a force, or a way and its rate."""
+    if isinstance(effect, AbstractSeries):
+        name = "load.damper" if effect.in_damper else f"load.{effect.port.value}"
+    else:
+        name = effect.port.value
+    return _march(effect, p, jax.tree.map(jnp.asarray, signals[name]), jnp.asarray(steps))
+
+
+@eqx.filter_jit
+def _march(
+    effect: AbstractEffect, p: Values, signals: PortSignals, steps: Float[Array, " D"]
+) -> Float[Array, "D n k"]:
+    size = len(effect.states)
+
+    def defect(now: Array, before: Array, at: PortSignals, step: Array) -> Array:
+        rate = (now - before) / step
+        if isinstance(effect, AbstractSeries):
+            return effect.balance(p, at.load, now, rate)
+        assert isinstance(effect, AbstractForce)
+        return rate - effect.rate(p, at, now)
+
+    def one_dwell(signals: PortSignals, step: Array) -> Array:
+        def advance(before: Array, at: PortSignals) -> tuple[Array, Array]:
+            now = before
+            for _ in range(4):
+                slope = jax.jacfwd(lambda each: defect(each, before, at, step))(now)
+                now = now - jnp.linalg.solve(slope, defect(now, before, at, step))
+            if isinstance(effect, AbstractForce):
+                return now, effect.force(p, at, now)[None]
+            return now, jnp.stack([now[0], (now[0] - before[0]) / step])
+
+        state = jnp.zeros(size)
+        for _ in range(PERIODS):
+            state, acted = jax.lax.scan(advance, state, signals)
+        return acted
+
+    return jax.vmap(one_dwell)(signals, steps)
+
+
+def _at_nodes(along: NDArray[np.float64], solution: PeriodicSolution) -> NDArray[np.float64]:
+    """(D, SAMPLES, k) on the nodes: (P,) for a force, (P, 2) for a way."""
+    layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
+    grid = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+    out = np.zeros((layout.total, along.shape[2]))
+    for dwell in range(len(layout.counts)):
+        mine = layout.dwell == dwell
+        for k in range(along.shape[2]):
+            out[mine, k] = np.interp(phase[mine], grid, along[dwell, :, k], period=2.0 * np.pi)
+    return out[:, 0] if along.shape[2] == 1 else out

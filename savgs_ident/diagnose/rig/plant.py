@@ -1,0 +1,268 @@
+"""The quarter-car rig as a plant: one model that has every effect without states at its null.
+
+An effect without states costs next to nothing at its null, so that one compiled program serves the baseline
+and all of them; only an effect with states of its own asks for another. Parameters that are not given are
+those of the rig, effects at their null.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.free_vector import known_to_tolerance
+from savgs_ident.core.parameter import ParameterTable
+from savgs_ident.core.rig import Rig, merge_parameters
+from savgs_ident.diagnose.engine.coordinates import Coordinates
+from savgs_ident.diagnose.engine.data import Data
+from savgs_ident.diagnose.engine.prediction import Prediction, Term
+from savgs_ident.diagnose.rig.columns import SHAPES, columns_with_states, shaped
+from savgs_ident.diagnose.rig.coordinates import free_coordinate, term_of, tolerance_coordinate
+from savgs_ident.fit.problem import used_parameters
+from savgs_ident.fit.target import harmonic_target
+from savgs_ident.model.damper import damper_curve
+from savgs_ident.model.effect import AbstractEffect
+from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.values import Values, as_values
+from savgs_ident.posterior.likelihood import Likelihood, likelihood_of
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.collocation import Trajectory
+from savgs_ident.simulate.excitation import Excitation
+from savgs_ident.simulate.measured import measured_excitation
+from savgs_ident.simulate.periodic import (
+    PeriodicSettings,
+    PeriodicSolution,
+    adapt,
+    directional,
+    harmonics,
+    resolve,
+    simulate_periodic,
+)
+from savgs_ident.simulate.stored import placed, stored
+
+WIDTH = 52
+"""Directions that are solved for at a time: a program for each number would have to be compiled."""
+
+ITERATIONS = 25
+"""Most Newton steps from one point of a search to the next."""
+
+
+@dataclass(frozen=True)
+class RigPlant:
+    """The rig, its catalogue and what drives it.
+
+    Attributes:
+        rig: the rig as known before the data.
+        catalogue: all effects by name.
+        baseline: names of those that the baseline has.
+        free: names of the parameters that the baseline identifies.
+        excitation: road and link of the dwells.
+        likelihood: what is compared, as rows.
+        orders: highest order of the harmonics.
+        settings: how finely to solve.
+    """
+
+    rig: Rig
+    catalogue: Mapping[str, AbstractEffect]
+    baseline: tuple[str, ...]
+    free: tuple[str, ...]
+    excitation: Excitation
+    likelihood: Likelihood
+    orders: int
+    settings: PeriodicSettings
+
+    @cached_property
+    def table(self) -> ParameterTable:
+        """All parameters, effects that the baseline does not have at their null."""
+        brought = (ParameterTable(effect.parameters) for effect in self.catalogue.values())
+        table = merge_parameters(self.rig.parameters, *brought)
+        absent = [each for name, each in self.catalogue.items() if name not in self.baseline]
+        return table.with_values({name: null for each in absent for name, null in each.null.items()})
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of all parameters, sorted."""
+        return tuple(sorted(self.table))
+
+    @cached_property
+    def nuisances(self) -> Coordinates:
+        """The free parameters of the baseline, then those known to a tolerance that matter."""
+        used = used_parameters(self.model(()), self.table)
+        known = [name for name in known_to_tolerance(self.table, self.free) if name in used]
+        return tuple(free_coordinate(self.table[name]) for name in self.free) + tuple(
+            tolerance_coordinate(self.table[name]) for name in known
+        )
+
+    @cached_property
+    def candidates(self) -> tuple[Term, ...]:
+        """All effects that the baseline does not have, but for those that its free parameters are."""
+        terms = [term_of(effect) for name, effect in self.catalogue.items() if name not in self.baseline]
+        return tuple(term for term in terms if term.amplitudes)
+
+    def model(self, terms: Sequence[str]) -> QuarterCar:
+        """All effects without states, and those of ``terms`` that have some."""
+        model = QuarterCar(damper_curve(self.rig))
+        for name, effect in self.catalogue.items():
+            if not effect.states or name in self.baseline:
+                model = model + effect
+        for name in terms:
+            if self.catalogue[name].states and name not in self.baseline:
+                model = model + self.catalogue[name]
+        return model
+
+    def values(self, given: Mapping[str, float]) -> Values:
+        """All parameters, SI, with the given ones."""
+        return as_values(self.table.as_dict() | dict(given))
+
+    def start(self, values: Mapping[str, float]) -> PeriodicSolution:
+        """Periodic motions of the baseline from a cold start.
+
+        Raises :class:`InputError` if there are none.
+        """
+        solution = simulate_periodic(self.model(()), self.values(values), self.excitation, self.settings)
+        if not all(status.ok for status in solution.status()):
+            lost = [
+                f"{f:.4g} Hz"
+                for f, status in zip(np.asarray(self.excitation.frequency), solution.status(), strict=True)
+                if not status.ok
+            ]
+            raise InputError(
+                "the baseline has no periodic motion at " + ", ".join(lost),
+                remedy="leave these dwells out with --max-frequency, or mend the rig file",
+            )
+        return solution
+
+    def adapted(
+        self, terms: tuple[str, ...], values: Mapping[str, float], near: PeriodicSolution
+    ) -> PeriodicSolution:
+        """The same motions on nodes that follow them."""
+        return adapt(self.model(terms), self.values(values), near, near.mesh.layout, self.settings.iterations)
+
+    def predict(
+        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], near: Any
+    ) -> Prediction:
+        """Rows with ``terms`` at ``values``, with slopes in ``names``, on the nodes of ``near``."""
+        model, p = self.model(terms), placed(self.values(values))
+        solution = resolve(model, p, near, ITERATIONS, self._fitting(model, near))
+        rows = np.asarray(_rows(model, self.likelihood, p, solution, self.orders))
+        solved = all(status.ok for status in solution.status())
+        return Prediction(rows, self._slopes(model, p, solution, names), solved, solution)
+
+    def columns(
+        self, terms: tuple[str, ...], values: Mapping[str, float], near: Any, candidates: Sequence[Term]
+    ) -> list[NDArray[np.float64]]:
+        """First-order change of the rows per unit of each candidate's amplitudes, (choices, m, amplitudes)."""
+        model = self.model(terms)
+        found: dict[str, list[NDArray[np.float64]]] = {term.name: [] for term in candidates}
+        with_states = [term for term in candidates if self.catalogue[term.name].states]
+        without = [term for term in candidates if not self.catalogue[term.name].states]
+        names = [each.name for term in without for each in term.amplitudes]
+        for choice in SHAPES:
+            shapes = shaped(candidates, choice)
+            p = placed(self.values(dict(values) | shapes))
+            slopes = self._slopes(model, p, near, names)
+            for term in without:
+                places = [names.index(each.name) for each in term.amplitudes]
+                found[term.name].append(slopes[:, places])
+            typical = [
+                shapes | {each.name: each.centre + 0.5 * each.scale for each in term.amplitudes}
+                for term in with_states
+            ]
+            effects = [self.catalogue[term.name] for term in with_states]
+            moved = columns_with_states(model, self.likelihood, self.orders, p, near, effects, typical)
+            for term, rows in zip(with_states, moved, strict=True):
+                found[term.name].append(rows[:, None] / (0.5 * term.amplitudes[0].scale))
+        return [np.stack(found[term.name]) for term in candidates]
+
+    def _slopes(
+        self, model: QuarterCar, p: Values, solution: PeriodicSolution, names: Sequence[str]
+    ) -> NDArray[np.float64]:
+        """Slopes of the rows in the named parameters, (m, n)."""
+        parts = []
+        for first in range(0, max(len(names), 1), WIDTH):
+            some = names[first : first + WIDTH]
+            directions = np.zeros((WIDTH, len(self.names)))
+            directions[np.arange(len(some)), [self.names.index(name) for name in some]] = 1.0
+            (slopes,) = _sloped(
+                model, self.likelihood, p, solution, placed(jnp.asarray(directions)), self.names, self.orders
+            )
+            parts.append(np.asarray(slopes)[: len(some)])
+        return np.concatenate(parts).T
+
+    def _fitting(self, model: QuarterCar, near: PeriodicSolution) -> Trajectory:
+        """The motions of ``near`` with as many states as ``model`` has, further ones at rest."""
+        x, y = near.trajectory
+        lacking = 4 + len(model.states) - x.shape[0]
+        if lacking == 0:
+            return near.trajectory
+        if lacking < 0:
+            return Trajectory(x[:lacking], y[:lacking])
+        rest = jnp.zeros((lacking, x.shape[1]))
+        return Trajectory(jnp.concatenate([x, rest]), jnp.concatenate([y, rest]))
+
+
+@eqx.filter_jit
+def _rows(
+    model: QuarterCar, likelihood: Likelihood, p: Values, solution: PeriodicSolution, orders: int
+) -> Array:
+    return likelihood.rows(harmonics(model, p, solution, orders))
+
+
+@eqx.filter_jit
+def _sloped(*args: Any) -> tuple[Array, ...]:
+    return stored(_directional_rows, *args)
+
+
+def _directional_rows(
+    model: QuarterCar,
+    likelihood: Likelihood,
+    p: Values,
+    solution: PeriodicSolution,
+    directions: Array,
+    names: tuple[str, ...],
+    orders: int,
+) -> tuple[Array]:
+    along = directional(model, p, solution, names, orders)
+    return (jax.lax.map(lambda direction: likelihood.rows(along(direction)), directions),)
+
+
+def rig_plant(
+    measured: HarmonicResponse,
+    rig: Rig,
+    catalogue: Mapping[str, AbstractEffect],
+    baseline: tuple[str, ...],
+    free: tuple[str, ...],
+    orders: int = 9,
+    settings: PeriodicSettings | None = None,
+) -> tuple[RigPlant, Data]:
+    """The plant of a measured response, and the response as data.
+
+    Raises :class:`InputError` for a response that cannot be used.
+    """
+    target = harmonic_target(measured, orders)
+    likelihood = likelihood_of(target)
+    excitation = measured_excitation(measured, rig.parameters["psi_nominal"].value)
+    plant = RigPlant(
+        rig=rig,
+        catalogue=catalogue,
+        baseline=baseline,
+        free=free,
+        excitation=excitation,
+        likelihood=likelihood,
+        orders=int(target.used.shape[-1]) - 1,
+        settings=settings or PeriodicSettings(),
+    )
+    shape = target.used.shape
+    dwell = np.repeat(np.arange(shape[0]), 2 * shape[1] * shape[2])[likelihood.place]
+    data = Data(
+        np.asarray(likelihood.measured), np.asarray(likelihood.variance), np.asarray(likelihood.reach), dwell
+    )
+    return plant, data
