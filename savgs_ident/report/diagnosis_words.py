@@ -1,0 +1,159 @@
+"""What reports say about a diagnosis beside its own sentences: the same words in the terminal and on the page."""
+
+from collections.abc import Mapping
+from math import floor, isfinite, log10
+from types import MappingProxyType
+
+from savgs_ident.diagnose.result import Candidate, Diagnosis, Estimate, NotJudgeable, Shrink
+from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.report.numerals import DASH, decimal, interval, numeral, percentage, signed, unit_text
+
+PORT_WORDS: Mapping[str, str] = MappingProxyType(
+    {
+        "rail": "rail",
+        "strut": "strut",
+        "suspension": "wishbone joints",
+        "tyre_radial": "tyre, radial",
+        "tyre_lateral": "tyre, lateral",
+        "link": "link and drive",
+        "road": "road plate",
+        "frame": "frame",
+        "inertia": "masses",
+        "sensor.sprung_accel": "accelerometer",
+        "sensor.susp_deflection": "potentiometer",
+    }
+)
+"""The ports as an engineer calls them."""
+
+KIND_WORDS: Mapping[str, str] = MappingProxyType(
+    {"none": "nothing", "effect": "one effect", "several": "several effects", "unknown": "unknown"}
+)
+"""The kinds of verdict: what is missing."""
+
+_SMALL = 0.001
+_SHOWN = 5
+
+
+def alarm(diagnosis: Diagnosis) -> str | None:
+    """What must be read before the verdict; None where it may be used."""
+    if diagnosis.converged:
+        return None
+    return "Not converged: this verdict must not be used."
+
+
+def port_words(port: str) -> str:
+    """A port in words; its name where there are none."""
+    return PORT_WORDS.get(port, port)
+
+
+def symptoms(effects: tuple[str, ...]) -> tuple[str, ...]:
+    """What each effect that the catalogue has is known by, a sentence each."""
+    told = (CATALOGUE[name].symptom for name in effects if name in CATALOGUE)
+    return tuple(f"{text[:1].upper()}{text[1:]}." for text in told)
+
+
+def references(effects: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    """The effects that the catalogue has, each with where its law is from."""
+    return tuple((name, CATALOGUE[name].reference) for name in effects if name in CATALOGUE)
+
+
+def about_candidate(candidate: Candidate) -> str:
+    """What a hypothesis says, in a sentence."""
+    if candidate.effects:
+        return " ".join(symptoms(candidate.effects))
+    if candidate.name == "none":
+        return "The recalibrated baseline is all there is."
+    return "An effect that is not in the catalogue."
+
+
+def shown_candidates(diagnosis: Diagnosis) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
+    """The hypotheses worth reading, and the others: the first few, all with a chance, and "none" and "unknown"."""
+    worth = [
+        place < _SHOWN or each.probability >= _SMALL or not each.effects
+        for place, each in enumerate(diagnosis.candidates)
+    ]
+    return (
+        tuple(each for each, kept in zip(diagnosis.candidates, worth, strict=True) if kept),
+        tuple(each for each, kept in zip(diagnosis.candidates, worth, strict=True) if not kept),
+    )
+
+
+def model_label(diagnosis: Diagnosis) -> str:
+    """What the model after the diagnosis is called in a legend."""
+    verdict = diagnosis.verdict
+    if verdict.effects:
+        return f"with {' + '.join(verdict.effects)}"
+    if verdict.kind == "unknown":
+        where = f" at the {port_words(verdict.ports[0])}" if verdict.ports else ""
+        return f"with what was learned{where}"
+    return "after (nothing added)"
+
+
+def baseline_sentence(diagnosis: Diagnosis) -> str:
+    """What was compared with what."""
+    measured = diagnosis.measured
+    number = len(measured.tests)
+    effects = " and ".join(diagnosis.effects) or "no effect of the catalogue"
+    span = f" between {measured.frequency[0]:.2f} and {measured.frequency[-1]:.2f} Hz" if number else ""
+    return (
+        f"Baseline {diagnosis.model} with {effects}, held against {number}"
+        f" {'dwell' if number == 1 else 'dwells'}{span}; it took {diagnosis.wall_s:.0f} s."
+    )
+
+
+def closed_words(shrink: Shrink) -> str:
+    """Share of the explainable gap that is closed, with its interval."""
+    if not isfinite(shrink.share_closed):
+        return DASH
+    low, high = (percentage(end) for end in shrink.interval)
+    return f"{percentage(shrink.share_closed)} ({low} to {high})"
+
+
+def gap_percentage(gap: float) -> str:
+    """A relative gap in per cent, two decimals below 10 %."""
+    return percentage(gap, 2 if gap < 0.1 else 1)
+
+
+def probability_words(probability: float) -> str:
+    """A probability in per cent; neither 0 nor 100 unless it is."""
+    return "< 0.1 %" if 0.0 < probability < 0.5 * _SMALL else percentage(probability)
+
+
+def gain_words(gain: float) -> str:
+    """A gain with its sign and three digits."""
+    if not isfinite(gain) or gain == 0.0:
+        return signed(gain, 2)
+    return signed(gain, min(max(2 - floor(log10(abs(gain))), 0), 4))
+
+
+def sigma_words(sigma: float) -> str:
+    """A number of standard deviations."""
+    return decimal(sigma, 1 if abs(sigma) < 100.0 else 0)
+
+
+def smallest_words(each: NotJudgeable) -> str:
+    """The smallest size of an effect that could have been seen, with its unit."""
+    unit = unit_text(each.unit)
+    return numeral(each.smallest, 0.1 * abs(each.smallest)) + ("" if unit == DASH else f" {unit}")
+
+
+def estimate_words(each: Estimate) -> str:
+    """A parameter with interval and unit."""
+    unit = unit_text(each.unit)
+    tail = "" if unit == DASH else f" {unit}"
+    return f"{value_words(each)} ({interval_words(each)}){tail}"
+
+
+def value_words(each: Estimate) -> str:
+    """The value of a parameter, to the digits that its interval justifies."""
+    return numeral(each.value, _error(each))
+
+
+def interval_words(each: Estimate) -> str:
+    """The 95 % interval of a parameter."""
+    return interval(each.lo, each.hi, _error(each))
+
+
+def _error(each: Estimate) -> float:
+    """About a standard deviation [unit]; NaN where the interval is open."""
+    return 0.25 * (each.hi - each.lo)
