@@ -1,0 +1,96 @@
+"""How well a hypothesis agrees with a recording, how well its parameters are known, and what it is mistaken for.
+
+Blocks of time are the independent units throughout: their scatter gives intervals that correlation between rows
+does not make too narrow.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from savgs_ident.diagnose.engine.climb import Mode
+from savgs_ident.diagnose.engine.coordinates import slopes_at
+from savgs_ident.diagnose.engine.data import Data
+from savgs_ident.diagnose.engine.score import Score
+from savgs_ident.diagnose.result import Confusable, Estimate, Shrink
+
+ALIKE = 0.95
+"""Cosine from which two laws are mistaken for one another."""
+
+DRAWS = 2000
+"""Resamples of the blocks."""
+
+
+def relative_error(data: Data, force: NDArray[np.float64]) -> float:
+    """Norm of measured less predicted force (m,), relative to the measured."""
+    return float(np.linalg.norm(data.measured - force) / np.linalg.norm(data.measured))
+
+
+def share_closed(gap: float, left: float, floor: float) -> float:
+    """Share of the explainable part of a gap that is closed; all three are relative errors."""
+    return 1.0 - (left**2 - floor**2) / (gap**2 - floor**2)
+
+
+def shrink_of(
+    data: Data, before: NDArray[np.float64], recalibrated: NDArray[np.float64], after: NDArray[np.float64]
+) -> Shrink:
+    """The gap of three predictions (m,) each."""
+    floor = float(np.sqrt(np.sum(data.variance)) / np.linalg.norm(data.measured))
+    gap, left = relative_error(data, before), relative_error(data, after)
+    squares = [
+        np.bincount(data.test, each)
+        for each in ((data.measured - before) ** 2, (data.measured - after) ** 2, data.variance)
+    ]
+    drawn = np.random.default_rng(0).integers(data.tests, size=(DRAWS, data.tests))
+    first, last, noise = (each[drawn].sum(axis=1) for each in squares)
+    low, high = np.quantile(1.0 - (last - noise) / (first - noise), [0.025, 0.975])
+    return Shrink(
+        gap,
+        relative_error(data, recalibrated),
+        left,
+        floor,
+        share_closed(gap, left, floor),
+        (float(low), float(high)),
+    )
+
+
+def estimates_of(data: Data, mode: Mode) -> tuple[Estimate, ...]:
+    """All parameters of a mode, with 95 % intervals from the scatter of the scores over blocks.
+
+    Neighbouring blocks may still agree in part: their products count by half (Newey and West, Econometrica 55,
+    1987). As few as the blocks are, those that went into the parameters are not counted, and Student's law takes
+    the place of the normal one.
+    """
+    free = max(data.tests - mode.x.size, 1)
+    weighted = mode.slopes * ((data.measured - mode.prediction.rows) / mode.misfit.spread)[:, None]
+    scores = np.stack([np.bincount(data.test, column) for column in weighted.T])
+    across = scores[:, 1:] @ scores[:, :-1].T
+    scatter = (scores @ scores.T + 0.5 * (across + across.T)) * data.tests / free
+    covariance = mode.covariance() @ (scatter + np.eye(mode.x.size)) @ mode.covariance()
+    wide = float(student.ppf(0.975, free))
+    errors = wide * np.sqrt(np.diag(covariance)) * slopes_at(mode.coordinates, mode.x)
+    found = zip(mode.coordinates, mode.values.values(), errors, strict=True)
+    return tuple(
+        Estimate(each.name, value, value - float(error), value + float(error), each.unit)
+        for each, value, error in found
+    )
+
+
+def confusable_with(mode: Mode, name: str, scores: Sequence[Score]) -> list[Confusable]:
+    """Laws that look like the named one beside what ``mode`` has already."""
+    weight = np.sqrt(1.0 / mode.misfit.spread)[:, None]
+    spans = {each.term.name: np.linalg.qr(weight * _beside(mode, each.column))[0] for each in scores}
+    found = []
+    for other, span in spans.items():
+        cosine = float(np.linalg.norm(spans[name].T @ span, 2))
+        if other != name and cosine > ALIKE:
+            found.append(Confusable((name, other), min(cosine, 1.0)))
+    return found
+
+
+def _beside(mode: Mode, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Columns (m, k) less what the parameters of ``mode`` can do in their place."""
+    cross = (mode.slopes.T / mode.misfit.spread) @ columns
+    return np.asarray(columns - mode.slopes @ np.linalg.solve(mode.precision, cross))
