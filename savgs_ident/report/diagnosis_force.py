@@ -15,10 +15,21 @@ from savgs_ident.report.diagnosis_words import port_words
 from savgs_ident.report.numerals import unit_text
 from savgs_ident.report.style import BLUE, INK, ORANGE, label_of, new_figure, styled
 
+MOST_LOOPS = 6
+"""So many loops are drawn at most."""
+
 _MILLI = 1e3
 _SMALL_UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "N": ("N", 1.0)}
 _ARROW_AT = 0.12
 """Where on the period the arrow is that says which way the loop is run through."""
+
+
+def spread_loops(loops: tuple[ForceLoop, ...]) -> tuple[ForceLoop, ...]:
+    """At most MOST_LOOPS of them, from the first test to the last."""
+    if len(loops) <= MOST_LOOPS:
+        return loops
+    chosen = np.unique(np.linspace(0, len(loops) - 1, MOST_LOOPS).round().astype(int))
+    return tuple(loops[place] for place in chosen)
 
 
 def force_figure(loop: ForceLoop, law: str) -> Figure:
@@ -35,10 +46,10 @@ def force_figure(loop: ForceLoop, law: str) -> Figure:
             fontsize=10.0,
             fontweight="bold",
         )
-        for axes, motion in ((left, loop.velocity), (right, loop.displacement)):
-            _draw(axes, _MILLI * (motion - _centre(axes is right, motion)), scale * loop.inferred, "inferred")
+        for axes, motion in ((left, loop.velocity), (right, _from_middle(loop.displacement))):
+            _draw(axes, _MILLI * motion, scale * loop.inferred, "inferred")
             if loop.law.size:
-                _draw_law(axes, _MILLI * (motion - _centre(axes is right, motion)), scale * loop.law, law)
+                _draw_law(axes, _MILLI * motion, scale * loop.law, law)
             axes.xaxis.set_major_locator(MaxNLocator(4))
         left.set_ylabel(label_of(f"{_quantity(loop.unit)} [{unit_text(unit)}]"))
         left.set_xlabel("velocity [mm/s]")
@@ -56,9 +67,9 @@ def _quantity(unit: str) -> str:
     return "moment" if unit == "N m" else "signal"
 
 
-def _centre(moved: bool, motion: NDArray[np.float64]) -> float:
+def _from_middle(displacement: NDArray[np.float64]) -> NDArray[np.float64]:
     """Displacements count from the middle of their range: a strut is half a metre long."""
-    return 0.5 * float(np.max(motion, initial=0.0) + np.min(motion, initial=0.0)) if moved else 0.0
+    return displacement - 0.5 * (np.max(displacement) + np.min(displacement))
 
 
 def _draw(axes: Axes, across: NDArray[np.float64], up: NDArray[np.float64], label: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from savgs_ident.diagnose.result import Diagnosis, ForceLoop
 from savgs_ident.report.diagnosis_bode import compared_channels, diagnosis_bode_figure, first_harmonic_gap
-from savgs_ident.report.diagnosis_force import force_figure
+from savgs_ident.report.diagnosis_force import force_figure, spread_loops
 from savgs_ident.report.diagnosis_map import gap_channels, gap_map_figure, gap_table
 from savgs_ident.report.diagnosis_rig import rig_figure
 from savgs_ident.report.diagnosis_rows import (
@@ -26,6 +26,7 @@ from savgs_ident.report.diagnosis_words import (
     alarm,
     baseline_sentence,
     gap_percentage,
+    law_label,
     port_words,
     probability_words,
     references,
@@ -36,9 +37,6 @@ from savgs_ident.report.html import Picture, embed, render_page
 from savgs_ident.report.numerals import DASH, decimal, percentage, signed
 from savgs_ident.report.origin import Origin
 from savgs_ident.report.readings import READINGS
-
-MOST_LOOPS = 6
-"""So many inferred signals are drawn at most, spread over the tests."""
 
 
 def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
@@ -52,6 +50,8 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "origin": origin,
             "alarm": alarm(diagnosis),
             "verdict": verdict,
+            # A number and its per cent stay on one line.
+            "sentence": verdict.sentence.replace(" %", "\u00a0%"),
             "named": " + ".join(verdict.effects) or "its verdict",
             "baseline": baseline_sentence(diagnosis),
             "facts": _facts(diagnosis),
@@ -59,7 +59,7 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "rig_picture": _rig(diagnosis),
             "ports": [port_row(each, diagnosis) for each in diagnosis.ports],
             "bode": [_bode(diagnosis, c) for c in compared_channels(diagnosis)],
-            "loops": [_loop(diagnosis, each) for each in _spread(diagnosis.loops)],
+            "loops": [_loop(diagnosis, each) for each in spread_loops(diagnosis.loops)],
             "lawful": any(each.law.size for each in diagnosis.loops),
             "shown": [candidate_row(each, diagnosis) for each in shown],
             "rest": [candidate_row(each, diagnosis) for each in rest],
@@ -91,7 +91,7 @@ def _facts(diagnosis: Diagnosis) -> tuple[dict[str, object], ...]:
     """Four numbers that tell at a glance what was found."""
     verdict, shrink = diagnosis.verdict, diagnosis.shrink
     first = diagnosis.candidates[0] if diagnosis.candidates else None
-    low, high = (percentage(end, 0) for end in shrink.interval)
+    low, high = (percentage(end) for end in shrink.interval)
     known = np.isfinite(shrink.share_closed)
     return (
         {
@@ -143,22 +143,13 @@ def _bode(diagnosis: Diagnosis, c: int) -> Picture:
     return embed(diagnosis_bode_figure(diagnosis, c), words)
 
 
-def _spread(loops: tuple[ForceLoop, ...]) -> tuple[ForceLoop, ...]:
-    """At most MOST_LOOPS, from the first test to the last."""
-    if len(loops) <= MOST_LOOPS:
-        return loops
-    chosen = np.unique(np.linspace(0, len(loops) - 1, MOST_LOOPS).round().astype(int))
-    return tuple(loops[place] for place in chosen)
-
-
 def _loop(diagnosis: Diagnosis, loop: ForceLoop) -> Picture:
-    law = f"law of {' + '.join(diagnosis.verdict.effects)}"
     largest = float(np.max(np.abs(loop.inferred), initial=0.0))
     words = (
         f"Signal inferred at the {port_words(loop.port)} over velocity and displacement at"
         f" {loop.frequency_hz:.3g} Hz; it reaches {largest:.3g} {loop.unit}."
     )
-    return embed(force_figure(loop, law), words)
+    return embed(force_figure(loop, law_label(diagnosis, loop.port)), words)
 
 
 def _shrink(diagnosis: Diagnosis) -> Picture:

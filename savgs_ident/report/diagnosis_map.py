@@ -73,13 +73,14 @@ def gap_map_figure(diagnosis: Diagnosis, channel: str) -> Figure:
 
 
 def colour_steps(values: NDArray[np.float64], first: float, least: float) -> tuple[float, ...]:
-    """Where the colour changes: at 0, at ``first``, then at round numbers that end near the largest value.
+    """Where the colour changes: at 0, at ``first``, then at round numbers up to the largest value.
 
     The scale reaches ``least`` at least, so that a small gap looks small; the last step has no end.
     """
     largest = max(float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0)), least)
     beyond = [step for step in _ROUND if first < step <= largest]
-    return (0.0, first, *beyond[-_STEPS:])
+    chosen = np.unique(np.linspace(0, len(beyond) - 1, _STEPS).round().astype(int))
+    return (0.0, first, *(beyond[place] for place in chosen))
 
 
 def _draw(

@@ -89,6 +89,13 @@ def model_label(diagnosis: Diagnosis) -> str:
     return "after (nothing added)"
 
 
+def law_label(diagnosis: Diagnosis, port: str) -> str:
+    """What the law of the named effects at a port is called in a legend."""
+    named = diagnosis.verdict.effects
+    there = [name for name in named if name in CATALOGUE and CATALOGUE[name].port.value == port]
+    return f"law of {' + '.join(there or named)}"
+
+
 def baseline_sentence(diagnosis: Diagnosis) -> str:
     """What was compared with what."""
     measured = diagnosis.measured
@@ -123,7 +130,7 @@ def gain_words(gain: float) -> str:
     """A gain with its sign and three digits."""
     if not isfinite(gain) or gain == 0.0:
         return signed(gain, 2)
-    return signed(gain, min(max(2 - floor(log10(abs(gain))), 0), 4))
+    return signed(gain, min(max(2 - floor(log10(abs(gain))), 0), 3))
 
 
 def sigma_words(sigma: float) -> str:

@@ -183,7 +183,7 @@ def _responses(measured: HarmonicResponse, gap: float) -> Responses:
     bump = 0.12 * np.exp(-(((measured.frequency - 2.0) / 0.8) ** 2))[:, None, None]
     order = 1.0 + 0.4 * np.arange(seen.shape[2])
     off = gap * bump * np.exp(0.8j) * order
-    return Responses(seen * (1.0 + 2.0 * np.exp(1.1j) * off), seen * (1.0 + off), after)
+    return Responses(after * (1.0 + 2.0 * np.exp(1.1j) * off), after * (1.0 + off), after)
 
 
 def _map(measured: HarmonicResponse, predicted: NDArray[np.complex128]) -> tuple[MapCell, ...]:

@@ -1,0 +1,331 @@
+"""Figures of a diagnosis draw what it says: gaps over the noise, the rig at its hardpoints, the guilty in orange."""
+
+from dataclasses import replace
+from itertools import combinations
+from math import hypot, isfinite
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgba
+from matplotlib.patches import Circle, Rectangle
+from numpy.testing import assert_allclose
+
+from savgs_ident.core.rig import Rig
+from savgs_ident.diagnose.result import Diagnosis, MapCell
+from savgs_ident.model.effect import Port
+from savgs_ident.report.diagnosis_bode import compared_channels, diagnosis_bode_figure, first_harmonic_gap
+from savgs_ident.report.diagnosis_force import MOST_LOOPS, force_figure, spread_loops
+from savgs_ident.report.diagnosis_map import NOISE, colour_steps, gap_channels, gap_map_figure, gap_table
+from savgs_ident.report.diagnosis_rig import port_marks, rig_figure
+from savgs_ident.report.diagnosis_rig_drawing import rig_points
+from savgs_ident.report.diagnosis_shrink import shrink_figure, shrink_rows
+from savgs_ident.report.diagnosis_words import PORT_WORDS, law_label
+from savgs_ident.report.html import embed
+from savgs_ident.report.style import BLUE, ORANGE
+
+from .diagnosis_synthetic import KINDS, SHARES, hostile, synthetic_diagnosis
+from .posterior_synthetic import nominal_response
+
+HOSTILE = "<b>$\\frac{1}{0}$\x1b漢\ud800</b>"
+
+
+@pytest.fixture(scope="module")
+def by_kind(nominal_campaign: Path) -> dict[str, Diagnosis]:
+    measured = nominal_response(nominal_campaign)
+    return {kind: synthetic_diagnosis(measured, kind) for kind in KINDS}
+
+
+@pytest.fixture(scope="module")
+def diagnosis(by_kind: dict[str, Diagnosis]) -> Diagnosis:
+    return by_kind["effect"]
+
+
+def test_the_gap_of_the_first_harmonic_is_the_one_that_was_put_in(diagnosis: Diagnosis) -> None:
+    bump = 12.0 * np.exp(-(((diagnosis.measured.frequency - 2.0) / 0.8) ** 2))
+    for c in (0, 1):
+        gap = first_harmonic_gap(diagnosis, c)
+        # Order 1 has 1.4 of the bump, and what lies below the noise is lost in it.
+        assert np.all(np.abs(gap.recalibrated - 1.4 * bump) <= 5.0 * gap.noise + 1e-3)
+        assert np.all(np.abs(gap.before - 2.8 * bump) <= 5.0 * gap.noise + 1e-3)
+        # Noise in two components of the same size as the measurement's.
+        assert np.mean((gap.after / gap.noise) ** 2) == pytest.approx(1.0, abs=0.6)
+
+
+def test_the_bode_figure_has_units_every_model_and_every_point(diagnosis: Diagnosis) -> None:
+    for c, per_road in ((0, "m/s² per m of road]"), (1, "m per m of road]")):
+        figure = diagnosis_bode_figure(diagnosis, c)
+        assert [axes.get_ylabel().split("[")[1] for axes in figure.axes] == [
+            per_road, "deg]", "% of the response]"
+        ]  # fmt: skip
+        assert figure.axes[2].get_xlabel() == "road frequency [Hz]"
+        told = [text.get_text() for text in figure.legends[0].get_texts()]
+        assert told == [
+            "before, as given", "recalibrated", "with rail_stribeck", "measured, ± 2 sd", "noise of the measurement"
+        ]  # fmt: skip
+        magnitude = {line.get_label(): line.get_ydata() for line in figure.axes[0].get_lines()}
+        road = diagnosis.measured.harmonics[:, 0, 1]
+        assert_allclose(
+            magnitude["recalibrated"], np.abs(diagnosis.responses.recalibrated[:, c, 1] / road), rtol=1e-12
+        )
+        points = [line for line in figure.axes[0].get_lines() if line.get_marker() == "o"]
+        assert len(np.asarray(points[0].get_xdata())) == 28
+
+
+def test_gaps_are_drawn_inside_the_panel_down_to_half_of_the_noise(diagnosis: Diagnosis) -> None:
+    gap = first_harmonic_gap(diagnosis, 0)
+    axes = diagnosis_bode_figure(diagnosis, 0).axes[2]
+    low, high = axes.get_ylim()
+    assert low == pytest.approx(0.5 * gap.noise.min())
+    assert high > gap.before.max()
+    after, recalibrated, before = (np.asarray(line.get_ydata()) for line in axes.get_lines())
+    assert_allclose(after, np.maximum(gap.after, low))
+    assert_allclose(recalibrated, np.maximum(gap.recalibrated, low))
+    assert_allclose(before, np.maximum(gap.before, low))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_verdict_is_drawn_without_an_empty_panel(
+    by_kind: dict[str, Diagnosis], kind: str
+) -> None:
+    diagnosis = by_kind[kind]
+    figures = [
+        rig_figure(diagnosis),
+        shrink_figure(diagnosis),
+        *(diagnosis_bode_figure(diagnosis, c) for c in compared_channels(diagnosis)),
+        *(gap_map_figure(diagnosis, channel) for channel in gap_channels(diagnosis)),
+        *(force_figure(loop, law_label(diagnosis, loop.port)) for loop in diagnosis.loops),
+    ]
+    assert len(figures) == (6 if kind == "none" else 10)
+    for figure in figures:
+        assert all(axes.has_data() for axes in figure.axes)
+
+
+def test_a_channel_that_was_not_recorded_has_no_bode_figure(diagnosis: Diagnosis) -> None:
+    alone = replace(diagnosis.measured, channels=("road_height", "sprung_accel", "something_else"))
+    assert compared_channels(replace(diagnosis, measured=alone)) == (0,)
+
+
+def test_dwells_without_a_solution_are_left_open(diagnosis: Diagnosis) -> None:
+    after = diagnosis.responses.after.copy()
+    after[3:6] = np.nan
+    figure = diagnosis_bode_figure(replace(diagnosis, responses=replace(diagnosis.responses, after=after)), 0)
+    drawn = np.asarray(figure.axes[0].get_lines()[0].get_ydata())
+    assert np.array_equal(np.flatnonzero(np.isnan(drawn)), [3, 4, 5])
+    low, high = figure.axes[2].get_ylim()
+    assert isfinite(low)
+    assert isfinite(high)
+
+
+def test_the_map_has_each_cell_at_its_dwell_and_order() -> None:
+    cells = [
+        MapCell("sprung_accel", 2.0, 3, 0.7, 12.0),
+        MapCell("sprung_accel", 0.5, 1, 25.0, 300.0),
+        MapCell("susp_deflection", 4.0, 1, 9.0, 9.0),
+        MapCell("sprung_accel", 2.0, 1, 0.05, 1.0),
+    ]
+    frequency, orders, sigma, percent = gap_table(cells, "sprung_accel")
+    assert frequency.tolist() == [0.5, 2.0]
+    assert orders.tolist() == [1, 3]
+    assert_allclose(sigma, [[300.0, 1.0], [np.nan, 12.0]])
+    assert_allclose(percent, [[25.0, 0.05], [np.nan, 0.7]])
+
+
+def test_what_is_within_the_noise_is_white_and_larger_gaps_are_darker(diagnosis: Diagnosis) -> None:
+    sizes = (0.5, 1.9, 2.1, 7.0, 30.0, 400.0, 4000.0)
+    cells = tuple(MapCell("sprung_accel", 1.0 + n, 1, 0.1, size) for n, size in enumerate(sizes))
+    figure = gap_map_figure(replace(diagnosis, map=cells), "sprung_accel")
+    mesh = figure.axes[0].collections[-1]
+    figure.canvas = FigureCanvasAgg(figure)
+    figure.canvas.draw()
+    light = [float(np.mean(colour[:3])) for colour in np.asarray(mesh.get_facecolor())]
+    assert light[0] == light[1] == 1.0
+    assert light[1:] == sorted(light[1:], reverse=True)
+    assert len(set(light[1:])) == 6
+
+
+@given(st.floats(0.0, 1e5), st.sampled_from([(NOISE, 100.0), (0.1, 10.0)]))
+def test_the_colours_change_at_growing_numbers_that_reach_the_largest_gap(
+    largest: float, ends: tuple[float, float]
+) -> None:
+    first, least = ends
+    steps = colour_steps(np.array([np.nan, -largest, 0.1]), first, least)
+    assert steps[:2] == (0.0, first)
+    assert list(steps) == sorted(set(steps))
+    assert len(steps) <= 8
+    assert steps[-1] <= max(largest, least) < max(2.5001 * steps[-1], 1e4 + 1e5)
+
+
+def test_the_map_names_channel_units_and_dwells(diagnosis: Diagnosis) -> None:
+    figure = gap_map_figure(diagnosis, "susp_deflection")
+    above, below = figure.axes[:2]
+    assert above.get_title(loc="left") == "gap [noise sd]"
+    assert below.get_title(loc="left") == "gap [% of the response]"
+    assert below.get_xlabel() == "road frequency of the dwell [Hz]"
+    assert above.get_ylabel() == "harmonic order"
+    told = [text.get_text() for text in below.get_xticklabels()]
+    assert told[0] == "0.5"
+    assert told[-1] == "6"
+    assert [text.get_text() for text in above.get_yticklabels()] == [str(k) for k in range(1, 10)]
+
+
+def test_a_loop_is_drawn_whole_over_velocity_and_displacement(diagnosis: Diagnosis) -> None:
+    loop = diagnosis.loops[1]
+    figure = force_figure(replace(loop, displacement=loop.displacement + 0.45), "law of rail_stribeck")
+    left, right = figure.axes
+    assert left.get_xlabel() == "velocity [mm/s]"
+    assert right.get_xlabel() == "displacement [mm]"
+    assert left.get_ylabel() == "force [N]"
+    inferred, law = left.get_lines()[1:]
+    assert_allclose(np.asarray(inferred.get_xdata())[:-1], 1e3 * loop.velocity)
+    assert_allclose(np.asarray(inferred.get_ydata())[:-1], loop.inferred)
+    assert_allclose(np.asarray(law.get_ydata())[:-1], loop.law)
+    # The loop closes, and a displacement counts from the middle of its range.
+    over = np.asarray(right.get_lines()[1].get_xdata())
+    assert over[0] == over[-1]
+    assert over.min() == pytest.approx(-12.0, abs=0.01)
+    assert over.max() == pytest.approx(12.0, abs=0.01)
+
+
+def test_a_loop_without_a_law_has_one_line_and_ways_are_in_millimetres(
+    by_kind: dict[str, Diagnosis],
+) -> None:
+    loop = by_kind["unknown"].loops[0]
+    figure = force_figure(replace(loop, unit="m", inferred=1e-5 * loop.inferred), "")
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["inferred"]
+    assert figure.axes[0].get_ylabel() == "signal [mm]"
+    assert_allclose(np.asarray(figure.axes[0].get_lines()[1].get_ydata())[:-1], 1e-2 * loop.inferred)
+
+
+def test_many_loops_are_thinned_from_the_first_test_to_the_last(diagnosis: Diagnosis) -> None:
+    loops = tuple(replace(diagnosis.loops[0], frequency_hz=0.5 + 0.1 * n) for n in range(28))
+    drawn = [loop.frequency_hz for loop in spread_loops(loops)]
+    assert len(drawn) == MOST_LOOPS
+    assert drawn == sorted(drawn)
+    assert (drawn[0], drawn[-1]) == (loops[0].frequency_hz, loops[-1].frequency_hz)
+    assert spread_loops(loops[:MOST_LOOPS]) == loops[:MOST_LOOPS]
+
+
+def test_the_law_at_a_port_is_that_of_the_effect_there(by_kind: dict[str, Diagnosis]) -> None:
+    both = by_kind["several"]
+    assert law_label(both, "rail") == "law of rail_stribeck"
+    assert law_label(both, "sensor.sprung_accel") == "law of accel_lag"
+    assert law_label(both, "road") == "law of rail_stribeck + accel_lag"
+
+
+def test_gaps_are_drawn_at_their_per_cent(diagnosis: Diagnosis) -> None:
+    rows = shrink_rows(diagnosis)
+    assert list(rows) == ["both channels", "acceleration", "deflection", "sweep, waveform"]
+    axes = shrink_figure(diagnosis).axes[0]
+    assert axes.get_xlabel().endswith("[%]")
+    drawn = {
+        (line.get_marker(), float(np.asarray(line.get_ydata())[0])): float(np.asarray(line.get_xdata())[0])
+        for line in axes.get_lines()
+        if line.get_marker() != "None" and np.asarray(line.get_xdata()).size
+    }
+    assert drawn["o", 0.0] == pytest.approx(17.32)
+    assert drawn["s", 0.0] == pytest.approx(8.71)
+    assert drawn["^", 2.0] == pytest.approx(0.31)
+    assert drawn["|", 1.0] == pytest.approx(0.28)
+    assert drawn["o", 3.0] == pytest.approx(18.81)
+    assert ("|", 3.0) not in drawn
+
+
+def test_the_linkage_is_drawn_at_the_hardpoints_of_the_rig(diagnosis: Diagnosis, rig: Rig) -> None:
+    at, p = rig_points(diagnosis.rig.parameters), rig.parameters
+    assert (p["C_y"].value, p["C_z"].value) == at.C
+    assert hypot(at.F[0] - at.G[0], at.F[1] - at.G[1]) == pytest.approx(p["l_SL"].value)
+    assert at.carriages[1] - at.carriages[0] == pytest.approx(p["l_tb"].value)
+    # Across the strut, as a link at 90 deg stands.
+    strut = (at.F[0] - at.E[0], at.F[1] - at.E[1])
+    link = (at.F[0] - at.G[0], at.F[1] - at.G[1])
+    cosine = (strut[0] * link[0] + strut[1] * link[1]) / (hypot(*strut) * hypot(*link))
+    assert abs(cosine) < 0.05
+    circles = [patch for patch in rig_figure(diagnosis).axes[0].patches if isinstance(patch, Circle)]
+    centres = [tuple(patch.get_center()) for patch in circles]
+    for joint in (at.A, at.B, at.C, at.D, at.E, at.F):
+        assert joint in centres
+
+
+def test_a_rig_with_other_hardpoints_is_drawn_otherwise(diagnosis: Diagnosis) -> None:
+    table = diagnosis.rig.parameters
+    moved = replace(diagnosis, rig=replace(diagnosis.rig, parameters=table.with_values({"D_z": 0.48})))
+    centres = [
+        tuple(patch.get_center()) for patch in rig_figure(moved).axes[0].patches if isinstance(patch, Circle)
+    ]
+    assert (table["D_y"].value, 0.48) in centres
+
+
+def test_every_port_has_a_place_a_name_and_its_share(diagnosis: Diagnosis) -> None:
+    assert set(PORT_WORDS) == {port.value for port in Port}
+    marks = {mark.port: mark for mark in port_marks(diagnosis)}
+    assert set(marks) == set(PORT_WORDS)
+    for port, (share, _) in SHARES.items():
+        assert marks[port].share == share
+        assert marks[port].place is not None
+    figure = rig_figure(diagnosis)
+    texts = [text.get_text() for text in figure.axes[0].texts]
+    assert set(PORT_WORDS.values()) <= set(texts)
+    assert "94 %" in texts
+    bars = [
+        patch.get_width()
+        for patch in figure.axes[0].patches
+        if isinstance(patch, Rectangle) and patch.get_facecolor() in (to_rgba(ORANGE), to_rgba(BLUE))
+    ]
+    longest = max(bars)
+    whole = longest / SHARES["rail"][0]
+    expected = [max(share, 0.0) for share, _ in SHARES.values()]
+    assert_allclose(sorted(width / whole for width in bars), sorted(expected), atol=1e-9)
+
+
+@pytest.mark.parametrize(("kind", "guilty"), [("none", 0), ("effect", 1), ("several", 2), ("unknown", 1)])
+def test_the_guilty_ports_alone_are_orange(by_kind: dict[str, Diagnosis], kind: str, guilty: int) -> None:
+    diagnosis = by_kind[kind]
+    assert sum(mark.guilty for mark in port_marks(diagnosis)) == guilty
+    dots = [
+        patch.get_center()
+        for patch in rig_figure(diagnosis).axes[0].patches
+        if isinstance(patch, Circle) and patch.get_facecolor() == to_rgba(ORANGE)
+    ]
+    places = [mark.place for mark in port_marks(diagnosis) if mark.guilty]
+    assert sorted(map(tuple, dots)) == sorted(place for place in places if place is not None)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_two_texts_of_the_rig_touch_and_none_is_cut_off(by_kind: dict[str, Diagnosis], kind: str) -> None:
+    figure = rig_figure(by_kind[kind])
+    canvas = FigureCanvasAgg(figure)
+    boxes = [text.get_window_extent(canvas.get_renderer()) for text in figure.axes[0].texts]
+    assert len(boxes) > 20
+    for one, other in combinations(boxes, 2):
+        assert not one.overlaps(other)
+    width, height = figure.get_size_inches() * figure.dpi
+    for box in boxes:
+        assert box.x0 >= 0.0
+        assert box.y0 >= 0.0
+        assert box.x1 <= width
+        assert box.y1 <= height
+
+
+def test_a_port_whose_share_is_not_known_is_drawn_without_a_bar(diagnosis: Diagnosis) -> None:
+    few = replace(diagnosis, ports=diagnosis.ports[:1])
+    texts = [text.get_text() for text in rig_figure(few).axes[0].texts]
+    assert texts.count("\u2013") == len(PORT_WORDS) - 1
+
+
+def test_names_in_figures_are_neither_formulas_nor_missing_glyphs(diagnosis: Diagnosis) -> None:
+    attacked = hostile(diagnosis, HOSTILE)
+    figures = [
+        rig_figure(attacked),
+        shrink_figure(attacked),
+        diagnosis_bode_figure(attacked, 0),
+        gap_map_figure(attacked, HOSTILE),
+        force_figure(attacked.loops[0], law_label(attacked, HOSTILE)),
+    ]
+    for figure in figures:
+        assert embed(figure, "hostile").width > 300
+    texts = [text.get_text() for text in figures[0].axes[0].texts]
+    assert "<b>$\\frac{1}{0}$\\x1b\\u6f22\\ud800</b>" in texts

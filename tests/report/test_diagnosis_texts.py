@@ -1,0 +1,384 @@
+"""Record, terminal and page of a diagnosis say its numbers, the verdict first, and hostile names as text."""
+
+import base64
+import io
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from savgs_ident.core.errors import DataWarning
+from savgs_ident.diagnose.result import Diagnosis, Estimate, NotJudgeable
+from savgs_ident.report.diagnosis_files import write_diagnosis
+from savgs_ident.report.diagnosis_html import diagnosis_html
+from savgs_ident.report.diagnosis_record import diagnosis_record
+from savgs_ident.report.diagnosis_rows import parameter_table
+from savgs_ident.report.diagnosis_text import diagnosis_text
+from savgs_ident.report.diagnosis_words import (
+    closed_words,
+    estimate_words,
+    gain_words,
+    gap_percentage,
+    probability_words,
+    shown_candidates,
+    smallest_words,
+)
+from savgs_ident.report.files import to_json
+from savgs_ident.report.numerals import DASH
+from savgs_ident.report.origin import Origin
+
+from .diagnosis_synthetic import (
+    KINDS,
+    NO_SHRINK,
+    SENTENCES,
+    SHARES,
+    SHRINK,
+    hostile,
+    synthetic_diagnosis,
+    unconverged,
+)
+from .posterior_synthetic import nominal_response
+
+HOSTILE = "<script>x</script>\"'&[bold red]\x1b[2J\u202etxt"
+SHOWN = HOSTILE.replace("\x1b", "\\x1b").replace("\u202e", "\\u202e")
+ORIGIN = Origin(
+    ("savgs-ident", "diagnose", "a & b.csv"), "runs/a<b>.csv", "ab" * 32, "m & m.toml", {"savgs-ident": "0.1.0"},
+    (DataWarning("odd", "something", test="dwell_2"),),
+)  # fmt: skip
+SECTIONS = ["where", "response", "loops", "which", "shrink", "map", "next", "limits", "origin"]
+
+
+class Reader(HTMLParser):
+    """Texts and tags of a page, in order."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: list[str] = []
+        self._styling = False
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self._styling = tag in ("style", "title")
+
+    def handle_endtag(self, tag: str) -> None:
+        self._styling = self._styling and tag not in ("style", "title")
+
+    def handle_data(self, data: str) -> None:
+        if data.strip() and not self._styling:
+            self.texts.append(" ".join(data.split()))
+
+    @property
+    def pictures(self) -> list[dict[str, str | None]]:
+        return [attributes for tag, attributes in self.tags if tag == "img"]
+
+
+@pytest.fixture(scope="module")
+def by_kind(nominal_campaign: Path) -> dict[str, Diagnosis]:
+    measured = nominal_response(nominal_campaign)
+    return {kind: synthetic_diagnosis(measured, kind) for kind in KINDS}
+
+
+@pytest.fixture(scope="module")
+def diagnosis(by_kind: dict[str, Diagnosis]) -> Diagnosis:
+    return by_kind["effect"]
+
+
+@pytest.fixture(scope="module")
+def source(diagnosis: Diagnosis) -> str:
+    return diagnosis_html(diagnosis, ORIGIN)
+
+
+@pytest.fixture(scope="module")
+def page(source: str) -> Reader:
+    return Reader(source)
+
+
+def rendered(diagnosis: Diagnosis, width: int = 100) -> str:
+    stream = io.StringIO()
+    Console(file=stream, width=width, highlight=False).print(diagnosis_text(diagnosis))
+    return stream.getvalue()
+
+
+def record_of(diagnosis: Diagnosis) -> dict[str, Any]:
+    return dict(json.loads(to_json(diagnosis_record(diagnosis, ORIGIN))))
+
+
+def has_form(value: object, form: object) -> bool:
+    """Whether a JSON value is of this form: types, lists of one form, and objects with at least these keys."""
+    if isinstance(form, Mapping):
+        return isinstance(value, dict) and all(
+            key in value and has_form(value[key], each) for key, each in form.items()
+        )
+    if isinstance(form, list):
+        return isinstance(value, list) and all(has_form(entry, form[0]) for entry in value)
+    return isinstance(value, form) and not isinstance(value, bool)  # type: ignore[arg-type]  # A type or several.
+
+
+NUMBER = (int, float)
+MAYBE = (int, float, type(None))
+CONTRACT: dict[str, object] = {
+    "schema": int,
+    "baseline": {"model": str, "parameters": {"mu_r": NUMBER, "c_sd": NUMBER}},
+    "verdict": {"kind": str, "effects": [str], "ports": [str], "confusable_with": [str], "sentence": str},
+    "where": {
+        "ports": [{"port": str, "share": NUMBER}],
+        "map": [
+            {"channel": str, "frequency_hz": NUMBER, "order": int, "gap_percent": NUMBER, "gap_sigma": NUMBER}
+        ],
+    },
+    "which": [
+        {
+            "effect": str,
+            "probability": NUMBER,
+            "score_sigma": NUMBER,
+            "heldout_gain": NUMBER,
+            "parameters": {},
+        }
+    ],
+    "shrink": {
+        "before": NUMBER,
+        "recalibrated": NUMBER,
+        "after": NUMBER,
+        "floor": NUMBER,
+        "share_closed": MAYBE,
+        "interval": [MAYBE],
+        "by_channel": {"sprung_accel": {"before": NUMBER}, "susp_deflection": {"before": NUMBER}},
+    },
+    "next_test": [{"test": str, "separates": [str], "expected_sigma": NUMBER}],
+}
+"""The object of diagnosis.json."""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_record_is_the_object_of_the_contract(by_kind: dict[str, Diagnosis], kind: str) -> None:
+    record = record_of(by_kind[kind])
+    assert list(record)[: len(CONTRACT)] == list(CONTRACT)
+    assert has_form(record, CONTRACT)
+    assert record["schema"] == 1
+    assert record["verdict"]["kind"] == kind
+    assert {"none", "unknown"} <= {entry["effect"] for entry in record["which"]}
+    assert sum(entry["probability"] for entry in record["which"]) == pytest.approx(1.0, abs=1e-12)
+    for entry in record["which"]:
+        for parameter in entry["parameters"].values():
+            assert has_form(parameter, {"value": NUMBER, "lo": NUMBER, "hi": NUMBER, "unit": str})
+
+
+def test_the_form_of_the_contract_refuses_what_is_not_of_it(diagnosis: Diagnosis) -> None:
+    record = record_of(diagnosis)
+    assert not has_form({**record, "schema": "1"}, CONTRACT)
+    assert not has_form({key: value for key, value in record.items() if key != "shrink"}, CONTRACT)
+    assert not has_form({**record, "next_test": [{"test": "x"}]}, CONTRACT)
+
+
+def test_the_record_holds_the_numbers_of_the_diagnosis(diagnosis: Diagnosis) -> None:
+    record = record_of(diagnosis)
+    assert record["baseline"]["parameters"]["c_sd"] == 5391.2
+    assert record["identified"]["c_sd"] == 5386.1
+    assert record["verdict"]["effects"] == ["rail_stribeck"]
+    assert record["verdict"]["confusable_with"] == ["rail_preload"]
+    assert {entry["port"]: (entry["share"], entry["reach"]) for entry in record["where"]["ports"]} == SHARES
+    # 28 dwells, two channels, nine orders: none is left out where all were measured.
+    assert len(record["where"]["map"]) == len(diagnosis.map) == 504
+    assert record["which"][0]["parameters"]["stribeck_velocity"] == {
+        "value": 0.1012, "lo": 0.0957, "hi": 0.1066, "unit": "m/s"
+    }  # fmt: skip
+    assert record["shrink"]["share_closed"] == SHRINK.share_closed
+    assert record["shrink"]["interval"] == list(SHRINK.interval)
+    assert record["shrink"]["by_channel"]["susp_deflection"]["floor"] == 0.0009
+    assert record["next_test"][0]["separates"] == ["rail_stribeck", "rail_preload"]
+    assert record["not_judgeable"][0] == {
+        "effect": "bump_stop", "parameter": "bump_stop_stiffness", "smallest": 3.2e4, "unit": "N/m"
+    }  # fmt: skip
+    assert record["confusable"][1]["cosine"] == -0.951
+    assert record["sweep"]["after"] == 0.0132
+    assert record["converged"] is True
+    assert record["provenance"]["data_sha256"] == "ab" * 32
+    assert record["provenance"]["warnings"][0]["code"] == "odd"
+
+
+def test_what_was_not_computed_is_null_in_the_record(by_kind: dict[str, Diagnosis]) -> None:
+    record = record_of(replace(by_kind["none"], sweep=None))
+    assert record["sweep"] is None
+    assert record["shrink"]["share_closed"] is None
+    assert record["shrink"]["interval"] == [None, None]
+    assert record["which"][-1]["share_closed"] is None
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_terminal_tells_the_verdict_first_in_80_columns(by_kind: dict[str, Diagnosis], kind: str) -> None:
+    text = rendered(by_kind[kind], width=80)
+    joined = " ".join(text.split())
+    assert joined.startswith(SENTENCES[kind])
+    assert "nan" not in joined
+    assert "\\u" not in joined
+    assert (
+        text.index("How far it shrinks")
+        < text.index("What it could be")
+        < text.index("What to test next")
+        < text.index("This campaign cannot show")
+    )
+
+
+def test_the_terminal_tells_the_numbers(diagnosis: Diagnosis) -> None:
+    text = rendered(diagnosis)
+    assert re.search(r"together +17\.3 % +8\.71 % +0\.47 % +0\.21 % +99\.9 % \(99\.9 % to > 99\.9 %\)", text)
+    assert re.search(rf"sweep, waveform +18\.8 % +9\.42 % +1\.32 % +{DASH} +{DASH}", text)
+    assert re.search(r"rail_stribeck +98\.2 % +61\.2 +\+3\.41 +99\.9 %", text)
+    assert "- stribeck_velocity: 0.1012 (0.0957 to 0.1066) m/s" in text
+    assert "This campaign cannot tell it from: rail_preload." in text
+    assert "rail 94 %, wishbone joints 41 %, strut 30 %" in " ".join(text.split())
+    assert "unless its bump_stop_stiffness is at least 32 000 N/m" in text
+    assert "What it could be (5 of 33 hypotheses)" in text
+
+
+def test_none_and_unknown_are_told_however_unlikely_and_so_is_all_that_has_a_chance(
+    diagnosis: Diagnosis,
+) -> None:
+    ordered = sorted(diagnosis.candidates, key=lambda each: bool(each.effects))
+    last = replace(ordered[-1], probability=0.002)
+    shuffled = (*(each for each in ordered if each.effects), ordered[0], ordered[1], last)
+    shown, rest = shown_candidates(replace(diagnosis, candidates=shuffled))
+    assert {"none", "unknown", last.name} <= {each.name for each in shown}
+    assert len(shown) + len(rest) == len(shuffled)
+    assert all(each.probability < 0.001 for each in rest)
+
+
+def test_the_page_has_its_sections_in_order_and_the_verdict_on_top(
+    page: Reader, diagnosis: Diagnosis
+) -> None:
+    assert [attributes["id"] for tag, attributes in page.tags if tag == "section"] == SECTIONS
+    assert not any(tag in ("script", "iframe", "object") for tag, _ in page.tags)
+    assert diagnosis.verdict.sentence in page.texts[:4]
+
+
+def test_the_page_fetches_nothing(page: Reader) -> None:
+    for _, attributes in page.tags:
+        for name in ("src", "href", "action", "data"):
+            assert (attributes.get(name) or "#").startswith(("data:", "#"))
+
+
+def test_pictures_are_drawings_that_execute_nothing(page: Reader) -> None:
+    # The rig, two of the response, four loops, the gaps, two maps.
+    assert len(page.pictures) == 10
+    for attributes in page.pictures:
+        drawing = base64.b64decode(
+            (attributes["src"] or "").removeprefix("data:image/svg+xml;base64,")
+        ).decode()
+        assert "<svg" in drawing
+        assert not re.search(r"<script|\son\w+=|javascript:|<foreignObject", drawing, re.IGNORECASE)
+        assert not re.search(r'href="(?!#|data:image/png)', drawing)
+
+
+def test_the_page_tells_numbers_and_origin(page: Reader) -> None:
+    text = " ".join(page.texts)
+    for part in (
+        "98.2 %",
+        "17.3 %",
+        "0.1012 (0.0957 to 0.1066) m/s",
+        "Friction is highest where the body turns round: slow tests stick more than fast ones.",
+        "Armstrong-Helouvry",
+        "dwell at 0.35 Hz, plate at half its stroke",
+        "rail_stribeck from rail_preload",
+        "bump_stop_stiffness",
+        "The dwell at 6 Hz was left out: the wheel lifts off.",
+        "71 %",
+        "runs/a<b>.csv",
+        "ab" * 32,
+        "m & m.toml",
+        "savgs-ident diagnose a & b.csv",
+        "[odd]",
+    ):
+        assert part in text
+    assert "Not converged" not in text
+    assert "nan" not in re.sub(r"[a-z]*nan[a-z]+|[a-z]+nan", "", text)
+
+
+@pytest.mark.parametrize("kind", ["none", "several"])
+def test_the_page_says_what_there_is_and_what_there_is_not(by_kind: dict[str, Diagnosis], kind: str) -> None:
+    page = Reader(diagnosis_html(by_kind[kind], ORIGIN))
+    text = " ".join(page.texts)
+    assert SENTENCES[kind] in text
+    assert len(page.pictures) == (6 if kind == "none" else 10)
+    assert ("No signal was inferred: nothing is missing." in text) is (kind == "none")
+    assert ("Where the named laws are from" in text) is (kind == "several")
+    assert ("Dashed: the law" in text) is (kind == "several")
+
+
+def test_a_diagnosis_that_did_not_converge_says_so_first_and_hostile_names_stay_text(
+    diagnosis: Diagnosis,
+) -> None:
+    attacked = unconverged(hostile(diagnosis, HOSTILE))
+    origin = Origin(("savgs-ident", HOSTILE), HOSTILE, HOSTILE, HOSTILE, {HOSTILE: HOSTILE})
+    source = diagnosis_html(attacked, origin)
+    page = Reader(source)
+    warning = "Not converged: this verdict must not be used."
+    assert page.texts[0] == warning
+    assert "<title>Not converged: " in source
+    assert record_of(attacked)["converged"] is False
+    assert not any(tag == "script" for tag, _ in page.tags)
+    # Data, sentence, baseline, warning, port, candidate, parameter, cycle, channel, next test, pair, limit, origin.
+    assert sum(SHOWN in text for text in page.texts) >= 20
+    assert any(SHOWN in (attributes["alt"] or "") for attributes in page.pictures)
+    told = rendered(attacked, width=300)
+    assert told.splitlines()[0] == warning
+    assert "[bold red]\\x1b[2J" in told
+    assert "\x1b" not in told
+
+
+def test_a_diagnosis_with_nothing_beside_its_verdict_has_a_page(diagnosis: Diagnosis) -> None:
+    bare = replace(
+        diagnosis, ports=(), map=(), cycle=(), loops=(), by_channel={}, sweep=None, next_tests=(),
+        not_judgeable=(), confusable=(), warnings=(), candidates=diagnosis.candidates[:1],
+        parameters=diagnosis.rig.parameters.as_dict(), identified=diagnosis.rig.parameters.as_dict(),
+    )  # fmt: skip
+    page = Reader(diagnosis_html(bare, replace(ORIGIN, warnings=())))
+    text = " ".join(page.texts)
+    for part in ("No port was examined.", "Nothing was mapped.", "Every effect of the catalogue would have"):
+        assert part in text
+    assert "Parameters that moved" not in text
+    assert len(page.pictures) == 4
+    assert rendered(bare).startswith(SENTENCES["effect"])
+    assert record_of(bare)["where"]["map"] == []
+
+
+def test_parameters_that_moved_are_told_in_tolerances(diagnosis: Diagnosis) -> None:
+    rows = {row.name: row for row in parameter_table(diagnosis)}
+    assert set(rows) == {"c_sd", "k_t", "mu_r", "stribeck_rise", "stribeck_velocity"}
+    # (264100 - 275000) / 13750 = -0.79.
+    assert rows["k_t"].moved == "\u22120.8"
+    assert rows["mu_r"].recalibrated == "0.03620"
+    assert rows["mu_r"].identified == "0.03000"
+    assert rows["stribeck_velocity"].given == "\u2013"
+    assert rows["stribeck_velocity"].unit == "m/s"
+
+
+def test_numbers_are_told_to_the_digits_that_they_justify() -> None:
+    assert probability_words(1e-9) == "< 0.1 %"
+    assert probability_words(0.0) == "0.0 %"
+    assert probability_words(1.0) == "100.0 %"
+    assert probability_words(0.99999) == "> 99.9 %"
+    assert gap_percentage(0.0021) == "0.21 %"
+    assert gap_percentage(0.1732) == "17.3 %"
+    assert gain_words(3.413) == "+3.41"
+    assert gain_words(41.3) == "+41.3"
+    assert gain_words(float("nan")) == "\u2013"
+    assert closed_words(NO_SHRINK) == "\u2013"
+    assert estimate_words(Estimate("tau", 0.01503, 0.0147, 0.0153, "s")) == "0.01503 (0.01470 to 0.01530) s"
+    assert smallest_words(NotJudgeable("a", "b", 0.25, "1")) == "0.250"
+
+
+def test_both_files_are_written_and_the_same_diagnosis_gives_the_same_page(
+    diagnosis: Diagnosis, source: str, tmp_path: Path
+) -> None:
+    files = write_diagnosis(diagnosis, ORIGIN, tmp_path)
+    assert [file.name for file in files] == ["diagnosis.json", "diagnosis.html"]
+    assert json.loads(files[0].read_text()) == record_of(diagnosis)
+    assert files[1].read_text(encoding="utf-8") == source
