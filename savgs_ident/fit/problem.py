@@ -76,9 +76,12 @@ def used_parameters(model: QuarterCar, table: ParameterTable) -> frozenset[str]:
 
     values = as_values(table.as_dict())
     jaxpr = jax.make_jaxpr(response)(values).jaxpr
-    read = {id(variable) for equation in jaxpr.eqns for variable in equation.invars}
+    needed = {id(variable) for variable in jaxpr.outvars}
+    for equation in reversed(jaxpr.eqns):
+        if any(id(variable) in needed for variable in equation.outvars):
+            needed |= {id(variable) for variable in equation.invars}
     # A dictionary is flattened in the order of its sorted keys.
-    return frozenset(n for n, v in zip(sorted(values), jaxpr.invars, strict=True) if id(v) in read)
+    return frozenset(n for n, v in zip(sorted(values), jaxpr.invars, strict=True) if id(v) in needed)
 
 
 # Compiled as a whole: the maps of forty parameters, one operation at a time, would take seconds.

@@ -61,7 +61,8 @@ def static_equilibrium(
         return model.residual(p, _at_rest(Coordinates(x[0], x[1])), x[2:], still, inputs, curves)
 
     scale = jnp.asarray([*COORDINATE_SCALE, *states])
-    x = find_root(residual, jnp.zeros(2 + len(states)), scale, PRECISION)
+    # At rest a velocity among the states has nothing on the diagonal: rows have to be exchanged.
+    x = find_root(residual, jnp.zeros(2 + len(states)), scale, PRECISION, jnp.linalg.solve)
     q = Coordinates(x[0], x[1])
     still = jnp.zeros_like(x[2:])
     return Equilibrium(q, x[2:], model.loads(p, _at_rest(q), x[2:], still, inputs, curves).strut)

@@ -91,9 +91,9 @@ class LinearSweep(AbstractProfile):
 
 
 class SweptAngle(AbstractProfile):
-    """An angle [rad] from ``offset`` on, turning at a frequency that runs linearly and then stays.
+    """An angle [rad] that is ``offset`` at t = 0, turning at a frequency that runs linearly and then stays.
 
-    From ``start`` [Hz] at t = 0 to ``end`` [Hz] at t = ``duration`` [s].
+    From ``start`` [Hz], before and at t = 0, to ``end`` [Hz] at t = ``duration`` [s].
     """
 
     start: Number = eqx.field(converter=jnp.asarray)
@@ -105,7 +105,8 @@ class SweptAngle(AbstractProfile):
         """The angle at time ``t`` [s]."""
         running = jnp.clip(t, 0.0, self.duration)
         slope = (self.end - self.start) / self.duration
-        turns = (self.start + 0.5 * slope * running) * running + self.end * (t - running)
+        outside = self.start * jnp.minimum(t, 0.0) + self.end * jnp.maximum(t - self.duration, 0.0)
+        turns = (self.start + 0.5 * slope * running) * running + outside
         return 2.0 * jnp.pi * turns + self.offset
 
 

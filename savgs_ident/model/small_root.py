@@ -56,23 +56,31 @@ def solve_dense(matrix: Float[Array, "n n"], right: Vector) -> Vector:
     return jnp.stack([row[size] for row in rows])
 
 
+LinearSolver = Callable[[Float[Array, "n n"], Vector], Vector]
+"""Solves a matrix for a right side."""
+
+
 def find_root(
-    function: Callable[[Vector], Vector], start: Vector, scale: Vector, precision: float = PRECISION
+    function: Callable[[Vector], Vector],
+    start: Vector,
+    scale: Vector,
+    precision: float = PRECISION,
+    solve: LinearSolver = solve_dense,
 ) -> Vector:
     """The root (n,) of ``function`` that Newton's method reaches from ``start``; NaN if it reaches none.
 
-    ``scale`` (n,) is the typical size of each unknown. Where the function may be closed over traced values,
-    derivatives in these are exact.
+    ``scale`` (n,) is the typical size of each unknown; ``solve`` has to suit the function's slopes. Where the
+    function may be closed over traced values, derivatives in these are exact.
     """
 
     def newton(function: Callable[[Vector], Vector], start: Vector) -> Vector:
         def advance(now: _Progress) -> _Progress:
             _, slope = jax.linearize(function, now.root)
             jacobian = _columns(slope, now.root)
-            root = now.root - solve_dense(jacobian, now.residual)
+            root = now.root - solve(jacobian, now.residual)
             residual = function(root)
             # Where the same piece holds at the new point, the step that is left is what the old Jacobian says.
-            step_left = jnp.max(jnp.abs(solve_dense(jacobian, residual)) / scale)
+            step_left = jnp.max(jnp.abs(solve(jacobian, residual)) / scale)
             return _Progress(root, residual, step_left, now.iterations + 1)
 
         def unfinished(now: _Progress) -> Array:
@@ -83,7 +91,7 @@ def find_root(
         return jnp.where(end.step_left <= precision, end.root, jnp.nan)
 
     def linear(function: Callable[[Vector], Vector], right: Vector) -> Vector:
-        return solve_dense(_columns(function, right), right)
+        return solve(_columns(function, right), right)
 
     root: Vector = jax.lax.custom_root(function, start, newton, linear)
     return root

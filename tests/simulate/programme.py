@@ -35,7 +35,9 @@ def altered(values: Values, changes: Mapping[str, float]) -> Values:
     return as_values(dict(values) | dict(changes))
 
 
-def orders(p: Values, solution: PeriodicSolution, highest: int = 9) -> NDArray[np.complex128]:
+def orders(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, highest: int = 9
+) -> NDArray[np.complex128]:
     """Harmonics 0..``highest``, (D, 2, ``highest`` + 1)."""
     return np.asarray(harmonics(model, p, solution, highest))
 

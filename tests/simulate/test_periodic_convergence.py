@@ -30,7 +30,7 @@ def test_a_dwell_cut_off_at_the_iteration_limit_says_so(
     settings = PeriodicSettings(iterations=2, adaptations=0)
     cut = simulate_periodic(friction, numbers, cam(FEW), settings)
     assert cut.status() == (Status.MAX_ITERATIONS,) * FEW.size
-    assert np.min(distance(orders(numbers, cut), orders(numbers, few))) > 1e-3
+    assert np.min(distance(orders(friction, numbers, cut), orders(friction, numbers, few))) > 1e-3
 
 
 def test_dwells_end_each_in_their_own_way(
@@ -42,7 +42,7 @@ def test_dwells_end_each_in_their_own_way(
     assert Status.MAX_ITERATIONS in cut.status()[:-1]
     full = simulate_periodic(friction, numbers, cam(FEW), PeriodicSettings(adaptations=0))
     assert all(status.ok for status in full.status())
-    wrong = distance(orders(numbers, cut), orders(numbers, full))
+    wrong = distance(orders(friction, numbers, cut), orders(friction, numbers, full))
     for status, each in zip(cut.status(), wrong, strict=True):
         assert np.max(each) < 1e-12 if status.ok else np.max(each) > 1e-9
 
@@ -66,7 +66,7 @@ def test_a_stuck_rig_is_a_solution_too(friction: QuarterCar, numbers: Values) ->
     p = altered(numbers, {"mu_r": 0.5})
     stuck = simulate_periodic(friction, p, cam(FEW))
     assert all(status.ok for status in stuck.status())
-    swing = np.abs(orders(p, stuck)[:, 0, 1]) / (2.0 * np.pi * FEW) ** 2
+    swing = np.abs(orders(friction, p, stuck)[:, 0, 1]) / (2.0 * np.pi * FEW) ** 2
     assert np.all(swing < 2000.0 / float(p["k_pre"]))
 
 
@@ -77,16 +77,16 @@ def test_a_warm_start_finds_what_a_cold_one_finds(
     warm = resolve(friction, p, few)
     cold = _same_nodes(friction, p, few)
     assert all(status.ok for status in (*warm.status(), *cold.status()))
-    assert np.max(distance(orders(p, warm), orders(p, cold))) < 1e-11
+    assert np.max(distance(orders(friction, p, warm), orders(friction, p, cold))) < 1e-11
     anew = simulate_periodic(friction, p, cam(FEW))
-    assert np.max(distance(orders(p, warm), orders(p, anew))) < 1e-3
+    assert np.max(distance(orders(friction, p, warm), orders(friction, p, anew))) < 1e-3
 
 
 def test_the_order_of_the_dwells_does_not_matter(
     friction: QuarterCar, numbers: Values, few: PeriodicSolution
 ) -> None:
     turned = simulate_periodic(friction, numbers, cam(FEW[::-1]))
-    here, there = orders(numbers, turned)[::-1], orders(numbers, few)
+    here, there = orders(friction, numbers, turned)[::-1], orders(friction, numbers, few)
     assert np.max(distance(here, there)) < 1e-11
 
 
@@ -94,5 +94,5 @@ def test_a_dwell_does_not_depend_on_its_company(
     friction: QuarterCar, numbers: Values, few: PeriodicSolution, programme: PeriodicSolution
 ) -> None:
     places = np.flatnonzero(np.isin(np.asarray(programme.excitation.frequency), FEW))
-    here, there = orders(numbers, programme)[places], orders(numbers, few)
+    here, there = orders(friction, numbers, programme)[places], orders(friction, numbers, few)
     assert np.max(distance(here, there)) < 1e-11

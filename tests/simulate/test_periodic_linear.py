@@ -78,7 +78,7 @@ def test_a_tiny_motion_has_the_transfer_function_of_the_linearised_rig(
     settings = PeriodicSettings(nodes=1024, slow=0.1)
     solution = simulate_periodic(straight, numbers, cam_excitation(PROGRAMME, TINY, LINK), settings)
     assert all(status.ok for status in solution.status())
-    found = orders(numbers, solution)[:, :, 1] / (TINY / 2.0)
+    found = orders(straight, numbers, solution)[:, :, 1] / (TINY / 2.0)
     wanted = _transfer(linearised, omega, 1j * omega)
     assert np.max(np.abs(found / wanted - 1.0)) < 1e-4
 
@@ -91,7 +91,7 @@ def test_equal_steps_warp_the_frequency_exactly_as_the_trapezoidal_rule_does(
     omega, step = 2.0 * np.pi * frequency, 1.0 / (nodes * frequency)
     settings = PeriodicSettings(nodes=nodes, slow=0.1, adaptations=0)
     solution = simulate_periodic(straight, numbers, cam_excitation(frequency, TINY, LINK), settings)
-    found = orders(numbers, solution)[:, :, 1] / (TINY / 2.0)
+    found = orders(straight, numbers, solution)[:, :, 1] / (TINY / 2.0)
     warped = 2j / step * np.tan(omega * step / 2.0)
     assert np.max(np.abs(found / _transfer(linearised, omega, warped) - 1.0)) < 3e-6
     assert np.max(np.abs(found / _transfer(linearised, omega, 1j * omega) - 1.0)) > 1e-4
@@ -100,7 +100,7 @@ def test_equal_steps_warp_the_frequency_exactly_as_the_trapezoidal_rule_does(
 def test_simqc_peaks_at_two_hertz(frictionless: QuarterCar, numbers: Values) -> None:
     solution = simulate_periodic(frictionless, numbers, cam(PROGRAMME))
     assert all(status.ok for status in solution.status())
-    found = orders(numbers, solution, 15)[:, 0]
+    found = orders(frictionless, numbers, solution, 15)[:, 0]
     reach = peak_to_peak(found, np.ones(16, bool))
     for response in (np.abs(found[:, 1]), reach):
         assert abs(PROGRAMME[np.argmax(response)] - 2.0) <= 0.1

@@ -21,7 +21,7 @@ def _difference(model: QuarterCar, p: Values, solution: PeriodicSolution, name: 
     value = float(p[name])
     step = STEP * max(abs(value), 1e-3)
     ends = [altered(p, {name: value + side * step}) for side in (-1.0, 1.0)]
-    low, high = (orders(each, resolve(model, each, solution)) for each in ends)
+    low, high = (orders(model, each, resolve(model, each, solution)) for each in ends)
     return (high - low) / (2.0 * step)
 
 

@@ -15,7 +15,7 @@ def actual(friction: QuarterCar, numbers: Values, programme: PeriodicSolution) -
     """Distance to a solution on eight times as many nodes, whose own error is a fortieth of it, (28, 2)."""
     solution = finer(friction, numbers, programme, 8)
     assert all(status.ok for status in solution.status())
-    return distance(orders(numbers, programme), orders(numbers, solution))
+    return distance(orders(friction, numbers, programme), orders(friction, numbers, solution))
 
 
 def test_every_dwell_converges_from_a_cold_start(programme: PeriodicSolution) -> None:

@@ -117,7 +117,7 @@ def _energy(p: Values, motion: transient.Motion, road: Array, angle: Array) -> A
 
 def _power(bench: Bench, solution: TransientSolution) -> dict[str, np.ndarray]:
     """What every source brings in [W], (n,); the losses are negative."""
-    p, (q, qd, _), (road, link) = bench.p, solution.motion, solution.inputs
+    p, (q, qd, _), (road, link, *_) = bench.p, solution.motion, solution.inputs
     loads = transient_loads(bench.model, p, solution)
     spring = p["k_sd"] * (p["l_free"] - jax.vmap(lambda a, b: strut_length(p, a, b))(q.theta_LW, link.angle))
     torque = jax.vmap(lambda *at: link_torque(p, *at))(loads.strut, q.theta_LW, link.angle)
@@ -179,10 +179,15 @@ def test_the_error_follows_the_tolerance(simtr: Bench) -> None:
         solution = simulate_transient(simtr.model, simtr.p, road, link, times, tolerance=tolerance)
         return np.asarray(solution.motion.q.z_s)
 
+    def error(tolerance: float) -> np.floating:
+        """Of several runs: where a step ends at a reversal, another rounding halves or doubles it."""
+        close = tolerance * np.array([0.9, 0.95, 1.0, 1.05, 1.1])
+        return np.median([np.max(np.abs(motion(each) - exact)) for each in close])
+
     exact = motion(1e-11)
-    rough, fine = (np.max(np.abs(motion(tolerance) - exact)) for tolerance in (1e-5, 1e-8))
-    assert fine < 1e-8
-    assert fine < rough / 20.0
+    rough, fine = error(1e-5), error(1e-9)
+    assert fine < 5e-9
+    assert fine < rough / 500.0
 
 
 @pytest.mark.slow
@@ -227,11 +232,11 @@ def test_the_solved_rates_leave_no_residual(simtr: Bench) -> None:
 
     @jax.jit
     @jax.vmap
-    def residual(motion: transient.Motion, s: Array, inputs: transient.Inputs) -> Array:
-        out: Array = simtr.model.residual(simtr.p, motion, s, jnp.zeros_like(s), inputs)[:2]
-        return out
+    def residual(motion: transient.Motion, s: Array, sd: Array, inputs: transient.Inputs) -> Array:
+        return simtr.model.residual(simtr.p, motion, s, sd, inputs)
 
-    assert np.max(np.abs(residual(solution.motion, solution.s, solution.inputs))) < 1e-6
+    left = residual(solution.motion, solution.s, solution.sd, solution.inputs)
+    assert np.max(np.abs(left)) < 1e-6
 
 
 def test_static_equilibrium_holds_and_carries_the_weight(simtr: Bench) -> None:

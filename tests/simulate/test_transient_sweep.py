@@ -68,7 +68,7 @@ def test_a_slow_sweep_passes_through_the_dwells(simtr: QuarterCar, truth: Values
     phase = 2.0 * np.pi * 0.025 * times[near] ** 2
     window = np.hanning(phase.size)
     dwell = simulate_periodic(simtr, truth, cam_excitation([2.0], 0.0275, np.pi / 2.0))
-    expected = np.abs(np.asarray(harmonics(truth, dwell, 1)))[0, :, 1]
+    expected = np.abs(np.asarray(harmonics(simtr, truth, dwell, 1)))[0, :, 1]
     for name, amplitude in zip(CHANNELS, expected, strict=True):
         signal = np.asarray(getattr(solution.readings, name))[near]
         kernel = window * np.exp(-1j * phase)
