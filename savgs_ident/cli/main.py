@@ -14,6 +14,7 @@ from savgs_ident import __version__
 from savgs_ident.cli.arguments import spread_values
 from savgs_ident.cli.bode_command import bode
 from savgs_ident.cli.calibrate_command import calibrate
+from savgs_ident.cli.diagnose_command import diagnose
 from savgs_ident.cli.fit_command import demo, fit
 from savgs_ident.cli.inspect_command import inspect
 from savgs_ident.cli.posterior_command import posterior
@@ -47,7 +48,7 @@ def _root(
     """
 
 
-for _command in (demo, inspect, fit, bode, simulate, posterior, calibrate):
+for _command in (demo, inspect, fit, bode, simulate, posterior, calibrate, diagnose):
     app.command()(_command)
 
 

@@ -24,7 +24,7 @@ class AccelLag(AbstractSensorFault):
     port: ClassVar[Port] = Port.SENSOR_SPRUNG_ACCEL
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "accel_lag_time", 5e-3, "s", lower=0.0, upper=0.2, about="time constant of the accelerometer"
+            "accel_lag_time", 2e-3, "s", lower=0.0, upper=0.2, about="time constant of the accelerometer"
         ),
     )
     null: ClassVar[Mapping[str, float]] = {"accel_lag_time": 0.0}

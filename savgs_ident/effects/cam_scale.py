@@ -19,7 +19,7 @@ class CamScale(AbstractRoadFault):
     port: ClassVar[Port] = Port.ROAD
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "cam_scale_change", 0.05, "1", lower=-0.5, upper=0.5, about="relative error of the cam's lift"
+            "cam_scale_change", 0.03, "1", lower=-0.5, upper=0.5, about="relative error of the cam's lift"
         ),
     )
     null: ClassVar[Mapping[str, float]] = {"cam_scale_change": 0.0}

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.model.effect import AbstractSeries, InternalState, Port, linear_series
+from savgs_ident.model.effect import AbstractSeries, InternalState, Load, Port, linear_series
 from savgs_ident.model.values import Values
 
 
@@ -25,7 +25,7 @@ class DamperHysteresis(AbstractSeries):
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
             "damper_compliance",
-            2e-6,
+            5e-7,
             "m/N",
             lower=0.0,
             upper=1e-4,
@@ -41,7 +41,7 @@ class DamperHysteresis(AbstractSeries):
     in_damper: ClassVar[bool] = True
 
     def balance(
-        self, p: Values, load: Float[Array, ""], state: Float[Array, " s"], rate: Float[Array, " s"]
+        self, p: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
     ) -> Float[Array, " s"]:
         """The deflection [m] under the damper's push."""
-        return linear_series(p["damper_compliance"], jnp.zeros_like(load), load, state, rate)
+        return linear_series(p["damper_compliance"], jnp.zeros_like(load.total), load, state, rate)

@@ -25,7 +25,7 @@ class DeflectionDelay(AbstractSensorFault):
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
             "deflection_delay_time",
-            5e-3,
+            2e-3,
             "s",
             lower=0.0,
             upper=0.2,

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.model.effect import AbstractSeries, InternalState, Port
+from savgs_ident.model.effect import AbstractSeries, InternalState, Load, Port
 from savgs_ident.model.values import Values
 
 
@@ -25,7 +25,7 @@ class FrameMode(AbstractSeries):
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
             "frame_mobility",
-            1e-3,
+            2e-3,
             "1/kg",
             lower=0.0,
             upper=1.0,
@@ -48,10 +48,10 @@ class FrameMode(AbstractSeries):
     in_damper: ClassVar[bool] = False
 
     def balance(
-        self, p: Values, load: Float[Array, ""], state: Float[Array, " s"], rate: Float[Array, " s"]
+        self, p: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
     ) -> Float[Array, " s"]:
         """Velocity and acceleration of the frame out of balance [m/s], [m/s^2]."""
         omega = 2.0 * jnp.pi * p["frame_frequency"]
         damping = 2.0 * p["frame_damping_ratio"] * omega * state[1]
-        acceleration = p["frame_mobility"] * load - damping - omega**2 * state[0]
+        acceleration = p["frame_mobility"] * load.beyond_rest - damping - omega**2 * state[0]
         return rate - jnp.stack([state[1], acceleration])

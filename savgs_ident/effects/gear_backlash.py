@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.model.effect import SETTLING, AbstractSeries, InternalState, Port
+from savgs_ident.model.effect import SETTLING, AbstractSeries, InternalState, Load, Port
 from savgs_ident.model.values import Values
 
 CHANGE_OVER = 1.0
@@ -41,8 +41,8 @@ class GearBacklash(AbstractSeries):
     in_damper: ClassVar[bool] = False
 
     def balance(
-        self, p: Values, load: Float[Array, ""], state: Float[Array, " s"], rate: Float[Array, " s"]
+        self, p: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
     ) -> Float[Array, " s"]:
-        """The way off the middle [rad] under the torque to greater angles."""
-        flank = p["gear_backlash"] / 2.0 * jnp.tanh(load / CHANGE_OVER)
-        return SETTLING * rate + state - flank
+        """The way [rad] off the flank that carries at rest, under the torque to greater angles."""
+        flank = jnp.tanh(load.total / CHANGE_OVER) - jnp.tanh(load.rest / CHANGE_OVER)
+        return SETTLING * rate + state - p["gear_backlash"] / 2.0 * flank

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.model.effect import AbstractSeries, InternalState, Port, linear_series
+from savgs_ident.model.effect import AbstractSeries, InternalState, Load, Port, linear_series
 from savgs_ident.model.values import Values
 
 
@@ -24,7 +24,7 @@ class GearCompliance(AbstractSeries):
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
             "gear_compliance",
-            1e-4,
+            1e-3,
             "rad/(N m)",
             lower=0.0,
             upper=1e-2,
@@ -42,7 +42,7 @@ class GearCompliance(AbstractSeries):
     in_damper: ClassVar[bool] = False
 
     def balance(
-        self, p: Values, load: Float[Array, ""], state: Float[Array, " s"], rate: Float[Array, " s"]
+        self, p: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
     ) -> Float[Array, " s"]:
         """The wind-up [rad] under the torque to greater angles."""
-        return linear_series(p["gear_compliance"], jnp.zeros_like(load), load, state, rate)
+        return linear_series(p["gear_compliance"], jnp.zeros_like(load.total), load, state, rate)

@@ -24,7 +24,7 @@ class LinkOffset(AbstractChange):
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
             "link_offset",
-            0.03,
+            0.2,
             "rad",
             lower=-0.5,
             upper=0.5,

@@ -12,7 +12,7 @@ from typing import ClassVar
 from jaxtyping import Array, Float
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.model.effect import AbstractSeries, InternalState, Port, linear_series
+from savgs_ident.model.effect import AbstractSeries, InternalState, Load, Port, linear_series
 from savgs_ident.model.values import Values
 
 
@@ -23,7 +23,7 @@ class MountCompliance(AbstractSeries):
     port: ClassVar[Port] = Port.STRUT
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "mount_compliance", 1e-6, "m/N", lower=0.0, upper=2e-5, about="compliance of the top mount"
+            "mount_compliance", 5e-7, "m/N", lower=0.0, upper=2e-5, about="compliance of the top mount"
         ),
         Parameter("mount_damping", 500.0, "N s/m", lower=0.0, upper=5e4, about="damping of the top mount"),
     )
@@ -36,7 +36,7 @@ class MountCompliance(AbstractSeries):
     in_damper: ClassVar[bool] = False
 
     def balance(
-        self, p: Values, load: Float[Array, ""], state: Float[Array, " s"], rate: Float[Array, " s"]
+        self, p: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
     ) -> Float[Array, " s"]:
         """The mount's deflection [m] under the strut's push."""
         return linear_series(p["mount_compliance"], p["mount_damping"], load, state, rate)

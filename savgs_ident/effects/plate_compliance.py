@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.model.effect import AbstractSeries, InternalState, Port, linear_series
+from savgs_ident.model.effect import AbstractSeries, InternalState, Load, Port, linear_series
 from savgs_ident.model.values import Values
 
 
@@ -23,7 +23,7 @@ class PlateCompliance(AbstractSeries):
     port: ClassVar[Port] = Port.ROAD
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "plate_compliance", 3e-8, "m/N", lower=0.0, upper=1e-5, about="compliance of plate and follower"
+            "plate_compliance", 5e-7, "m/N", lower=0.0, upper=1e-5, about="compliance of plate and follower"
         ),
     )
     null: ClassVar[Mapping[str, float]] = {"plate_compliance": 0.0}
@@ -33,7 +33,7 @@ class PlateCompliance(AbstractSeries):
     in_damper: ClassVar[bool] = False
 
     def balance(
-        self, p: Values, load: Float[Array, ""], state: Float[Array, " s"], rate: Float[Array, " s"]
+        self, p: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
     ) -> Float[Array, " s"]:
         """By how much the plate is lower [m] under F_tz."""
-        return linear_series(p["plate_compliance"], jnp.zeros_like(load), load, state, rate)
+        return linear_series(p["plate_compliance"], jnp.zeros_like(load.total), load, state, rate)

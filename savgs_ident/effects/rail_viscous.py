@@ -24,7 +24,7 @@ class RailViscous(AbstractForce):
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
             "rail_viscous_damping",
-            30.0,
+            60.0,
             "N s/m",
             lower=0.0,
             upper=5000.0,

@@ -22,7 +22,7 @@ class SpringRate(AbstractChange):
     port: ClassVar[Port] = Port.STRUT
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "spring_rate_change", 0.1, "1", lower=-0.6, upper=1.5, about="relative change of the spring rate"
+            "spring_rate_change", 0.05, "1", lower=-0.6, upper=1.5, about="relative change of the spring rate"
         ),
     )
     null: ClassVar[Mapping[str, float]] = {"spring_rate_change": 0.0}

@@ -1,8 +1,8 @@
 """Lateral compliance of the tyre's carcass: the tread stays behind when the wheel scrubs sideways.
 
-    force on the plate = x / C
+    force on the plate = x / C + c xd
 
-with the compliance C [m/N]. The friction of eq. (3) sees the tread, which starts to slide late.
+with the compliance C [m/N] and a little damping c [N s/m] of the rubber. The friction of eq. (3) sees the tread, which starts to slide late.
 """
 
 from collections.abc import Mapping
@@ -12,8 +12,13 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.model.effect import AbstractSeries, InternalState, Port, linear_series
+from savgs_ident.model.effect import AbstractSeries, InternalState, Load, Port, linear_series
 from savgs_ident.model.values import Values
+
+DAMPING = 1000.0
+"""Damping of the carcass [N s/m]: a tenth or less of what the tread's friction has before it slides. Without
+it a tread that is about to slide is hard to solve for.
+"""
 
 
 class TyreLateralCompliance(AbstractSeries):
@@ -40,7 +45,9 @@ class TyreLateralCompliance(AbstractSeries):
     in_damper: ClassVar[bool] = False
 
     def balance(
-        self, p: Values, load: Float[Array, ""], state: Float[Array, " s"], rate: Float[Array, " s"]
+        self, p: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
     ) -> Float[Array, " s"]:
         """The carcass's deflection [m] under the lateral force."""
-        return linear_series(p["tyre_lateral_compliance"], jnp.zeros_like(load), load, state, rate)
+        return linear_series(
+            p["tyre_lateral_compliance"], DAMPING * jnp.ones_like(load.total), load, state, rate
+        )

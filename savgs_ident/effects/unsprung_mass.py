@@ -24,7 +24,7 @@ class UnsprungMass(AbstractChange):
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
             "unsprung_mass_change",
-            4.0,
+            8.0,
             "kg",
             lower=-20.0,
             upper=40.0,

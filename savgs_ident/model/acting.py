@@ -18,6 +18,7 @@ from savgs_ident.model.effect import (
     AbstractSeries,
     Cam,
     Grip,
+    Load,
     Port,
     PortSignals,
 )
@@ -54,7 +55,7 @@ class Acting:
         self.parts, self.p = parts, p
         self.balances: dict[str, Array] = {}
         self.ports: dict[str, PortSignals] = {}
-        self.carried: dict[str, Array] = {}
+        self.carried: dict[str, Load] = {}
 
     def _series(self, port: Port, in_damper: bool) -> Iterator[tuple[AbstractSeries, Part]]:
         for part in self.parts:
@@ -69,8 +70,11 @@ class Acting:
             way = Way(way.displacement + part.state[0], way.velocity + part.rate[0])
         return way
 
-    def carry(self, port: Port, load: Float[Array, ""], in_damper: bool = False) -> None:
-        """Put everything in series at a port under its load."""
+    def carry(
+        self, port: Port, total: Float[Array, ""], rest: Float[Array, ""], in_damper: bool = False
+    ) -> None:
+        """Put everything in series at a port under its load, of which ``rest`` is there in the nominal state."""
+        load = Load(total, rest)
         self.carried["damper" if in_damper else port.value] = load
         for effect, part in self._series(port, in_damper):
             self.balances[effect.name] = effect.balance(self.p, load, part.state, part.rate)

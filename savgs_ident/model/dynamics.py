@@ -98,6 +98,11 @@ def inertia_and_weight(p: Values, swing_: Swing, motion: Motion) -> GeneralisedF
     )
 
 
+def weight(p: Values) -> Float[Array, ""]:
+    """Weight of the rig on the plate [N]."""
+    return (p["m_s"] + p["m_u"]) * p["g"]
+
+
 def carriage_load(p: Values, total: GeneralisedForce) -> Float[Array, ""]:
     """|F_Nt| + |F_Nb| [N] of eq. (2) from the sum of all generalised forces on the rig.
 

@@ -24,6 +24,7 @@ from enum import Enum
 from typing import NamedTuple
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
 from savgs_ident.core.parameter import Parameter
@@ -136,8 +137,20 @@ class AbstractGrip(AbstractEffect):
         """The share [N]; it may be negative, the sum of all is held at zero or above."""
 
 
+class Load(NamedTuple):
+    """A load, and what of it is there when the rig stands in its nominal state, as what it acts on was set up."""
+
+    total: Float[Array, ""]
+    rest: Float[Array, ""]
+
+    @property
+    def beyond_rest(self) -> Float[Array, ""]:
+        """The load less that at rest."""
+        return self.total - self.rest
+
+
 class AbstractSeries(AbstractEffect):
-    """Something that gives way in the path of a load: its first state is by how much [m or rad].
+    """Something that gives way in the path of a load: its first state is by how much [m or rad], counted from rest.
 
     =============== ============================ =============================================================
     port            gives way (positive)         under the load (positive)
@@ -155,7 +168,7 @@ class AbstractSeries(AbstractEffect):
 
     @abstractmethod
     def balance(
-        self, p: Values, load: Float[Array, ""], state: Float[Array, " s"], rate: Float[Array, " s"]
+        self, p: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
     ) -> Float[Array, " s"]:
         """What vanishes for the right ``rate`` of the states, shape (s,), growing with it."""
 
@@ -184,20 +197,21 @@ class AbstractSensorFault(AbstractEffect):
         """Reading over truth at frequencies [Hz]."""
 
 
-SETTLING = 1e-4
-"""Time [s] in which a series element without a damper of its own gives way: short beside a reversal. It keeps
-the element's law regular where its compliance vanishes."""
+SETTLING = 2e-5
+"""Least time [s] in which a series element gives way: far shorter than any motion of the rig. It keeps the
+element's law regular where its compliance vanishes."""
 
 
 def linear_series(
     compliance: Float[Array, ""],
     damping: Float[Array, ""],
-    load: Float[Array, ""],
+    load: Load,
     state: Float[Array, " 1"],
     rate: Float[Array, " 1"],
 ) -> Float[Array, " 1"]:
     """Balance of a spring [m/N or rad/(N m)] with a damper beside it [N s/m or N m s/rad], any compliance >= 0.
 
-    C (load - c xd) - x vanishes in the course of :data:`SETTLING`.
+    x + T xd = C (load - load at rest) with T = C c, at least :data:`SETTLING`.
     """
-    return (SETTLING + compliance * damping) * rate + state - compliance * load
+    time = jnp.sqrt((compliance * damping) ** 2 + SETTLING**2)
+    return time * rate + state - compliance * load.beyond_rest

@@ -21,20 +21,21 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.model.acting import Acting, Part, Way
 from savgs_ident.model.bristle import ANCHOR, Presliding, bristle
 from savgs_ident.model.damper import DamperCurve
-from savgs_ident.model.dynamics import GeneralisedForce, Motion, carriage_load, point_force
+from savgs_ident.model.dynamics import GeneralisedForce, Motion, carriage_load, point_force, weight
 from savgs_ident.model.effect import (
     AbstractChange,
     AbstractEffect,
     AbstractGrip,
     AbstractSensorFault,
     InternalState,
+    Load,
     Port,
     PortSignals,
 )
 from savgs_ident.model.inputs import Imposed, Inputs, nothing_imposed
 from savgs_ident.model.section import Section, SectionCurves, section, section_curves
 from savgs_ident.model.sensors import RESPONSE_CHANNELS, Readings, read_sensors
-from savgs_ident.model.strut import Link, Strut, strut
+from savgs_ident.model.strut import Link, Strut, strut, strut_at_rest
 from savgs_ident.model.tyre import Contact, Road, contact, radial_force
 from savgs_ident.model.values import Values
 
@@ -57,7 +58,7 @@ class Loads(NamedTuple):
     reaction: Float[Array, "2"]
     touch: Contact
     ports: dict[str, PortSignals]
-    carried: dict[str, Float[Array, ""]]
+    carried: dict[str, Load]
 
 
 class QuarterCar(eqx.Module):
@@ -149,7 +150,7 @@ class QuarterCar(eqx.Module):
             held = bristle(Presliding(p["k_pre"], p["c_pre"]), sliding, acting.grip(sliding), s[0])
             rail += held.force
             anchor = [sd[:1] - held.rate]
-        acting.carry(Port.FRAME, -vertical - rail)
+        acting.carry(Port.FRAME, -vertical - rail, -weight(p))
         total += jnp.stack([rail, zero, zero, zero])
         states = [acting.balances[part.effect.name] for part in acting.parts if part.effect.states]
         balance = jnp.concatenate([*anchor, *states] or [jnp.zeros(0)])
@@ -173,9 +174,10 @@ class QuarterCar(eqx.Module):
         damping = p["c_sd"] * self.damper(-(rate + end.velocity))
         extra = acting.force(Port.STRUT, PortSignals(length, rate, damping), given.strut)
         push = p["k_sd"] * (p["l_free"] - length) + damping + extra
-        acting.carry(Port.STRUT, push)
-        acting.carry(Port.STRUT, damping, in_damper=True)
-        acting.carry(Port.LINK, push * leg.link_slope)
+        rest = strut_at_rest(p)
+        acting.carry(Port.STRUT, push, rest.push)
+        acting.carry(Port.STRUT, damping, jnp.zeros_like(damping), in_damper=True)
+        acting.carry(Port.LINK, push * leg.link_slope, rest.torque)
         return leg, push
 
     def residual(
@@ -227,11 +229,11 @@ def _wheel(
     pressing = PortSignals(touch.compression, touch.compression_rate, jnp.zeros_like(touch.compression))
     extra = acting.force(Port.TYRE_RADIAL, pressing, given.tyre_radial)
     vertical = radial_force(p, touch, extra) / touch.cos_tilt
-    acting.carry(Port.ROAD, vertical)
+    acting.carry(Port.ROAD, vertical, weight(p))
     carcass = acting.way(Port.TYRE_LATERAL, given.carcass_way)
     scrub = PortSignals(
         touch.place[0] - carcass.displacement, touch.lateral_velocity - carcass.velocity, vertical
     )
     lateral = acting.force(Port.TYRE_LATERAL, scrub, given.tyre_lateral)
-    acting.carry(Port.TYRE_LATERAL, -lateral)
+    acting.carry(Port.TYRE_LATERAL, -lateral, jnp.zeros_like(lateral))
     return touch, vertical, lateral

@@ -43,8 +43,9 @@ def pass_through(
     """
     count = times.shape[0]
     rest = count // 2
+    total = count + 2 * rest
     step = (times[-1] - times[0]) / max(count - 1, 1)
     padded = jnp.pad(jnp.stack(seen), ((0, 0), (rest, rest)), mode="edge")
-    frequency = jnp.arange((count + 2 * rest) // 2 + 1) / (jnp.maximum(step, TINY) * (count + 2 * rest))
-    shown = jnp.fft.irfft(jnp.fft.rfft(padded) * transfer(frequency), count + 2 * rest)
+    frequency = jnp.arange(total // 2 + 1, dtype=step.dtype) / (jnp.maximum(step, TINY) * total)
+    shown = jnp.fft.irfft(jnp.fft.rfft(padded) * transfer(frequency), total)
     return Readings(*shown[:, rest : rest + count])

@@ -26,6 +26,23 @@ class Strut(NamedTuple):
     link_slope: Float[Array, ""]
 
 
+class Standing(NamedTuple):
+    """The strut of the drawing: its push [N] and the torque with which it turns the link to greater angles [N m]."""
+
+    push: Float[Array, ""]
+    torque: Float[Array, ""]
+
+
+def strut_at_rest(p: Values) -> Standing:
+    """Loads of the strut in the nominal state."""
+    angle = p["theta_0"] + p["psi_nominal"]
+    pin_y, pin_z = crank_pin(p, p["psi_nominal"])
+    span_y, span_z = pin_y - p["E_y"], pin_z - p["E_z"]
+    length = jnp.sqrt(span_y**2 + span_z**2)
+    push = p["k_sd"] * (p["l_free"] - length)
+    return Standing(push, push * p["l_SL"] * (span_z * jnp.cos(angle) - span_y * jnp.sin(angle)) / length)
+
+
 def strut(p: Values, section: Section, omega: Float[Array, ""], link: Link) -> Strut:
     """The strut at a section whose angle moves at ``omega`` [rad/s]."""
     pin_y, pin_z = crank_pin(p, link.angle)

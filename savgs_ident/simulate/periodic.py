@@ -240,7 +240,8 @@ def _sensors(
     model: QuarterCar, p: Values, frequency: Float[Array, " D"], orders: int
 ) -> Complex[Array, "D C K"]:
     """What the sensors make of each order."""
-    return jnp.moveaxis(model.transfers(p, frequency[:, None] * jnp.arange(orders + 1)), 0, 1)
+    order = jnp.arange(orders + 1, dtype=frequency.dtype)
+    return jnp.moveaxis(model.transfers(p, frequency[:, None] * order), 0, 1)
 
 
 @eqx.filter_jit

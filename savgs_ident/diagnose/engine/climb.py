@@ -5,7 +5,7 @@ that misses weighs its rows by what it can explain from the first step on; it is
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import log
 from typing import Any
 
@@ -46,6 +46,7 @@ class Mode:
         precision: precision of the coordinates, (n, n).
         evidence: log evidence by Laplace's method, up to what all hypotheses share.
         status: how the search ended.
+        precise: whether the plant was made as precise there as it can be.
     """
 
     terms: tuple[str, ...]
@@ -57,6 +58,7 @@ class Mode:
     precision: NDArray[np.float64]
     evidence: float
     status: Status
+    precise: bool = False
 
     @property
     def values(self) -> dict[str, float]:
@@ -124,6 +126,12 @@ def climb(
             break
         x, here, value = there, tried, found
     return _mode(search, names, coordinates, x, here, value, status)
+
+
+def refine(search: Search, mode: Mode, terms: tuple[Term, ...]) -> Mode:
+    """The mode again, with the plant made as precise there as it can be."""
+    near = search.plant.refined(mode.terms, mode.values, mode.prediction.near)
+    return replace(climb(search, terms, mode.values, near), precise=True)
 
 
 def _value(part: Data, search: Search, prediction: Prediction, x: NDArray[np.float64]) -> float:

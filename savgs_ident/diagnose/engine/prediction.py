@@ -56,6 +56,9 @@ class Plant(Protocol):
     ) -> Prediction:
         """Rows with the given terms at ``values``, with slopes in ``names``, started from ``near`` if not None."""
 
+    def refined(self, terms: tuple[str, ...], values: Mapping[str, float], near: Any) -> Any:
+        """What to start from nearby, made as precise as it can be."""
+
     def columns(
         self, terms: tuple[str, ...], values: Mapping[str, float], near: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:

@@ -16,6 +16,9 @@ from savgs_ident.diagnose.engine.coordinates import reach_of
 from savgs_ident.diagnose.engine.linear import best_of, log_determinant
 from savgs_ident.diagnose.engine.prediction import Term
 
+STANDS_OUT = 5.0
+"""Standard deviations by which an effect must change the response to be seen."""
+
 
 @dataclass(frozen=True)
 class Score:
@@ -26,14 +29,18 @@ class Score:
         sigma: significance in standard deviations, nuisances projected out.
         evidence: log evidence of the linearised hypothesis.
         start: parameters at its best point, SI, by name.
-        column: its effect on the rows per standard deviation of its prior at that choice, (m, amplitudes).
+        smallest: the first amplitude that would stand out of the noise by :data:`STANDS_OUT` sd, nuisances projected
+            out [its unit]; infinite if none would.
+        direction: what it does to the rows there, nuisances projected out, in units of their sd, (m,): of unit
+            length, or nothing.
     """
 
     term: Term
     sigma: float
     evidence: float
     start: dict[str, float]
-    column: NDArray[np.float64]
+    smallest: float
+    direction: NDArray[np.float64]
 
 
 def score_terms(search: Search, mode: Mode, terms: list[Term], choices: tuple[float, ...]) -> list[Score]:
@@ -48,7 +55,8 @@ def _score(
     residual = search.residual(mode.prediction)
     count = len(term.amplitudes)
     bounds = tuple(
-        np.concatenate(pair) for pair in zip(reach_of(mode.coordinates), reach_of(term.amplitudes), strict=True)
+        np.concatenate(pair)
+        for pair in zip(reach_of(mode.coordinates), reach_of(term.amplitudes), strict=True)
     )
     scales = np.array([each.scale for each in term.amplitudes])
     best: Score | None = None
@@ -61,12 +69,49 @@ def _score(
         evidence = top.value - 0.5 * log_determinant(top.precision) + halved
         if best is None or evidence > best.evidence:
             found = dict(zip((c.name for c in term.amplitudes), top.x[-count:], strict=True))
-            start = {each.name: each.value(found[each.name]) for each in term.amplitudes} | {
-                each.name: float(np.clip(choice * each.centre, each.lower, each.upper)) for each in term.shapes
+            start = {each.name: each.value(float(found[each.name])) for each in term.amplitudes} | {
+                each.name: float(np.clip(choice * each.centre, each.lower, each.upper))
+                for each in term.shapes
             }
-            best = Score(term, _significance(search, mode, moved), evidence, start, moved)
+            direction = _direction(search, mode, moved @ _some(top.x[-count:]))
+            sigma, smallest = (
+                _significance(search, mode, moved),
+                scales[0] * _smallest(search, mode, moved[:, 0]),
+            )
+            best = Score(term, sigma, evidence, start, smallest, direction)
     assert best is not None
     return best
+
+
+def cosine(one: Score, other: Score) -> float:
+    """How much two candidates look alike, -1 to 1."""
+    return float(one.direction @ other.direction)
+
+
+def _some(amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The amplitudes, or a unit of each where all vanish."""
+    return amplitudes if np.any(amplitudes) else np.ones_like(amplitudes)
+
+
+def _direction(search: Search, mode: Mode, moved: NDArray[np.float64]) -> NDArray[np.float64]:
+    weight = np.zeros(moved.size)
+    weight[search.kept] = 1.0 / np.sqrt(mode.misfit.spread)
+    inside = mode.slopes * weight[:, None]
+    left = moved * weight
+    left = left - inside @ np.linalg.solve(mode.precision, inside.T @ left)
+    length = float(np.linalg.norm(left))
+    return left / length if length > 0.0 else left
+
+
+def _smallest(search: Search, mode: Mode, moved: NDArray[np.float64]) -> float:
+    """How many units of a column stand out of the noise."""
+    kept, noise = search.kept, search.data.variance[search.kept]
+    inside, column = mode.slopes[kept], moved[kept]
+    precision = np.eye(mode.x.size) + (inside.T / noise) @ inside
+    cross = inside.T @ (column / noise)
+    visible = float(column @ (column / noise) - cross @ np.linalg.solve(precision, cross))
+    whole = float(column @ (column / noise))
+    return STANDS_OUT / sqrt(visible) if visible > 1e-9 * whole > 0.0 else np.inf
 
 
 def _significance(search: Search, mode: Mode, moved: NDArray[np.float64]) -> float:
@@ -80,5 +125,7 @@ def _significance(search: Search, mode: Mode, moved: NDArray[np.float64]) -> flo
     score = weighted.T @ residual - held.T @ (inside.T @ (residual / spread) - mode.x)
     information = weighted.T @ moved[kept] - cross.T @ held
     size = np.trace(information) / len(information)
-    drop = score @ np.linalg.solve(information + 1e-12 * size * np.eye(len(score)), score)
+    if size <= 0.0:
+        return 0.0
+    drop = score @ np.linalg.solve(information + 1e-10 * size * np.eye(len(score)), score)
     return sqrt(max(float(drop), 0.0))

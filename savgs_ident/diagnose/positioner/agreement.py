@@ -13,7 +13,7 @@ from scipy.stats import t as student
 from savgs_ident.diagnose.engine.climb import Mode
 from savgs_ident.diagnose.engine.coordinates import slopes_at
 from savgs_ident.diagnose.engine.data import Data
-from savgs_ident.diagnose.engine.score import Score
+from savgs_ident.diagnose.engine.score import Score, cosine
 from savgs_ident.diagnose.result import Confusable, Estimate, Shrink
 
 ALIKE = 0.95
@@ -78,19 +78,8 @@ def estimates_of(data: Data, mode: Mode) -> tuple[Estimate, ...]:
     )
 
 
-def confusable_with(mode: Mode, name: str, scores: Sequence[Score]) -> list[Confusable]:
-    """Laws that look like the named one beside what ``mode`` has already."""
-    weight = np.sqrt(1.0 / mode.misfit.spread)[:, None]
-    spans = {each.term.name: np.linalg.qr(weight * _beside(mode, each.column))[0] for each in scores}
-    found = []
-    for other, span in spans.items():
-        cosine = float(np.linalg.norm(spans[name].T @ span, 2))
-        if other != name and cosine > ALIKE:
-            found.append(Confusable((name, other), min(cosine, 1.0)))
-    return found
-
-
-def _beside(mode: Mode, columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Columns (m, k) less what the parameters of ``mode`` can do in their place."""
-    cross = (mode.slopes.T / mode.misfit.spread) @ columns
-    return np.asarray(columns - mode.slopes @ np.linalg.solve(mode.precision, cross))
+def confusable_with(name: str, scores: Sequence[Score]) -> list[Confusable]:
+    """Laws whose scores say that they look like the named one."""
+    named = next(each for each in scores if each.term.name == name)
+    alike = {each.term.name: abs(cosine(named, each)) for each in scores if each is not named}
+    return [Confusable((name, other), size) for other, size in alike.items() if size > ALIKE]

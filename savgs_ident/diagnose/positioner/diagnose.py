@@ -198,10 +198,4 @@ def _listed(names: tuple[str, ...]) -> str:
 def _confusable(selection: Selection) -> tuple[Confusable, ...]:
     """Look-alikes of every law at the point where it was added."""
     steps = (*selection.textbook, *selection.details)
-    before = (selection.base, *(step.mode for step in steps))
-    return tuple(
-        each
-        for mode, step in zip(before, steps, strict=False)
-        if step.added
-        for each in confusable_with(mode, step.term, step.scores)
-    )
+    return tuple(each for step in steps if step.added for each in confusable_with(step.term, step.scores))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.diagnose.engine.climb import Mode, Search, climb, search_of
 from savgs_ident.diagnose.engine.data import Data
+from savgs_ident.diagnose.engine.heldout import hold_out
 from savgs_ident.diagnose.engine.prediction import Term
 from savgs_ident.diagnose.engine.score import Score, score_terms
 from savgs_ident.diagnose.positioner.laws import Law
@@ -31,9 +32,6 @@ CLEAR = 3.0
 
 PROMISING = 3
 """How many of the best scored are fitted in full."""
-
-FOLDS = 4
-"""Parts of a recording, each predicted from the others."""
 
 PITCHES = 6
 """How many of the best pitches are scored."""
@@ -135,28 +133,11 @@ class _Chooser:
 
     def heldout(self, mode: Mode, other: Mode) -> Gain:
         """Rise of the log predictive density over ``other`` in parts left out."""
-        rise, test = self._left_out(mode) - self._left_out(other), self.search.data.test
+        one, two = (hold_out(self.search, each, self.terms(each.terms)) for each in (mode, other))
+        rise, test = one.log_density - two.log_density, self.search.data.test
         blocks = np.bincount(test, rise - rise.mean())
         error = np.sqrt(np.sum(blocks**2) * blocks.size / (blocks.size - 1)) / rise.size
         return Gain(float(rise.mean()), float(error))
-
-    def _left_out(self, mode: Mode) -> NDArray[np.float64]:
-        """Log predictive density of every row, (m,), by fits without the part that it is in."""
-        data, density = self.search.data, np.zeros(self.search.data.measured.size)
-        part = np.arange(data.tests) * FOLDS // data.tests
-        for each in range(FOLDS):
-            out = data.of_tests(part == each)
-            fitted = climb(search_of(self.plant, data, ~out), self.terms(mode.terms), mode.values, None)
-            spread = misfit_spread(fitted, data)
-            density[out] = (-0.5 * (self.search.residual(fitted.prediction) ** 2 / spread + np.log(spread)))[
-                out
-            ]
-        return density
-
-
-def misfit_spread(mode: Mode, data: Data) -> NDArray[np.float64]:
-    """Variance of rows (m,) about a mode: noise and discrepancy as it has them."""
-    return np.asarray(mode.misfit.noise**2 * data.variance + mode.misfit.discrepancy**2 * data.reach**2)
 
 
 def _pitches(plant: PositionerPlant) -> dict[str, tuple[tuple[float, ...], NDArray[np.float64]]]:

@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from savgs_ident.diagnose.engine.prediction import Term
-from savgs_ident.model.effect import AbstractEffect, AbstractForce, AbstractSeries, Port, PortSignals
+from savgs_ident.model.effect import AbstractEffect, AbstractForce, AbstractSeries, Load, Port, PortSignals
 from savgs_ident.model.inputs import Imposed, nothing_imposed
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values, as_values
@@ -72,6 +72,14 @@ def columns_with_states(
     return impose(model, likelihood, orders, p, solution, fields)
 
 
+def marched_effect(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, effect: AbstractEffect
+) -> NDArray[np.float64]:
+    """What an effect with states does at its port along a motion: a force (P,), or a way and its rate (P, 2)."""
+    signals, steps = _evenly(model, p, solution)
+    return _at_nodes(np.asarray(_marched(effect, placed(dict(p)), signals, steps)), solution)
+
+
 def field_of(effect: AbstractEffect) -> str:
     """The field of :class:`Imposed` through which an effect acts."""
     if isinstance(effect, AbstractSeries):
@@ -119,14 +127,11 @@ def _answer_rows(
     return (jax.lax.map(lambda one: likelihood.rows(along(one)), imposed),)
 
 
-PortTable = dict[str, NDArray[np.float64]]
-
-
 def _evenly(
     model: QuarterCar, p: Values, solution: PeriodicSolution
-) -> tuple[dict[str, PortSignals], NDArray[np.float64]]:
+) -> tuple[dict[str, PortSignals | Load], NDArray[np.float64]]:
     """Port signals, or loads as those of a series element, (D, SAMPLES) each, and the time steps [s], (D,)."""
-    ports, carried = _loads(model, placed(dict(p)), solution)
+    ports, carried = node_loads(model, p, solution)
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
     grid = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
 
@@ -138,11 +143,24 @@ def _evenly(
         ]
         return np.stack(rows)
 
-    signals = {name: PortSignals(*(even(part) for part in each)) for name, each in ports.items()}
+    signals: dict[str, PortSignals | Load] = {
+        name: PortSignals(*(even(part) for part in each)) for name, each in ports.items()
+    }
     for name, load in carried.items():
-        zero = np.zeros((len(layout.counts), SAMPLES))
-        signals[f"load.{name}"] = PortSignals(zero, zero, even(load))
+        signals[f"load.{name}"] = Load(even(load.total), even(load.rest))
     return signals, 1.0 / (SAMPLES * np.asarray(solution.excitation.frequency))
+
+
+def node_loads(
+    model: QuarterCar, p: Values, solution: PeriodicSolution
+) -> tuple[dict[str, PortSignals], dict[str, Load]]:
+    """What the forces at each port see at the nodes, and the loads in which something may give way; (P,) each."""
+    ports, carried = _loads(model, placed(dict(p)), solution)
+    whole = {
+        name: Load(load.total, jnp.broadcast_to(load.rest, load.total.shape))
+        for name, load in carried.items()
+    }
+    return ports, whole
 
 
 @eqx.filter_jit
@@ -154,7 +172,7 @@ def _loads(model: QuarterCar, p: Values, solution: PeriodicSolution) -> tuple[An
 def _marched(
     effect: AbstractEffect,
     p: Values,
-    signals: Mapping[str, PortSignals],
+    signals: Mapping[str, PortSignals | Load],
     steps: NDArray[np.float64],
 ) -> Float[Array, "D n k"]:
     """What the effect does at its port along the last period: a force, or a way and its rate."""
@@ -167,19 +185,19 @@ def _marched(
 
 @eqx.filter_jit
 def _march(
-    effect: AbstractEffect, p: Values, signals: PortSignals, steps: Float[Array, " D"]
+    effect: AbstractEffect, p: Values, signals: PortSignals | Load, steps: Float[Array, " D"]
 ) -> Float[Array, "D n k"]:
     size = len(effect.states)
 
-    def defect(now: Array, before: Array, at: PortSignals, step: Array) -> Array:
+    def defect(now: Array, before: Array, at: Any, step: Array) -> Array:
         rate = (now - before) / step
         if isinstance(effect, AbstractSeries):
-            return effect.balance(p, at.load, now, rate)
+            return effect.balance(p, at, now, rate)
         assert isinstance(effect, AbstractForce)
         return rate - effect.rate(p, at, now)
 
-    def one_dwell(signals: PortSignals, step: Array) -> Array:
-        def advance(before: Array, at: PortSignals) -> tuple[Array, Array]:
+    def one_dwell(signals: Any, step: Array) -> Array:
+        def advance(before: Array, at: Any) -> tuple[Array, Array]:
             now = before
             for _ in range(4):
                 slope = jax.jacfwd(lambda each: defect(each, before, at, step))(now)

@@ -66,7 +66,7 @@ class RigPlant:
         free: names of the parameters that the baseline identifies.
         excitation: road and link of the dwells.
         likelihood: what is compared, as rows.
-        orders: highest order of the harmonics.
+        shape: tests, channels and orders of the harmonics that the likelihood takes.
         settings: how finely to solve.
     """
 
@@ -76,8 +76,20 @@ class RigPlant:
     free: tuple[str, ...]
     excitation: Excitation
     likelihood: Likelihood
-    orders: int
+    shape: tuple[int, int, int]
     settings: PeriodicSettings
+
+    @property
+    def orders(self) -> int:
+        """Highest order of the harmonics."""
+        return self.shape[2] - 1
+
+    @property
+    def channel(self) -> NDArray[np.intp]:
+        """The channel of each row, an index of RESPONSE_CHANNELS, (m,)."""
+        tests, channels, orders = self.shape
+        every = np.broadcast_to(np.arange(channels)[None, :, None, None], (tests, channels, orders, 2))
+        return every.ravel()[self.likelihood.place]
 
     @cached_property
     def table(self) -> ParameterTable:
@@ -108,11 +120,23 @@ class RigPlant:
         return tuple(term for term in terms if term.amplitudes)
 
     def model(self, terms: Sequence[str]) -> QuarterCar:
-        """All effects without states, and those of ``terms`` that have some."""
+        """The baseline with ``terms``.
+
+        With all effects without states too, at their null, unless a term with states asks for a program of its own
+        anyway: then the smaller model is the sooner compiled.
+        """
+        special = [name for name in terms if self.catalogue[name].states and name not in self.baseline]
         model = QuarterCar(damper_curve(self.rig))
         for name, effect in self.catalogue.items():
-            if not effect.states or name in self.baseline:
+            if name in self.baseline or (not effect.states and (not special or name in terms)):
                 model = model + effect
+        for name in special:
+            model = model + self.catalogue[name]
+        return model
+
+    def complete(self, terms: Sequence[str]) -> QuarterCar:
+        """The baseline with ``terms`` and all effects without states, those at their null."""
+        model = self.model(())
         for name in terms:
             if self.catalogue[name].states and name not in self.baseline:
                 model = model + self.catalogue[name]
@@ -140,7 +164,7 @@ class RigPlant:
             )
         return solution
 
-    def adapted(
+    def refined(
         self, terms: tuple[str, ...], values: Mapping[str, float], near: PeriodicSolution
     ) -> PeriodicSolution:
         """The same motions on nodes that follow them."""
@@ -160,7 +184,7 @@ class RigPlant:
         self, terms: tuple[str, ...], values: Mapping[str, float], near: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """First-order change of the rows per unit of each candidate's amplitudes, (choices, m, amplitudes)."""
-        model = self.model(terms)
+        model = self.complete(terms)
         found: dict[str, list[NDArray[np.float64]]] = {term.name: [] for term in candidates}
         with_states = [term for term in candidates if self.catalogue[term.name].states]
         without = [term for term in candidates if not self.catalogue[term.name].states]
@@ -257,7 +281,7 @@ def rig_plant(
         free=free,
         excitation=excitation,
         likelihood=likelihood,
-        orders=int(target.used.shape[-1]) - 1,
+        shape=(int(target.used.shape[0]), int(target.used.shape[1]), int(target.used.shape[2])),
         settings=settings or PeriodicSettings(),
     )
     shape = target.used.shape

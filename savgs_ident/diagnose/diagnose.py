@@ -1,0 +1,241 @@
+"""The diagnosis of a campaign: recalibrate, attribute, score, fit, hold out, and say what is missing."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.rig import Rig
+from savgs_ident.diagnose.candidates import candidates_of, confusable_of, not_judgeable_of
+from savgs_ident.diagnose.engine.attribution import Attribution, attribute
+from savgs_ident.diagnose.engine.climb import Mode, Search, climb, refine, search_of
+from savgs_ident.diagnose.engine.data import Data
+from savgs_ident.diagnose.engine.heldout import HeldOut, hold_out
+from savgs_ident.diagnose.engine.prediction import Term
+from savgs_ident.diagnose.engine.search import EXPLAINED, Findings, find_terms, left_over
+from savgs_ident.diagnose.result import Diagnosis, ForceLoop, Kind, NextTest, PortShare, Responses
+from savgs_ident.diagnose.rig.columns import SHAPES
+from savgs_ident.diagnose.rig.gap import Rows, shrinks
+from savgs_ident.diagnose.rig.loops import loops_of
+from savgs_ident.diagnose.rig.next_test import next_tests
+from savgs_ident.diagnose.rig.places import places_of
+from savgs_ident.diagnose.rig.plant import RigPlant, rig_plant
+from savgs_ident.diagnose.rig.where import cycle_positions, gap_map
+from savgs_ident.diagnose.settings import DiagnosisSettings
+from savgs_ident.diagnose.verdict import Weighed, kind_of, probabilities, rivals_of, weigh
+from savgs_ident.diagnose.words import verdict_of, warnings_of
+from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+
+Progress = Callable[[str], None]
+"""Is told what is going on, a line at a time."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A rig as a plant, what it is held against, and the baseline as given and recalibrated.
+
+    ``given`` are the rows of the baseline as given, (m,).
+    """
+
+    plant: RigPlant
+    data: Data
+    search: Search
+    given: NDArray[np.float64]
+    base: Mode
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What was found out about a case."""
+
+    findings: Findings
+    places: tuple[Attribution, ...]
+    weighed: tuple[Weighed, ...]
+    kind: Kind
+    chosen: Weighed
+    left: float
+
+
+def diagnose_response(
+    measured: HarmonicResponse,
+    rig: Rig,
+    settings: DiagnosisSettings | None = None,
+    values: Mapping[str, float] | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Diagnose the gap between a rig's baseline model and a measured response.
+
+    ``rig`` is the rig as known before any fit; ``values`` (SI, by name) are those that the baseline is given with, the
+    rig's own where left out.
+
+    Look at ``converged`` of the result. Raises :class:`InputError` for a response that cannot be used, for names
+    that do not exist, and for a rig whose baseline has no periodic motion.
+    """
+    began = time.perf_counter()
+    options, tell = settings or DiagnosisSettings(), progress or _silent
+    case = recalibrate(measured, rig, options, values or {}, tell)
+    judged = judge(case, tell)
+    terms = {term.name: term for term in case.plant.candidates}
+    named = judged.chosen.mode if judged.kind in ("effect", "several") else None
+    held = _hold_out_all(case, judged, terms, tell)
+    return _assemble(case, judged, named, held, measured, options, tell, began)
+
+
+def recalibrate(
+    measured: HarmonicResponse,
+    rig: Rig,
+    options: DiagnosisSettings,
+    values: Mapping[str, float],
+    tell: Progress,
+) -> Case:
+    """The baseline at its own best: what calibration alone can do."""
+    unknown = sorted({*options.without, *options.baseline} - set(CATALOGUE))
+    if unknown:
+        raise InputError(
+            f"there is no effect '{unknown[0]}'", remedy="choose among: " + ", ".join(sorted(CATALOGUE))
+        )
+    catalogue = {name: each for name, each in CATALOGUE.items() if name not in options.without}
+    tell("solving the baseline")
+    plant, data = rig_plant(
+        measured, rig, catalogue, options.baseline, options.free, options.orders, options.periodic
+    )
+    near = plant.start(values)
+    search = search_of(plant, data)
+    given = plant.predict((), values, [each.name for each in plant.nuisances], near)
+    tell("recalibrating the baseline")
+    base = climb(search, (), values, near)
+    if not np.isfinite(base.evidence):
+        raise InputError("the baseline cannot be recalibrated", remedy="mend the rig file")
+    base = refine(search, base, ())
+    return Case(plant, data, search, given.rows, base)
+
+
+def judge(case: Case, tell: Progress) -> Judged:
+    """Hypotheses, ports and the verdict's kind."""
+    plant, search, base = case.plant, case.search, case.base
+    tell("attributing the gap to ports")
+    p = plant.values(base.values)
+    places = attribute(search, base, places_of(plant, (), p, base.prediction.near))
+    findings = find_terms(search, base, plant.candidates, SHAPES, tell)
+    best = findings.best
+    unknown = max(each.evidence for each in places)
+    left = left_over(search, base, best)
+    if best.terms and left > EXPLAINED:
+        tell(f"what {' + '.join(best.terms)} leaves")
+        q = plant.values(best.values)
+        beyond = attribute(search, best, places_of(plant, best.terms, q, best.prediction.near))
+        unknown = max(unknown, *(each.evidence for each in beyond))
+    weighed = weigh(findings, unknown)
+    size = float(np.sqrt(np.sum(case.data.measured**2)))
+    change = float(np.sqrt(np.sum((best.prediction.rows - base.prediction.rows) ** 2))) / size
+    kind, chosen = kind_of(weighed, change, left)
+    return Judged(findings, tuple(places), tuple(weighed), kind, chosen, left)
+
+
+def _hold_out_all(case: Case, judged: Judged, terms: dict[str, Term], tell: Progress) -> dict[str, HeldOut]:
+    """Left-out predictions of the baseline and of the two best fitted hypotheses, by name."""
+    modes = [case.base, *sorted(judged.findings.modes, key=lambda each: -each.evidence)[:2]]
+    held = {}
+    for mode in modes:
+        name = " + ".join(mode.terms) or "none"
+        tell(f"leaving tests out: {name}")
+        held[name] = hold_out(case.search, mode, tuple(terms[each] for each in mode.terms))
+    return held
+
+
+def _assemble(
+    case: Case,
+    judged: Judged,
+    named: Mode | None,
+    held: dict[str, HeldOut],
+    measured: HarmonicResponse,
+    options: DiagnosisSettings,
+    tell: Progress,
+    began: float,
+) -> Diagnosis:
+    plant, data, base = case.plant, case.data, case.base
+    after = named or base
+    rows = Rows(
+        before=case.given,
+        recalibrated=held["none"].rows,
+        after=held[" + ".join(after.terms) or "none"].rows,
+        channel=plant.channel,
+    )
+    together, by_channel = shrinks(data, rows)
+    confusable = confusable_of(judged.findings)
+    rivals = rivals_of(list(judged.weighed), judged.chosen)
+    verdict = verdict_of(judged.kind, judged.chosen, judged.places, rivals, together)
+    shares = probabilities(list(judged.weighed))
+    tell("inferring the signal at the port")
+    loops = _loops(case, judged, named, verdict.ports)
+    return Diagnosis(
+        model=options.model,
+        effects=options.baseline,
+        rig=plant.rig,
+        parameters=base.values,
+        identified=after.values,
+        verdict=verdict,
+        ports=tuple(PortShare(each.name, each.share, each.reach) for each in judged.places),
+        map=gap_map(plant, data, base.prediction.rows),
+        cycle=cycle_positions(plant, data, base.prediction.rows),
+        candidates=candidates_of(judged.findings, judged.weighed, shares, held, case.search),
+        shrink=together,
+        by_channel=by_channel,
+        sweep=None,
+        next_tests=_next_tests(case, judged, tuple(each.effects for each in confusable), tell),
+        not_judgeable=not_judgeable_of(judged.findings),
+        confusable=confusable,
+        loops=loops,
+        responses=_responses(plant, case.given, base.prediction.rows, after.prediction.rows),
+        measured=measured,
+        converged=base.status.ok and after.status.ok,
+        warnings=warnings_of(case.base, after, judged.left, judged.kind),
+        wall_s=time.perf_counter() - began,
+    )
+
+
+def _responses(plant: RigPlant, *rows: NDArray[np.float64]) -> Responses:
+    return Responses(*(plant.likelihood.harmonics(each[None], plant.shape)[0] for each in rows))
+
+
+def _loops(case: Case, judged: Judged, named: Mode | None, ports: Sequence[str]) -> tuple[ForceLoop, ...]:
+    if not ports:
+        return ()
+    found = next((each for each in judged.places if each.name == ports[0]), None)
+    if found is None:
+        return ()
+    values = case.base.values | ({} if named is None else named.values)
+    effect = None
+    if named is not None:
+        effect = next(
+            (CATALOGUE[name] for name in named.terms if CATALOGUE[name].port.value == ports[0]), None
+        )
+    return loops_of(case.plant, case.plant.values(values), case.base.prediction.near, found, effect)
+
+
+def _next_tests(
+    case: Case, judged: Judged, confusable_names: tuple[tuple[str, str], ...], tell: Progress
+) -> tuple[NextTest, ...]:
+    """Tests that separate the chosen hypothesis from the best fitted one that looks like it."""
+    chosen = judged.chosen.mode
+    if chosen is None or len(chosen.terms) != 1:
+        return ()
+    alike = {name for pair in confusable_names if chosen.terms[0] in pair for name in pair}
+    rivals = [
+        mode
+        for mode in judged.findings.modes
+        if len(mode.terms) == 1 and mode.terms[0] in alike - {*chosen.terms}
+    ]
+    found: list[NextTest] = []
+    for rival in sorted(rivals, key=lambda each: -each.evidence)[:2]:
+        tell(f"looking for a test that tells {chosen.terms[0]} from {rival.terms[0]}")
+        found += next_tests(case.search, case.plant, chosen, rival)
+    return tuple(found)
+
+
+def _silent(line: str) -> None:
+    del line

@@ -1,0 +1,153 @@
+"""Where the gap comes from: the smallest unknown signal at each place of the plant that explains it.
+
+Two questions are asked of every place. How much could any signal there explain, free in every test (its reach)?
+And how much of the tests left out does a law explain that was learned from the others (its share)? A law is a
+sum of given functions of what the place sees, with normal coefficients; the baseline's parameters are free
+beside it, so that it gets no credit for what recalibration can do.
+"""
+
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.diagnose.engine.climb import Mode, Search
+from savgs_ident.diagnose.engine.coordinates import reach_of
+from savgs_ident.diagnose.engine.linear import best_of, log_determinant
+
+Matrix = NDArray[np.float64]
+
+FOLDS = 4
+"""Parts into which the tests are split: each is left out once."""
+
+SIZES = (0.3, 3.0, 30.0)
+"""Widths of a coefficient's prior, in rms of the rows in their sd, among which the evidence chooses."""
+
+FREE_SIZE = 100.0
+"""The same of a free signal: wide, so that its reach is an upper bound."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """What a place can do to the rows.
+
+    Attributes:
+        name: its name.
+        law: change of the rows per function of a law, the same in all tests, (m, q).
+        free: change of the rows per component of a free signal, in each test its own, (m, f).
+    """
+
+    name: str
+    law: Matrix
+    free: Matrix
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """What a place explains.
+
+    Attributes:
+        name: name of the place.
+        share: share of the gap in left-out tests that the law explains; 0 if it makes it worse.
+        reach: share that a free signal explains.
+        evidence: log evidence of the baseline with the law, linearised.
+        predicted: the law's part of the rows, (m,).
+        coefficients: those of the free signal by test, (tests, f).
+    """
+
+    name: str
+    share: float
+    reach: float
+    evidence: float
+    predicted: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+
+
+def attribute(search: Search, mode: Mode, places: list[Place]) -> list[Attribution]:
+    """What every place explains beyond a mode, the largest share first."""
+    found = [_attribution(search, mode, place) for place in places]
+    return sorted(found, key=lambda each: -each.share)
+
+
+def _attribution(search: Search, mode: Mode, place: Place) -> Attribution:
+    weight = 1.0 / np.sqrt(mode.misfit.spread)
+    law = _scaled(place.law, weight)
+    size, evidence, predicted = _best_size(search, mode, law)
+    reach, coefficients = _reach(search, mode, place.free, weight)
+    share = _share(search, mode, law * size, weight)
+    return Attribution(place.name, share, reach, evidence, predicted, coefficients)
+
+
+def _scaled(columns: Matrix, weight: NDArray[np.float64]) -> Matrix:
+    """Columns of unit rms in units of the rows' sd; what does nothing stays nothing."""
+    size = np.sqrt(np.mean((columns * weight[:, None]) ** 2, axis=0))
+    return columns / np.where(size > 0.0, size, 1.0)
+
+
+def _best_size(search: Search, mode: Mode, law: Matrix) -> tuple[float, float, NDArray[np.float64]]:
+    residual = search.residual(mode.prediction)
+    lower, upper = reach_of(mode.coordinates)
+    wide = np.full(law.shape[1], np.inf)
+    bounds = np.concatenate([lower, -wide]), np.concatenate([upper, wide])
+    start = np.concatenate([mode.x, np.zeros(law.shape[1])])
+    halved = log(2.0) * sum(each.halved for each in mode.coordinates)
+    best = 0.0, -np.inf, np.zeros_like(residual)
+    for size in SIZES:
+        top = best_of(search.data, residual, np.concatenate([mode.slopes, size * law], axis=1), start, bounds)
+        evidence = top.value - 0.5 * log_determinant(top.precision) + halved
+        if evidence > best[1]:
+            best = size, evidence, size * law @ top.x[mode.x.size :]
+    return best
+
+
+def _share(search: Search, mode: Mode, law: Matrix, weight: NDArray[np.float64]) -> float:
+    """Share of the gap in left-out tests, each left out once, that the law explains beyond recalibration."""
+    residual = search.residual(mode.prediction) * weight
+    slopes, across = mode.slopes * weight[:, None], law * weight[:, None]
+    before, after = 0.0, 0.0
+    for fold in range(FOLDS):
+        out = search.data.test % FOLDS == fold
+        if not out.any() or out.all():
+            continue
+        before += _left_out(residual, slopes, mode.x, out)
+        both = np.concatenate([slopes, across], axis=1)
+        after += _left_out(residual, both, np.concatenate([mode.x, np.zeros(law.shape[1])]), out)
+    return max(0.0, 1.0 - after / before) if before > 0.0 else 0.0
+
+
+def _left_out(residual: Matrix, slopes: Matrix, x: NDArray[np.float64], out: NDArray[np.bool_]) -> float:
+    """Sum of squares over the rows ``out`` when the others have set the coordinates."""
+    inside = slopes[~out]
+    precision = np.eye(x.size) + inside.T @ inside
+    step = np.linalg.solve(precision, inside.T @ residual[~out] - x)
+    return float(np.sum((residual[out] - slopes[out] @ step) ** 2))
+
+
+def _reach(
+    search: Search, mode: Mode, free: Matrix, weight: NDArray[np.float64]
+) -> tuple[float, NDArray[np.float64]]:
+    """Share of the gap that signals free in every test explain, the parameters set anew; and the signals."""
+    residual = search.residual(mode.prediction) * weight
+    slopes, signal = mode.slopes * weight[:, None], _scaled(free, weight) * weight[:, None] * FREE_SIZE
+    tests = [np.flatnonzero(search.data.test == test) for test in range(search.data.tests)]
+    removed_residual, removed_slopes = residual.copy(), slopes.copy()
+    inverses = []
+    for rows in tests:
+        mine = signal[rows]
+        inverse = np.linalg.solve(np.eye(mine.shape[1]) + mine.T @ mine, mine.T)
+        inverses.append(inverse)
+        removed_residual[rows] -= mine @ (inverse @ residual[rows])
+        removed_slopes[rows] -= mine @ (inverse @ slopes[rows])
+    precision = np.eye(mode.x.size) + slopes.T @ removed_slopes
+    step = np.linalg.solve(precision, removed_slopes.T @ residual - mode.x)
+    left = float(np.sum((removed_residual - removed_slopes @ step) ** 2))
+    size = np.sqrt(np.mean((free * weight[:, None]) ** 2, axis=0))
+    coefficients = np.stack(
+        [
+            inverse @ (residual[rows] - slopes[rows] @ step) * FREE_SIZE / np.where(size > 0.0, size, 1.0)
+            for rows, inverse in zip(tests, inverses, strict=True)
+        ]
+    )
+    whole = float(np.sum(residual**2))
+    return (max(0.0, 1.0 - left / whole) if whole > 0.0 else 0.0), coefficients

@@ -1,0 +1,156 @@
+"""The search for what is missing: scores, then full fits of the promising, then pairs where one is not enough.
+
+Every hypothesis that is fitted in full comes out as a :class:`Mode` with its evidence. The linear evidence of
+the scores says which are worth the fit; a pair is tried on top of the best single terms if these leave more than
+the noise.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from savgs_ident.diagnose.engine.climb import Mode, Search, climb, refine
+from savgs_ident.diagnose.engine.parallel import in_parallel
+from savgs_ident.diagnose.engine.prediction import Term
+from savgs_ident.diagnose.engine.score import Score, cosine, score_terms
+
+Tell = Callable[[str], None]
+"""Is told what is going on, a line at a time."""
+
+FIRST = 2
+"""Single terms that are fitted in full at first."""
+
+MORE = 4
+"""Further ones that are, if the first leave something."""
+
+ALIKE = 0.9
+"""Cosine from which on two terms look alike: where one explains all, the other must be fitted too."""
+
+NOTICED = 2.0
+"""Rise of the log evidence, by the score, from which on a term is worth a fit."""
+
+SURE = 10.0
+"""Rise of the log evidence from which on partners are looked for."""
+
+PARTNERS = 3
+"""Partners tried with a term that leaves something."""
+
+PARENTS = 2
+"""Best single terms that are tried with partners."""
+
+CLOSE = 300.0
+"""Log evidence below the best from which on precision does not matter."""
+
+REFINED = 3
+"""Best hypotheses that are found again with the plant as precise as it can be."""
+
+EXPLAINED = 0.01
+"""Share of the baseline's excess misfit that a hypothesis may leave and still count as explaining all."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All that was tried.
+
+    Attributes:
+        base: the baseline, recalibrated.
+        scores: scores of all candidates at the baseline, best first.
+        modes: hypotheses that were fitted in full, the best first; the baseline is not among them.
+    """
+
+    base: Mode
+    scores: tuple[Score, ...]
+    modes: tuple[Mode, ...]
+
+    @property
+    def best(self) -> Mode:
+        """The hypothesis with the greatest evidence."""
+        return max((self.base, *self.modes), key=lambda mode: mode.evidence)
+
+
+def excess(search: Search, mode: Mode) -> float:
+    """Mean square of the residuals in noise variances, less one: what the noise does not explain."""
+    kept = search.kept
+    residual = search.residual(mode.prediction)[kept]
+    return max(float(np.mean(residual**2 / search.data.variance[kept])) - 1.0, 0.0)
+
+
+def left_over(search: Search, base: Mode, mode: Mode) -> float:
+    """Share of the baseline's excess that a hypothesis leaves; 0 where there is no excess."""
+    whole = excess(search, base)
+    return excess(search, mode) / whole if whole > 0.0 else 0.0
+
+
+def find_terms(
+    search: Search, base: Mode, terms: Sequence[Term], choices: tuple[float, ...], tell: Tell
+) -> Findings:
+    """Hypotheses about what is missing in the baseline at its mode ``base``."""
+    tell(f"scores of {len(terms)} effects")
+    scores = sorted(score_terms(search, base, list(terms), choices), key=lambda each: -each.evidence)
+    worth = [each for each in scores if each.evidence > base.evidence + NOTICED]
+    ranked = _refined(search, _fitted(search, base, worth[:FIRST], terms, tell), terms, tell)
+    later = worth[FIRST : FIRST + MORE]
+    if ranked and left_over(search, base, ranked[0]) <= EXPLAINED:
+        named = next(each for each in scores if each.term.name == ranked[0].terms[0])
+        later = [each for each in worth[FIRST:] if abs(cosine(each, named)) > ALIKE]
+    ranked = _refined(search, [*ranked, *_fitted(search, base, later, terms, tell)], terms, tell)
+    pairs: list[Mode] = []
+    if ranked and ranked[0].evidence > base.evidence + SURE:
+        for parent in ranked[:PARENTS]:
+            if left_over(search, base, ranked[0]) > EXPLAINED:
+                pairs += _with_partners(search, parent, terms, choices, pairs, tell)
+        pairs = _refined(search, pairs, terms, tell)
+    modes = sorted([*ranked, *pairs], key=lambda mode: -mode.evidence)
+    return Findings(base, tuple(scores), tuple(modes))
+
+
+def _refined(search: Search, modes: Sequence[Mode], terms: Sequence[Term], tell: Tell) -> list[Mode]:
+    """The hypotheses, the best of them made precise, best first."""
+    by_name = {term.name: term for term in terms}
+    ranked = sorted(modes, key=lambda mode: -mode.evidence)
+
+    def again(mode: Mode) -> Mode:
+        tell(f"refining {' + '.join(mode.terms)}")
+        better = refine(search, mode, tuple(by_name[name] for name in mode.terms))
+        return better if np.isfinite(better.evidence) else mode
+
+    near = [mode for mode in ranked[:REFINED] if mode.evidence > ranked[0].evidence - CLOSE]
+    finer = in_parallel(again, [mode for mode in near if not mode.precise])
+    settled = [mode for mode in ranked if not any(mode is each and not mode.precise for each in near)]
+    return sorted([*finer, *settled], key=lambda mode: -mode.evidence)
+
+
+def _with_partners(
+    search: Search,
+    parent: Mode,
+    terms: Sequence[Term],
+    choices: tuple[float, ...],
+    known: Sequence[Mode],
+    tell: Tell,
+) -> list[Mode]:
+    """Pairs of a fitted term with the partners that score best beside it."""
+    tell(f"partners of {' + '.join(parent.terms)}")
+    tried = {frozenset(mode.terms) for mode in known}
+    others = [
+        term
+        for term in terms
+        if term.name not in parent.terms and frozenset({*parent.terms, term.name}) not in tried
+    ]
+    scores = sorted(score_terms(search, parent, others, choices), key=lambda each: -each.evidence)
+    worth = [each for each in scores if each.evidence > parent.evidence]
+    return _fitted(search, parent, worth[:PARTNERS], terms, tell)
+
+
+def _fitted(
+    search: Search, parent: Mode, scores: Sequence[Score], terms: Sequence[Term], tell: Tell
+) -> list[Mode]:
+    """Full fits of the scored terms, each added to those of ``parent``."""
+    by_name = {term.name: term for term in terms}
+    inherited = tuple(by_name[name] for name in parent.terms)
+
+    def fit(score: Score) -> Mode:
+        tell(f"fitting {' + '.join((*parent.terms, score.term.name))}")
+        return climb(search, (*inherited, score.term), parent.values | score.start, parent.prediction.near)
+
+    return [mode for mode in in_parallel(fit, scores) if np.isfinite(mode.evidence)]

@@ -1,0 +1,186 @@
+"""The rig's ports as places of an unknown signal: laws of what a port sees, and free harmonics.
+
+A force may be any law of displacement, velocity and load of its port; what gives way, of the load there and its
+rate; a sensor's error, of its reading; the road's, of the cam's angle. A law is a sum of smooth functions, some
+sharp about zero velocity, where friction turns round.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.diagnose.engine.attribution import Place
+from savgs_ident.diagnose.rig.columns import impose, node_loads
+from savgs_ident.diagnose.rig.plant import RigPlant
+from savgs_ident.model.effect import Port
+from savgs_ident.model.sensors import RESPONSE_CHANNELS
+from savgs_ident.model.values import Values
+from savgs_ident.simulate.periodic import PeriodicSolution, harmonics
+
+Signal = NDArray[np.float64]
+
+FORCES = (Port.STRUT, Port.SUSPENSION, Port.TYRE_RADIAL, Port.TYRE_LATERAL, Port.RAIL)
+"""Ports at which a force may be unknown."""
+
+SHARP = (0.01, 0.1)
+"""Velocities over which friction-like functions turn round, as shares of the largest."""
+
+RESONANCES = (3.0, 6.0, 12.0, 25.0, 50.0)
+"""Natural frequencies [Hz] of what the frame may do."""
+
+FREE_ORDERS = 9
+"""Highest order of a free signal."""
+
+
+class Nodes(NamedTuple):
+    """Phase [rad], dwell and angular frequency [rad/s] of the nodes, (P,) each."""
+
+    phase: Signal
+    dwell: NDArray[np.intp]
+    omega: Signal
+
+
+WAY_LOADS = {
+    Port.LINK: ("link", "link_way"),
+    Port.ROAD: ("road", "plate_way"),
+    Port.FRAME: ("frame", "frame_way"),
+}
+"""The load under which a port gives way, and where that is imposed."""
+
+
+GIVING = {
+    Port.STRUT: (("strut", "mount_way"), ("damper", "damper_way")),
+    Port.TYRE_LATERAL: (("tyre_lateral", "carcass_way"),),
+}
+"""The same where a force may be unknown too."""
+
+
+def nodes_of(solution: PeriodicSolution) -> Nodes:
+    """The nodes of a motion."""
+    layout = solution.mesh.layout
+    omega = 2.0 * np.pi * np.asarray(solution.excitation.frequency)[layout.dwell]
+    return Nodes(np.asarray(solution.mesh.phase), np.asarray(layout.dwell), omega)
+
+
+def places_of(plant: RigPlant, terms: tuple[str, ...], p: Values, solution: PeriodicSolution) -> list[Place]:
+    """All ports as places about a motion with ``terms`` at the parameters ``p``."""
+    model = plant.complete(terms)
+    ports, carried = node_loads(model, p, solution)
+    nodes = nodes_of(solution)
+    laws: dict[str, list[tuple[str, Signal]]] = {}
+    free: dict[str, list[tuple[str, Signal]]] = {}
+    for port in FORCES:
+        seen = [np.asarray(part) for part in ports[port.value]]
+        laws[port.value] = [(port.value, each) for each in _force_laws(*seen)]
+        for load, field in GIVING.get(port, ()):
+            beyond = np.asarray(carried[load].beyond_rest)
+            ways = _force_laws(beyond, _rate(beyond, nodes, solution), np.zeros_like(beyond))
+            laws[port.value] += [(field, _with_rate(each, nodes, solution)) for each in ways]
+        free[port.value] = [(port.value, each) for each in _waves(nodes)]
+    for port, (load, field) in WAY_LOADS.items():
+        beyond = np.asarray(carried[load].beyond_rest)
+        ways = _force_laws(beyond, _rate(beyond, nodes, solution), np.zeros_like(beyond))
+        if port is Port.ROAD:
+            ways = [*ways, *_cam_waves(nodes, solution)]
+        if port is Port.FRAME:
+            ways = [beyond, *_resonances(beyond, nodes)]
+        laws[port.value] = [(field, _with_rate(each, nodes, solution)) for each in ways]
+        free[port.value] = [(field, _with_rate(each, nodes, solution)) for each in _waves(nodes)]
+    wheel = np.asarray(ports["rail"].velocity) + np.asarray(ports["suspension"].velocity)
+    body = _rate(np.asarray(ports["rail"].velocity), nodes, solution)
+    laws["inertia"] = [("rail", body), ("tyre_radial", _rate(wheel, nodes, solution))]
+    free["inertia"] = laws["inertia"]
+    fields = [each for group in (laws, free) for some in group.values() for each in some]
+    rows = iter(impose(model, plant.likelihood, plant.orders, p, solution, fields))
+    law_rows = {name: np.stack([next(rows) for _ in some]).T for name, some in laws.items()}
+    free_rows = {name: np.stack([next(rows) for _ in some]).T for name, some in free.items()}
+    places = [Place(name, law_rows[name], free_rows[name]) for name in laws]
+    return places + _sensor_places(plant, p, solution)
+
+
+def free_signal(coefficients: Signal, phase: Signal) -> Signal:
+    """The free signal of a test at phases [rad], from its coefficients."""
+    order = np.arange(1, FREE_ORDERS + 1)[:, None]
+    return np.asarray(coefficients[0::2] @ np.cos(order * phase) + coefficients[1::2] @ np.sin(order * phase))
+
+
+def _waves(nodes: Nodes) -> list[Signal]:
+    return [wave(order * nodes.phase) for order in range(1, FREE_ORDERS + 1) for wave in (np.cos, np.sin)]
+
+
+def _force_laws(displacement: Signal, velocity: Signal, load: Signal) -> list[Signal]:
+    """Functions of what a port sees, each of about unit size."""
+    x = displacement - displacement.mean()
+    x = x / max(float(np.abs(x).max()), np.finfo(float).tiny)
+    v = velocity / max(float(np.abs(velocity).max()), np.finfo(float).tiny)
+    sharp = [np.tanh(v / width) for width in SHARP]
+    functions = [*sharp, v, v * np.abs(v), v**2, x, x**2, x**3, x * sharp[0], x * v, x**2 * v]
+    functions += [sharp[0] * np.exp(-((v / width) ** 2)) for width in (0.05, 0.2)]
+    if np.any(load):
+        weight = load / np.abs(load).max()
+        functions += [weight * sharp[0], weight * v, weight]
+    return functions
+
+
+def _rate(signal: Signal, nodes: Nodes, solution: PeriodicSolution) -> Signal:
+    """Time derivative at the nodes, by differences to both neighbours."""
+    layout, gap = solution.mesh.layout, np.asarray(solution.mesh.gap)
+    ahead, behind = gap, gap[layout.preceding]
+    forward = (signal[layout.following] - signal) / ahead
+    backward = (signal - signal[layout.preceding]) / behind
+    return nodes.omega * (forward * behind + backward * ahead) / (ahead + behind)
+
+
+def _with_rate(signal: Signal, nodes: Nodes, solution: PeriodicSolution) -> Signal:
+    return np.stack([signal, _rate(signal, nodes, solution)], axis=1)
+
+
+def _cam_waves(nodes: Nodes, solution: PeriodicSolution) -> list[Signal]:
+    """What a cam of another shape or lift would do."""
+    turned = np.angle(np.asarray(solution.excitation.road))[:, 1][nodes.dwell]
+    angle = nodes.phase + turned
+    return [wave(order * angle) for order in (1, 2, 3) for wave in (np.cos, np.sin)]
+
+
+def _resonances(load: Signal, nodes: Nodes) -> list[Signal]:
+    """What an oscillator of each natural frequency makes of a load, slightly damped."""
+    found = []
+    tests = [np.flatnonzero(nodes.dwell == test) for test in range(int(nodes.dwell.max()) + 1)]
+    grid = 2.0 * np.pi * np.arange(256) / 256
+    for natural in RESONANCES:
+        out = np.zeros_like(load)
+        for rows in tests:
+            spectrum = np.fft.rfft(np.interp(grid, nodes.phase[rows], load[rows], period=2.0 * np.pi))
+            omega = nodes.omega[rows[0]] * np.arange(spectrum.size)
+            own = 2.0 * np.pi * natural
+            answer = np.fft.irfft(spectrum * own**2 / (own**2 - omega**2 + 0.2j * own * omega), 256)
+            out[rows] = np.interp(nodes.phase[rows], grid, answer, period=2.0 * np.pi)
+        found.append(out)
+    return found
+
+
+def _sensor_places(plant: RigPlant, p: Values, solution: PeriodicSolution) -> list[Place]:
+    """Errors of a sensor: linear filters of its reading; and free harmonics of it."""
+    read = np.array(harmonics(plant.complete(()), p, solution, plant.orders))
+    order = np.arange(plant.orders + 1)
+    omega = 2.0 * np.pi * np.asarray(solution.excitation.frequency)[:, None] * order
+    places = []
+    for c, channel in enumerate(RESPONSE_CHANNELS):
+
+        def rows_of(values: NDArray[np.complex128], c: int = c) -> Signal:
+            out = np.zeros_like(read)
+            out[:, c] = values
+            return np.asarray(plant.likelihood.rows(jnp.asarray(out)))
+
+        mine = read[:, c]
+        filters = [1.0 + 0.0 * omega, 1j * omega / 20.0, -((omega / 20.0) ** 2)]
+        filters += [corner / (corner + 1j * omega) for corner in (20.0, 60.0, 180.0)]
+        law = np.stack([rows_of(mine * each) for each in filters], axis=1)
+        unit = [
+            np.where(order == k, 1.0, 0.0) * turn for k in range(1, plant.orders + 1) for turn in (1.0, -1j)
+        ]
+        free = np.stack([rows_of(np.broadcast_to(each, mine.shape)) for each in unit], axis=1)
+        places.append(Place(f"sensor.{channel}", law, free))
+    return places

@@ -1,0 +1,99 @@
+"""From hypotheses to a verdict: probabilities, and what may be said."""
+
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.diagnose.engine.climb import Mode
+from savgs_ident.diagnose.engine.search import Findings
+from savgs_ident.diagnose.result import Kind
+
+PRIOR_NONE = 0.4
+PRIOR_SINGLE = 0.4
+PRIOR_PAIR = 0.1
+PRIOR_UNKNOWN = 0.1
+"""Prior probabilities that nothing is missing, one effect, two, or something that the catalogue does not have."""
+
+SURE = 10.0
+"""Log odds against the baseline from which on something is said to be missing."""
+
+MATERIAL = 0.003
+"""Change of the response, as a share of it, below which nothing that matters is missing."""
+
+LEFT = 0.05
+"""Share of the baseline's excess misfit that named effects may leave; beyond it something else is missing."""
+
+CONFUSED = 5.0
+"""Log odds within which two hypotheses cannot be told apart."""
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A hypothesis with its log weight: evidence and prior.
+
+    ``name`` is "none", "unknown" or the effects joined by " + "; ``mode`` is missing where it was only scored.
+    """
+
+    name: str
+    effects: tuple[str, ...]
+    weight: float
+    mode: Mode | None
+
+
+def weigh(findings: Findings, unknown: float) -> list[Weighed]:
+    """All hypotheses by falling weight; ``unknown`` is the log evidence of the best learned law."""
+    count = max(len(findings.scores), 1)
+    single, pair = log(PRIOR_SINGLE / count), log(PRIOR_PAIR / max(count * (count - 1) / 2, 1))
+    found = [
+        Weighed("none", (), findings.base.evidence + log(PRIOR_NONE), findings.base),
+        Weighed("unknown", (), unknown + log(PRIOR_UNKNOWN), None),
+    ]
+    for mode in findings.modes:
+        prior = single if len(mode.terms) == 1 else pair
+        found.append(Weighed(" + ".join(mode.terms), mode.terms, mode.evidence + prior, mode))
+    fitted = {mode.terms for mode in findings.modes}
+    found += [
+        Weighed(score.term.name, (score.term.name,), score.evidence + single, None)
+        for score in findings.scores
+        if (score.term.name,) not in fitted
+    ]
+    return sorted(found, key=lambda each: -each.weight)
+
+
+def probabilities(weighed: list[Weighed]) -> NDArray[np.float64]:
+    """Their probabilities, which sum to 1."""
+    weights = np.array([each.weight for each in weighed])
+    shares = np.exp(weights - weights.max())
+    return np.asarray(shares / shares.sum())
+
+
+def kind_of(weighed: list[Weighed], change: float, left: float) -> tuple[Kind, Weighed]:
+    """What may be said, and the hypothesis that it rests on.
+
+    ``change`` is the change of the response that the best fitted hypothesis makes, as a share of it; ``left`` the
+    share of the excess misfit that it leaves.
+    """
+    by_name = {each.name: each for each in weighed}
+    none, unknown = by_name["none"], by_name["unknown"]
+    fitted = [each for each in weighed if each.mode is not None and each.effects]
+    best = fitted[0] if fitted else none
+    if max(best.weight, unknown.weight) < none.weight + SURE:
+        return "none", none
+    if unknown.weight > best.weight or left > LEFT:
+        return "unknown", unknown
+    if change < MATERIAL:
+        return "none", none
+    return ("effect" if len(best.effects) == 1 else "several"), best
+
+
+def rivals_of(weighed: list[Weighed], chosen: Weighed) -> tuple[str, ...]:
+    """Single effects that cannot be told from the chosen hypothesis."""
+    return tuple(
+        each.effects[0]
+        for each in weighed
+        if len(each.effects) == 1
+        and each.effects != chosen.effects
+        and each.weight > chosen.weight - CONFUSED
+    )
