@@ -1,4 +1,4 @@
-"""Energy: what the rig stores changes by what road, link, drives and losses bring and take."""
+"""Energy: what the rig stores changes by what road, link, drives, losses and what gives way bring and take."""
 
 from typing import NamedTuple
 
@@ -7,9 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from jaxtyping import Array
+from numpy.typing import NDArray
 
 from savgs_ident.model.dynamics import Coordinates, Motion, upright_mass
-from savgs_ident.model.inputs import Inputs
+from savgs_ident.model.inputs import Imposed, Inputs
 from savgs_ident.model.kinematics import linkage, strut_length
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values
@@ -17,10 +18,16 @@ from savgs_ident.model.values import Values
 from .instants import draw_instants, inputs_of, motion_of, shifted
 
 COUNT = 200
+FORCES = 5
+LARGEST_WAY = np.array([[1e-3, 1e-3, 0.02, 1e-3, 1e-3, 1e-3], [0.05, 0.05, 0.5, 0.05, 0.05, 0.05]]).T
+"""How far and how fast it gives way at mount, damper's end, link, plate, carcass and frame."""
 
 
 class Powers(NamedTuple):
-    """Power into the rig [W] along a motion; ``stored`` is the rate of kinetic and potential energy."""
+    """Power into the rig [W] along a motion; ``stored`` is the rate of kinetic and potential energy.
+
+    Those from ``force_rail`` on are of what is imposed from outside. What presses the tyre counts as damping.
+    """
 
     stored: Array
     road: Array
@@ -30,10 +37,20 @@ class Powers(NamedTuple):
     tyre_friction: Array
     rail_friction: Array
     drives: Array
+    force_rail: Array
+    force_strut: Array
+    force_suspension: Array
+    force_tyre_lateral: Array
+    mount: Array
+    damper_end: Array
+    link_way: Array
+    plate: Array
+    carcass: Array
+    frame: Array
 
 
-def _energy(p: Values, q: Coordinates, qd: Coordinates, road: Array, link: Array) -> Array:
-    """Kinetic and potential energy [J], from the places of the bodies alone."""
+def _energy(p: Values, q: Coordinates, qd: Coordinates, road: Array, link: Array, way: Array) -> Array:
+    """Kinetic and potential energy [J], from the places of the bodies alone; ``way`` as in ``LARGEST_WAY``."""
     pose, rate = jax.jvp(lambda angle: linkage(p, angle), (q.theta_LW,), (qd.theta_LW,))
     energy = p["m_s"] * (qd.z_s**2 / 2.0 + p["g"] * q.z_s)
     masses = {"L": p["m_L"], "U": p["m_U"], "K": upright_mass(p)}
@@ -42,38 +59,54 @@ def _energy(p: Values, q: Coordinates, qd: Coordinates, road: Array, link: Array
         height = getattr(pose, f"cg_{body}")[1] + q.z_s
         spin = getattr(rate, f"roll_{body}")
         energy += mass * (velocity @ velocity / 2.0 + p["g"] * height) + p[f"J_{body}"] * spin**2 / 2.0
-    squeeze = p["l_free"] - strut_length(p, q.theta_LW, link)
-    radius = (q.z_s + pose.W[1] - road) / jnp.cos(pose.roll_K + p["tilt"])
+    mount, _, turned, plate, _, frame = jnp.unstack(way)
+    squeeze = p["l_free"] - strut_length(p, q.theta_LW, link + turned) - mount
+    radius = (q.z_s + pose.W[1] - (road - plate + frame)) / jnp.cos(pose.roll_K + p["tilt"])
     pressed = jnp.maximum(p["r_free"] - radius, 0.0)
     return energy + p["k_sd"] * squeeze**2 / 2.0 + p["k_t"] * pressed**2 / 2.0
 
 
-def _powers(
-    model: QuarterCar, p: Values, motion: Motion, anchor: Array, inputs: Inputs
-) -> tuple[Powers, Array]:
-    road, link = inputs
+def _powers(model: QuarterCar, p: Values, motion: Motion, anchor: Array, inputs: Inputs) -> Powers:
+    road, link, _, given = inputs
+    assert given is not None
+    ways = jnp.stack(given[FORCES:])
     _, stored = jax.jvp(
-        lambda q, qd, height, angle: _energy(p, q, qd, height, angle),
-        (motion.q, motion.qd, road.height, link.angle),
-        (motion.qd, motion.qdd, road.velocity, link.velocity),
+        lambda q, qd, height, angle, way: _energy(p, q, qd, height, angle, way),
+        (motion.q, motion.qd, road.height, link.angle, ways[:, 0]),
+        (motion.qd, motion.qdd, road.velocity, link.velocity, ways[:, 1]),
     )
-    loads = model.loads(p, motion, anchor, jnp.zeros_like(anchor), inputs)
-    residual = model.residual(p, motion, anchor, jnp.zeros(1), inputs)
-    touch, length = loads.touch, strut_length(p, motion.q.theta_LW, link.angle)
-    per_link = jax.grad(strut_length, argnums=2)(p, motion.q.theta_LW, link.angle)
-    spring = p["k_sd"] * (p["l_free"] - length)
-    damping = loads.vertical * touch.cos_tilt - p["k_t"] * jnp.maximum(touch.compression, 0.0)
-    powers = Powers(
-        stored=stored,
-        road=loads.vertical * road.velocity,
-        link=-loads.strut * per_link * link.velocity,
-        damper=(loads.strut - spring) * loads.strut_rate,
-        tyre_damper=-damping * touch.compression_rate,
-        tyre_friction=loads.lateral * touch.lateral_velocity,
-        rail_friction=loads.rail * motion.qd.z_s,
-        drives=-residual[:2] @ jnp.stack([motion.qd.z_s, motion.qd.theta_LW]),
+    still = jnp.zeros_like(anchor)
+    loads = model.loads(p, motion, anchor, still, inputs)
+    residual = model.residual(p, motion, anchor, still, inputs)
+    strut, scrub, rail = (loads.ports[port] for port in ("strut", "tyre_lateral", "rail"))
+    per_link = jax.grad(strut_length, argnums=2)(p, motion.q.theta_LW, link.angle + ways[2, 0])
+    pressing = loads.vertical * loads.touch.cos_tilt - p["k_t"] * jnp.maximum(loads.touch.compression, 0.0)
+    held = ("strut", "damper", "link", "road", "tyre_lateral", "frame")
+    carried = [loads.carried[port].total for port in held]
+    return Powers(
+        stored,
+        loads.vertical * road.velocity,
+        -loads.strut * per_link * link.velocity,
+        strut.load * (strut.velocity + given.damper_way[1]),
+        -pressing * loads.touch.compression_rate,
+        (loads.lateral - given.tyre_lateral) * scrub.velocity,
+        (loads.rail - given.rail) * rail.velocity,
+        -residual[:2] @ jnp.stack([motion.qd.z_s, motion.qd.theta_LW]),
+        given.rail * rail.velocity,
+        given.strut * strut.velocity,
+        given.suspension * loads.ports["suspension"].velocity,
+        given.tyre_lateral * scrub.velocity,
+        *(-jnp.stack(carried) * ways[:, 1]),
     )
-    return powers, loads.rail
+
+
+def _imposed(seed: int) -> Imposed:
+    """Forces and ways, and nothing at all at every fourth instant."""
+    rng = np.random.default_rng(seed)
+    some = (np.arange(COUNT) % 4 > 0).astype(float)
+    forces = [300.0 * rng.standard_normal(COUNT) * some for _ in range(FORCES)]
+    ways = [size * rng.standard_normal((COUNT, 2)) * some[:, None] for size in LARGEST_WAY]
+    return Imposed(*forces, *ways)
 
 
 @pytest.fixture(scope="module")
@@ -85,11 +118,11 @@ def powers(simtr: QuarterCar, numbers: dict[str, float]) -> Powers:
 
     @jax.jit
     @jax.vmap
-    def at(values: Values, instant: Array, stretch: Array) -> tuple[Powers, Array]:
-        motion, inputs = motion_of(instant), inputs_of(instant)
-        return _powers(simtr, values, motion, (instant[0] - stretch)[None], inputs)
+    def at(values: Values, instant: Array, stretch: Array, given: Imposed) -> Powers:
+        inputs = inputs_of(instant)._replace(imposed=given)
+        return _powers(simtr, values, motion_of(instant), (instant[0] - stretch)[None], inputs)
 
-    return Powers(*(np.asarray(part) for part in at(p, draw_instants(11, COUNT), limit)[0]))
+    return Powers(*(np.asarray(part) for part in at(p, draw_instants(11, COUNT), limit, _imposed(6))))
 
 
 def test_what_is_stored_changes_by_what_comes_in(powers: Powers) -> None:
@@ -105,5 +138,7 @@ def test_every_source_counts(powers: Powers) -> None:
 
 
 def test_damper_and_tyre_only_take_energy(powers: Powers) -> None:
-    for power in (powers.damper, powers.tyre_damper, powers.tyre_friction):
+    """The tyre where nothing else presses it."""
+    alone: NDArray[np.float64] = np.asarray(powers.tyre_damper)[::4]
+    for power in (powers.damper, powers.tyre_friction, alone):
         assert np.max(power) <= 1e-9

@@ -1,4 +1,4 @@
-"""Ports of the rig: where a force acts, with what power, and how effects add up."""
+"""Ports of the rig: where a force acts, with what power, what gives way there, and how effects add up."""
 
 from typing import ClassVar
 
@@ -12,19 +12,21 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.effects.rail_coulomb import RailCoulomb
 from savgs_ident.effects.tyre_friction import TyreFriction
-from savgs_ident.model.effect import AbstractEffect, InternalState, Port, PortSignals
-from savgs_ident.model.quarter_car import HANDLED_PORTS, QuarterCar
-from savgs_ident.model.sensors import read_sensors
+from savgs_ident.model.effect import AbstractForce, InternalState, Port, PortSignals
+from savgs_ident.model.inputs import Imposed, nothing_imposed
+from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values
 
 from .instants import NOMINAL, as_values, draw_instants, inputs_of, motion_of
+from .series import SERIES_PORTS, Yielding
 
 FORCE = 7.0
+FORCE_PORTS = (Port.RAIL, Port.STRUT, Port.SUSPENSION, Port.TYRE_RADIAL, Port.TYRE_LATERAL)
 WITH_THE_VELOCITY = {Port.TYRE_RADIAL: -1.0}
 """Power into the rig per force and velocity, where it is not 1: the tyre pushes against compression."""
 
 
-class _Probe(AbstractEffect):
+class _Probe(AbstractForce):
     """A force at a port as its second state says; the rates of its states show what the port shows."""
 
     port: Port = eqx.field(static=True)
@@ -43,40 +45,86 @@ class _Probe(AbstractEffect):
 
 
 @eqx.filter_jit
-def _out_of_balance(model: QuarterCar, p: Values, instant: NDArray[np.float64], s: Array) -> Array:
+def _out_of_balance(
+    model: QuarterCar,
+    p: Values,
+    instant: NDArray[np.float64],
+    s: Array,
+    sd: Array,
+    imposed: Imposed | None = None,
+) -> Array:
     instant = jnp.asarray(instant)
-    return model.residual(p, motion_of(instant), s, jnp.zeros_like(s), inputs_of(instant))
+    return model.residual(p, motion_of(instant), s, sd, inputs_of(instant)._replace(imposed=imposed))
+
+
+def _lively() -> NDArray[np.float64]:
+    """An instant at which every port moves."""
+    instant = NOMINAL.copy()
+    instant[:7] = 0.004, 0.05, 0.3, -0.7, 2.0, 9.0, 0.02
+    return instant
 
 
 def test_a_force_at_each_port_has_the_power_of_its_velocity(
     simqc: QuarterCar, numbers: dict[str, float]
 ) -> None:
     """Force times velocity of a port is what the force adds to the power of the generalised forces."""
-    p = as_values(numbers)
-    instant = NOMINAL.copy()
-    instant[:6] = 0.004, 0.05, 0.3, -0.7, 2.0, 9.0
-    instant[6] = 0.02
-    model = simqc
-    for port in HANDLED_PORTS:
+    p, instant, model = as_values(numbers), _lively(), simqc
+    for port in FORCE_PORTS:
         model = model + _Probe(port, port.value)
-    states = jnp.zeros(2 * len(HANDLED_PORTS))
-    bare = np.asarray(_out_of_balance(model, p, instant, states))
-    for place, port in enumerate(HANDLED_PORTS):
-        probed = np.asarray(_out_of_balance(model, p, instant, states.at[2 * place + 1].set(FORCE)))
+    still = jnp.zeros(2 * len(FORCE_PORTS))
+    bare = np.asarray(_out_of_balance(model, p, instant, still, still))
+    for place, port in enumerate(FORCE_PORTS):
+        pushed = still.at[2 * place + 1].set(FORCE)
+        probed = np.asarray(_out_of_balance(model, p, instant, pushed, still))
         velocity = -probed[2 + 2 * place]
         power = (probed - bare)[:2] @ instant[2:4]
         assert abs(velocity) > 1e-3
         assert power == pytest.approx(WITH_THE_VELOCITY.get(port, 1.0) * FORCE * velocity, rel=1e-9), port
 
 
+def test_a_force_from_outside_is_one_of_an_effect(simqc: QuarterCar, numbers: dict[str, float]) -> None:
+    p, instant, model = as_values(numbers), _lively(), simqc
+    for port in FORCE_PORTS:
+        model = model + _Probe(port, port.value)
+    still = jnp.zeros(2 * len(FORCE_PORTS))
+    for place, port in enumerate(FORCE_PORTS):
+        pushed = still.at[2 * place + 1].set(FORCE)
+        expected = np.asarray(_out_of_balance(model, p, instant, pushed, still))[:2]
+        imposed = nothing_imposed(jnp.zeros(()))._replace(**{port.value: jnp.asarray(FORCE)})
+        found = np.asarray(_out_of_balance(simqc, p, instant, jnp.zeros(0), jnp.zeros(0), imposed))
+        np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("field", "port", "in_damper"), SERIES_PORTS)
+def test_a_way_from_outside_is_one_of_an_effect(
+    simtr: QuarterCar, numbers: dict[str, float], field: str, port: Port, in_damper: bool
+) -> None:
+    """And it moves the rig."""
+    p, instant = as_values(numbers), _lively()
+    s, sd, way = instant[:1] - 1e-6, np.zeros(1), np.array([2e-3, 0.05])
+    model = simtr + Yielding(port, in_damper)
+    expected = _out_of_balance(model, p, instant, np.append(s, way[0]), np.append(sd, way[1]))
+    imposed = nothing_imposed(jnp.zeros(()))._replace(**{field: jnp.asarray(way)})
+    found = np.asarray(_out_of_balance(simtr, p, instant, s, sd, imposed))
+    np.testing.assert_allclose(found, np.asarray(expected)[:3], rtol=1e-12)
+    bare = np.asarray(_out_of_balance(simtr, p, instant, s, sd))
+    assert np.max(np.abs(found - bare)) > 1e-3
+
+
 def test_states_stay_in_the_order_of_the_effects_not_of_the_ports(
     simqc: QuarterCar, numbers: dict[str, float]
 ) -> None:
-    model = simqc + _Probe(Port.RAIL, "first") + TyreFriction() + _Probe(Port.STRUT, "second")
+    """But for the rail's anchor, which is the model's own and comes first."""
+    model = simqc + _Probe(Port.TYRE_LATERAL, "first") + TyreFriction() + _Probe(Port.STRUT, "second")
+    instant, p = draw_instants(1, 1)[0], as_values(numbers)
     s = jnp.array([1.0, 2.0, 3.0, 4.0])
-    found = _out_of_balance(model, as_values(numbers), draw_instants(1, 1)[0], s)
+    found = _out_of_balance(model, p, instant, s, jnp.zeros(4))
     assert [state.name for state in model.states] == ["velocity", "force"] * 2
     assert -np.asarray(found)[[3, 5]] == pytest.approx([20.0, 40.0])
+    held = model + RailCoulomb()
+    found = _out_of_balance(held, p, instant, jnp.append(instant[:1], s), jnp.zeros(5))
+    assert [state.name for state in held.states] == ["anchor", *["velocity", "force"] * 2]
+    assert -np.asarray(found)[[4, 6]] == pytest.approx([20.0, 40.0])
 
 
 def test_the_order_in_which_effects_are_added_does_not_matter(
@@ -86,25 +134,10 @@ def test_the_order_in_which_effects_are_added_does_not_matter(
     other = simqc + TyreFriction() + RailCoulomb()
     for instant in draw_instants(4, 8):
         s = jnp.asarray(instant[:1])
-        one, two = (_out_of_balance(model, p, instant, s) for model in (simtr, other))
+        one, two = (_out_of_balance(model, p, instant, s, jnp.zeros(1)) for model in (simtr, other))
         assert np.array_equal(one, two)
 
 
-def test_an_effect_is_added_once_and_where_a_force_can_act(simqc: QuarterCar) -> None:
+def test_an_effect_is_added_once(simqc: QuarterCar) -> None:
     with pytest.raises(InputError, match="'rail_coulomb' is in the model already"):
         simqc + RailCoulomb() + RailCoulomb()
-    with pytest.raises(InputError, match=r"tilted: no force can act at port 'sensor\.sprung_accel'"):
-        simqc + _Probe(Port.SENSOR_SPRUNG_ACCEL, "tilted")
-
-
-def test_sensors_show_acceleration_and_deflection_times_their_gains(numbers: dict[str, float]) -> None:
-    p = as_values(numbers | {"accel_gain": 1.02, "deflection_gain": 0.98})
-    angle, acceleration = np.float64(0.03), np.float64(-2.5)
-    true = read_sensors(as_values(numbers), angle, acceleration)
-    seen = read_sensors(p, angle, acceleration)
-    assert float(true.sprung_accel) == -2.5
-    assert float(true.susp_deflection) == pytest.approx(0.03 * 0.37, rel=0.01)
-    assert float(seen.sprung_accel) == pytest.approx(-2.5 * 1.02, rel=1e-15)
-    assert float(seen.susp_deflection) == pytest.approx(0.98 * float(true.susp_deflection), rel=1e-15)
-    rest = read_sensors(as_values(numbers), np.float64(0.0), np.float64(0.0))
-    assert float(rest.susp_deflection) == pytest.approx(0.0, abs=1e-15)

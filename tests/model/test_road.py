@@ -64,6 +64,24 @@ def test_a_cam_may_be_steady_from_the_start() -> None:
     np.testing.assert_allclose(height, 0.01375 * np.cos(4.0 * np.pi * TIMES), atol=1e-15)
 
 
+@pytest.mark.parametrize("road", [cam_road(0.0275, 2.35), sweep_road(0.0275, 0.5, 3.0, 2.5)], ids=["dwell", "sweep"])
+def test_the_cam_is_at_nought_where_it_lifts_highest(road: RoadMotion) -> None:
+    """Its height is the cosine of its angle, in the dwell, in the sweep and after it."""
+    cam = jax.jit(jax.vmap(road.cam_at))(jnp.asarray(TIMES))
+    assert cam is not None
+    np.testing.assert_allclose(0.01375 * np.cos(cam.angle), over(road.height, TIMES), atol=1e-14)
+    lift = -0.01375 * np.sin(cam.angle) * np.asarray(cam.speed)
+    np.testing.assert_allclose(lift, over(road.velocity, TIMES), atol=1e-13)
+    gained = np.diff(np.asarray(cam.angle)) / np.diff(TIMES)
+    between = (np.asarray(cam.speed)[1:] + np.asarray(cam.speed)[:-1]) / 2.0
+    np.testing.assert_allclose(gained, between, rtol=1e-9)
+
+
+def test_nothing_turns_behind_a_road_that_no_cam_drives() -> None:
+    for road in (flat_road(), tabulated_road([0.0, 1.0], [0.0, 0.01])):
+        assert road.cam_at(jnp.zeros(())) is None
+
+
 def test_a_sweep_starts_at_rest_and_gains_frequency_evenly() -> None:
     road = sweep_road(0.0275, 0.0, 3.0, 60.0)
     assert over(road.height, np.zeros(1))[0] == 0.0
