@@ -2,8 +2,8 @@
 
     zdd_f + 2 zeta w zd_f + w^2 z_f = beta F,        w = 2 pi f
 
-with z_f [m] the height of rail and plate, F [N] the force of the rig on them, upwards, and the mobility beta
-[1/kg]: one over the mass that moves. At rest the frame is bent by the weight.
+with z_f [m] the height of rail and plate, F [N] the force of the rig on them beyond its weight, upwards, and the
+mobility beta [1/kg]: one over the mass that moves.
 """
 
 from collections.abc import Mapping

@@ -1,10 +1,10 @@
 """Backlash of the link's gear: the link lies against one flank or the other.
 
-    x = b / 2 tanh(T / T_0)
+    x = b / 2 (tanh(T / T_0) - tanh(T_r / T_0))
 
-with the backlash b [rad] at the link, the torque T [N m] and T_0 = 1 N m, over which it changes flanks. While
-the strut carries the body its load keeps the gear against one flank: then backlash is a constant offset of
-the link's angle and hardly shows. It shows where the torque changes its sign: with the link near 0 or 180
+with the backlash b [rad] at the link, the torque T [N m], T_r that at rest in the nominal state, and T_0 = 1 N m,
+over which it changes flanks. With the link at its nominal angle the strut's load keeps the gear against one
+flank: tests there show nothing of it. It shows where the torque changes its sign: with the link near 0 or 180
 deg, and in hard rebounds.
 """
 

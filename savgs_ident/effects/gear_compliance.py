@@ -1,8 +1,8 @@
 """Compliance of the link's gear: a torsion spring between the drive and the link.
 
-    torque = x / C
+    torque beyond that at rest = x / C
 
-with the compliance C [rad/(N m)]. The strut winds it up, the static load included.
+with the compliance C [rad/(N m)]. The link's angle was set with the rig standing on it.
 """
 
 from collections.abc import Mapping

@@ -1,9 +1,9 @@
 """Top mount of the strut: a spring with a damper beside it, in series with the whole strut.
 
-    load = x / C + c xd
+    push beyond that at rest = x / C + c xd
 
-with the compliance C [m/N] and the damping c [N s/m]. It gives way by x under the push of the strut, the
-static one included.
+with the compliance C [m/N] and the damping c [N s/m]. The strut's length was measured with the rig standing on
+it.
 """
 
 from collections.abc import Mapping

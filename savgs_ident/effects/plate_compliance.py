@@ -1,8 +1,8 @@
 """Compliance of the road plate and of the cam's follower under the tyre's load.
 
-    F_tz = x / C
+    F_tz beyond the weight = x / C
 
-with the compliance C [m/N]: the plate is lower by x than its encoder says, the static load included.
+with the compliance C [m/N]: the plate is lower by x than its encoder says, which was set with the rig on it.
 """
 
 from collections.abc import Mapping

@@ -2,7 +2,8 @@
 
     force on the plate = x / C + c xd
 
-with the compliance C [m/N] and a little damping c [N s/m] of the rubber. The friction of eq. (3) sees the tread, which starts to slide late.
+with the compliance C [m/N] and a little damping c [N s/m] of the rubber. The friction of eq. (3) sees the
+tread, which starts to slide late.
 """
 
 from collections.abc import Mapping
