@@ -64,7 +64,9 @@ def test_a_cam_may_be_steady_from_the_start() -> None:
     np.testing.assert_allclose(height, 0.01375 * np.cos(4.0 * np.pi * TIMES), atol=1e-15)
 
 
-@pytest.mark.parametrize("road", [cam_road(0.0275, 2.35), sweep_road(0.0275, 0.5, 3.0, 2.5)], ids=["dwell", "sweep"])
+@pytest.mark.parametrize(
+    "road", [cam_road(0.0275, 2.35), sweep_road(0.0275, 0.5, 3.0, 2.5)], ids=["dwell", "sweep"]
+)
 def test_the_cam_is_at_nought_where_it_lifts_highest(road: RoadMotion) -> None:
     """Its height is the cosine of its angle, in the dwell, in the sweep and after it."""
     cam = jax.jit(jax.vmap(road.cam_at))(jnp.asarray(TIMES))

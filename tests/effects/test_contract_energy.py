@@ -1,0 +1,24 @@
+"""No mechanism of the catalogue gives energy over a cycle: a friction takes it, a spring gives back what it took.
+
+Whether there is energy to speak of is decided by kind: forces, grips and what gives way; changed numbers, plates
+and sensors that err are no mechanisms.
+"""
+
+import numpy as np
+import pytest
+
+from savgs_ident.model.effect import AbstractEffect
+
+from ..model.instants import as_values
+from .cycles import along_a_cycle
+from .kinds import MECHANISMS, effects_of
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("effect", effects_of(*MECHANISMS))
+def test_it_adds_no_energy_over_a_cycle(effect: AbstractEffect, numbers: dict[str, float], seed: int) -> None:
+    """With its internal states back where they were."""
+    cycle = along_a_cycle(effect, as_values(numbers), seed)
+    assert cycle.open < 1e-6
+    assert np.max(np.abs(cycle.power)) > 0.0
+    assert np.mean(cycle.power) >= -1e-4 * np.mean(np.abs(cycle.power))
