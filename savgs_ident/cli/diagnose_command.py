@@ -37,9 +37,9 @@ def diagnose(
 ) -> int:
     """Diagnose the sim-to-real gap: where it lies, which unmodelled effect causes it, how far it shrinks.
 
-    The baseline model is recalibrated first, within its tolerances, so that a part inside its tolerance is not called
-    a gap. Every effect of the catalogue is then tested, alone and in pairs; if none explains the recordings the verdict
-    is "unknown", with the port at which something is missing.
+    The baseline model is recalibrated first, within its tolerances, so that a part inside its tolerance is not
+    called a gap. Every effect of the catalogue is then tested, alone and in pairs; if none explains the recordings
+    the verdict is "unknown", with the port at which something is missing.
 
     Writes diagnosis.html (the report) and diagnosis.json.
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.rig import Rig
@@ -69,15 +70,26 @@ def diagnose_response(
 ) -> Diagnosis:
     """Diagnose the gap between a rig's baseline model and a measured response.
 
-    ``rig`` is the rig as known before any fit; ``values`` (SI, by name) are those that the baseline is given with, the
-    rig's own where left out.
+    ``rig`` is the rig as known before any fit; ``values`` (SI, by name) are those that the baseline is given with,
+    the rig's own where left out.
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a response that cannot be used, for names
     that do not exist, and for a rig whose baseline has no periodic motion.
     """
+    # Threads of the linear algebra only get in each other's way: its matrices are small, and there are many.
+    with threadpool_limits(1, "blas"):
+        return _diagnose(measured, rig, settings or DiagnosisSettings(), values or {}, progress or _silent)
+
+
+def _diagnose(
+    measured: HarmonicResponse,
+    rig: Rig,
+    options: DiagnosisSettings,
+    values: Mapping[str, float],
+    tell: Progress,
+) -> Diagnosis:
     began = time.perf_counter()
-    options, tell = settings or DiagnosisSettings(), progress or _silent
-    case = recalibrate(measured, rig, options, values or {}, tell)
+    case = recalibrate(measured, rig, options, values, tell)
     judged = judge(case, tell)
     terms = {term.name: term for term in case.plant.candidates}
     named = judged.chosen.mode if judged.kind in ("effect", "several") else None

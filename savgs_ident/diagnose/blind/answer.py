@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 Drawn = Literal["none", "effect", "two", "unknown"]
 """What a trial's rig has beyond its model: nothing, an effect, two, or one that the catalogue then lacks."""
@@ -20,7 +20,7 @@ class Answer:
         changes: by how much each alone changes the clean response, relative; by effect.
         sigmas: by how many standard deviations each stands out of what noise, calibration and tolerances can do,
             the other one projected out; by effect.
-        imitators: effects of the catalogue that do the same to this campaign, within the noise.
+        imitators: effects of the catalogue that do the same to this campaign, to first order within the noise.
         parameters: true values of the effects' parameters, SI.
         rig: true values of the rig's own parameters that are not those of the sheet, SI.
         without: effects that are removed from the catalogue for this trial.
@@ -38,8 +38,17 @@ class Answer:
     without: tuple[str, ...]
 
 
-def answer_of(record: Mapping[str, object]) -> Answer:
-    """The answer from what ``dataclasses.asdict`` made of it, and JSON made of that."""
-    lists = ("effects", "ports", "imitators", "without")
-    fields = {name: tuple(each) if name in lists else each for name, each in record.items()}  # type: ignore
-    return Answer(**fields)
+def answer_of(record: Mapping[str, Any]) -> Answer:
+    """The answer that ``dataclasses.asdict`` and JSON made ``record`` of; raises ``KeyError`` for another."""
+    return Answer(
+        number=record["number"],
+        kind=record["kind"],
+        effects=tuple(record["effects"]),
+        ports=tuple(record["ports"]),
+        changes=dict(record["changes"]),
+        sigmas=dict(record["sigmas"]),
+        imitators=tuple(record["imitators"]),
+        parameters=dict(record["parameters"]),
+        rig=dict(record["rig"]),
+        without=tuple(record["without"]),
+    )

@@ -67,7 +67,7 @@ class Mode:
 
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of the coordinates, (n, n)."""
-        return np.linalg.inv(self.precision)
+        return np.asarray(np.linalg.inv(self.precision), np.float64)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from savgs_ident.diagnose.engine.prediction import Term
 from savgs_ident.model.effect import AbstractEffect, AbstractForce, AbstractSeries, Load, Port, PortSignals
 from savgs_ident.model.inputs import Imposed, nothing_imposed
 from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.small_root import solve_dense
 from savgs_ident.model.values import Values, as_values
 from savgs_ident.posterior.likelihood import Likelihood
 from savgs_ident.simulate.imposed import answers, loads_at_nodes
@@ -33,6 +34,9 @@ SAMPLES = 512
 
 PERIODS = 3
 """Periods until they repeat."""
+
+NEWTON_STEPS = 4
+"""Steps to the state of the next instant."""
 
 BATCH = 32
 """Signals that are imposed at a time."""
@@ -98,13 +102,13 @@ def impose(
     """Change of the rows by signals at the nodes, (P,) or (P, 2) each, imposed one at a time; (signals, m)."""
     found = []
     nodes = solution.mesh.layout.total
-    blank = nothing_imposed(np.zeros(nodes))
+    blank = nothing_imposed(jnp.zeros(nodes))
     for first in range(0, len(fields), BATCH):
         some = fields[first : first + BATCH]
         stacked = {name: np.zeros((BATCH, *part.shape)) for name, part in blank._asdict().items()}
         for place, (field, values) in enumerate(some):
             stacked[field][place] = values
-        imposed = placed(jax.tree.map(jnp.asarray, Imposed(**stacked)))
+        imposed = placed(Imposed(**{name: jnp.asarray(part) for name, part in stacked.items()}))
         (rows,) = _answered(model, likelihood, placed(dict(p)), solution, imposed, orders)
         found.append(np.asarray(rows)[: len(some)])
     return np.concatenate(found)
@@ -135,13 +139,13 @@ def _evenly(
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
     grid = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
 
-    def even(values: Array) -> NDArray[np.float64]:
+    def even(values: Array) -> Array:
         flat = np.asarray(values)
         rows = [
             np.interp(grid, phase[layout.dwell == dwell], flat[layout.dwell == dwell], period=2.0 * np.pi)
             for dwell in range(len(layout.counts))
         ]
-        return np.stack(rows)
+        return jnp.asarray(np.stack(rows))
 
     signals: dict[str, PortSignals | Load] = {
         name: PortSignals(*(even(part) for part in each)) for name, each in ports.items()
@@ -180,7 +184,7 @@ def _marched(
         name = "load.damper" if effect.in_damper else f"load.{effect.port.value}"
     else:
         name = effect.port.value
-    return _march(effect, p, jax.tree.map(jnp.asarray, signals[name]), jnp.asarray(steps))
+    return _march(effect, p, signals[name], jnp.asarray(steps))
 
 
 @eqx.filter_jit
@@ -198,18 +202,23 @@ def _march(
 
     def one_dwell(signals: Any, step: Array) -> Array:
         def advance(before: Array, at: Any) -> tuple[Array, Array]:
-            now = before
-            for _ in range(4):
-                slope = jax.jacfwd(lambda each: defect(each, before, at, step))(now)
-                now = now - jnp.linalg.solve(slope, defect(now, before, at, step))
+            def better(_: Array, now: Array) -> Array:
+                columns = [
+                    jax.jvp(lambda each: defect(each, before, at, step), (now,), (unit,))[1]
+                    for unit in jnp.unstack(jnp.eye(size))
+                ]
+                return now - solve_dense(jnp.stack(columns, axis=1), defect(now, before, at, step))
+
+            now = jax.lax.fori_loop(0, NEWTON_STEPS, better, before)
             if isinstance(effect, AbstractForce):
                 return now, effect.force(p, at, now)[None]
             return now, jnp.stack([now[0], (now[0] - before[0]) / step])
 
-        state = jnp.zeros(size)
-        for _ in range(PERIODS):
-            state, acted = jax.lax.scan(advance, state, signals)
-        return acted
+        def period(_: Array, begun: Array) -> Array:
+            return jax.lax.scan(advance, begun, signals)[0]
+
+        repeated = jax.lax.fori_loop(0, PERIODS - 1, period, jnp.zeros(size))
+        return jax.lax.scan(advance, repeated, signals)[1]
 
     return jax.vmap(one_dwell)(signals, steps)
 

@@ -74,8 +74,8 @@ def loops_of(
             ForceLoop(
                 port=found.name,
                 frequency_hz=float(solution.excitation.frequency[test]),
-                displacement=at(signals.displacement),
-                velocity=at(signals.velocity),
+                displacement=at(np.asarray(signals.displacement)),
+                velocity=at(np.asarray(signals.velocity)),
                 inferred=free_signal(found.coefficients[test], grid),
                 law=np.zeros(0) if law is None else _without_mean(at(law)),
                 unit=UNITS.get(found.name, "N"),
@@ -85,7 +85,7 @@ def loops_of(
 
 
 def _without_mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return values - values.mean()
+    return np.asarray(values - values.mean())
 
 
 def _law(

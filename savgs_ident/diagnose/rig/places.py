@@ -130,7 +130,7 @@ def _rate(signal: Signal, nodes: Nodes, solution: PeriodicSolution) -> Signal:
     ahead, behind = gap, gap[layout.preceding]
     forward = (signal[layout.following] - signal) / ahead
     backward = (signal - signal[layout.preceding]) / behind
-    return nodes.omega * (forward * behind + backward * ahead) / (ahead + behind)
+    return np.asarray(nodes.omega * (forward * behind + backward * ahead) / (ahead + behind))
 
 
 def _with_rate(signal: Signal, nodes: Nodes, solution: PeriodicSolution) -> Signal:

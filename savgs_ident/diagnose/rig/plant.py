@@ -89,7 +89,7 @@ class RigPlant:
         """The channel of each row, an index of RESPONSE_CHANNELS, (m,)."""
         tests, channels, orders = self.shape
         every = np.broadcast_to(np.arange(channels)[None, :, None, None], (tests, channels, orders, 2))
-        return every.ravel()[self.likelihood.place]
+        return np.asarray(every.ravel()[self.likelihood.place])
 
     @cached_property
     def table(self) -> ParameterTable:

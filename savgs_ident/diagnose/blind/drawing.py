@@ -1,0 +1,142 @@
+"""A rig for which effects are drawn: how large they are made on it, and whether they can be seen there."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.diagnose.blind.bench import Bench, change_of
+from savgs_ident.diagnose.blind.hiding import (
+    Hiding,
+    first_order_sigma,
+    hiding_at,
+    moved,
+    rows_of,
+    sigma_of,
+)
+from savgs_ident.diagnose.blind.sizing import draw_form, find_size
+from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.simulate.periodic import PeriodicSolution
+
+SMALLEST, LARGEST = 0.03, 0.25
+"""Change of the response by a drawn effect, relative; drawn evenly in its logarithm."""
+
+STANDS_OUT = 5.0
+"""Standard deviations from which on an effect can be told from what calibration and tolerances do."""
+
+
+@dataclass(frozen=True)
+class Present:
+    """An effect of a size: its parameters [SI], its change of the response, the response with it alone."""
+
+    name: str
+    parameters: Mapping[str, float]
+    change: float
+    response: NDArray[np.complex128]
+
+    def scaled(self, factor: float) -> dict[str, float]:
+        """Its parameters with the amplitudes multiplied, within their bounds."""
+        effect = CATALOGUE[self.name]
+        return {each.name: self._scaled(each, effect.null, factor) for each in effect.parameters}
+
+    def _scaled(self, each: Parameter, null: Mapping[str, float], factor: float) -> float:
+        value = self.parameters[each.name]
+        if each.name not in null:
+            return value
+        there = null[each.name] + factor * (value - null[each.name])
+        return float(np.clip(there, each.lower, each.upper))
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A rig without the effects that are drawn for it.
+
+    Attributes:
+        bench: what it is put through.
+        rig: its parameters off the sheet, SI.
+        response: its response, (D, 2, K).
+        hiding: what can hide an effect.
+        starts: its motions, by the effects with states that the model has.
+    """
+
+    bench: Bench
+    rig: Mapping[str, float]
+    response: NDArray[np.complex128]
+    hiding: Hiding
+    starts: dict[tuple[str, ...], PeriodicSolution | None] = field(default_factory=dict)
+
+    def solve(self, names: Sequence[str], given: Mapping[str, float]) -> NDArray[np.complex128] | None:
+        """The response with effects; None where a dwell has no motion."""
+        model = tuple(sorted(name for name in names if CATALOGUE[name].states))
+        if model not in self.starts:
+            self.starts[model] = self.bench.solve(model, self.rig)
+        solution = self.bench.solve(names, given, self.starts[model])
+        return None if solution is None else self.bench.response(names, given, solution)
+
+    def present(self, name: str, random: np.random.Generator) -> Present | None:
+        """An effect of a size drawn; None where no size within its bounds does that much."""
+        form = draw_form(CATALOGUE[name], random)
+        target = float(np.exp(random.uniform(np.log(SMALLEST), np.log(LARGEST))))
+        found: dict[float, NDArray[np.complex128]] = {}
+
+        def change(size: float) -> float | None:
+            response = self.solve((name,), dict(self.rig) | form.at(size))
+            if response is None:
+                return None
+            found[size] = response
+            return change_of(response, self.response)
+
+        size = find_size(change, target, form.most)
+        if size is None:
+            return None
+        return Present(name, form.at(size), change_of(found[size], self.response), found[size])
+
+    def sigma(self, target: NDArray[np.complex128], beside: Present | None = None) -> float:
+        """How far a response stands out of what the rig can do, with the effect ``beside`` of any size."""
+        names = () if beside is None else (beside.name,)
+        noise, known = self.hiding.noise, len(self.hiding.names)
+        flat = np.zeros((noise.size, len(names)))
+        if beside is not None:
+            flat[:, 0] = (rows_of(beside.response) - rows_of(self.response)) / noise
+
+        def miss_at(x: NDArray[np.float64]) -> NDArray[np.float64] | None:
+            own = {} if beside is None else beside.scaled(float(x[-1]))
+            response = self.solve(names, self._moved(x) | own)
+            return None if response is None else (rows_of(target) - rows_of(response)) / noise
+
+        def columns_at(x: NDArray[np.float64]) -> NDArray[np.float64]:
+            there = self._moved(x)
+            solution = self.bench.solve((), there, self.starts[()])
+            near = self.hiding if solution is None else hiding_at(self.bench, there, solution)
+            return np.concatenate([near.columns, flat], axis=1)
+
+        start = np.concatenate([np.zeros(known), np.ones(len(names))])
+        columns = np.concatenate([self.hiding.columns, flat], axis=1)
+        return sigma_of(miss_at, columns_at, start, columns, known)
+
+    def _moved(self, x: NDArray[np.float64]) -> dict[str, float]:
+        table, free = self.bench.table, self.bench.free
+        return dict(self.rig) | {
+            name: moved(table[name], self.rig.get(name, table[name].value), value, name in free)
+            for name, value in zip(self.hiding.names, x.tolist(), strict=False)
+        }
+
+    def imitators(self, present: Present) -> tuple[str, ...]:
+        """Effects without states that, of some size, do the same to first order."""
+        change = rows_of(present.response) - rows_of(self.response)
+        return tuple(
+            name
+            for name, columns in self.hiding.imitators.items()
+            if name != present.name and first_order_sigma(self.hiding, change, columns) < STANDS_OUT
+        )
+
+
+def drawing_of(bench: Bench, rig: Mapping[str, float]) -> Drawing | None:
+    """The rig with these parameters, without effects; None where a dwell has no motion."""
+    solution = bench.solve((), rig)
+    if solution is None:
+        return None
+    response = bench.response((), rig, solution)
+    return Drawing(bench, rig, response, hiding_at(bench, rig, solution), {(): solution})

@@ -1,0 +1,144 @@
+"""Whether an effect can be seen at all: what calibration and tolerances can do, it must not be.
+
+A spring that is 3 % stiffer than its sheet says, at a tolerance of 1.5 %, is no missing effect, and a damper
+that is 10 % harder is identified anyway. What an effect changes is therefore held against the best that the
+model without it can do:
+
+    sigma^2 = min_x  |(change - moved(x)) / noise|^2 + |x|^2
+
+with x the parameters that are identified or known to a tolerance, in units of what is known of them beforehand.
+The search takes damped Gauss-Newton steps.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.free_vector import known_to_tolerance
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.diagnose.blind.bench import ORDERS, Bench
+from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.fit.problem import used_parameters
+from savgs_ident.simulate.periodic import PeriodicSolution, harmonic_sensitivities
+
+STEPS = 6
+"""Steps of the search at most."""
+
+SHARES = (1.0, 0.3, 0.1)
+"""Shares of a step that are tried."""
+
+KEPT = 1.2
+"""The search ends where a step leaves no more than this of what it promised: there is nothing more to find."""
+
+ENOUGH = 2.0
+"""It ends as well below so many standard deviations: nobody could see that."""
+
+Real = NDArray[np.float64]
+
+
+class Hiding(NamedTuple):
+    """What can hide an effect, to first order about a rig.
+
+    Attributes:
+        noise: standard deviations of the rows, (m,).
+        names: parameters that are identified or known to a tolerance, n.
+        columns: change of the rows in noise per unit of what is known of each, (m, n).
+        imitators: the same per unit of the amplitudes of every effect without states, (m, a) by effect.
+    """
+
+    noise: Real
+    names: tuple[str, ...]
+    columns: Real
+    imitators: Mapping[str, Real]
+
+
+def rows_of(response: NDArray[np.complex128]) -> Real:
+    """Real and imaginary parts of the orders from 1 on, (m,), of a response (..., K)."""
+    kept = response[..., 1:]
+    return np.stack([kept.real, kept.imag], axis=-1).ravel()
+
+
+def noise_rows(bench: Bench) -> Real:
+    """Standard deviation of every row, (m,): white noise of the sensors over the length of each dwell."""
+    each = bench.sensors
+    samples = [bench.programme.periods_at(f) / f * each.rate for f in bench.programme.dwells]
+    spread = np.sqrt(2.0 / np.array(samples))[:, None] * np.array([each.accel, each.deflection])
+    return np.repeat(spread.ravel(), 2 * ORDERS)
+
+
+def moved(each: Parameter, value: float, x: float, free: bool) -> float:
+    """A parameter moved from ``value`` by ``x`` of what is known of it beforehand, within its bounds."""
+    there = value * np.exp(x) if free else value + each.tolerance * x
+    return float(np.clip(there, each.lower, each.upper))
+
+
+def hiding_at(bench: Bench, given: Mapping[str, float], solution: PeriodicSolution) -> Hiding:
+    """What can hide an effect of the rig with these parameters, whose motions are ``solution``."""
+    model, p = bench.model(()), bench.values(given)
+    known = known_to_tolerance(bench.table, bench.free)
+    used = used_parameters(model, bench.table)
+    known = [name for name in known if name in used]
+    others = {n: tuple(e.null) for n, e in CATALOGUE.items() if n not in bench.baseline and not e.states}
+    amplitudes = [name for each in others.values() for name in each]
+    names = (*bench.free, *known)
+    slopes = np.asarray(harmonic_sensitivities(model, p, solution, (*names, *amplitudes), ORDERS))
+    noise = noise_rows(bench)
+    table = {name: rows_of(slope) / noise for name, slope in zip((*names, *amplitudes), slopes, strict=True)}
+    units = [float(p[name]) if name in bench.free else bench.table[name].tolerance for name in names]
+    return Hiding(
+        noise,
+        names,
+        np.stack([table[name] * unit for name, unit in zip(names, units, strict=True)], axis=1),
+        {effect: np.stack([table[name] for name in own], axis=1) for effect, own in others.items()},
+    )
+
+
+def _step(columns: Real, miss: Real, x: Real, known: int) -> Real:
+    """The step of the search from ``x``; its first ``known`` entries have priors."""
+    stacked = np.concatenate([columns, np.eye(known, x.size)])
+    step: Real = np.linalg.lstsq(stacked, np.concatenate([miss, -x[:known]]), rcond=None)[0]
+    return step
+
+
+def first_order_sigma(hiding: Hiding, change: Real, flat: Real) -> float:
+    """How far ``change`` (m,) stands out to first order, with columns ``flat`` (m, k) that may have any size."""
+    columns, known = np.concatenate([hiding.columns, flat], axis=1), hiding.columns.shape[1]
+    miss = change / hiding.noise
+    x = _step(columns, miss, np.zeros(columns.shape[1]), known)
+    return float(np.sqrt(np.sum((miss - columns @ x) ** 2) + np.sum(x[:known] ** 2)))
+
+
+def sigma_of(
+    miss_at: Callable[[Real], Real | None],
+    columns_at: Callable[[Real], Real],
+    start: Real,
+    columns: Real,
+    known: int,
+) -> float:
+    """How far a response stands out: the least sigma found from ``start`` (n,), with (m,) misses in noise.
+
+    ``columns`` are minus the slopes of ``miss_at`` there, (m, n), and ``columns_at(x)`` those elsewhere; the first
+    ``known`` entries of x have priors. Steps that make it worse, or lead where there is no motion, are shortened.
+    """
+
+    def square(x: Real, miss: Real | None) -> float:
+        return np.inf if miss is None else float(miss @ miss + np.sum(x[:known] ** 2))
+
+    x, miss = start, miss_at(start)
+    best = square(x, miss)
+    for turn in range(STEPS):
+        if miss is None:
+            break
+        slopes, before = columns_at(x) if turn else columns, best
+        step = _step(slopes, miss, x, known)
+        promised = square(x + step, miss - slopes @ step)
+        for share in SHARES:
+            found = miss_at(x + share * step)
+            if square(x + share * step, found) < best:
+                x, miss, best = x + share * step, found, square(x + share * step, found)
+                break
+        if best < max(KEPT * promised, ENOUGH**2) or best == before:
+            break
+    return float(np.sqrt(best))
