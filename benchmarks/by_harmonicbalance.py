@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from benchmarks.outcome import Outcome, Tell
 from benchmarks.task import ORDERS, TOLERANCE_PERCENT, Harmonics, Task, errors_percent
 from savgs_ident.effects.rail_coulomb import RailCoulomb
+from savgs_ident.model.bristle import Presliding, bristle
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.effect import PortSignals
 from savgs_ident.model.inputs import Inputs
@@ -90,11 +91,15 @@ def measure(task: Task, reference: Harmonics, tell: Tell) -> Outcome:
 def compile_force(task: Task) -> Callable[..., Array]:
     """The two equations of motion at n samples of a period, (n, 2), from coordinates and derivatives (n,)."""
     model, values, curves, rail = task.model, task.values, task.curves, RailCoulomb()
+    stick = Presliding(values["k_pre"], values["c_pre"])
 
     def anchors(height: Array, speed: Array, load: Array, step: Array) -> Float[Array, " n"]:
         def march(anchor: Array, now: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+            sliding = PortSignals(*now)
+            grip = rail.grip(values, sliding)
+
             def balance(moved: Array) -> Array:
-                return (moved - anchor) / step - rail.rate(values, PortSignals(*now), moved[None])[0]
+                return (moved - anchor) / step - bristle(stick, sliding, grip, moved).rate
 
             # The rate is piecewise linear in the anchor: two Newton steps are exact.
             moved = anchor

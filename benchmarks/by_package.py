@@ -35,7 +35,7 @@ def measure(task: Task, reference: Harmonics) -> Outcome:
 
     def value() -> tuple[PeriodicSolution, object]:
         solution = resolve(task.model, moved, start)
-        return solution, harmonics(moved, solution, ORDERS)
+        return solution, harmonics(task.model, moved, solution, ORDERS)
 
     def sensitivities(solution: PeriodicSolution) -> object:
         return harmonic_sensitivities(task.model, moved, solution, PARAMETERS, ORDERS)
