@@ -1,0 +1,156 @@
+"""The search for what is missing, on a plant that can be checked by hand."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from savgs_ident.diagnose.engine.attribution import Place, attribute
+from savgs_ident.diagnose.engine.climb import Mode, Search, climb, search_of
+from savgs_ident.diagnose.engine.heldout import FOLDS, hold_out
+from savgs_ident.diagnose.engine.misfit import misfit_of
+from savgs_ident.diagnose.engine.score import cosine, score_terms
+from savgs_ident.diagnose.engine.search import Findings, excess, find_terms, left_over
+
+from .toy import CHOICES, TERMS, ToyPlant, draw
+
+PLANT = ToyPlant()
+NOISE = 0.02
+
+
+def _silent(line: str) -> None:
+    del line
+
+
+def _found(values: dict[str, float], seed: int) -> tuple[Search, Findings]:
+    search = search_of(PLANT, draw(PLANT, values, NOISE, seed))
+    base = climb(search, (), {}, None)
+    return search, find_terms(search, base, TERMS, CHOICES, _silent)
+
+
+def _names(findings: Findings) -> tuple[str, ...]:
+    best = findings.best
+    return best.terms if best.evidence > findings.base.evidence + 5.0 else ()
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize(
+    ("values", "names"),
+    [
+        ({"a": 1.1}, ()),
+        ({"a": 0.8, "c": 0.3}, ("bend",)),
+        ({"a": 1.1, "s": 0.1, "w": 7.0}, ("ripple",)),
+        ({"a": 1.0, "t": -0.8}, ("twist",)),
+    ],
+)
+def test_what_is_missing_is_named(values: dict[str, float], names: tuple[str, ...], seed: int) -> None:
+    _, findings = _found(values, seed)
+    assert _names(findings) == names
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_two_that_are_missing_are_both_named(seed: int) -> None:
+    search, findings = _found({"a": 0.9, "c": 0.3, "s": 0.15, "w": 8.0}, seed)
+    assert set(_names(findings)) == {"bend", "ripple"}
+    assert left_over(search, findings.base, findings.best) < 0.02
+    assert excess(search, findings.best) < 0.5
+
+
+def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
+    inside = []
+    for seed in range(60):
+        search = search_of(PLANT, draw(PLANT, {"a": 1.1, "c": 0.2}, NOISE, seed))
+        mode = climb(search, TERMS[:1], {}, None)
+        sd = np.sqrt(np.diag(mode.covariance()))
+        truth = np.array([each.at({"a": 1.1, "c": 0.2}[each.name]) for each in mode.coordinates])
+        inside.append(np.abs(mode.x - truth) < 1.96 * sd)
+    share = np.mean(inside)
+    assert 0.88 < share <= 1.0
+
+
+def test_evidence_is_the_integral_over_the_prior() -> None:
+    """Against quadrature, noise scale and discrepancy held where the mode has them."""
+    search = search_of(PLANT, draw(PLANT, {"a": 1.1}, NOISE, 3))
+    mode = climb(search, (), {}, None)
+    spread = mode.misfit.spread
+    height = mode.misfit.value - 0.5 * float(mode.x @ mode.x)
+
+    def relative(x: float) -> float:
+        residual = search.data.measured - PLANT.rows({"a": 1.0 + 0.2 * x})
+        here = mode.misfit.value - 0.5 * np.sum(residual**2 / spread)
+        there = -0.5 * np.sum(search.residual(mode.prediction) ** 2 / spread)
+        return float(np.exp(here - there - 0.5 * x**2 - height))
+
+    middle, width = float(mode.x[0]), float(np.sqrt(mode.covariance()[0, 0]))
+    area, _ = quad(relative, middle - 8.0 * width, middle + 8.0 * width, epsabs=1e-12)
+    assert mode.evidence == pytest.approx(height + np.log(area / np.sqrt(2.0 * np.pi)), abs=1e-3)
+
+
+def test_the_score_is_the_drop_of_chi2_that_a_fit_brings() -> None:
+    search = search_of(PLANT, draw(PLANT, {"a": 1.1, "c": 0.01}, NOISE, 5))
+    base = climb(search, (), {}, None)
+    bend = next(score for score in score_terms(search, base, list(TERMS), CHOICES) if score.term.name == "bend")
+    weight = 1.0 / np.sqrt(base.misfit.spread)
+    slope, bent = 0.2 * PLANT.x * weight, 0.4 * PLANT.x**2 * weight
+    residual = search.residual(base.prediction) * weight
+    both = np.stack([slope, bent], axis=1)
+    prior = np.diag([1.0, 0.0])
+    step = np.linalg.solve(both.T @ both + prior, both.T @ residual - prior @ np.array([base.x[0], 0.0]))
+
+    def chi2(step: np.ndarray) -> float:
+        return float(np.sum((residual - both @ step) ** 2) + (base.x[0] + step[0]) ** 2)
+
+    assert bend.sigma == pytest.approx(np.sqrt(chi2(np.zeros(2)) - chi2(step)), rel=1e-3)
+
+
+def test_what_a_tolerance_explains_is_no_effect() -> None:
+    search = search_of(PLANT, draw(PLANT, {"a": 1.35}, NOISE, 6))
+    base = climb(search, (), {}, None)
+    assert base.values["a"] == pytest.approx(1.35, abs=0.01)
+    assert max(score.sigma for score in score_terms(search, base, list(TERMS), CHOICES)) < 4.0
+
+
+def test_two_effects_that_do_the_same_look_alike() -> None:
+    search = search_of(PLANT, draw(PLANT, {"t": 0.2}, NOISE, 7))
+    base = climb(search, (), {}, None)
+    bend, ripple, twist = score_terms(search, base, list(TERMS), CHOICES)
+    assert cosine(twist, twist) == pytest.approx(1.0)
+    assert abs(cosine(bend, twist)) < 1e-6
+    assert abs(cosine(ripple, twist)) > 0.5
+
+
+def test_left_out_tests_are_predicted_without_being_seen() -> None:
+    data = draw(PLANT, {"a": 1.1, "c": 0.3}, NOISE, 8)
+    search = search_of(PLANT, data)
+    mode: Mode = climb(search, TERMS[:1], {}, None)
+    seen = hold_out(search, mode, TERMS[:1])
+    fold = data.test % FOLDS == 0
+    measured = np.where(fold, data.measured + 5.0, data.measured)
+    spoilt = search_of(PLANT, type(data)(measured, data.variance, data.reach, data.test))
+    again = hold_out(spoilt, mode, TERMS[:1])
+    np.testing.assert_allclose(again.rows[fold], seen.rows[fold], atol=1e-6)
+    assert np.abs(again.rows[~fold] - seen.rows[~fold]).max() > 0.1
+    without = hold_out(search, climb(search, (), {}, None), ())
+    assert seen.mean > without.mean + 1.0
+
+
+def test_a_gap_is_attributed_to_the_place_that_can_make_it() -> None:
+    search = search_of(PLANT, draw(PLANT, {"c": 0.3}, NOISE, 9))
+    base = climb(search, (), {}, None)
+    x = PLANT.x
+    spring = Place("spring", np.stack([x**2, x**4], axis=1), np.stack([x**2, x**3], axis=1))
+    sensor = Place("sensor", np.stack([np.sin(6 * x), np.sin(9 * x)], axis=1), np.stack([x**3], axis=1))
+    first, second = attribute(search, base, [sensor, spring])
+    assert (first.name, second.name) == ("spring", "sensor")
+    assert first.share > 0.98
+    assert first.reach > 0.98
+    assert second.share < 0.05
+    np.testing.assert_allclose(first.predicted, 0.3 * x**2, atol=0.02)
+    assert first.evidence > base.evidence + 100.0 > second.evidence
+
+
+def test_excess_is_what_the_noise_does_not_explain() -> None:
+    data = draw(PLANT, {"a": 1.0}, NOISE, 10, miss=0.05)
+    search = search_of(PLANT, data)
+    base = climb(search, (), {}, None)
+    assert excess(search, base) == pytest.approx((0.05 / NOISE) ** 2, rel=0.3)
+    assert misfit_of(data, search.residual(base.prediction)).discrepancy == pytest.approx(0.05, rel=0.25)

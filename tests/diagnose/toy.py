@@ -1,0 +1,89 @@
+"""A plant that can be checked by hand: a stiffness line in several tests, and what may be added to it.
+
+    y = a x + c x^2 + s sin(w x) + t x^3 / (1 + t^2),       |x| <= 1 in every test
+
+with the tolerance a and the terms "bend" (c), "ripple" (s with the shape w) and "twist" (t, nonlinear).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.diagnose.engine.coordinates import Coordinates, Linear, Logarithmic
+from savgs_ident.diagnose.engine.data import Data
+from savgs_ident.diagnose.engine.prediction import Prediction, Term
+
+CHOICES = (0.5, 1.0, 2.0)
+
+STEP = 1e-6
+
+TERMS = (
+    Term("bend", "spring", (Linear("c", "N", 0.0, 0.4),)),
+    Term("ripple", "sensor", (Linear("s", "N", 0.0, 0.4, lower=0.0),), (Logarithmic("w", "1", 6.0, 0.5),)),
+    Term("twist", "joint", (Linear("t", "1", 0.0, 0.4),)),
+)
+
+
+@dataclass(frozen=True)
+class ToyPlant:
+    """Tests of ``points`` instants each."""
+
+    tests: int = 6
+    points: int = 20
+
+    @cached_property
+    def x(self) -> NDArray[np.float64]:
+        return np.tile(np.linspace(-1.0, 1.0, self.points), self.tests)
+
+    @property
+    def nuisances(self) -> Coordinates:
+        return (Linear("a", "N", 1.0, 0.2),)
+
+    def rows(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+        v = {"a": 1.0, "c": 0.0, "s": 0.0, "w": 6.0, "t": 0.0} | dict(values)
+        bent = v["a"] * self.x + v["c"] * self.x**2 + v["s"] * np.sin(v["w"] * self.x)
+        return bent + v["t"] * self.x**3 / (1.0 + v["t"] ** 2)
+
+    def predict(
+        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], near: Any
+    ) -> Prediction:
+        here = self.rows(values)
+        slopes = [
+            (self.rows(dict(values) | {n: values[n] + STEP}) - self.rows(dict(values) | {n: values[n] - STEP}))
+            / (2.0 * STEP)
+            for n in names
+        ]
+        return Prediction(here, np.stack(slopes, axis=1), True, near)
+
+    def refined(self, terms: tuple[str, ...], values: Mapping[str, float], near: Any) -> Any:
+        return near
+
+    def columns(
+        self, terms: tuple[str, ...], values: Mapping[str, float], near: Any, candidates: Sequence[Term]
+    ) -> list[NDArray[np.float64]]:
+        found = []
+        for term in candidates:
+            choices = []
+            for choice in CHOICES:
+                shapes = {each.name: choice * each.centre for each in term.shapes}
+                amplitudes = {each.name: each.centre for each in term.amplitudes}
+                names = [each.name for each in term.amplitudes]
+                choices.append(self.predict(terms, dict(values) | shapes | amplitudes, names, None).slopes)
+            found.append(np.stack(choices))
+        return found
+
+
+def draw(
+    plant: ToyPlant, values: Mapping[str, float], noise: float, seed: int, miss: float = 0.0
+) -> Data:
+    """Data of a plant at the given parameters, with noise and a discrepancy of relative size ``miss``."""
+    rng = np.random.default_rng(seed)
+    truth = plant.rows(values)
+    spread = np.sqrt(noise**2 + miss**2)
+    measured = truth + spread * rng.standard_normal(truth.size)
+    test = np.repeat(np.arange(plant.tests), plant.points)
+    return Data(measured, np.full(truth.size, noise**2), np.ones(truth.size), test)
