@@ -14,7 +14,7 @@ from savgs_ident.diagnose.candidates import candidates_of, confusable_of, not_ju
 from savgs_ident.diagnose.engine.attribution import Attribution, attribute
 from savgs_ident.diagnose.engine.climb import Mode, Search, climb, refine, search_of
 from savgs_ident.diagnose.engine.data import Data
-from savgs_ident.diagnose.engine.heldout import HeldOut, hold_out
+from savgs_ident.diagnose.engine.heldout import HeldOut, held_out_by_law, hold_out
 from savgs_ident.diagnose.engine.prediction import Term
 from savgs_ident.diagnose.engine.search import EXPLAINED, Findings, find_terms, left_over
 from savgs_ident.diagnose.result import Diagnosis, ForceLoop, Kind, NextTest, PortShare, Responses
@@ -149,13 +149,14 @@ def judge(case: Case, tell: Progress) -> Judged:
 
 
 def _hold_out_all(case: Case, judged: Judged, terms: dict[str, Term], tell: Progress) -> dict[str, HeldOut]:
-    """Left-out predictions of the baseline and of the two best fitted hypotheses, by name."""
+    """Left-out predictions of the baseline, the two best fitted hypotheses and the best learned law, by name."""
     modes = [case.base, *sorted(judged.findings.modes, key=lambda each: -each.evidence)[:2]]
     held = {}
     for mode in modes:
         name = " + ".join(mode.terms) or "none"
         tell(f"leaving tests out: {name}")
         held[name] = hold_out(case.search, mode, tuple(terms[each] for each in mode.terms))
+    held["unknown"] = held_out_by_law(case.search, judged.places[0].held_out)
     return held
 
 
@@ -174,7 +175,7 @@ def _assemble(
     rows = Rows(
         before=case.given,
         recalibrated=held["none"].rows,
-        after=held[" + ".join(after.terms) or "none"].rows,
+        after=held["unknown" if judged.kind == "unknown" else " + ".join(after.terms) or "none"].rows,
         channel=plant.channel,
     )
     together, by_channel = shrinks(data, rows)
@@ -182,6 +183,7 @@ def _assemble(
     rivals = rivals_of(list(judged.weighed), judged.chosen)
     verdict = verdict_of(judged.kind, judged.chosen, judged.places, rivals, together)
     shares = probabilities(list(judged.weighed))
+    fitted = judged.places[0].held_out if judged.kind == "unknown" else after.prediction.rows
     tell("inferring the signal at the port")
     loops = _loops(case, judged, named, verdict.ports)
     return Diagnosis(
@@ -202,7 +204,7 @@ def _assemble(
         not_judgeable=not_judgeable_of(judged.findings),
         confusable=confusable,
         loops=loops,
-        responses=_responses(plant, case.given, base.prediction.rows, after.prediction.rows),
+        responses=_responses(plant, case.given, base.prediction.rows, fitted),
         measured=measured,
         converged=base.status.ok and after.status.ok,
         warnings=warnings_of(case.base, after, judged.left, judged.kind),

@@ -144,7 +144,7 @@ def test_a_gap_is_attributed_to_the_place_that_can_make_it() -> None:
     assert first.share > 0.98
     assert first.reach > 0.98
     assert second.share < 0.05
-    np.testing.assert_allclose(first.predicted, 0.3 * x**2, atol=0.02)
+    np.testing.assert_allclose(first.held_out, x + 0.3 * x**2, atol=0.02)
     assert first.evidence > base.evidence + 100.0 > second.evidence
 
 

@@ -29,8 +29,8 @@ STEPS = 6
 SHARES = (1.0, 0.3, 0.1)
 """Shares of a step that are tried."""
 
-KEPT = 1.2
-"""The search ends where a step leaves no more than this of what it promised: there is nothing more to find."""
+SETTLED = 0.8
+"""The search ends where a step leaves more than this of the square."""
 
 ENOUGH = 2.0
 """It ends as well below so many standard deviations: nobody could see that."""
@@ -133,12 +133,11 @@ def sigma_of(
             break
         slopes, before = columns_at(x) if turn else columns, best
         step = _step(slopes, miss, x, known)
-        promised = square(x + step, miss - slopes @ step)
         for share in SHARES:
             found = miss_at(x + share * step)
             if square(x + share * step, found) < best:
                 x, miss, best = x + share * step, found, square(x + share * step, found)
                 break
-        if best < max(KEPT * promised, ENOUGH**2) or best == before:
+        if best < ENOUGH**2 or best > SETTLED * before:
             break
     return float(np.sqrt(best))

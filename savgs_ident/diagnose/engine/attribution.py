@@ -52,7 +52,7 @@ class Attribution:
         share: share of the gap in left-out tests that the law explains; 0 if it makes it worse.
         reach: share that a free signal explains.
         evidence: log evidence of the baseline with the law, linearised.
-        predicted: the law's part of the rows, (m,).
+        held_out: rows (m,) of each test, predicted by the law and parameters that the others set.
         coefficients: those of the free signal by test, (tests, f).
     """
 
@@ -60,7 +60,7 @@ class Attribution:
     share: float
     reach: float
     evidence: float
-    predicted: NDArray[np.float64]
+    held_out: NDArray[np.float64]
     coefficients: NDArray[np.float64]
 
 
@@ -73,10 +73,13 @@ def attribute(search: Search, mode: Mode, places: list[Place]) -> list[Attributi
 def _attribution(search: Search, mode: Mode, place: Place) -> Attribution:
     weight = 1.0 / np.sqrt(mode.misfit.spread)
     law = _scaled(place.law, weight)
-    size, evidence, predicted = _best_size(search, mode, law)
+    size, evidence = _best_size(search, mode, law)
     reach, coefficients = _reach(search, mode, place.free, weight)
-    share = _share(search, mode, law * size, weight)
-    return Attribution(place.name, share, reach, evidence, predicted, coefficients)
+    without, missed = (_left_out(search, mode, each, weight) for each in (law * 0.0, law * size))
+    whole = float(np.sum((without * weight) ** 2))
+    share = max(0.0, 1.0 - float(np.sum((missed * weight) ** 2)) / whole) if whole > 0.0 else 0.0
+    held_out = search.data.measured - missed
+    return Attribution(place.name, share, reach, evidence, held_out, coefficients)
 
 
 def _scaled(columns: Matrix, weight: NDArray[np.float64]) -> Matrix:
@@ -85,43 +88,37 @@ def _scaled(columns: Matrix, weight: NDArray[np.float64]) -> Matrix:
     return columns / np.where(size > 0.0, size, 1.0)
 
 
-def _best_size(search: Search, mode: Mode, law: Matrix) -> tuple[float, float, NDArray[np.float64]]:
+def _best_size(search: Search, mode: Mode, law: Matrix) -> tuple[float, float]:
     residual = search.residual(mode.prediction)
     lower, upper = reach_of(mode.coordinates)
     wide = np.full(law.shape[1], np.inf)
     bounds = np.concatenate([lower, -wide]), np.concatenate([upper, wide])
     start = np.concatenate([mode.x, np.zeros(law.shape[1])])
     halved = log(2.0) * sum(each.halved for each in mode.coordinates)
-    best = 0.0, -np.inf, np.zeros_like(residual)
+    best = 0.0, -np.inf
     for size in SIZES:
         top = best_of(search.data, residual, np.concatenate([mode.slopes, size * law], axis=1), start, bounds)
         evidence = top.value - 0.5 * log_determinant(top.precision) + halved
         if evidence > best[1]:
-            best = size, evidence, size * law @ top.x[mode.x.size :]
+            best = size, evidence
     return best
 
 
-def _share(search: Search, mode: Mode, law: Matrix, weight: NDArray[np.float64]) -> float:
-    """Share of the gap in left-out tests, each left out once, that the law explains beyond recalibration."""
-    residual = search.residual(mode.prediction) * weight
-    slopes, across = mode.slopes * weight[:, None], law * weight[:, None]
-    before, after = 0.0, 0.0
+def _left_out(search: Search, mode: Mode, law: Matrix, weight: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Residuals (m,) of every test when the others have set the parameters and the law's coefficients."""
+    residual = search.residual(mode.prediction)
+    slopes = np.concatenate([mode.slopes, law], axis=1)
+    x = np.concatenate([mode.x, np.zeros(law.shape[1])])
+    missed = residual.copy()
     for fold in range(FOLDS):
         out = search.data.test % FOLDS == fold
+        inside = slopes[~out] * weight[~out, None]
         if not out.any() or out.all():
             continue
-        before += _left_out(residual, slopes, mode.x, out)
-        both = np.concatenate([slopes, across], axis=1)
-        after += _left_out(residual, both, np.concatenate([mode.x, np.zeros(law.shape[1])]), out)
-    return max(0.0, 1.0 - after / before) if before > 0.0 else 0.0
-
-
-def _left_out(residual: Matrix, slopes: Matrix, x: NDArray[np.float64], out: NDArray[np.bool_]) -> float:
-    """Sum of squares over the rows ``out`` when the others have set the coordinates."""
-    inside = slopes[~out]
-    precision = np.eye(x.size) + inside.T @ inside
-    step = np.linalg.solve(precision, inside.T @ residual[~out] - x)
-    return float(np.sum((residual[out] - slopes[out] @ step) ** 2))
+        precision = np.eye(x.size) + inside.T @ inside
+        step = np.linalg.solve(precision, inside.T @ (residual * weight)[~out] - x)
+        missed[out] = residual[out] - slopes[out] @ step
+    return missed
 
 
 def _reach(

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.diagnose.engine.climb import Mode, Search, climb
+from savgs_ident.diagnose.engine.misfit import misfit_of
 from savgs_ident.diagnose.engine.prediction import Term
 
 FOLDS = 3
@@ -26,6 +27,13 @@ class HeldOut:
     def mean(self) -> float:
         """Mean log density of a row."""
         return float(np.mean(self.log_density))
+
+
+def held_out_by_law(search: Search, rows: NDArray[np.float64]) -> HeldOut:
+    """Left-out predictions (m,) of a learned law, with the noise scale and discrepancy that they show."""
+    miss = search.data.measured - rows
+    spread = misfit_of(search.data, miss).spread
+    return HeldOut(rows, -0.5 * (miss**2 / spread + np.log(spread / search.data.variance)))
 
 
 def hold_out(search: Search, mode: Mode, terms: tuple[Term, ...]) -> HeldOut:
