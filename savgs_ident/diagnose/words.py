@@ -28,8 +28,8 @@ def verdict_of(
         sentence = (
             f"Something is missing that no effect of the catalogue explains: a law learned at the port "
             f"'{best.name}' accounts for {100.0 * best.share:.0f} % of the squared gap in tests left out, which "
-            f"shrinks from {_percent(gap.recalibrated)} recalibrated to {_percent(gap.after)} of the response; the noise is "
-            f"{_percent(gap.floor)}."
+            f"shrinks from {_percent(gap.recalibrated)} recalibrated to {_percent(gap.after)} of the response; "
+            f"the noise is {_percent(gap.floor)}."
         )
         return Verdict(kind, (), (best.name,), (), sentence)
     ports = tuple(dict.fromkeys(CATALOGUE[name].port.value for name in chosen.effects))

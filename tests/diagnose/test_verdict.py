@@ -1,0 +1,83 @@
+"""What may be said, by the weight of hypotheses."""
+
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from savgs_ident.diagnose.engine.climb import Mode
+from savgs_ident.diagnose.verdict import (
+    CONFUSED,
+    LEFT,
+    MATERIAL,
+    SURE,
+    Weighed,
+    kind_of,
+    probabilities,
+    rivals_of,
+)
+
+FITTED = cast(Mode, SimpleNamespace())
+
+
+def _weighed(weights: Mapping[str, float], scored: tuple[str, ...] = ()) -> list[Weighed]:
+    found = []
+    for name, weight in weights.items():
+        effects = () if name in ("none", "unknown") else tuple(name.split(" + "))
+        mode: Any = None if name in (*scored, "unknown") else FITTED
+        found.append(Weighed(name, effects, weight, mode))
+    return sorted(found, key=lambda each: -each.weight)
+
+
+@pytest.mark.parametrize(
+    ("weights", "change", "left", "kind", "name"),
+    [
+        ({"none": 0.0, "unknown": -20.0, "rail_viscous": SURE - 1.0}, 0.05, 0.5, "none", "none"),
+        ({"none": 0.0, "unknown": -20.0, "rail_viscous": SURE + 1.0}, 0.05, 0.0, "effect", "rail_viscous"),
+        ({"none": 0.0, "unknown": -20.0, "rail_viscous": 500.0}, MATERIAL / 2.0, 0.0, "none", "none"),
+        ({"none": 0.0, "unknown": 400.0, "rail_viscous": 500.0}, 0.05, LEFT * 2.0, "unknown", "unknown"),
+        ({"none": 0.0, "unknown": 600.0, "rail_viscous": 500.0}, 0.05, 0.0, "unknown", "unknown"),
+        ({"none": 0.0, "unknown": 600.0}, 0.0, 1.0, "unknown", "unknown"),
+        ({"none": 0.0, "unknown": 5.0}, 0.0, 1.0, "none", "none"),
+        (
+            {"none": 0.0, "unknown": 5.0, "spring_rate": 90.0, "spring_rate + accel_lag": 800.0},
+            0.05,
+            0.0,
+            "several",
+            "spring_rate + accel_lag",
+        ),
+    ],
+)
+def test_kinds(weights: dict[str, float], change: float, left: float, kind: str, name: str) -> None:
+    found, chosen = kind_of(_weighed(weights), change, left)
+    assert (found, chosen.name) == (kind, name)
+
+
+def test_only_what_was_fitted_can_be_named() -> None:
+    weights = {"none": 0.0, "unknown": -1.0, "rail_viscous": 900.0, "spring_rate": 50.0}
+    assert kind_of(_weighed(weights, scored=("rail_viscous",)), 0.05, 0.0)[1].name == "spring_rate"
+
+
+def test_probabilities_are_those_of_the_weights() -> None:
+    weighed = _weighed({"none": 0.0, "unknown": -800.0, "spring_rate": np.log(3.0)})
+    shares = probabilities(weighed)
+    assert shares.sum() == pytest.approx(1.0)
+    assert dict(zip((each.name for each in weighed), shares, strict=True)) == pytest.approx(
+        {"spring_rate": 0.75, "none": 0.25, "unknown": 0.0}
+    )
+
+
+def test_rivals_are_single_effects_that_the_data_hardly_tell_apart() -> None:
+    weights = {
+        "none": 0.0,
+        "unknown": 99.0,
+        "mount_compliance": 100.0,
+        "gear_compliance": 100.0 - CONFUSED + 1.0,
+        "spring_rate": 100.0 - CONFUSED - 1.0,
+        "spring_rate + accel_lag": 99.0,
+    }
+    weighed = _weighed(weights)
+    chosen = next(each for each in weighed if each.name == "mount_compliance")
+    assert rivals_of(weighed, chosen) == ("gear_compliance",)
