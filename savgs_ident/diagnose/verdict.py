@@ -19,7 +19,7 @@ PRIOR_UNKNOWN = 0.1
 SURE = 10.0
 """Log odds against the baseline from which on something is said to be missing."""
 
-MATERIAL = 0.003
+MATERIAL = 0.001
 """Change of the response, as a share of it, below which nothing that matters is missing."""
 
 LEFT = 0.05
