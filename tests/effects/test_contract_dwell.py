@@ -1,0 +1,115 @@
+"""The catalogue in a dwell: the periodic solution and the transient agree, and what is at its null does nothing."""
+
+from collections.abc import Iterable, Iterator
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from savgs_ident.core.rig import Rig
+from savgs_ident.effects.registry import CATALOGUE, MODELS, build_model, model_parameters
+from savgs_ident.model.actuation import held_link
+from savgs_ident.model.effect import AbstractEffect, AbstractSeries
+from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.road import cam_road
+from savgs_ident.model.values import Values, as_values
+from savgs_ident.simulate.excitation import cam_excitation
+from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, simulate_periodic
+from savgs_ident.simulate.transient import simulate_transient
+
+from ..relaxed import with_kept_programs
+from .kinds import PORTS, effects_of
+
+LIFT, LINK, HERTZ = 0.0275, np.pi / 2.0, 2.35
+PERIODS, SAMPLES, ORDERS = 10, 512, 9
+
+OF_ALL_KINDS = (
+    *MODELS["simtr"],
+    "rail_stribeck",
+    "mount_compliance",
+    "spring_rate",
+    "cam_harmonic",
+    "accel_lag",
+)
+"""One of each kind at least."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _as_users_have_it() -> Iterator[None]:
+    with with_kept_programs():
+        yield
+
+
+def _bench(rig: Rig, names: Iterable[str]) -> tuple[QuarterCar, Values]:
+    """SimTR and some effects, at their values."""
+    names = tuple(dict.fromkeys((*MODELS["simtr"], *names)))
+    return build_model(rig, names), as_values(model_parameters(rig, names).as_dict())
+
+
+def _at_null(p: Values, names: Iterable[str]) -> Values:
+    """With some effects at their null."""
+    return dict(p) | {
+        each: jnp.asarray(value) for name in names for each, value in CATALOGUE[name].null.items()
+    }
+
+
+def _periodic(model: QuarterCar, p: Values) -> tuple[PeriodicSolution, NDArray[np.complex128]]:
+    """The dwell's solution, and its harmonics 1..ORDERS, (2, ORDERS)."""
+    solution = simulate_periodic(model, p, cam_excitation([HERTZ], LIFT, LINK))
+    assert all(status.ok for status in solution.status())
+    return solution, np.asarray(harmonics(model, p, solution, ORDERS))[0, :, 1:]
+
+
+def _transient(model: QuarterCar, p: Values) -> NDArray[np.complex128]:
+    """The same of the last but one of some periods from rest: sensors know nothing of what follows the last."""
+    times = np.arange(PERIODS * SAMPLES + 1) / (HERTZ * SAMPLES)
+    road = cam_road(LIFT, HERTZ, settle=1.0)
+    solution = simulate_transient(model, p, road, held_link(LINK), times)
+    assert solution.status().ok
+    shown = np.stack(solution.readings)[:, (PERIODS - 2) * SAMPLES : (PERIODS - 1) * SAMPLES]
+    return 2.0 * np.fft.rfft(shown, axis=1)[:, 1 : ORDERS + 1] / SAMPLES
+
+
+def _differ(found: NDArray[np.complex128], wanted: NDArray[np.complex128]) -> float:
+    """Largest difference of any order, relative to the first of its channel."""
+    return float(np.max(np.abs(found - wanted) / np.abs(wanted[:, :1])))
+
+
+def test_there_is_one_of_each_kind() -> None:
+    assert all(any(isinstance(CATALOGUE[name], kind) for name in OF_ALL_KINDS) for kind in PORTS)
+
+
+def test_effects_of_all_kinds_together_end_in_the_periodic_motion(rig: Rig) -> None:
+    """And with all but the frictions of SimTR at their null it is that of SimTR."""
+    model, p = _bench(rig, OF_ALL_KINDS)
+    together = _periodic(model, p)[1]
+    assert _differ(_transient(model, p), together) < 1e-3
+    simtr = _periodic(*_bench(rig, ()))[1]
+    found = _periodic(model, _at_null(p, set(OF_ALL_KINDS) - set(MODELS["simtr"])))[1]
+    assert _differ(found, simtr) < 1e-9
+    assert _differ(together, simtr) > 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", effects_of())
+def test_each_effect_ends_in_its_periodic_motion(effect: AbstractEffect, rig: Rig) -> None:
+    """And it is to be seen."""
+    model, p = _bench(rig, [effect.name])
+    wanted = _periodic(model, p)[1]
+    assert _differ(_transient(model, p), wanted) < 1e-3
+    assert _differ(_periodic(model, _at_null(p, [effect.name]))[1], wanted) > 1e-3
+
+
+@pytest.mark.slow
+def test_the_whole_catalogue_at_its_null_is_simtr(rig: Rig) -> None:
+    """Every yield is nought all along."""
+    model, p = _bench(rig, CATALOGUE)
+    solution, found = _periodic(model, _at_null(p, set(CATALOGUE) - set(MODELS["simtr"])))
+    assert _differ(found, _periodic(*_bench(rig, ()))[1]) < 1e-9
+    given = [effect for effect in CATALOGUE.values() if isinstance(effect, AbstractSeries)]
+    yields = {state.name for effect in given for state in effect.states}
+    for place, state in enumerate(model.states):
+        if state.name in yields:
+            along = np.asarray(solution.trajectory.x[4 + place])
+            assert np.max(np.abs(along)) < 1e-10 * state.scale, state.name
