@@ -134,18 +134,29 @@ def judge(case: Case, tell: Progress) -> Judged:
     places = attribute(search, base, places_of(plant, (), p, base.prediction.near))
     findings = find_terms(search, base, plant.candidates, SHAPES, tell)
     best = findings.best
-    unknown = max(each.evidence for each in places)
+    alone, besides = max(each.evidence for each in places), -np.inf
     left = left_over(search, base, best)
     if best.terms and left > EXPLAINED:
         tell(f"what {' + '.join(best.terms)} leaves")
         q = plant.values(best.values)
         beyond = attribute(search, best, places_of(plant, best.terms, q, best.prediction.near))
-        unknown = max(unknown, *(each.evidence for each in beyond))
-    weighed = weigh(findings, unknown)
-    size = float(np.sqrt(np.sum(case.data.measured**2)))
-    change = float(np.sqrt(np.sum((best.prediction.rows - base.prediction.rows) ** 2))) / size
-    kind, chosen = kind_of(weighed, change, left)
+        besides = max(each.evidence for each in beyond)
+    weighed = weigh(findings, alone, besides)
+    kind, chosen = kind_of(weighed, _own_change(case, best), left)
     return Judged(findings, tuple(places), tuple(weighed), kind, chosen, left)
+
+
+def _own_change(case: Case, mode: Mode) -> float:
+    """What the terms of a hypothesis do to the response, all other parameters as they are; as a share of it."""
+    if not mode.terms:
+        return 0.0
+    own = {each.name for each in case.plant.nuisances}
+    values = {name: value for name, value in mode.values.items() if name in own}
+    without = case.plant.predict((), values, sorted(own), case.base.prediction.near)
+    if not without.solved:
+        return np.inf
+    change = np.sum((mode.prediction.rows - without.rows) ** 2) / np.sum(case.data.measured**2)
+    return float(np.sqrt(change))
 
 
 def _hold_out_all(case: Case, judged: Judged, terms: dict[str, Term], tell: Progress) -> dict[str, HeldOut]:

@@ -19,8 +19,8 @@ PRIOR_UNKNOWN = 0.1
 SURE = 10.0
 """Log odds against the baseline from which on something is said to be missing."""
 
-MATERIAL = 0.001
-"""Change of the response, as a share of it, below which nothing that matters is missing."""
+MATERIAL = 0.003
+"""Change of the response by the named effects, as a share of it, below which nothing that matters is missing."""
 
 LEFT = 0.05
 """Share of the baseline's excess misfit that named effects may leave; beyond it something else is missing."""
@@ -42,17 +42,27 @@ class Weighed:
     mode: Mode | None
 
 
-def weigh(findings: Findings, unknown: float) -> list[Weighed]:
-    """All hypotheses by falling weight; ``unknown`` is the log evidence of the best learned law."""
+def weigh(findings: Findings, alone: float, besides: float) -> list[Weighed]:
+    """All hypotheses by falling weight.
+
+    ``alone`` is the log evidence of the best law learned at a port; ``besides`` that of the best one beside the best
+    effects, which is no more probable beforehand than these are.
+    """
     count = max(len(findings.scores), 1)
     single, pair = log(PRIOR_SINGLE / count), log(PRIOR_PAIR / max(count * (count - 1) / 2, 1))
+
+    def prior(mode: Mode) -> float:
+        return {0: log(PRIOR_NONE), 1: single}.get(len(mode.terms), pair)
+
+    unknown = max(alone, besides + prior(findings.best)) + log(PRIOR_UNKNOWN)
     found = [
         Weighed("none", (), findings.base.evidence + log(PRIOR_NONE), findings.base),
-        Weighed("unknown", (), unknown + log(PRIOR_UNKNOWN), None),
+        Weighed("unknown", (), unknown, None),
     ]
-    for mode in findings.modes:
-        prior = single if len(mode.terms) == 1 else pair
-        found.append(Weighed(" + ".join(mode.terms), mode.terms, mode.evidence + prior, mode))
+    found += [
+        Weighed(" + ".join(mode.terms), mode.terms, mode.evidence + prior(mode), mode)
+        for mode in findings.modes
+    ]
     fitted = {mode.terms for mode in findings.modes}
     found += [
         Weighed(score.term.name, (score.term.name,), score.evidence + single, None)
@@ -72,7 +82,7 @@ def probabilities(weighed: list[Weighed]) -> NDArray[np.float64]:
 def kind_of(weighed: list[Weighed], change: float, left: float) -> tuple[Kind, Weighed]:
     """What may be said, and the hypothesis that it rests on.
 
-    ``change`` is the change of the response that the best fitted hypothesis makes, as a share of it; ``left`` the
+    ``change`` is what the best fitted hypothesis does to the response, as a share of it; ``left`` the
     share of the excess misfit that it leaves.
     """
     by_name = {each.name: each for each in weighed}

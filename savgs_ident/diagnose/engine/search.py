@@ -45,6 +45,9 @@ CLOSE = 300.0
 REFINED = 3
 """Best hypotheses that are found again with the plant as precise as it can be."""
 
+LITTLE = 0.3
+"""Excess that noise known from few periods and the plant's own solver may leave."""
+
 EXPLAINED = 0.01
 """Share of the baseline's excess misfit that a hypothesis may leave and still count as explaining all."""
 
@@ -77,9 +80,9 @@ def excess(search: Search, mode: Mode) -> float:
 
 
 def left_over(search: Search, base: Mode, mode: Mode) -> float:
-    """Share of the baseline's excess that a hypothesis leaves; 0 where there is no excess."""
-    whole = excess(search, base)
-    return excess(search, mode) / whole if whole > 0.0 else 0.0
+    """Share of the baseline's excess that a hypothesis leaves; 0 where it leaves hardly more than the noise."""
+    left = excess(search, mode)
+    return left / excess(search, base) if left > LITTLE else 0.0
 
 
 def find_terms(
