@@ -3,9 +3,9 @@
     x = b / 2 (tanh(T / T_0) - tanh(T_r / T_0))
 
 with the backlash b [rad] at the link, the torque T [N m], T_r that at rest in the nominal state, and T_0 = 1 N m,
-over which it changes flanks. With the link at its nominal angle the strut's load keeps the gear against one
-flank: tests there show nothing of it. It shows where the torque changes its sign: with the link near 0 or 180
-deg, and in hard rebounds.
+over which it changes flanks. The strut's load keeps the gear against one flank, and where it lets go, with the
+link near 0 or 180 deg, it has no lever: passive tests show nothing of it. It shows where a strut that is pulled
+turns the torque round, and where a drive takes the link through 0 or 180 deg.
 """
 
 from collections.abc import Mapping
