@@ -12,6 +12,7 @@ import typer
 
 from savgs_ident import __version__
 from savgs_ident.cli.arguments import spread_values
+from savgs_ident.cli.blind_command import blind
 from savgs_ident.cli.bode_command import bode
 from savgs_ident.cli.calibrate_command import calibrate
 from savgs_ident.cli.diagnose_command import diagnose
@@ -48,7 +49,7 @@ def _root(
     """
 
 
-for _command in (demo, inspect, fit, bode, simulate, posterior, calibrate, diagnose):
+for _command in (demo, inspect, fit, bode, simulate, posterior, calibrate, diagnose, blind):
     app.command()(_command)
 
 

@@ -23,8 +23,12 @@ from savgs_ident.simulate.periodic import PeriodicSolution
 SMALLEST, LARGEST = 0.03, 0.25
 """Change of the response by a drawn effect, relative; drawn evenly in its logarithm."""
 
-STANDS_OUT = 5.0
-"""Standard deviations from which on an effect can be told from what calibration and tolerances do."""
+STANDS_OUT = 8.0
+"""Standard deviations, expected, by which an effect must stand out of what calibration and tolerances do: with
+that it does so by five however noise and tolerances fall."""
+
+TOLD_APART = 5.0
+"""Standard deviations from which on two effects can be told apart."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +133,7 @@ class Drawing:
         return tuple(
             name
             for name, columns in self.hiding.imitators.items()
-            if name != present.name and first_order_sigma(self.hiding, change, columns) < STANDS_OUT
+            if name != present.name and first_order_sigma(self.hiding, change, columns) < TOLD_APART
         )
 
 

@@ -77,9 +77,8 @@ def moved(each: Parameter, value: float, x: float, free: bool) -> float:
 def hiding_at(bench: Bench, given: Mapping[str, float], solution: PeriodicSolution) -> Hiding:
     """What can hide an effect of the rig with these parameters, whose motions are ``solution``."""
     model, p = bench.model(()), bench.values(given)
-    known = known_to_tolerance(bench.table, bench.free)
     used = used_parameters(model, bench.table)
-    known = [name for name in known if name in used]
+    known = [name for name in known_to_tolerance(bench.table, bench.free) if name in used]
     others = {n: tuple(e.null) for n, e in CATALOGUE.items() if n not in bench.baseline and not e.states}
     amplitudes = [name for each in others.values() for name in each]
     names = (*bench.free, *known)

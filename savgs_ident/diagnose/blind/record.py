@@ -15,6 +15,8 @@ from savgs_ident.diagnose.blind.bench import Bench
 from savgs_ident.diagnose.blind.programme import Sensors
 from savgs_ident.diagnose.blind.steady import Steady, steady_dwells
 from savgs_ident.diagnose.blind.swept import sweep_readings
+from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.values import Values
 from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording, TestKind
 
 STAMP = 1e-5
@@ -64,9 +66,7 @@ def _dwell(bench: Bench, dwell: Steady, lift: float, angle: float, random: np.ra
     readings = CubicSpline(knots, closed, axis=1, bc_type="periodic")(turns)
     road = lift / 2.0 * np.cos(2.0 * np.pi * turns)
     truth = np.stack([road, *readings])
-    return _test(
-        f"dwell_{frequency:.2f}Hz", "dwell", frequency, stamps, truth, angle, bench.sensors, random
-    )
+    return _test(f"dwell_{frequency:.2f}Hz", "dwell", frequency, stamps, truth, angle, bench.sensors, random)
 
 
 def _sweep(
@@ -76,7 +76,9 @@ def _sweep(
     stamps = _stamps(programme.sweep, bench.sensors, random)
     times, readings = sweep_readings(model, p, programme.sweep, programme.sweep_end, bench.sensors.rate)
     turns = 0.5 * programme.sweep_end / programme.sweep * stamps**2
-    truth = np.stack([lift / 2.0 * np.sin(2.0 * np.pi * turns), *CubicSpline(times, readings, axis=1)(stamps)])
+    truth = np.stack(
+        [lift / 2.0 * np.sin(2.0 * np.pi * turns), *CubicSpline(times, readings, axis=1)(stamps)]
+    )
     name = f"sweep_0_{programme.sweep_end:g}Hz_{programme.sweep:g}s"
     return _test(name, "sweep", None, stamps, truth, angle, bench.sensors, random)
 

@@ -1,7 +1,8 @@
 """How large a drawn effect is made: by what it changes, not by its parameter's number.
 
 Newtons of friction and seconds of lag have no common size; what they do to the response has. The amplitude is
-searched for at which the clean response changes by what was drawn (:func:`savgs_ident.diagnose.blind.bench.change_of`).
+searched for at which the clean response changes by what was drawn; how that is measured, see
+:func:`savgs_ident.diagnose.blind.bench.change_of`.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,8 +1,9 @@
 """A steady cam by time integration: one period of the motion that a dwell comes to.
 
-The rig is started at rest on the first dwell and goes from one dwell to the next as on the stand, with the cam
-at its top each time. It runs until the states at the ends of two stretches agree; then one period is kept. What
-follows in a dwell repeats that period; the sensors' own dynamics, which are linear, act on its harmonics.
+The rig starts at rest; the cam's lift grows to its height during the first second, and then its speed changes
+from dwell to dwell, with the cam at its top each time. Every dwell runs until the states at the ends of two
+stretches agree; then one period is kept. What follows in a dwell repeats that period; the sensors' own dynamics,
+which are linear, act on its harmonics.
 """
 
 from collections.abc import Iterator
@@ -16,13 +17,13 @@ import numpy as np
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.model.actuation import held_link
+from savgs_ident.model.actuation import ImposedLink, held_link
 from savgs_ident.model.dynamics import Coordinates
 from savgs_ident.model.effect import AbstractSensorFault
 from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.road import cam_road, flat_road
+from savgs_ident.model.road import RoadMotion, cam_road, flat_road
 from savgs_ident.model.values import Values
-from savgs_ident.simulate.stored import placed
+from savgs_ident.simulate.stored import placed, stored
 from savgs_ident.simulate.transient import STATE_SCALE, RigState, rest_state, simulate_transient
 
 SAMPLES = 2048
@@ -31,8 +32,9 @@ SAMPLES = 2048
 STRETCH = 1.0
 """A stretch is so many whole periods that it lasts at least this long [s]."""
 
-CLOSED = 3e-5
-"""Two ends agree if no state differs by more than this of its typical size."""
+CLOSED = 2e-4
+"""Two ends agree if no state differs by more than this of its typical size: a tenth of what the noise of a dwell
+leaves open, and about what the steps of the integration scatter by."""
 
 PATIENCE = 60.0
 """A dwell that has not settled after so long [s] does not."""
@@ -66,53 +68,66 @@ def without_sensor_faults(model: QuarterCar) -> QuarterCar:
 
 def steady_dwells(model: QuarterCar, p: Values, frequencies: tuple[float, ...]) -> Iterator[Steady]:
     """The steady motions of the rig in one dwell after the other [Hz], with a link held at its nominal angle."""
-    mechanics, end = without_sensor_faults(model), None
+    mechanics = without_sensor_faults(model)
+    state, rise = _at_rest(mechanics, p), STRETCH
     for frequency in frequencies:
+        apart = np.inf
         for _ in range(ceil(PATIENCE / STRETCH)):
-            start, end = end, _stretch(mechanics, p, frequency, ceil(STRETCH * frequency), end)[0]
-            settled = start is not None and _apart(mechanics, start, end) < CLOSED
-            if settled:
+            before, state = (
+                state,
+                _stretch(mechanics, p, state, frequency, ceil(STRETCH * frequency), rise)[0],
+            )
+            apart, rise = _apart(mechanics, before, state), 0.0
+            if apart < CLOSED or np.isnan(apart):
                 break
-        end, truth = _stretch(mechanics, p, frequency, 1, end)
-        yield Steady(frequency, _shown(model, p, frequency, truth), settled)
+        state, truth = _stretch(mechanics, p, state, frequency, 1, rise)
+        yield Steady(frequency, _shown(model, p, frequency, truth), bool(apart < CLOSED))
 
 
-def _apart(model: QuarterCar, start: Array, end: Array) -> float:
-    """Largest difference of two packed states, of their typical sizes; infinite if one is not a number."""
+def _apart(model: QuarterCar, before: Array, after: Array) -> float:
+    """Largest difference of two packed states, of their typical sizes; NaN if one is not a number."""
     scale = np.array([*STATE_SCALE, *(state.scale for state in model.states)])
-    apart = float(np.max(np.abs(np.asarray(end) - np.asarray(start)) / scale))
-    return apart if np.isfinite(apart) else np.inf
+    return float(np.max(np.abs(np.asarray(after) - np.asarray(before)) / scale))
 
 
 def _stretch(
-    model: QuarterCar, p: Values, frequency: float, periods: int, start: Array | None
+    model: QuarterCar, p: Values, start: Array, frequency: float, periods: int, rise: float
 ) -> tuple[Array, NDArray[np.float64]]:
-    """The packed state after so many periods, and what was read on the way, (2, SAMPLES)."""
-    rising = start is None
-    begin = _at_rest(model, p) if start is None else start
-    numbers = (frequency, periods / frequency, STRETCH if rising else 0.0)
-    end, readings = _integrated(model, p, begin, placed(jnp.asarray(numbers, jnp.float64)))
+    """The packed state after so many periods, and what was read on the way, (2, SAMPLES).
+
+    The cam's lift grows to its height during the first ``rise`` [s].
+    """
+    lift, angle = float(p["cam_peak_to_peak"]), float(p["psi_nominal"])
+    times = np.linspace(0.0, periods / frequency, SAMPLES + 1)
+    drive = (cam_road(lift, frequency, rise), held_link(angle), jnp.asarray(times))
+    end, readings = _integrated(model, p, start, *placed(drive))
     return end, np.asarray(readings)
 
 
-@eqx.filter_jit
 def _at_rest(model: QuarterCar, p: Values) -> Array:
-    link = held_link(p["psi_nominal"])
-    return _packed(rest_state(model, p, flat_road(), link, jnp.zeros(())))
+    state: Array = _rested(model, p, placed(held_link(float(p["psi_nominal"]))))[0]
+    return state
+
+
+# Stored, as a trial's processes come and go, and to trace an integration takes as long as a dwell.
+@eqx.filter_jit
+def _rested(*args: Any) -> tuple[Array, ...]:
+    return stored(_rest, *args)
 
 
 @eqx.filter_jit
 def _integrated(*args: Any) -> tuple[Array, ...]:
-    return _integrate(*args)
+    return stored(_integrate, *args)
 
 
-def _integrate(model: QuarterCar, p: Values, start: Array, numbers: Array) -> tuple[Array, Array]:
-    frequency, duration, rise = jnp.unstack(numbers)
-    road = cam_road(p["cam_peak_to_peak"], frequency, rise)
-    times = duration * jnp.arange(SAMPLES + 1) / SAMPLES
-    found = simulate_transient(
-        model, p, road, held_link(p["psi_nominal"]), times, _unpacked(start), PRECISION
-    )
+def _rest(model: QuarterCar, p: Values, link: ImposedLink) -> tuple[Array]:
+    return (_packed(rest_state(model, p, flat_road(), link, jnp.zeros(()))),)
+
+
+def _integrate(
+    model: QuarterCar, p: Values, start: Array, road: RoadMotion, link: ImposedLink, times: Array
+) -> tuple[Array, Array]:
+    found = simulate_transient(model, p, road, link, times, _unpacked(start), PRECISION)
     return _packed(found.state_at(-1)), jnp.stack(found.readings)[:, :-1]
 
 
@@ -129,9 +144,7 @@ def _transfers(model: QuarterCar, p: Values, frequency: Array) -> Array:
     return model.transfers(p, frequency)
 
 
-def _shown(
-    model: QuarterCar, p: Values, frequency: float, truth: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _shown(model: QuarterCar, p: Values, frequency: float, truth: NDArray[np.float64]) -> NDArray[np.float64]:
     """What the sensors make of a period."""
     order = jnp.arange(SAMPLES // 2 + 1, dtype=jnp.float64)
     passed = np.asarray(_transfers(model, p, frequency * order))

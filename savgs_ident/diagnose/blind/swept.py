@@ -1,18 +1,22 @@
 """A sweep of the cam from rest, by time integration."""
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from diffrax import RESULTS
 from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.diagnose.blind.steady import PRECISION
-from savgs_ident.model.actuation import held_link
+from savgs_ident.model.actuation import ImposedLink, held_link
 from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.road import sweep_road
+from savgs_ident.model.road import RoadMotion, sweep_road
 from savgs_ident.model.values import Values
-from savgs_ident.simulate.transient import TransientSolution, simulate_transient
+from savgs_ident.simulate.stored import placed, stored
+from savgs_ident.simulate.transient import simulate_transient
 
 
 def sweep_readings(
@@ -23,14 +27,21 @@ def sweep_readings(
     Raises :class:`InputError` if the integration does not end well.
     """
     times = np.arange(round(duration * rate) + 1) / rate
-    found = _sweep(model, p, jnp.asarray(times), jnp.asarray([duration, end]))
-    if not found.status().ok:
-        raise InputError("the sweep cannot be simulated", source="sweep", remedy=found.status().advice)
-    return times, np.stack([np.asarray(each) for each in found.readings])
+    road = sweep_road(float(p["cam_peak_to_peak"]), 0.0, end, duration)
+    link = held_link(float(p["psi_nominal"]))
+    shown, ended = _swept(model, p, *placed((road, link, jnp.asarray(times))))
+    if not np.isfinite(shown).all() or not bool(ended):
+        raise InputError("the sweep cannot be simulated", source="sweep", remedy="draw another rig")
+    return times, np.asarray(shown)
 
 
 @eqx.filter_jit
-def _sweep(model: QuarterCar, p: Values, times: Array, numbers: Array) -> TransientSolution:
-    duration, end = jnp.unstack(numbers)
-    road = sweep_road(p["cam_peak_to_peak"], 0.0, end, duration)
-    return simulate_transient(model, p, road, held_link(p["psi_nominal"]), times, tolerance=PRECISION)
+def _swept(*args: Any) -> tuple[Array, ...]:
+    return stored(_sweep, *args)
+
+
+def _sweep(
+    model: QuarterCar, p: Values, road: RoadMotion, link: ImposedLink, times: Array
+) -> tuple[Array, Array]:
+    found = simulate_transient(model, p, road, link, times, tolerance=PRECISION)
+    return jnp.stack(found.readings), jnp.asarray(found.result == RESULTS.successful)

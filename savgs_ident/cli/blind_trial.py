@@ -1,0 +1,188 @@
+"""One blind trial from the draw to its marks, on disk.
+
+    trial_0007/
+      campaign/campaign.csv.gz     all that the diagnosis gets
+      campaign/seal.json           digests of answer and recordings, written before the diagnosis begins
+      answer.json                  the answer and its salt, opened when the diagnosis has spoken
+      diagnosis.json               what it said
+
+The seal is written last: a folder with a seal is whole, and its recordings serve again.
+"""
+
+import json
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from savgs_ident.cli.console import Progress
+from savgs_ident.cli.reading import read_response
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.rig import Rig, read_rig
+from savgs_ident.diagnose.blind.answer import Answer
+from savgs_ident.diagnose.blind.bench import Bench
+from savgs_ident.diagnose.blind.draw import Shares, draw_answer
+from savgs_ident.diagnose.blind.log import FILE, write_campaign
+from savgs_ident.diagnose.blind.programme import DWELLS, Programme
+from savgs_ident.diagnose.blind.record import record_campaign
+from savgs_ident.diagnose.blind.score import Score, failed, score_of
+from savgs_ident.diagnose.blind.seal import Envelope, Seal, envelope_of, opened, sealed
+from savgs_ident.diagnose.diagnose import diagnose_response
+from savgs_ident.diagnose.settings import DiagnosisSettings
+from savgs_ident.recordings.read import read_campaign
+from savgs_ident.recordings.recording import Recording
+from savgs_ident.report.diagnosis_record import diagnosis_record
+from savgs_ident.report.files import prepare_folder, to_json, write_json
+from savgs_ident.report.origin import origin_of
+
+DRAWS = 5
+"""So often a rig that does not come to a steady motion is drawn again."""
+
+SWEEP = 60.0
+"""Length of the sweep [s], where there is one."""
+
+SILENT = Progress(None, None)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the trials of a run have in common.
+
+    Attributes:
+        rig: file of the rig's sheet.
+        seed: of everything that is drawn.
+        shares: how often which kind of trial is drawn.
+        every: so many dwells of the programme are left out between two.
+        sweep: whether a sweep is recorded.
+    """
+
+    rig: Path
+    seed: int
+    shares: tuple[float, float, float, float]
+    every: int
+    sweep: bool
+
+    def marks(self) -> dict[str, Any]:
+        """What trials must have in common to be counted together, as JSON has it."""
+        return {
+            "rig": str(self.rig),
+            "seed": self.seed,
+            "shares": list(self.shares),
+            "every": self.every,
+            "sweep": self.sweep,
+        }
+
+    def bench(self) -> Bench:
+        """The rig and what it is put through."""
+        settings = DiagnosisSettings()
+        programme = Programme(
+            dwells=DWELLS[(len(DWELLS) - 1) % self.every :: self.every], sweep=SWEEP if self.sweep else 0.0
+        )
+        return Bench(read_rig(self.rig), settings.baseline, settings.free, programme)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A rig that was drawn: the truth, a salt for its seal (hexadecimal), and its campaign."""
+
+    answer: Answer
+    salt: str
+    recordings: tuple[Recording, ...]
+
+
+Draw = Callable[[Plan, Bench, int], Drawn]
+"""The rig of the trial with a number; always the same."""
+
+Diagnose = Callable[[Path, Rig, tuple[str, ...]], Mapping[str, Any]]
+"""From a campaign's folder, the rig's sheet and effects to leave out to the object of ``diagnosis.json``."""
+
+
+def run_trial(plan: Plan, draw: Draw, diagnose: Diagnose, out: Path, number: int) -> Score:
+    """The marks of a trial: drawn and recorded unless its folder holds that already, diagnosed, opened."""
+    folder = prepare_folder(out / f"trial_{number:04d}")
+    bench = plan.bench()
+    if not _is_recorded(folder, plan, number):
+        _record(folder, plan, draw(plan, bench, number), number)
+    campaign = folder / "campaign"
+    found = _diagnosed(diagnose, campaign, bench.rig, _without(folder))
+    write_json(folder / "diagnosis.json", found)
+    seal = Seal(**_read(campaign / "seal.json")["seal"])
+    envelope = envelope_of(_read(folder / "answer.json"))
+    return score_of(opened(seal, envelope, read_campaign(campaign).sha256), found)
+
+
+def diagnose_folder(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
+    """The diagnosis of a recorded campaign as its ``diagnosis.json`` has it."""
+    settings = DiagnosisSettings(without=without)
+    campaign, measured = read_response(folder, None, settings.orders, None, SILENT)
+    diagnosis = diagnose_response(measured, rig, settings)
+    origin = origin_of(campaign, rig.name, (), (), measured.warnings)
+    record: Mapping[str, Any] = json.loads(to_json(diagnosis_record(diagnosis, origin)))
+    return record
+
+
+def _diagnosed(diagnose: Diagnose, folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
+    try:
+        return diagnose(folder, rig, without)
+    except InputError as error:
+        return failed(str(error))
+
+
+def draw_and_record(plan: Plan, bench: Bench, number: int) -> Drawn:
+    """A rig drawn in secret, and its campaign by the transient simulator.
+
+    Raises :class:`InputError` if none that can be judged, or none that comes to a steady motion, is found.
+    """
+    for attempt in range(DRAWS):
+        random = np.random.default_rng((plan.seed, number, attempt))
+        answer = draw_answer(bench, Shares(*plan.shares), number, random)
+        try:
+            recordings = record_campaign(bench, answer, random)
+        except InputError:
+            continue
+        return Drawn(answer, random.bytes(16).hex(), recordings)
+    raise InputError(
+        f"no rig that comes to a steady motion was drawn in {DRAWS} attempts",
+        source=f"trial {number}",
+        remedy="name another --seed",
+    )
+
+
+def _record(folder: Path, plan: Plan, drawn: Drawn, number: int) -> None:
+    """Write the campaign, the answer, and last the seal."""
+    shutil.rmtree(folder)
+    campaign = prepare_folder(folder / "campaign")
+    write_campaign(drawn.recordings, campaign)
+    envelope = Envelope(drawn.answer, drawn.salt)
+    settings = {"trial": number, "settings": plan.marks()}
+    write_json(folder / "answer.json", settings | asdict(envelope))
+    seal = sealed(envelope, read_campaign(campaign).sha256)
+    # What the catalogue of this trial lacks is part of the question.
+    write_json(campaign / "seal.json", {"without": drawn.answer.without, "seal": asdict(seal)})
+
+
+def _is_recorded(folder: Path, plan: Plan, number: int) -> bool:
+    """Whether the folder holds the sealed recordings of this trial."""
+    campaign = folder / "campaign"
+    whole = all(path.is_file() for path in (campaign / "seal.json", campaign / FILE, folder / "answer.json"))
+    if not whole:
+        return False
+    record = _read(folder / "answer.json")
+    return bool(record.get("trial") == number and record.get("settings") == plan.marks())
+
+
+def _without(folder: Path) -> tuple[str, ...]:
+    return tuple(_read(folder / "campaign" / "seal.json")["without"])
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        record: dict[str, Any] = json.loads(path.read_text())
+    except ValueError as error:
+        raise InputError(
+            "is not valid JSON", source=path, remedy="remove the trial's folder to record it again"
+        ) from error
+    return record

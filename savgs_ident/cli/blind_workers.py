@@ -1,0 +1,55 @@
+"""Work in processes side by side that end with the program, however it ends."""
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing.connection import wait
+from typing import TypeVar
+
+Result = TypeVar("Result")
+
+
+def side_by_side(work: Callable[[int], Result], numbers: Sequence[int], jobs: int) -> Iterator[Result]:
+    """The results of ``work``, defined at the top of a module, as they come; ``jobs`` at a time.
+
+    One at a time is done in this process. Where the work ends early, so do the processes.
+    """
+    if jobs == 1 or len(numbers) < 2:
+        yield from map(work, numbers)
+        return
+    # Forked processes would share the threads of JAX.
+    context = multiprocessing.get_context("spawn")
+    before = set(multiprocessing.active_children())
+    with ProcessPoolExecutor(min(jobs, len(numbers)), context, _prepare) as pool:
+        waiting = [pool.submit(work, number) for number in numbers]
+        finished = False
+        try:
+            for each in as_completed(waiting):
+                yield each.result()
+            finished = True
+        finally:
+            if not finished:
+                for each in waiting:
+                    each.cancel()
+                for child in set(multiprocessing.active_children()) - before:
+                    child.terminate()
+
+
+def _prepare() -> None:
+    """Make a new process keep its programs, and end with the one that started it: by that one at Ctrl-C, by
+    itself if that one is killed."""
+    from savgs_ident.simulate.compilation import use_persistent_cache
+
+    use_persistent_cache()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)

@@ -1,0 +1,121 @@
+"""How well a diagnosis did: its ``diagnosis.json`` against the answer. Pure functions.
+
+An effect counts as named only by its own name; one that cannot be told from it does not count, though it is
+noted that the diagnosis said so. Marks that do not apply to a kind of trial are None.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from savgs_ident.diagnose.blind.answer import Answer, Drawn
+
+FAILED = "failed"
+"""The verdict of a diagnosis that ended with an error."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """True value of an effect's parameter, and the 95 % interval that the diagnosis gave."""
+
+    true: float
+    low: float
+    high: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the truth lies inside."""
+        return self.low <= self.true <= self.high
+
+
+@dataclass(frozen=True)
+class Score:
+    """A trial's marks.
+
+    Attributes:
+        number: of the trial.
+        kind: what was drawn.
+        effects: names of the drawn effects.
+        changes: by how much each changes the response, relative, in the same order.
+        verdict: kind of the verdict: none, effect, several, unknown, or :data:`FAILED`.
+        said: names of the effects that the verdict names.
+        named_right: the drawn effect and no other is named; of trials with one effect.
+        named_or_alike: it is named, or among those that the verdict says look like the named one; of the same.
+        located_right: the verdict's ports are those of the drawn effects; of trials with any effect.
+        false_alarm: something is named, or said to be unknown; of trials with nothing.
+        unknown_recognised: the verdict is unknown; of trials whose effect is not in the catalogue.
+        both_named: both drawn effects and no other are named; of trials with two.
+        share_closed: share of the explainable gap that the diagnosis closed, on tests held out; None if there
+            is none or the diagnosis does not tell.
+        intervals: of the effects' parameters, where the verdict names all of them and no other.
+        wall_s: how long the diagnosis took [s].
+    """
+
+    number: int
+    kind: Drawn
+    effects: tuple[str, ...]
+    changes: tuple[float, ...]
+    verdict: str
+    said: tuple[str, ...]
+    named_right: bool | None
+    named_or_alike: bool | None
+    located_right: bool | None
+    false_alarm: bool | None
+    unknown_recognised: bool | None
+    both_named: bool | None
+    share_closed: float | None
+    intervals: Mapping[str, Interval]
+    wall_s: float
+
+
+def score_of(answer: Answer, diagnosis: Mapping[str, Any]) -> Score:
+    """The marks of a diagnosis, given as the object of its ``diagnosis.json``."""
+    verdict = diagnosis["verdict"]
+    said, true = tuple(verdict["effects"]), set(answer.effects)
+    right = set(said) == true and len(said) == len(true)
+    alike = len(said) == 1 and bool(true & {*said, *verdict["confusable_with"]})
+    here = set(verdict["ports"]) == set(answer.ports) and verdict["kind"] != "none"
+    kind = answer.kind
+    return Score(
+        number=answer.number,
+        kind=kind,
+        effects=answer.effects,
+        changes=tuple(answer.changes[name] for name in answer.effects),
+        verdict=verdict["kind"],
+        said=said,
+        named_right=right if kind == "effect" else None,
+        named_or_alike=alike if kind == "effect" else None,
+        located_right=here if kind != "none" else None,
+        false_alarm=verdict["kind"] not in ("none", FAILED) if kind == "none" else None,
+        unknown_recognised=verdict["kind"] == "unknown" if kind == "unknown" else None,
+        both_named=right if kind == "two" else None,
+        share_closed=diagnosis["shrink"]["share_closed"],
+        intervals=_intervals(answer, diagnosis) if right else {},
+        wall_s=float(diagnosis["wall_s"]),
+    )
+
+
+def score_from(record: Mapping[str, Any]) -> Score:
+    """The marks that ``dataclasses.asdict`` and JSON made ``record`` of; ``KeyError`` or ``TypeError`` for others."""
+    lists = {name: tuple(record[name]) for name in ("effects", "changes", "said")}
+    intervals = {name: Interval(**each) for name, each in record["intervals"].items()}
+    return Score(**{**record, **lists, "intervals": intervals})
+
+
+def failed(why: str) -> dict[str, Any]:
+    """What stands for the ``diagnosis.json`` of a diagnosis that ended with an error."""
+    verdict = {"kind": FAILED, "effects": [], "ports": [], "confusable_with": [], "sentence": why}
+    return {"verdict": verdict, "which": [], "shrink": {"share_closed": None}, "wall_s": 0.0}
+
+
+def _intervals(answer: Answer, diagnosis: Mapping[str, Any]) -> dict[str, Interval]:
+    """Intervals that the verdict's hypothesis gives for parameters that the rig truly has."""
+    said = sorted(diagnosis["verdict"]["effects"])
+    for each in diagnosis["which"]:
+        if sorted(each["effects"]) == said:
+            return {
+                name: Interval(answer.parameters[name], found["lo"], found["hi"])
+                for name, found in each["parameters"].items()
+                if name in answer.parameters and None not in (found["lo"], found["hi"])
+            }
+    return {}

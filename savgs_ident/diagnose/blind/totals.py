@@ -1,0 +1,114 @@
+"""What many trials say together: rates with their intervals, and who is taken for whom. Pure functions."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.diagnose.blind.score import FAILED, Score
+
+Z = 1.959964
+"""Standard deviations of a 95 % interval."""
+
+NOTHING, TWO, OTHERS, UNKNOWN = "nothing", "both of two", "other effects", "unknown"
+
+
+@dataclass(frozen=True)
+class Rate:
+    """So many of so many, and the bounds that the rate should keep.
+
+    ``low`` and ``high`` are its 95 % interval after Wilson (1927); 0 and 1 if there is nothing to count.
+    """
+
+    count: int
+    total: int
+    least: float = 0.0
+    most: float = 1.0
+
+    @property
+    def rate(self) -> float | None:
+        """The rate; None if there is nothing to count."""
+        return self.count / self.total if self.total else None
+
+    @property
+    def met(self) -> bool | None:
+        """Whether it keeps its bounds; None if it has none, or there is nothing to count."""
+        if self.rate is None or (self.least <= 0.0 and self.most >= 1.0):
+            return None
+        return self.least <= self.rate <= self.most
+
+    @property
+    def low(self) -> float:
+        """Lower end of the interval."""
+        return self._ends()[0]
+
+    @property
+    def high(self) -> float:
+        """Upper end of the interval."""
+        return self._ends()[1]
+
+    def _ends(self) -> tuple[float, float]:
+        n = self.total
+        if n == 0:
+            return 0.0, 1.0
+        share = self.count / n
+        middle = (share + Z**2 / (2 * n)) / (1.0 + Z**2 / n)
+        half = Z * sqrt(share * (1.0 - share) / n + Z**2 / (4 * n**2)) / (1.0 + Z**2 / n)
+        return max(middle - half, 0.0), min(middle + half, 1.0)
+
+
+def rates_of(scores: Sequence[Score]) -> dict[str, Rate]:
+    """All rates by name, in the order in which they are told."""
+    held = [interval.holds for score in scores for interval in score.intervals.values()]
+    closed = [score.share_closed for score in scores if score.named_right or score.both_named]
+    return {
+        "named_right": _rate([score.named_right for score in scores], least=0.90),
+        "located_right": _rate([score.located_right for score in scores], least=0.95),
+        "false_alarms": _rate([score.false_alarm for score in scores], most=0.02),
+        "unknown_recognised": _rate([score.unknown_recognised for score in scores], least=0.80),
+        "both_named": _rate([score.both_named for score in scores], least=0.70),
+        "intervals_hold": _rate(held, least=0.90, most=0.99),
+        "share_closed_90": _rate([share is not None and share >= 0.9 for share in closed]),
+        "named_or_alike": _rate([score.named_or_alike for score in scores]),
+    }
+
+
+def _rate(marks: Iterable[bool | None], least: float = 0.0, most: float = 1.0) -> Rate:
+    counted = [mark for mark in marks if mark is not None]
+    return Rate(sum(counted), len(counted), least, most)
+
+
+@dataclass(frozen=True)
+class Confusion:
+    """Trials by what there was (rows) and what was said (columns), (r, c)."""
+
+    truths: tuple[str, ...]
+    verdicts: tuple[str, ...]
+    counts: NDArray[np.int64]
+
+
+def truth_of(score: Score) -> str:
+    """The row of a trial."""
+    return {"none": NOTHING, "two": TWO, "unknown": UNKNOWN, "effect": "".join(score.effects[:1])}[score.kind]
+
+
+def verdict_of(score: Score) -> str:
+    """Its column: what was named, or that more was named than there is, or not the right ones."""
+    several = TWO if score.both_named else OTHERS
+    words = {"none": NOTHING, "several": several, "effect": "".join(score.said[:1])}
+    return words.get(score.verdict, score.verdict)
+
+
+def confusion_of(scores: Sequence[Score], order: Sequence[str]) -> Confusion:
+    """The confusion matrix, effects in the given order, those that appear nowhere left out."""
+    truths, verdicts = ({name_of(score) for score in scores} for name_of in (truth_of, verdict_of))
+    effects = [name for name in order if name in truths | verdicts]
+    rows = [name for name in (NOTHING, *effects, TWO, UNKNOWN) if name in truths]
+    ends = (TWO, OTHERS, UNKNOWN, FAILED)
+    columns = [name for name in (NOTHING, *effects, *ends) if name in truths | verdicts]
+    counts = np.zeros((len(rows), len(columns)), dtype=np.int64)
+    for score in scores:
+        counts[rows.index(truth_of(score)), columns.index(verdict_of(score))] += 1
+    return Confusion(tuple(rows), tuple(columns), counts)
