@@ -9,7 +9,6 @@ which are linear, act on its harmonics.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil
-from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -23,7 +22,7 @@ from savgs_ident.model.effect import AbstractSensorFault
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.road import RoadMotion, cam_road, flat_road
 from savgs_ident.model.values import Values
-from savgs_ident.simulate.stored import placed, stored
+from savgs_ident.simulate.stored import placed
 from savgs_ident.simulate.transient import STATE_SCALE, RigState, rest_state, simulate_transient
 
 SAMPLES = 2048
@@ -69,7 +68,7 @@ def without_sensor_faults(model: QuarterCar) -> QuarterCar:
 def steady_dwells(model: QuarterCar, p: Values, frequencies: tuple[float, ...]) -> Iterator[Steady]:
     """The steady motions of the rig in one dwell after the other [Hz], with a link held at its nominal angle."""
     mechanics = without_sensor_faults(model)
-    state, rise = _at_rest(mechanics, p), STRETCH
+    state, rise = _at_rest(mechanics, p, placed(held_link(float(p["psi_nominal"])))), STRETCH
     for frequency in frequencies:
         apart = np.inf
         for _ in range(ceil(PATIENCE / STRETCH)):
@@ -104,27 +103,14 @@ def _stretch(
     return end, np.asarray(readings)
 
 
-def _at_rest(model: QuarterCar, p: Values) -> Array:
-    state: Array = _rested(model, p, placed(held_link(float(p["psi_nominal"]))))[0]
-    return state
-
-
-# Stored, as a trial's processes come and go, and to trace an integration takes as long as a dwell.
 @eqx.filter_jit
-def _rested(*args: Any) -> tuple[Array, ...]:
-    return stored(_rest, *args)
+def _at_rest(model: QuarterCar, p: Values, link: ImposedLink) -> Array:
+    return _packed(rest_state(model, p, flat_road(), link, jnp.zeros(())))
 
 
+# Compiled as a whole: what prepares an integration would take longer than the integration, step by step.
 @eqx.filter_jit
-def _integrated(*args: Any) -> tuple[Array, ...]:
-    return stored(_integrate, *args)
-
-
-def _rest(model: QuarterCar, p: Values, link: ImposedLink) -> tuple[Array]:
-    return (_packed(rest_state(model, p, flat_road(), link, jnp.zeros(()))),)
-
-
-def _integrate(
+def _integrated(
     model: QuarterCar, p: Values, start: Array, road: RoadMotion, link: ImposedLink, times: Array
 ) -> tuple[Array, Array]:
     found = simulate_transient(model, p, road, link, times, _unpacked(start), PRECISION)

@@ -1,7 +1,5 @@
 """A sweep of the cam from rest, by time integration."""
 
-from typing import Any
-
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -15,7 +13,7 @@ from savgs_ident.model.actuation import ImposedLink, held_link
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.road import RoadMotion, sweep_road
 from savgs_ident.model.values import Values
-from savgs_ident.simulate.stored import placed, stored
+from savgs_ident.simulate.stored import placed
 from savgs_ident.simulate.transient import simulate_transient
 
 
@@ -36,11 +34,7 @@ def sweep_readings(
 
 
 @eqx.filter_jit
-def _swept(*args: Any) -> tuple[Array, ...]:
-    return stored(_sweep, *args)
-
-
-def _sweep(
+def _swept(
     model: QuarterCar, p: Values, road: RoadMotion, link: ImposedLink, times: Array
 ) -> tuple[Array, Array]:
     found = simulate_transient(model, p, road, link, times, tolerance=PRECISION)

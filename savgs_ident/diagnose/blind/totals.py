@@ -34,10 +34,15 @@ class Rate:
 
     @property
     def met(self) -> bool | None:
-        """Whether it keeps its bounds; None if it has none, or there is nothing to count."""
+        """Whether it keeps its bounds; None if it has none, or there is nothing to count.
+
+        A rate that should be high, but not too high, is too high only if chance does not explain it: all of
+        twenty intervals hold the truth often enough where 95 % should.
+        """
         if self.rate is None or (self.least <= 0.0 and self.most >= 1.0):
             return None
-        return self.least <= self.rate <= self.most
+        highest = self.low if self.least > 0.0 else self.rate
+        return self.least <= self.rate and highest <= self.most
 
     @property
     def low(self) -> float:

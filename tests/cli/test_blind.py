@@ -1,0 +1,201 @@
+"""Blind trials on disk: kept, gone on with, diagnosed again, refused; and how the command ends."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from savgs_ident.cli.blinding import Job, run_blind
+from savgs_ident.cli.console import Voice
+from savgs_ident.cli.guard import NOT_TRUSTED, OK
+from savgs_ident.core.errors import InputError
+
+from .blind_fakes import always_none, always_right, draw, job
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+SILENT = Voice(False, True)
+
+
+def _never(*_: object) -> Any:
+    raise AssertionError("this is there already")
+
+
+def _record(out: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((out / "blind.json").read_text())
+    return found
+
+
+def test_a_run_that_goes_on_equals_one_that_was_never_stopped(tmp_path: Path) -> None:
+    assert run_blind(job(), draw, always_right, SILENT, tmp_path / "whole") == OK
+    run_blind(job(trials=3), draw, always_right, SILENT, tmp_path / "parts")
+    kept = tmp_path / "parts" / "trials.jsonl"
+    # Stopped in the middle of a line, and of the recording of the fourth trial.
+    kept.write_text(kept.read_text()[:-25])
+    begun = tmp_path / "parts" / "trial_0004" / "campaign"
+    begun.mkdir(parents=True)
+    (begun / "campaign.csv.gz").write_bytes(b"half")
+    assert run_blind(job(), draw, always_right, SILENT, tmp_path / "parts") == OK
+    assert _record(tmp_path / "parts") == _record(tmp_path / "whole")
+    assert (tmp_path / "parts/blind.html").read_bytes() == (tmp_path / "whole/blind.html").read_bytes()
+    assert kept.read_text() == (tmp_path / "whole/trials.jsonl").read_text()
+
+
+def test_trials_that_are_there_are_neither_drawn_nor_diagnosed(tmp_path: Path) -> None:
+    run_blind(job(), draw, always_right, SILENT, tmp_path)
+    before = _record(tmp_path)
+    assert run_blind(job(seed=None), _never, _never, SILENT, tmp_path) == OK
+    assert _record(tmp_path) == before
+
+
+def test_again_diagnoses_the_same_recordings(tmp_path: Path) -> None:
+    run_blind(job(), draw, always_right, SILENT, tmp_path)
+    code = run_blind(job(again=True), _never, always_none, SILENT, tmp_path)
+    assert code == NOT_TRUSTED
+    record = _record(tmp_path)
+    assert record["trials"] == 6
+    assert {score["verdict"] for score in record["scores"]} == {"none"}
+
+
+def test_what_is_told_is_what_was_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_blind(job(trials=8), draw, always_right, Voice(True, False), tmp_path) == OK
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == _record(tmp_path)
+    assert printed["kinds"] == {"none": 2, "effect": 2, "two": 2, "unknown": 2}
+    rates = {name: (each["count"], each["of"]) for name, each in printed["rates"].items()}
+    assert rates["named_right"] == rates["both_named"] == rates["unknown_recognised"] == (2, 2)
+    assert rates["located_right"] == (6, 6)
+    assert rates["false_alarms"] == (0, 2)
+    assert rates["intervals_hold"] == (6, 6)
+    assert printed["trusted"] is True
+    for name in ("confusion.png", "confusion.pdf", "blind.html", "trials.jsonl"):
+        assert (tmp_path / name).stat().st_size > 300
+
+
+def test_an_answer_that_was_changed_is_noticed(tmp_path: Path) -> None:
+    run_blind(job(trials=1), draw, always_right, SILENT, tmp_path)
+    path = tmp_path / "trial_0001" / "answer.json"
+    path.write_text(path.read_text().replace("accel_lag", "cam_scale"))
+    with pytest.raises(InputError, match="not the one that was sealed"):
+        run_blind(job(trials=1, again=True), _never, always_right, SILENT, tmp_path)
+
+
+def test_recordings_that_were_changed_are_noticed(tmp_path: Path) -> None:
+    run_blind(job(trials=2), draw, always_right, SILENT, tmp_path)
+    data = [tmp_path / f"trial_000{n}" / "campaign" / "campaign.csv.gz" for n in (1, 2)]
+    data[0].write_bytes(data[1].read_bytes())
+    with pytest.raises(InputError, match="recordings are not those"):
+        run_blind(job(trials=1, again=True), _never, always_none, SILENT, tmp_path)
+
+
+def test_a_diagnosis_that_ends_with_an_error_counts_as_wrong(tmp_path: Path) -> None:
+    def broken(*_: object) -> Any:
+        raise InputError("cannot be diagnosed")
+
+    assert run_blind(job(trials=1), draw, broken, SILENT, tmp_path) == NOT_TRUSTED
+    (score,) = _record(tmp_path)["scores"]
+    assert (score["verdict"], score["named_right"], score["located_right"]) == ("failed", False, False)
+
+
+@pytest.mark.parametrize("other", [job(seed=5), job(every=2), job(shares=(1.0, 1.0, 0.0, 0.0))])
+def test_trials_of_other_settings_are_refused(tmp_path: Path, other: Job) -> None:
+    run_blind(job(trials=1), draw, always_right, SILENT, tmp_path)
+    for again in (False, True):
+        with pytest.raises(InputError, match="trials of another"):
+            run_blind(replace(other, again=again), _never, _never, SILENT, tmp_path)
+
+
+def test_a_seed_that_nobody_gave_is_another_one_each_time(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        run_blind(job(trials=1, seed=None), draw, always_right, SILENT, tmp_path / name)
+    seeds = {_record(tmp_path / name)["settings"]["seed"] for name in ("one", "two")}
+    assert len(seeds) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--trials", "0"), "Invalid value for '--trials'"),
+        (("--jobs", "0"), "Invalid value for '--jobs'"),
+        (("--seed", "-1"), "Invalid value for '--seed'"),
+        (("--every", "0"), "Invalid value for '--every'"),
+        (("--shares", "1", "2", "3"), "Option '--shares' requires 4 arguments"),
+        (("--shares", "0", "0", "0", "0"), "the shares are 0, 0, 0, 0. Remedy: give four numbers"),
+        (("--shares", "1", "-1", "0", "0"), "the shares are 1, -1, 0, 0"),
+        (("--rig", "none.toml"), "none.toml: cannot be read"),
+        (("--out", "taken"), "taken: cannot be written"),
+        (("--out", "strange"), "trials.jsonl: is no list of trials"),
+        (("CAMPAIGN",), "unexpected extra argument"),
+    ],
+)  # fmt: skip
+def test_bad_arguments_are_code_2_with_a_reason(
+    invoke, tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    (tmp_path / "taken").write_text("mine")
+    (tmp_path / "strange").mkdir()
+    (tmp_path / "strange" / "trials.jsonl").write_text("nonsense\n")
+    done = invoke("blind", *words)
+    assert done.exit_code == 2
+    assert said in " ".join(done.stderr.replace("│", " ").split())
+    assert done.stdout == ""
+    assert "Traceback" not in done.stderr
+
+
+def test_the_help_says_what_it_writes(invoke) -> None:
+    done = invoke("blind", "--help")
+    assert done.exit_code == 0
+    for word in ("Example: savgs-ident blind", "Writes", "--trials", "--seed", "--jobs", "--out", "--json"):
+        assert word in done.output
+
+
+def _started(out: Path, trials: int, seconds: float) -> "subprocess.Popen[str]":
+    relaxed = {key: value for key, value in os.environ.items() if not key.startswith("JAX_NUMPY_")}
+    command = [sys.executable, "-m", "tests.cli.blind_fakes", str(out), str(trials), "2", str(seconds)]
+    return subprocess.Popen(
+        command, cwd=REPOSITORY, env=relaxed, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def _gone(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return True
+    status = Path(f"/proc/{process}/stat")
+    return status.exists() and status.read_text().rsplit(")", 1)[1].split()[0] == "Z"
+
+
+def _all_gone(processes: set[int]) -> bool:
+    """Whether processes end within half a minute."""
+    for _ in range(300):
+        if all(map(_gone, processes)):
+            return True
+        time.sleep(0.1)
+    return False
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_a_stopped_run_leaves_no_process_and_loses_no_trial(tmp_path: Path, how: signal.Signals) -> None:
+    stopped, whole = tmp_path / "stopped", tmp_path / "whole"
+    with _started(stopped, 6, 1.0) as process:
+        assert process.stdout is not None
+        workers = {int(process.stdout.readline()) for _ in range(4)}
+        process.send_signal(how)
+        process.wait(30)
+        assert process.returncode in (-how, 130, 1)
+        assert _all_gone(workers)
+    assert process.pid not in workers
+    kept = (stopped / "trials.jsonl").read_text().split("\n")[1:-1]
+    assert 1 <= len(kept) < 6
+    for out in (stopped, whole):
+        with _started(out, 6, 0.0) as process:
+            _, said = process.communicate(timeout=120)
+        assert process.returncode == OK, said
+    assert _record(stopped) == _record(whole)
