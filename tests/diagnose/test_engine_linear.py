@@ -30,7 +30,9 @@ def test_noise_scale_and_discrepancy_are_where_the_density_is_highest(seed: int,
     def density(scale: float, discrepancy: float) -> float:
         variance = scale**2 * data.variance + (discrepancy * data.reach) ** 2
         rows = norm.logpdf(residual, 0.0, np.sqrt(variance)) - norm.logpdf(0.0, 0.0, np.sqrt(data.variance))
-        return float(rows.sum() - 0.5 * (np.log(scale) / NOISE_TRUST) ** 2 - 0.5 * (discrepancy / DISCREPANCY) ** 2)
+        return float(
+            rows.sum() - 0.5 * (np.log(scale) / NOISE_TRUST) ** 2 - 0.5 * (discrepancy / DISCREPANCY) ** 2
+        )
 
     assert found.value == pytest.approx(density(found.noise, found.discrepancy), abs=1e-9)
     best = max(density(s, d) for s in np.linspace(0.8, 1.6, 81) for d in np.linspace(0.0, 0.4, 401))

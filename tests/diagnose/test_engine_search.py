@@ -88,7 +88,9 @@ def test_evidence_is_the_integral_over_the_prior() -> None:
 def test_the_score_is_the_drop_of_chi2_that_a_fit_brings() -> None:
     search = search_of(PLANT, draw(PLANT, {"a": 1.1, "c": 0.01}, NOISE, 5))
     base = climb(search, (), {}, None)
-    bend = next(score for score in score_terms(search, base, list(TERMS), CHOICES) if score.term.name == "bend")
+    bend = next(
+        score for score in score_terms(search, base, list(TERMS), CHOICES) if score.term.name == "bend"
+    )
     weight = 1.0 / np.sqrt(base.misfit.spread)
     slope, bent = 0.2 * PLANT.x * weight, 0.4 * PLANT.x**2 * weight
     residual = search.residual(base.prediction) * weight

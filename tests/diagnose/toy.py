@@ -53,7 +53,10 @@ class ToyPlant:
     ) -> Prediction:
         here = self.rows(values)
         slopes = [
-            (self.rows(dict(values) | {n: values[n] + STEP}) - self.rows(dict(values) | {n: values[n] - STEP}))
+            (
+                self.rows(dict(values) | {n: values[n] + STEP})
+                - self.rows(dict(values) | {n: values[n] - STEP})
+            )
             / (2.0 * STEP)
             for n in names
         ]
@@ -77,9 +80,7 @@ class ToyPlant:
         return found
 
 
-def draw(
-    plant: ToyPlant, values: Mapping[str, float], noise: float, seed: int, miss: float = 0.0
-) -> Data:
+def draw(plant: ToyPlant, values: Mapping[str, float], noise: float, seed: int, miss: float = 0.0) -> Data:
     """Data of a plant at the given parameters, with noise and a discrepancy of relative size ``miss``."""
     rng = np.random.default_rng(seed)
     truth = plant.rows(values)

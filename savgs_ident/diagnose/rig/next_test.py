@@ -5,8 +5,9 @@ link, more payload. The difference that the rival could not make up by moving it
 allows, in units of the noise, is the significance to expect.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,8 +16,10 @@ from numpy.typing import NDArray
 
 from savgs_ident.diagnose.engine.climb import Mode, Search
 from savgs_ident.diagnose.engine.coordinates import slopes_at
+from savgs_ident.diagnose.engine.prediction import Prediction
 from savgs_ident.diagnose.result import NextTest
 from savgs_ident.diagnose.rig.plant import RigPlant
+from savgs_ident.simulate.periodic import PeriodicSolution
 
 DWELLS = 4
 """Dwells of a proposed test."""
@@ -51,44 +54,63 @@ CONDITIONS = (
 def next_tests(search: Search, plant: RigPlant, one: Mode, other: Mode) -> tuple[NextTest, ...]:
     """The tests that separate two hypotheses best, most significant first."""
     pair = " + ".join(one.terms) or "none", " + ".join(other.terms) or "none"
+    drafts = sorted(_drafts(search, plant, one, other), key=lambda each: -each.raw)[:PROPOSED]
     found = []
+    for draft in drafts:
+        hertz = ", ".join(f"{f:.3g}" for f in np.sort(np.asarray(plant.excitation.frequency)[draft.tests]))
+        text = f"dwells at {hertz} Hz, {draft.condition.text}"
+        found.append(NextTest(text, pair, _expected(search, plant, other, draft)))
+    return tuple(sorted(found, key=lambda each: -each.expected_sigma))
+
+
+class _Draft(NamedTuple):
+    """A test under a condition: its most telling dwells, what the hypotheses differ by, rival's motions.
+
+    ``raw`` is the significance that the rival's own freedom has not been taken from yet.
+    """
+
+    condition: Condition
+    tests: NDArray[np.intp]
+    miss: NDArray[np.float64]
+    raw: float
+    near: Any
+
+
+def _drafts(search: Search, plant: RigPlant, one: Mode, other: Mode) -> Iterator[_Draft]:
+    """A draft for every condition under which both hypotheses can be solved."""
     for condition in CONDITIONS:
-        significance, tests = _expected(search, plant, one, other, condition)
-        if significance > 0.0:
-            hertz = ", ".join(f"{f:.3g}" for f in np.sort(np.asarray(plant.excitation.frequency)[tests]))
-            found.append(NextTest(f"dwells at {hertz} Hz, {condition.text}", pair, significance))
-    return tuple(sorted(found, key=lambda each: -each.expected_sigma)[:PROPOSED])
+        found, rival = (_run(plant, mode, condition, (), mode.prediction.near) for mode in (one, other))
+        if not (found.solved and rival.solved):
+            continue
+        miss = found.rows - rival.rows
+        by_test = np.bincount(search.data.test, miss**2 / search.data.variance)
+        tests = np.argsort(by_test)[::-1][:DWELLS]
+        yield _Draft(condition, tests, miss, float(np.sqrt(by_test[tests].sum())), rival.near)
 
 
-def _expected(
-    search: Search, plant: RigPlant, one: Mode, other: Mode, condition: Condition
-) -> tuple[float, NDArray[np.intp]]:
-    """Significance of the most telling dwells under a condition, and which these are; 0 where it cannot be run."""
+def _run(
+    plant: RigPlant, mode: Mode, condition: Condition, names: Sequence[str], near: PeriodicSolution
+) -> Prediction:
+    """A hypothesis under a condition."""
     excitation = plant.excitation
     there = excitation._replace(
         road=condition.lift * excitation.road,
         link=jnp.asarray(excitation.link).at[:, 0].add(condition.turn),
     )
-    elsewhere = replace(plant, excitation=there)
+    moved = eqx.tree_at(lambda each: each.excitation, near, there)
+    values = _loaded(mode.values, plant, condition.payload)
+    return replace(plant, excitation=there).predict(mode.terms, values, names, moved)
 
-    def at(mode: Mode) -> tuple[NDArray[np.float64], NDArray[np.float64], bool]:
-        near = eqx.tree_at(lambda each: each.excitation, mode.prediction.near, there)
-        values = _loaded(mode.values, plant, condition.payload)
-        found = elsewhere.predict(mode.terms, values, [each.name for each in mode.coordinates], near)
-        return found.rows, found.slopes * slopes_at(mode.coordinates, mode.x), found.solved
 
-    rows, _, solved = at(one)
-    rival, slopes, also = at(other)
-    nothing = np.zeros(0, np.intp)
-    if not (solved and also):
-        return 0.0, nothing
-    data, miss = search.data, rows - rival
-    by_test = np.bincount(data.test, miss**2 / data.variance)
-    tests = np.argsort(by_test)[::-1][:DWELLS]
-    chosen = np.isin(data.test, tests)
-    freedom = slopes[chosen] @ other.covariance() @ slopes[chosen].T
-    spread = np.diag(data.variance[chosen]) + freedom
-    return float(np.sqrt(miss[chosen] @ np.linalg.solve(spread, miss[chosen]))), tests
+def _expected(search: Search, plant: RigPlant, other: Mode, draft: _Draft) -> float:
+    """Significance of a draft once the rival has moved its parameters as far as the campaign allows."""
+    names = [each.name for each in other.coordinates]
+    rival = _run(plant, other, draft.condition, names, draft.near)
+    chosen = np.isin(search.data.test, draft.tests)
+    slopes = (rival.slopes * slopes_at(other.coordinates, other.x))[chosen]
+    spread = np.diag(search.data.variance[chosen]) + slopes @ other.covariance() @ slopes.T
+    miss = draft.miss[chosen]
+    return float(np.sqrt(miss @ np.linalg.solve(spread, miss)))
 
 
 def _loaded(values: Mapping[str, float], plant: RigPlant, payload: float) -> dict[str, float]:

@@ -210,8 +210,8 @@ class RigPlant:
         self, model: QuarterCar, p: Values, solution: PeriodicSolution, names: Sequence[str]
     ) -> NDArray[np.float64]:
         """Slopes of the rows in the named parameters, (m, n)."""
-        parts = []
-        for first in range(0, max(len(names), 1), WIDTH):
+        parts = [np.zeros((0, self.likelihood.measured.size))]
+        for first in range(0, len(names), WIDTH):
             some = names[first : first + WIDTH]
             directions = np.zeros((WIDTH, len(self.names)))
             directions[np.arange(len(some)), [self.names.index(name) for name in some]] = 1.0
