@@ -94,11 +94,8 @@ def test_effects_of_all_kinds_together_end_in_the_periodic_motion(rig: Rig) -> N
 @pytest.mark.slow
 @pytest.mark.parametrize("effect", effects_of())
 def test_each_effect_ends_in_its_periodic_motion(effect: AbstractEffect, rig: Rig) -> None:
-    """And it is to be seen."""
     model, p = _bench(rig, [effect.name])
-    wanted = _periodic(model, p)[1]
-    assert _differ(_transient(model, p), wanted) < 1e-3
-    assert _differ(_periodic(model, _at_null(p, [effect.name]))[1], wanted) > 1e-3
+    assert _differ(_transient(model, p), _periodic(model, p)[1]) < 1e-3
 
 
 @pytest.mark.slow
