@@ -69,8 +69,8 @@ def blind(
 
     Example: savgs-ident blind --trials 60 --seed 1
     """
-    # Checks that call back into Python from a compiled program would keep it from being kept for the next run; a failed one
-    # gives NaN then, which is looked for. Has to be said before the libraries are loaded.
+    # Checks that call back into Python from a compiled program would keep it from being kept for the next run; a
+    # failed one gives NaN then, which is looked for. Has to be said before the libraries are loaded.
     os.environ.setdefault("EQX_ON_ERROR", "nan")
     from savgs_ident.cli.blind_trial import diagnose_folder, draw_and_record
     from savgs_ident.cli.blinding import Job, run_blind
