@@ -22,8 +22,8 @@ from savgs_ident.model.values import Values
 STRETCH = 1e-4
 """How far the seals give before they slide [m]."""
 
-LAG = 3e-3
-"""Damping over stiffness of what sticks [s], as in the sheet's rail."""
+LAG = 3e-4
+"""Damping over stiffness of what sticks [s]: little, for the damper is beside it."""
 
 
 class StrutFriction(AbstractForce):

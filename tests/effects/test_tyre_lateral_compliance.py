@@ -6,7 +6,7 @@ import pytest
 from jaxtyping import Array
 
 from savgs_ident.effects.tyre_friction import TyreFriction
-from savgs_ident.effects.tyre_lateral_compliance import DAMPING, TyreLateralCompliance
+from savgs_ident.effects.tyre_lateral_compliance import DAMPING, MASS, TyreLateralCompliance
 from savgs_ident.model.effect import PortSignals
 
 from .laws import fundamental, give_way, typical
@@ -35,16 +35,17 @@ def _scrubbed(amplitude: float, frequency: float, compliance: float) -> tuple[np
 @pytest.mark.parametrize("frequency", [1.0, 4.0])
 @pytest.mark.parametrize("compliance", [2e-7, 2e-6, 1e-5])
 def test_slow_scrub_is_a_spring_in_series_with_a_dashpot(frequency: float, compliance: float) -> None:
-    """Deflection over velocity: D C / (1 + i w C (D + c))."""
+    """Deflection over velocity: D C / (1 + i w C (D + c) - w^2 C m), the mass hardly showing."""
     velocity, way = _scrubbed(0.02, frequency, compliance)
     found = fundamental(way) / fundamental(velocity)
     omega = 2.0 * np.pi * frequency
-    expected = DRAG * compliance / (1.0 + 1j * omega * compliance * (DRAG + DAMPING))
+    stiffness = 1.0 / compliance + 1j * omega * (DRAG + DAMPING) - omega**2 * MASS
+    expected = DRAG / stiffness
     assert abs(found - expected) < 5e-3 * abs(expected)
 
 
 def test_fast_scrub_bends_it_by_what_the_friction_can_hold() -> None:
-    """mu F_tz C, once the tread slides."""
+    """mu F_tz C, once the tread slides: where the scrub is fastest either way."""
     _, way = _scrubbed(0.5, 2.0, 2e-6)
-    assert np.max(way) == pytest.approx(float(P["mu_t"]) * PRESSED * 2e-6, rel=1e-3)
-    assert np.min(way) == pytest.approx(-np.max(way), rel=1e-3)
+    bent = float(P["mu_t"]) * PRESSED * 2e-6
+    assert way[[0, NODES // 2]] == pytest.approx([bent, -bent], rel=1e-3)
