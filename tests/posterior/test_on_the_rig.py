@@ -74,7 +74,9 @@ def test_the_model_near_its_anchor_is_the_model(expansion: Expansion) -> None:
     assert found.solved.all()
     for u, response in zip(points, found.harmonics, strict=True):
         p = problem.parameters(jnp.asarray(u))
-        expected = np.asarray(harmonics(problem.model, p, resolve(problem.model, p, anchor.solution), problem.orders))
+        expected = np.asarray(
+            harmonics(problem.model, p, resolve(problem.model, p, anchor.solution), problem.orders)
+        )
         first = np.abs(expected[..., 1:2])
         assert np.max(np.abs(response - expected) / first) < 1e-6
 
