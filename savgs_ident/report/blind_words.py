@@ -14,7 +14,7 @@ RATE_WORDS: Mapping[str, str] = {
     "unknown_recognised": "Unknown effect recognised as unknown",
     "both_named": "Both of two effects named",
     "intervals_hold": "95 % intervals that hold the truth",
-    "share_closed_90": "Of these, nine tenths of the gap closed or more",
+    "share_closed_90": "Nine tenths of the gap closed, where all is named",
     "named_or_alike": "Effect named, or among those said to look like it",
 }
 """What each rate counts."""

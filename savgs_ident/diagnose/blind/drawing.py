@@ -27,6 +27,9 @@ STANDS_OUT = 8.0
 """Standard deviations, expected, by which an effect must stand out of what calibration and tolerances do: with
 that it does so by five however noise and tolerances fall."""
 
+NUDGE = 0.02
+"""Share of an effect's size by which it is changed for a slope."""
+
 TOLD_APART = 5.0
 """Standard deviations from which on two effects can be told apart."""
 
@@ -73,11 +76,14 @@ class Drawing:
 
     def solve(self, names: Sequence[str], given: Mapping[str, float]) -> NDArray[np.complex128] | None:
         """The response with effects; None where a dwell has no motion."""
+        solution = self._motions(names, given)
+        return None if solution is None else self.bench.response(names, given, solution)
+
+    def _motions(self, names: Sequence[str], given: Mapping[str, float]) -> PeriodicSolution | None:
         model = tuple(sorted(name for name in names if CATALOGUE[name].states))
         if model not in self.starts:
             self.starts[model] = self.bench.solve(model, self.rig)
-        solution = self.bench.solve(names, given, self.starts[model])
-        return None if solution is None else self.bench.response(names, given, solution)
+        return self.bench.solve(names, given, self.starts[model])
 
     def present(self, name: str, random: np.random.Generator) -> Present | None:
         """An effect of a size drawn; None where no size within its bounds does that much."""
@@ -101,26 +107,35 @@ class Drawing:
         """How far a response stands out of what the rig can do, with the effect ``beside`` of any size."""
         names = () if beside is None else (beside.name,)
         noise, known = self.hiding.noise, len(self.hiding.names)
-        flat = np.zeros((noise.size, len(names)))
-        if beside is not None:
-            flat[:, 0] = (rows_of(beside.response) - rows_of(self.response)) / noise
+
+        def given_at(x: NDArray[np.float64]) -> dict[str, float]:
+            return self._moved(x) | ({} if beside is None else beside.scaled(float(x[-1])))
 
         def miss_at(x: NDArray[np.float64]) -> NDArray[np.float64] | None:
-            own = {} if beside is None else beside.scaled(float(x[-1]))
-            response = self.solve(names, self._moved(x) | own)
+            response = self.solve(names, given_at(x))
             return None if response is None else (rows_of(target) - rows_of(response)) / noise
 
-        def columns_at(x: NDArray[np.float64]) -> NDArray[np.float64]:
-            there = self._moved(x)
-            solution = self.bench.solve((), there, self.starts[()])
-            near = self.hiding if solution is None else hiding_at(self.bench, there, solution)
-            return np.concatenate([near.columns, flat], axis=1)
+        def columns_at(x: NDArray[np.float64], miss: NDArray[np.float64]) -> NDArray[np.float64]:
+            columns = self._hiding_at(names, given_at(x)).columns
+            if not names:
+                return columns
+            nudged = miss_at(x + NUDGE * np.eye(x.size)[-1])
+            last = np.zeros(noise.size) if nudged is None else (miss - nudged) / NUDGE
+            return np.column_stack([columns, last])
 
         start = np.concatenate([np.zeros(known), np.ones(len(names))])
-        columns = np.concatenate([self.hiding.columns, flat], axis=1)
-        return sigma_of(miss_at, columns_at, start, columns, known)
+        return sigma_of(miss_at, columns_at, start, known)
+
+    def _hiding_at(self, names: Sequence[str], given: Mapping[str, float]) -> Hiding:
+        """What can hide an effect elsewhere."""
+        if given == self.rig:
+            return self.hiding
+        solution = self._motions(names, given)
+        return self.hiding if solution is None else hiding_at(self.bench, names, given, solution)
 
     def _moved(self, x: NDArray[np.float64]) -> dict[str, float]:
+        if not x[: len(self.hiding.names)].any():
+            return dict(self.rig)
         table, free = self.bench.table, self.bench.free
         return dict(self.rig) | {
             name: moved(table[name], self.rig.get(name, table[name].value), value, name in free)
@@ -143,4 +158,4 @@ def drawing_of(bench: Bench, rig: Mapping[str, float]) -> Drawing | None:
     if solution is None:
         return None
     response = bench.response((), rig, solution)
-    return Drawing(bench, rig, response, hiding_at(bench, rig, solution), {(): solution})
+    return Drawing(bench, rig, response, hiding_at(bench, (), rig, solution), {(): solution})

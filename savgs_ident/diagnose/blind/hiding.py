@@ -10,7 +10,7 @@ with x the parameters that are identified or known to a tolerance, in units of w
 The search takes damped Gauss-Newton steps.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +23,7 @@ from savgs_ident.effects.registry import CATALOGUE
 from savgs_ident.fit.problem import used_parameters
 from savgs_ident.simulate.periodic import PeriodicSolution, harmonic_sensitivities
 
-STEPS = 6
+STEPS = 12
 """Steps of the search at most."""
 
 SHARES = (1.0, 0.3, 0.1)
@@ -74,9 +74,11 @@ def moved(each: Parameter, value: float, x: float, free: bool) -> float:
     return float(np.clip(there, each.lower, each.upper))
 
 
-def hiding_at(bench: Bench, given: Mapping[str, float], solution: PeriodicSolution) -> Hiding:
-    """What can hide an effect of the rig with these parameters, whose motions are ``solution``."""
-    model, p = bench.model(()), bench.values(given)
+def hiding_at(
+    bench: Bench, effects: Sequence[str], given: Mapping[str, float], solution: PeriodicSolution
+) -> Hiding:
+    """What can hide an effect of the rig with these effects and parameters, whose motions are ``solution``."""
+    model, p = bench.model(effects), bench.values(given)
     used = used_parameters(model, bench.table)
     known = [name for name in known_to_tolerance(bench.table, bench.free) if name in used]
     others = {n: tuple(e.null) for n, e in CATALOGUE.items() if n not in bench.baseline and not e.states}
@@ -111,15 +113,14 @@ def first_order_sigma(hiding: Hiding, change: Real, flat: Real) -> float:
 
 def sigma_of(
     miss_at: Callable[[Real], Real | None],
-    columns_at: Callable[[Real], Real],
+    columns_at: Callable[[Real, Real], Real],
     start: Real,
-    columns: Real,
     known: int,
 ) -> float:
     """How far a response stands out: the least sigma found from ``start`` (n,), with (m,) misses in noise.
 
-    ``columns`` are minus the slopes of ``miss_at`` there, (m, n), and ``columns_at(x)`` those elsewhere; the first
-    ``known`` entries of x have priors. Steps that make it worse, or lead where there is no motion, are shortened.
+    ``columns_at(x, miss)`` are minus the slopes of ``miss_at(x)``, (m, n); the first ``known`` entries of x have
+    priors. Steps that make it worse, or lead where there is no motion, are shortened.
     """
 
     def square(x: Real, miss: Real | None) -> float:
@@ -127,16 +128,15 @@ def sigma_of(
 
     x, miss = start, miss_at(start)
     best = square(x, miss)
-    for turn in range(STEPS):
-        if miss is None:
+    for _ in range(STEPS):
+        if miss is None or best < ENOUGH**2:
             break
-        slopes, before = columns_at(x) if turn else columns, best
-        step = _step(slopes, miss, x, known)
+        step, before = _step(columns_at(x, miss), miss, x, known), best
         for share in SHARES:
             found = miss_at(x + share * step)
             if square(x + share * step, found) < best:
                 x, miss, best = x + share * step, found, square(x + share * step, found)
                 break
-        if best < ENOUGH**2 or best > SETTLED * before:
+        if best > SETTLED * before:
             break
     return float(np.sqrt(best))
