@@ -22,5 +22,5 @@ def test_the_rig_file_has_the_last_word_on_the_parameters_of_effects(rig: Rig) -
 
 
 def test_an_unknown_effect_is_refused_with_the_choice(rig: Rig) -> None:
-    with pytest.raises(InputError, match=r"no effect 'rail_colomb'.*rail_coulomb, tyre_friction"):
+    with pytest.raises(InputError, match=r"no effect 'rail_colomb'.*rail_coulomb,.* tyre_friction"):
         build_model(rig, ["rail_colomb"])

@@ -15,6 +15,7 @@ from savgs_ident.effects.tyre_friction import TyreFriction
 from savgs_ident.model.effect import AbstractForce, InternalState, Port, PortSignals
 from savgs_ident.model.inputs import Imposed, nothing_imposed
 from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.section import SectionCurves, section_curves
 from savgs_ident.model.values import Values
 
 from .instants import NOMINAL, as_values, draw_instants, inputs_of, motion_of
@@ -44,7 +45,6 @@ class _Probe(AbstractForce):
         return jnp.stack([signals.velocity, 10.0 * state[1]])
 
 
-@eqx.filter_jit
 def _out_of_balance(
     model: QuarterCar,
     p: Values,
@@ -53,8 +53,23 @@ def _out_of_balance(
     sd: Array,
     imposed: Imposed | None = None,
 ) -> Array:
-    instant = jnp.asarray(instant)
-    return model.residual(p, motion_of(instant), s, sd, inputs_of(instant)._replace(imposed=imposed))
+    """The residual."""
+    return _evaluated(model, p, section_curves(p), jnp.asarray(instant), s, sd, imposed)
+
+
+# With the linkage compiled once for all models.
+@eqx.filter_jit
+def _evaluated(
+    model: QuarterCar,
+    p: Values,
+    curves: SectionCurves,
+    instant: Array,
+    s: Array,
+    sd: Array,
+    imposed: Imposed | None,
+) -> Array:
+    inputs = inputs_of(instant)._replace(imposed=imposed)
+    return model.residual(p, motion_of(instant), s, sd, inputs, curves)
 
 
 def _lively() -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ from savgs_ident.model.effect import Port
 from savgs_ident.model.equilibrium import Equilibrium, static_equilibrium
 from savgs_ident.model.kinematics import strut_length
 from savgs_ident.model.quarter_car import Loads, QuarterCar
+from savgs_ident.model.section import SectionCurves, section_curves
 from savgs_ident.model.values import Values
 
 from .instants import NOMINAL, as_values, draw_instants, inputs_of, motion_of
@@ -25,18 +26,29 @@ from .series import Yielding
 NONE = np.zeros(0)
 
 
-@eqx.filter_jit
 def _seen(
     model: QuarterCar, p: Values, instant: NDArray[np.float64], s: Array, sd: Array
 ) -> tuple[Array, Loads]:
     """Residual and loads."""
-    at = (p, motion_of(instant), s, sd, inputs_of(instant))
+    return _evaluated(model, p, section_curves(p), instant, s, sd)
+
+
+# With the linkage compiled once for all models.
+@eqx.filter_jit
+def _evaluated(
+    model: QuarterCar, p: Values, curves: SectionCurves, instant: NDArray[np.float64], s: Array, sd: Array
+) -> tuple[Array, Loads]:
+    at = (p, motion_of(instant), s, sd, inputs_of(instant), curves)
     return model.residual(*at), model.loads(*at)
 
 
 @eqx.filter_jit
+def _resting(model: QuarterCar, p: Values, curves: SectionCurves) -> Equilibrium:
+    return static_equilibrium(model, p, jnp.asarray(0.6), jnp.zeros(()), curves)
+
+
 def _at_rest(model: QuarterCar, p: Values) -> Equilibrium:
-    return static_equilibrium(model, p, jnp.asarray(0.6), jnp.zeros(()), model.curves(p))
+    return _resting(model, p, section_curves(p))
 
 
 def _still(seed: int) -> NDArray[np.float64]:
