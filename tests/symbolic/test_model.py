@@ -58,7 +58,7 @@ def told(rig: Rig, request: pytest.FixtureRequest) -> Told:
     parameters = np.array([list(shifted(table.as_dict(), seed).values()) for seed in range(COUNT)])
     examples = dict(zip(("instant", "s", "sd", "p"), (instants[0], s[0], sd[0], parameters[0]), strict=True))
     casadi = to_casadi("residual", residual, examples, ["residual"])
-    return Told(casadi, jax.vmap(residual), (instants, s, sd, parameters))
+    return Told(casadi, jax.jit(jax.vmap(residual)), (instants, s, sd, parameters))
 
 
 def test_the_residual_is_the_same(told: Told) -> None:
