@@ -80,6 +80,7 @@ def test_there_is_one_of_each_kind() -> None:
     assert all(any(isinstance(CATALOGUE[name], kind) for name in OF_ALL_KINDS) for kind in PORTS)
 
 
+@pytest.mark.slow
 def test_effects_of_all_kinds_together_end_in_the_periodic_motion(rig: Rig) -> None:
     """And with all but the frictions of SimTR at their null it is that of SimTR."""
     model, p = _bench(rig, OF_ALL_KINDS)
