@@ -48,9 +48,14 @@ def held_within(x: Float[Array, ""], lower: Float[Array, ""], upper: Float[Array
     return jnp.where(x > upper, upper, jnp.where(x < lower, lower, x))
 
 
+def _not_below_zero(x: Float[Array, ""]) -> Float[Array, ""]:
+    """``jnp.maximum`` halves the slope at zero, at the null."""
+    return jnp.where(x < 0.0, 0.0, x)
+
+
 def bristle(stick: Presliding, signals: PortSignals, grip: Grip, anchor: Float[Array, ""]) -> Bristle:
     """The bristle's force and how fast its anchor is dragged."""
-    up, down = jnp.maximum(grip.against_up, 0.0), -jnp.maximum(grip.against_down, 0.0)
+    up, down = _not_below_zero(grip.against_up), -_not_below_zero(grip.against_down)
     stretch = signals.displacement - anchor
     resisting = held_within(stick.stiffness * stretch + stick.damping * signals.velocity, down, up)
     over = stretch - held_within(stretch, down / stick.stiffness, up / stick.stiffness)

@@ -1,11 +1,15 @@
 """Eqs. (1)-(2): what the rail holds is in proportion to what it carries."""
 
+import jax
+import jax.numpy as jnp
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from jaxtyping import Array
 
 from savgs_ident.core.rig import Rig
 from savgs_ident.effects.rail_coulomb import RailCoulomb
+from savgs_ident.model.bristle import Presliding, bristle
 
 from .laws import in_the_rig, instant, signals, typical
 
@@ -31,3 +35,18 @@ def test_a_body_that_slides_is_held_by_that_and_one_that_sticks_by_the_bristle(
     stretch = 0.5 * numbers["mu_r"] * float(loads.carriage) / numbers["k_pre"] * way
     held = in_the_rig(rig, numbers, ("rail_coulomb",), sticking, (-stretch,))[1]
     assert float(held.rail) == pytest.approx(-numbers["k_pre"] * stretch, rel=1e-12)
+
+
+def test_its_null_has_the_slope_of_the_friction_to_either_side() -> None:
+    """Right at mu_r = 0 the derivative is the load opposing the motion, up and down alike."""
+    load = 5000.0
+
+    def force(mu: Array, velocity: float) -> Array:
+        seen = signals(velocity=velocity, load=load)
+        p = {"mu_r": mu}
+        return bristle(
+            Presliding(jnp.asarray(1e7), jnp.asarray(3e4)), seen, RAIL.grip(p, seen), mu * 0.0
+        ).force
+
+    slope = jax.grad(force)
+    assert [float(slope(jnp.zeros(()), velocity)) for velocity in (0.3, -0.3)] == [-load, load]
