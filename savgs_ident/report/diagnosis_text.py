@@ -1,6 +1,7 @@
 """A diagnosis in the terminal: the verdict first, then how far the gap shrinks, what else it could be, next tests."""
 
 from collections.abc import Iterator
+from math import isfinite
 
 from rich.console import Group, RenderableType
 
@@ -94,7 +95,7 @@ def _parameters(diagnosis: Diagnosis) -> Iterator[RenderableType]:
     estimates = named[0].parameters if named and diagnosis.verdict.effects else ()
     if estimates:
         yield plain("Its parameters, with 95 % intervals", "bold")
-        yield from (plain(f"- {each.name}: {_open(estimate_words(each))}") for each in estimates)
+        yield from (plain(f"- {each.name}: {estimate_words(each)}") for each in estimates)
         yield plain("")
 
 
@@ -117,13 +118,9 @@ def _not_judgeable(diagnosis: Diagnosis) -> Iterator[RenderableType]:
     if diagnosis.not_judgeable:
         yield plain("This campaign cannot show", "bold")
     for each in diagnosis.not_judgeable:
-        size = _open(smallest_words(each))
-        yield plain(f"- {each.effect}, unless its {each.parameter} is at least {size}")
-
-
-def _open(text: str) -> str:
-    """Thousands apart by a space that every terminal knows."""
-    return text.replace("\u202f", " ")
+        size = smallest_words(each)
+        limit = f"unless its {each.parameter} is at least {size}" if isfinite(each.smallest) else size
+        yield plain(f"- {each.effect}, {limit}")
 
 
 def _warnings(diagnosis: Diagnosis) -> Iterator[RenderableType]:

@@ -139,7 +139,9 @@ def sigma_words(sigma: float) -> str:
 
 
 def smallest_words(each: NotJudgeable) -> str:
-    """The smallest size of an effect that could have been seen, with its unit."""
+    """The smallest size of an effect that could have been seen, with its unit, if there is one."""
+    if not isfinite(each.smallest):
+        return "whatever its size"
     unit = unit_text(each.unit)
     return numeral(each.smallest, 0.1 * abs(each.smallest)) + ("" if unit == DASH else f" {unit}")
 

@@ -8,10 +8,13 @@ from rich.text import Text
 
 
 def plain(text: object, style: str = "") -> Text:
-    """``text`` exactly as it is, with control characters spelled out and markup left unread."""
+    """``text`` as it is, with control characters spelled out and markup left unread.
+
+    What keeps thousands apart becomes a space that every terminal knows.
+    """
     shown = "".join(
         char if char.isprintable() or char == "\n" else char.encode("unicode_escape").decode()
-        for char in str(text)
+        for char in str(text).replace("\u202f", " ")
     )
     return Text(shown, style=style)
 

@@ -373,6 +373,7 @@ def test_numbers_are_told_to_the_digits_that_they_justify() -> None:
     assert closed_words(NO_SHRINK) == "\u2013"
     assert estimate_words(Estimate("tau", 0.01503, 0.0147, 0.0153, "s")) == "0.01503 (0.01470 to 0.01530) s"
     assert smallest_words(NotJudgeable("a", "b", 0.25, "1")) == "0.250"
+    assert smallest_words(NotJudgeable("a", "b", float("inf"), "m")) == "whatever its size"
 
 
 def test_both_files_are_written_and_the_same_diagnosis_gives_the_same_page(
