@@ -118,7 +118,8 @@ def diagnose_folder(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping
     """The diagnosis of a recorded campaign as its ``diagnosis.json`` has it."""
     settings = DiagnosisSettings(without=without)
     campaign, measured = read_response(folder, None, settings.orders, None, SILENT)
-    diagnosis = diagnose_response(measured, rig, settings)
+    sweep = next(iter(campaign.of_kind("sweep")), None)
+    diagnosis = diagnose_response(measured, rig, settings, sweep=sweep)
     origin = origin_of(campaign, rig.name, (), (), measured.warnings)
     record: Mapping[str, Any] = json.loads(to_json(diagnosis_record(diagnosis, origin)))
     return record

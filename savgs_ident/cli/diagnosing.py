@@ -54,7 +54,8 @@ def run_diagnosis(job: Job, voice: Voice, out: Path) -> int:
         campaign, measured = read_response(
             job.campaign, job.channels, job.orders, job.max_frequency, progress
         )
-        diagnosis = diagnose_response(measured, rig, settings, values, progress)
+        sweep = next(iter(campaign.of_kind("sweep")), None)
+        diagnosis = diagnose_response(measured, rig, settings, values, progress, sweep)
         progress("writing")
         origin = origin_of(campaign, source, job.command, PACKAGES, measured.warnings)
         files = write_diagnosis(diagnosis, origin, out)

@@ -2,7 +2,8 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,20 +16,32 @@ from savgs_ident.diagnose.engine.attribution import Attribution, attribute
 from savgs_ident.diagnose.engine.climb import Mode, Search, climb, refine, search_of
 from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.heldout import HeldOut, held_out_by_law, hold_out
+from savgs_ident.diagnose.engine.parallel import in_parallel
 from savgs_ident.diagnose.engine.prediction import Term
 from savgs_ident.diagnose.engine.search import EXPLAINED, Findings, find_terms, left_over
-from savgs_ident.diagnose.result import Diagnosis, ForceLoop, Kind, NextTest, PortShare, Responses
+from savgs_ident.diagnose.engine.strain import strain_of
+from savgs_ident.diagnose.result import (
+    Diagnosis,
+    ForceLoop,
+    Kind,
+    NextTest,
+    PortShare,
+    Responses,
+    SweepShrink,
+)
 from savgs_ident.diagnose.rig.columns import SHAPES
 from savgs_ident.diagnose.rig.gap import Rows, shrinks
 from savgs_ident.diagnose.rig.loops import loops_of
 from savgs_ident.diagnose.rig.next_test import next_tests
 from savgs_ident.diagnose.rig.places import places_of
 from savgs_ident.diagnose.rig.plant import RigPlant, rig_plant
+from savgs_ident.diagnose.rig.sweep import cam_sweep, sweep_gaps
 from savgs_ident.diagnose.rig.where import cycle_positions, gap_map
 from savgs_ident.diagnose.settings import DiagnosisSettings
 from savgs_ident.diagnose.verdict import Weighed, kind_of, probabilities, rivals_of, weigh
 from savgs_ident.diagnose.words import verdict_of, warnings_of
-from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.effects.registry import CATALOGUE, build_model
+from savgs_ident.recordings.recording import Recording
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 Progress = Callable[[str], None]
@@ -67,18 +80,21 @@ def diagnose_response(
     settings: DiagnosisSettings | None = None,
     values: Mapping[str, float] | None = None,
     progress: Progress | None = None,
+    sweep: Recording | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between a rig's baseline model and a measured response.
 
     ``rig`` is the rig as known before any fit; ``values`` (SI, by name) are those that the baseline is given with,
-    the rig's own where left out.
+    the rig's own where left out. A ``sweep`` of the cam is no part of the diagnosis: it is predicted, and compared.
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a response that cannot be used, for names
     that do not exist, and for a rig whose baseline has no periodic motion.
     """
     # Threads of the linear algebra only get in each other's way: its matrices are small, and there are many.
     with threadpool_limits(1, "blas"):
-        return _diagnose(measured, rig, settings or DiagnosisSettings(), values or {}, progress or _silent)
+        return _diagnose(
+            measured, rig, settings or DiagnosisSettings(), values or {}, progress or _silent, sweep
+        )
 
 
 def _diagnose(
@@ -87,14 +103,18 @@ def _diagnose(
     options: DiagnosisSettings,
     values: Mapping[str, float],
     tell: Progress,
+    sweep: Recording | None,
 ) -> Diagnosis:
     began = time.perf_counter()
     case = recalibrate(measured, rig, options, values, tell)
     judged = judge(case, tell)
     terms = {term.name: term for term in case.plant.candidates}
     named = judged.chosen.mode if judged.kind in ("effect", "several") else None
-    held = _hold_out_all(case, judged, terms, tell)
-    return _assemble(case, judged, named, held, measured, options, tell, began)
+    with ThreadPoolExecutor(1) as aside:
+        swept = aside.submit(_predict_sweep, case, judged.kind, named, values, sweep, tell)
+        held = _hold_out_all(case, judged, terms, tell)
+        found = _assemble(case, judged, named, held, measured, options, tell)
+    return replace(found, sweep=swept.result(), wall_s=time.perf_counter() - began)
 
 
 def recalibrate(
@@ -141,7 +161,8 @@ def judge(case: Case, tell: Progress) -> Judged:
         q = plant.values(best.values)
         beyond = attribute(search, best, places_of(plant, best.terms, q, best.prediction.near))
         besides = max(each.evidence for each in beyond)
-    weighed = weigh(findings, alone, besides)
+    strained = best.evidence + strain_of(best, plant.nuisances)
+    weighed = weigh(findings, alone, besides, strained)
     kind, chosen = kind_of(weighed, _own_change(case, best), left)
     return Judged(findings, tuple(places), tuple(weighed), kind, chosen, left)
 
@@ -162,11 +183,13 @@ def _own_change(case: Case, mode: Mode) -> float:
 def _hold_out_all(case: Case, judged: Judged, terms: dict[str, Term], tell: Progress) -> dict[str, HeldOut]:
     """Left-out predictions of the baseline, the two best fitted hypotheses and the best learned law, by name."""
     modes = [case.base, *sorted(judged.findings.modes, key=lambda each: -each.evidence)[:2]]
-    held = {}
-    for mode in modes:
+
+    def without_parts(mode: Mode) -> tuple[str, HeldOut]:
         name = " + ".join(mode.terms) or "none"
         tell(f"leaving tests out: {name}")
-        held[name] = hold_out(case.search, mode, tuple(terms[each] for each in mode.terms))
+        return name, hold_out(case.search, mode, tuple(terms[each] for each in mode.terms))
+
+    held = dict(in_parallel(without_parts, modes))
     held["unknown"] = held_out_by_law(case.search, judged.places[0].held_out)
     return held
 
@@ -179,7 +202,6 @@ def _assemble(
     measured: HarmonicResponse,
     options: DiagnosisSettings,
     tell: Progress,
-    began: float,
 ) -> Diagnosis:
     plant, data, base = case.plant, case.data, case.base
     after = named or base
@@ -219,7 +241,32 @@ def _assemble(
         measured=measured,
         converged=base.status.ok and after.status.ok,
         warnings=warnings_of(case.base, after, judged.left, judged.kind),
-        wall_s=time.perf_counter() - began,
+        wall_s=0.0,
+    )
+
+
+def _predict_sweep(
+    case: Case,
+    kind: Kind,
+    named: Mode | None,
+    values: Mapping[str, float],
+    recording: Recording | None,
+    tell: Progress,
+) -> SweepShrink | None:
+    """The gap of a recorded sweep, predicted by the baseline as given, recalibrated, and with what is named."""
+    sweep = None if recording is None else cam_sweep(recording)
+    if recording is None or sweep is None:
+        return None
+    tell("predicting the sweep")
+    plant, bare = case.plant, build_model(case.plant.rig, case.plant.baseline)
+    models = [(bare, plant.values(given)) for given in (values, case.base.values)]
+    if named is not None:
+        model = build_model(plant.rig, (*plant.baseline, *named.terms))
+        models.append((model, plant.values(named.values)))
+    before, recalibrated, *after = sweep_gaps(recording, sweep, models)
+    # A learned law stands for no model that could be simulated.
+    return SweepShrink(
+        before, recalibrated, after[0] if after else np.nan if kind == "unknown" else recalibrated
     )
 
 
@@ -255,11 +302,11 @@ def _next_tests(
         for mode in judged.findings.modes
         if len(mode.terms) == 1 and mode.terms[0] in alike - {*chosen.terms}
     ]
-    found: list[NextTest] = []
-    for rival in sorted(rivals, key=lambda each: -each.evidence)[:2]:
-        tell(f"looking for a test that tells {chosen.terms[0]} from {rival.terms[0]}")
-        found += next_tests(case.search, case.plant, chosen, rival)
-    return tuple(found)
+    if not rivals:
+        return ()
+    rival = max(rivals, key=lambda each: each.evidence)
+    tell(f"looking for a test that tells {chosen.terms[0]} from {rival.terms[0]}")
+    return next_tests(case.search, case.plant, chosen, rival)
 
 
 def _silent(line: str) -> None:

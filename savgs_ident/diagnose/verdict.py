@@ -42,11 +42,12 @@ class Weighed:
     mode: Mode | None
 
 
-def weigh(findings: Findings, alone: float, besides: float) -> list[Weighed]:
+def weigh(findings: Findings, alone: float, besides: float, strained: float) -> list[Weighed]:
     """All hypotheses by falling weight.
 
     ``alone`` is the log evidence of the best law learned at a port; ``besides`` that of the best one beside the best
-    effects, which is no more probable beforehand than these are.
+    effects, and ``strained`` that of these if a tolerance does not hold, both no more probable beforehand than
+    these effects are.
     """
     count = max(len(findings.scores), 1)
     single, pair = log(PRIOR_SINGLE / count), log(PRIOR_PAIR / max(count * (count - 1) / 2, 1))
@@ -54,7 +55,8 @@ def weigh(findings: Findings, alone: float, besides: float) -> list[Weighed]:
     def prior(mode: Mode) -> float:
         return {0: log(PRIOR_NONE), 1: single}.get(len(mode.terms), pair)
 
-    unknown = max(alone, besides + prior(findings.best)) + log(PRIOR_UNKNOWN)
+    most = max(besides, strained) + prior(findings.best)
+    unknown = max(alone, most) + log(PRIOR_UNKNOWN)
     found = [
         Weighed("none", (), findings.base.evidence + log(PRIOR_NONE), findings.base),
         Weighed("unknown", (), unknown, None),

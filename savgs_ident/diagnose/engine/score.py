@@ -5,6 +5,7 @@ does not get credit for. Two numbers come out: its significance with the weights
 that the linearised hypothesis would have, where noise scale and discrepancy are set to their best anew.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log, sqrt
 
@@ -44,9 +45,24 @@ class Score:
 
 
 def score_terms(search: Search, mode: Mode, terms: list[Term], choices: tuple[float, ...]) -> list[Score]:
-    """Scores of candidates about a mode; ``choices`` are the multiples of their shapes that the plant tries."""
+    """Scores of candidates about a mode, best first.
+
+    ``choices`` are the multiples of their typical shapes that the plant tries.
+    """
     columns = search.plant.columns(mode.terms, mode.values, mode.prediction.near, terms)
-    return [_score(search, mode, term, each, choices) for term, each in zip(terms, columns, strict=True)]
+    return scores_of(search, mode, terms, columns, choices)
+
+
+def scores_of(
+    search: Search,
+    mode: Mode,
+    terms: Sequence[Term],
+    columns: Sequence[NDArray[np.float64]],
+    choices: tuple[float, ...],
+) -> list[Score]:
+    """The same with known ``columns``, (choices, m, amplitudes) of each term, best first."""
+    found = [_score(search, mode, term, each, choices) for term, each in zip(terms, columns, strict=True)]
+    return sorted(found, key=lambda each: -each.evidence)
 
 
 def _score(

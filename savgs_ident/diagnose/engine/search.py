@@ -5,15 +5,16 @@ the scores says which are worth the fit; a pair is tried on top of the best sing
 the noise.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from savgs_ident.diagnose.engine.climb import Mode, Search, climb, refine
 from savgs_ident.diagnose.engine.parallel import in_parallel
 from savgs_ident.diagnose.engine.prediction import Term
-from savgs_ident.diagnose.engine.score import Score, cosine, score_terms
+from savgs_ident.diagnose.engine.score import Score, cosine, score_terms, scores_of
 
 Tell = Callable[[str], None]
 """Is told what is going on, a line at a time."""
@@ -90,7 +91,9 @@ def find_terms(
 ) -> Findings:
     """Hypotheses about what is missing in the baseline at its mode ``base``."""
     tell(f"scores of {len(terms)} effects")
-    scores = sorted(score_terms(search, base, list(terms), choices), key=lambda each: -each.evidence)
+    columns = search.plant.columns((), base.values, base.prediction.near, list(terms))
+    alone = dict(zip((term.name for term in terms), columns, strict=True))
+    scores = scores_of(search, base, terms, columns, choices)
     worth = [each for each in scores if each.evidence > base.evidence + NOTICED]
     ranked = _refined(search, _fitted(search, base, worth[:FIRST], terms, tell), terms, tell)
     later = worth[FIRST : FIRST + MORE]
@@ -100,9 +103,11 @@ def find_terms(
     ranked = _refined(search, [*ranked, *_fitted(search, base, later, terms, tell)], terms, tell)
     pairs: list[Mode] = []
     if ranked and ranked[0].evidence > base.evidence + SURE:
-        for parent in ranked[:PARENTS]:
-            if left_over(search, base, ranked[0]) > EXPLAINED:
+        if left_over(search, base, ranked[0]) > EXPLAINED:
+            for parent in ranked[:PARENTS]:
                 pairs += _with_partners(search, parent, terms, choices, pairs, tell)
+        else:
+            pairs = _with_small_partners(search, ranked[0], terms, alone, choices, tell)
         pairs = _refined(search, pairs, terms, tell)
     modes = sorted([*ranked, *pairs], key=lambda mode: -mode.evidence)
     return Findings(base, tuple(scores), tuple(modes))
@@ -140,8 +145,27 @@ def _with_partners(
         for term in terms
         if term.name not in parent.terms and frozenset({*parent.terms, term.name}) not in tried
     ]
-    scores = sorted(score_terms(search, parent, others, choices), key=lambda each: -each.evidence)
+    scores = score_terms(search, parent, others, choices)
     worth = [each for each in scores if each.evidence > parent.evidence]
+    return _fitted(search, parent, worth[:PARTNERS], terms, tell)
+
+
+def _with_small_partners(
+    search: Search,
+    parent: Mode,
+    terms: Sequence[Term],
+    alone: Mapping[str, NDArray[np.float64]],
+    choices: tuple[float, ...],
+    tell: Tell,
+) -> list[Mode]:
+    """Pairs of a term that explains nearly all with partners so small that one alone does not show the other.
+
+    What a partner would do is taken from the motion without the term, columns by name in ``alone``: near enough to
+    say whether it is worth a fit.
+    """
+    others = [term for term in terms if term.name not in parent.terms]
+    scores = scores_of(search, parent, others, [alone[term.name] for term in others], choices)
+    worth = [each for each in scores if each.evidence > parent.evidence + NOTICED]
     return _fitted(search, parent, worth[:PARTNERS], terms, tell)
 
 

@@ -5,7 +5,7 @@ link, more payload. The difference that the rival could not make up by moving it
 allows, in units of the noise, is the significance to expect.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.diagnose.engine.climb import Mode, Search
 from savgs_ident.diagnose.engine.coordinates import slopes_at
+from savgs_ident.diagnose.engine.parallel import in_parallel
 from savgs_ident.diagnose.engine.prediction import Prediction
 from savgs_ident.diagnose.result import NextTest
 from savgs_ident.diagnose.rig.plant import RigPlant
@@ -76,16 +77,19 @@ class _Draft(NamedTuple):
     near: Any
 
 
-def _drafts(search: Search, plant: RigPlant, one: Mode, other: Mode) -> Iterator[_Draft]:
+def _drafts(search: Search, plant: RigPlant, one: Mode, other: Mode) -> list[_Draft]:
     """A draft for every condition under which both hypotheses can be solved."""
-    for condition in CONDITIONS:
+
+    def draft(condition: Condition) -> _Draft | None:
         found, rival = (_run(plant, mode, condition, (), mode.prediction.near) for mode in (one, other))
         if not (found.solved and rival.solved):
-            continue
+            return None
         miss = found.rows - rival.rows
         by_test = np.bincount(search.data.test, miss**2 / search.data.variance)
         tests = np.argsort(by_test)[::-1][:DWELLS]
-        yield _Draft(condition, tests, miss, float(np.sqrt(by_test[tests].sum())), rival.near)
+        return _Draft(condition, tests, miss, float(np.sqrt(by_test[tests].sum())), rival.near)
+
+    return [each for each in in_parallel(draft, CONDITIONS) if each is not None]
 
 
 def _run(
