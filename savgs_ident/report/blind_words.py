@@ -15,7 +15,7 @@ RATE_WORDS: Mapping[str, str] = {
     "both_named": "Both of two effects named",
     "intervals_hold": "95 % intervals that hold the truth",
     "share_closed_90": "Nine tenths of the gap closed, where all is named",
-    "named_or_alike": "Effect named, or among those said to look like it",
+    "named_exactly": "Effect named, and not one that does the same",
 }
 """What each rate counts."""
 

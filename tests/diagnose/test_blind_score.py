@@ -1,7 +1,7 @@
 """Marks of diagnoses made by hand, and what many of them say together."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import pytest
 from hypothesis import given
@@ -40,15 +40,24 @@ def test_an_effect_at_the_same_port_is_located_but_not_named() -> None:
     score = score_of(LAG, diagnosis("effect", "accel_gain"))
     assert score.named_right is False
     assert score.located_right is True
-    assert score.named_or_alike is False
+    assert score.named_exactly is False
 
 
-def test_what_looks_alike_does_not_count_as_named() -> None:
-    score = score_of(
-        answer("effect", "accel_tilt"), diagnosis("effect", "accel_gain", like=("accel_tilt", "cam_scale"))
-    )
-    assert score.named_right is False
-    assert score.named_or_alike is True
+@pytest.mark.parametrize(
+    ("imitators", "like", "right"),
+    [
+        (("gear_compliance",), ("mount_compliance", "cam_scale"), True),
+        (("gear_compliance",), ("cam_scale",), False),
+        ((), ("mount_compliance",), False),
+        (("accel_gain",), ("mount_compliance",), False),
+    ],
+)
+def test_what_does_the_same_counts_where_the_verdict_says_so(
+    imitators: tuple[str, ...], like: tuple[str, ...], right: bool
+) -> None:
+    truth = replace(answer("effect", "mount_compliance"), imitators=imitators)
+    score = score_of(truth, diagnosis("effect", "gear_compliance", like=like))
+    assert (score.named_right, score.located_right, score.named_exactly) == (right, right, False)
 
 
 @pytest.mark.parametrize("verdict", [diagnosis("none"), diagnosis("unknown", ports=["rail"])])
@@ -140,7 +149,7 @@ def test_rates_count_only_the_trials_that_they_are_about() -> None:
         "both_named": (1, 2),
         "intervals_hold": (1, 1),
         "share_closed_90": (1, 2),
-        "named_or_alike": (2, 3),
+        "named_exactly": (1, 3),
     }
 
 

@@ -20,7 +20,8 @@ class Answer:
         changes: by how much each alone changes the clean response, relative; by effect.
         sigmas: by how many standard deviations each stands out of what noise, calibration and tolerances can do,
             the other one projected out; by effect.
-        imitators: effects of the catalogue that do the same to this campaign, to first order within the noise.
+        imitators: of a single effect, others of the catalogue that do the same to this campaign, to first order
+            within the noise.
         parameters: true values of the effects' parameters, SI.
         rig: true values of the rig's own parameters that are not those of the sheet, SI.
         without: effects that are removed from the catalogue for this trial.

@@ -4,7 +4,7 @@ Its parameters are off the sheet by their tolerances, those that are to be ident
 nothing, an effect, two at once, or one that is removed from the catalogue; each so large that the response
 changes by 3 to 25 %, and such that it stands out of what calibration and tolerances can do
 (:mod:`savgs_ident.diagnose.blind.hiding`). What does not is drawn again. An effect that is removed must stand
-out of what is left in the catalogue, too.
+out of what is left in the catalogue, too, and each of two out of all others: nobody could name them else.
 """
 
 from collections.abc import Sequence
@@ -103,8 +103,8 @@ def _draw(kind: Drawn, drawing: Drawing, number: int, random: np.random.Generato
         return None
     twins = {twin for pair in TWINS for twin in pair if kind == "unknown" and chosen[0] in pair}
     without = tuple(sorted({*chosen, *twins})) if kind == "unknown" else ()
-    imitators = drawing.imitators(present[0]) if many == 1 else ()
-    if kind == "unknown" and set(imitators) - set(without):
+    imitators = {each.name: drawing.imitators(each) for each in present}
+    if kind != "effect" and any(set(each) - set(without) for each in imitators.values()):
         return None
     return Answer(
         number=number,
@@ -113,7 +113,7 @@ def _draw(kind: Drawn, drawing: Drawing, number: int, random: np.random.Generato
         ports=tuple(CATALOGUE[name].port.value for name in chosen),
         changes={each.name: each.change for each in present},
         sigmas=dict(zip(chosen, sigmas, strict=True)),
-        imitators=imitators,
+        imitators=imitators[chosen[0]] if kind == "effect" else (),
         parameters={name: value for each in present for name, value in each.parameters.items()},
         rig=drawing.rig,
         without=without,

@@ -2,15 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import Parameter
+from savgs_ident.diagnose.blind.alike import Ways, alike, ways_of
 from savgs_ident.diagnose.blind.bench import Bench, change_of
 from savgs_ident.diagnose.blind.hiding import (
     Hiding,
-    first_order_sigma,
     hiding_at,
     moved,
     rows_of,
@@ -29,9 +30,6 @@ that it does so by five however noise and tolerances fall."""
 
 NUDGE = 0.02
 """Share of an effect's size by which it is changed for a slope."""
-
-TOLD_APART = 5.0
-"""Standard deviations from which on two effects can be told apart."""
 
 
 @dataclass(frozen=True)
@@ -143,13 +141,15 @@ class Drawing:
         }
 
     def imitators(self, present: Present) -> tuple[str, ...]:
-        """Effects without states that, of some size, do the same to first order."""
-        change = rows_of(present.response) - rows_of(self.response)
-        return tuple(
-            name
-            for name, columns in self.hiding.imitators.items()
-            if name != present.name and first_order_sigma(self.hiding, change, columns) < TOLD_APART
-        )
+        """Effects that, of some size, do the same to first order."""
+        return alike(self.hiding, rows_of(present.response) - rows_of(self.response), self.ways, present.name)
+
+    @cached_property
+    def ways(self) -> Ways:
+        """What all effects would do to the rig."""
+        solution = self.starts[()]
+        assert solution is not None
+        return ways_of(self.bench, self.rig, solution)
 
 
 def drawing_of(bench: Bench, rig: Mapping[str, float]) -> Drawing | None:

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from savgs_ident.core.free_vector import known_to_tolerance
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.diagnose.blind.bench import ORDERS, Bench
-from savgs_ident.effects.registry import CATALOGUE
 from savgs_ident.fit.problem import used_parameters
 from savgs_ident.simulate.periodic import PeriodicSolution, harmonic_sensitivities
 
@@ -45,13 +44,11 @@ class Hiding(NamedTuple):
         noise: standard deviations of the rows, (m,).
         names: parameters that are identified or known to a tolerance, n.
         columns: change of the rows in noise per unit of what is known of each, (m, n).
-        imitators: the same per unit of the amplitudes of every effect without states, (m, a) by effect.
     """
 
     noise: Real
     names: tuple[str, ...]
     columns: Real
-    imitators: Mapping[str, Real]
 
 
 def rows_of(response: NDArray[np.complex128]) -> Real:
@@ -81,19 +78,12 @@ def hiding_at(
     model, p = bench.model(effects), bench.values(given)
     used = used_parameters(model, bench.table)
     known = [name for name in known_to_tolerance(bench.table, bench.free) if name in used]
-    others = {n: tuple(e.null) for n, e in CATALOGUE.items() if n not in bench.baseline and not e.states}
-    amplitudes = [name for each in others.values() for name in each]
     names = (*bench.free, *known)
-    slopes = np.asarray(harmonic_sensitivities(model, p, solution, (*names, *amplitudes), ORDERS))
+    slopes = np.asarray(harmonic_sensitivities(model, p, solution, names, ORDERS))
     noise = noise_rows(bench)
-    table = {name: rows_of(slope) / noise for name, slope in zip((*names, *amplitudes), slopes, strict=True)}
     units = [float(p[name]) if name in bench.free else bench.table[name].tolerance for name in names]
-    return Hiding(
-        noise,
-        names,
-        np.stack([table[name] * unit for name, unit in zip(names, units, strict=True)], axis=1),
-        {effect: np.stack([table[name] for name in own], axis=1) for effect, own in others.items()},
-    )
+    columns = [rows_of(slope) / noise * unit for slope, unit in zip(slopes, units, strict=True)]
+    return Hiding(noise, names, np.stack(columns, axis=1))
 
 
 def _step(columns: Real, miss: Real, x: Real, known: int) -> Real:

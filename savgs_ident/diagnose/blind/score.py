@@ -1,7 +1,8 @@
 """How well a diagnosis did: its ``diagnosis.json`` against the answer. Pure functions.
 
-An effect counts as named only by its own name; one that cannot be told from it does not count, though it is
-noted that the diagnosis said so. Marks that do not apply to a kind of trial are None.
+An effect counts as named by its own name. Where the draw found that another effect does the same to the campaign,
+so that nobody can tell which it is, naming that one counts too, if the verdict says that it cannot tell the two
+apart. Marks that do not apply to a kind of trial are None.
 """
 
 from collections.abc import Mapping
@@ -39,9 +40,11 @@ class Score:
         changes: by how much each changes the response, relative, in the same order.
         verdict: kind of the verdict: none, effect, several, unknown, or :data:`FAILED`.
         said: names of the effects that the verdict names.
-        named_right: the drawn effect and no other is named; of trials with one effect.
-        named_or_alike: it is named, or among those that the verdict says look like the named one; of the same.
-        located_right: the verdict's ports are those of the drawn effects; of trials with any effect.
+        named_right: the drawn effect and no other is named, or one that does the same and is said to; of trials
+            with one effect.
+        named_exactly: the drawn effect and no other is named; of the same.
+        located_right: the verdict's ports are those of the drawn effects, or of what does the same and is said to;
+            of trials with any effect.
         false_alarm: something is named, or said to be unknown; of trials with nothing.
         unknown_recognised: the verdict is unknown; of trials whose effect is not in the catalogue.
         both_named: both drawn effects and no other are named; of trials with two.
@@ -58,7 +61,7 @@ class Score:
     verdict: str
     said: tuple[str, ...]
     named_right: bool | None
-    named_or_alike: bool | None
+    named_exactly: bool | None
     located_right: bool | None
     false_alarm: bool | None
     unknown_recognised: bool | None
@@ -73,7 +76,7 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any]) -> Score:
     verdict = diagnosis["verdict"]
     said, true = tuple(verdict["effects"]), set(answer.effects)
     right = set(said) == true and len(said) == len(true)
-    alike = len(said) == 1 and bool(true & {*said, *verdict["confusable_with"]})
+    alike = len(said) == 1 and said[0] in answer.imitators and true <= {*verdict["confusable_with"]}
     here = set(verdict["ports"]) == set(answer.ports) and verdict["kind"] != "none"
     kind = answer.kind
     return Score(
@@ -83,9 +86,9 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any]) -> Score:
         changes=tuple(answer.changes[name] for name in answer.effects),
         verdict=verdict["kind"],
         said=said,
-        named_right=right if kind == "effect" else None,
-        named_or_alike=alike if kind == "effect" else None,
-        located_right=here if kind != "none" else None,
+        named_right=right or alike if kind == "effect" else None,
+        named_exactly=right if kind == "effect" else None,
+        located_right=here or alike if kind != "none" else None,
         false_alarm=verdict["kind"] not in ("none", FAILED) if kind == "none" else None,
         unknown_recognised=verdict["kind"] == "unknown" if kind == "unknown" else None,
         both_named=right if kind == "two" else None,

@@ -76,7 +76,7 @@ def rates_of(scores: Sequence[Score]) -> dict[str, Rate]:
         "both_named": _rate([score.both_named for score in scores], least=0.70),
         "intervals_hold": _rate(held, least=0.90, most=0.99),
         "share_closed_90": _rate([share is not None and share >= 0.9 for share in closed]),
-        "named_or_alike": _rate([score.named_or_alike for score in scores]),
+        "named_exactly": _rate([score.named_exactly for score in scores]),
     }
 
 
