@@ -29,7 +29,6 @@ from savgs_ident.diagnose.result import (
     Responses,
     SweepShrink,
 )
-from savgs_ident.diagnose.rig.columns import SHAPES
 from savgs_ident.diagnose.rig.gap import Rows, shrinks
 from savgs_ident.diagnose.rig.loops import loops_of
 from savgs_ident.diagnose.rig.next_test import next_tests
@@ -152,7 +151,7 @@ def judge(case: Case, tell: Progress) -> Judged:
     tell("attributing the gap to ports")
     p = plant.values(base.values)
     places = attribute(search, base, places_of(plant, (), p, base.prediction.near))
-    findings = find_terms(search, base, plant.candidates, SHAPES, tell)
+    findings = find_terms(search, base, plant.candidates, tell)
     best = findings.best
     alone, besides = max(each.evidence for each in places), -np.inf
     left = left_over(search, base, best)
@@ -168,7 +167,10 @@ def judge(case: Case, tell: Progress) -> Judged:
 
 
 def _own_change(case: Case, mode: Mode) -> float:
-    """What the terms of a hypothesis do to the response, all other parameters as they are; as a share of it."""
+    """What the terms of a hypothesis do to the response, all other parameters as they are.
+
+    As a share of it, in the channel where they do most.
+    """
     if not mode.terms:
         return 0.0
     own = {each.name for each in case.plant.nuisances}
@@ -176,8 +178,9 @@ def _own_change(case: Case, mode: Mode) -> float:
     without = case.plant.predict((), values, sorted(own), case.base.prediction.near)
     if not without.solved:
         return np.inf
-    change = np.sum((mode.prediction.rows - without.rows) ** 2) / np.sum(case.data.measured**2)
-    return float(np.sqrt(change))
+    change = np.bincount(case.plant.channel, (mode.prediction.rows - without.rows) ** 2)
+    whole = np.bincount(case.plant.channel, case.data.measured**2)
+    return float(np.sqrt(np.max(change[whole > 0.0] / whole[whole > 0.0])))
 
 
 def _hold_out_all(case: Case, judged: Judged, terms: dict[str, Term], tell: Progress) -> dict[str, HeldOut]:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from savgs_ident.core.parameter import Parameter
@@ -45,6 +46,9 @@ class FrameMode(AbstractSeries):
     )
     symptom: ClassVar[str] = "orders near one frequency are too large whichever dwell they belong to"
     reference: ClassVar[str] = "Ewins 2000, Modal Testing, ch. 2, single degree of freedom"
+    tried: ClassVar[tuple[Mapping[str, float], ...]] = tuple(
+        {"frame_frequency": frequency} for frequency in np.geomspace(4.0, 60.0, 16).tolist()
+    )
     in_damper: ClassVar[bool] = False
 
     def balance(

@@ -21,7 +21,7 @@ for, at no more cost than a gradient, on a model that does not have it.
 from abc import abstractmethod
 from collections.abc import Mapping
 from enum import Enum
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -96,7 +96,11 @@ class Cam(NamedTuple):
 
 
 class AbstractEffect(eqx.Module):
-    """Base of all effects; each one is final, of one of the kinds below, and lives in its own file."""
+    """Base of all effects; each one is final, of one of the kinds below, and lives in its own file.
+
+    ``tried`` are values of its shapes [SI] at which a diagnosis looks for it, where multiples of the typical ones
+    would leave some out: natural frequencies, say.
+    """
 
     name: eqx.AbstractClassVar[str]
     port: eqx.AbstractClassVar[Port]
@@ -105,6 +109,7 @@ class AbstractEffect(eqx.Module):
     states: eqx.AbstractClassVar[tuple[InternalState, ...]]
     symptom: eqx.AbstractClassVar[str]
     reference: eqx.AbstractClassVar[str]
+    tried: ClassVar[tuple[Mapping[str, float], ...]] = ()
 
 
 class AbstractForce(AbstractEffect):

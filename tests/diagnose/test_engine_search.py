@@ -11,7 +11,7 @@ from savgs_ident.diagnose.engine.misfit import misfit_of
 from savgs_ident.diagnose.engine.score import cosine, score_terms
 from savgs_ident.diagnose.engine.search import Findings, excess, find_terms, left_over
 
-from .toy import CHOICES, TERMS, ToyPlant, draw
+from .toy import TERMS, ToyPlant, draw
 
 PLANT = ToyPlant()
 NOISE = 0.02
@@ -24,7 +24,7 @@ def _silent(line: str) -> None:
 def _found(values: dict[str, float], seed: int) -> tuple[Search, Findings]:
     search = search_of(PLANT, draw(PLANT, values, NOISE, seed))
     base = climb(search, (), {}, None)
-    return search, find_terms(search, base, TERMS, CHOICES, _silent)
+    return search, find_terms(search, base, TERMS, _silent)
 
 
 def _names(findings: Findings) -> tuple[str, ...]:
@@ -97,9 +97,7 @@ def test_evidence_is_the_integral_over_the_prior() -> None:
 def test_the_score_is_the_drop_of_chi2_that_a_fit_brings() -> None:
     search = search_of(PLANT, draw(PLANT, {"a": 1.1, "c": 0.01}, NOISE, 5))
     base = climb(search, (), {}, None)
-    bend = next(
-        score for score in score_terms(search, base, list(TERMS), CHOICES) if score.term.name == "bend"
-    )
+    bend = next(score for score in score_terms(search, base, list(TERMS)) if score.term.name == "bend")
     weight = 1.0 / np.sqrt(base.misfit.spread)
     slope, bent = 0.2 * PLANT.x * weight, 0.4 * PLANT.x**2 * weight
     residual = search.residual(base.prediction) * weight
@@ -117,13 +115,13 @@ def test_what_a_tolerance_explains_is_no_effect() -> None:
     search = search_of(PLANT, draw(PLANT, {"a": 1.35}, NOISE, 6))
     base = climb(search, (), {}, None)
     assert base.values["a"] == pytest.approx(1.35, abs=0.01)
-    assert max(score.sigma for score in score_terms(search, base, list(TERMS), CHOICES)) < 4.0
+    assert max(score.sigma for score in score_terms(search, base, list(TERMS))) < 4.0
 
 
 def test_two_effects_that_do_the_same_look_alike() -> None:
     search = search_of(PLANT, draw(PLANT, {"t": 0.2}, NOISE, 7))
     base = climb(search, (), {}, None)
-    scores = {score.term.name: score for score in score_terms(search, base, list(TERMS), CHOICES)}
+    scores = {score.term.name: score for score in score_terms(search, base, list(TERMS))}
     bend, ripple, twist = (scores[name] for name in ("bend", "ripple", "twist"))
     assert cosine(twist, twist) == pytest.approx(1.0)
     assert abs(cosine(bend, twist)) < 1e-6

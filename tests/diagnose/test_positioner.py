@@ -8,6 +8,7 @@ import pytest
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.diagnose.engine.climb import climb, search_of
+from savgs_ident.diagnose.engine.prediction import MULTIPLES
 from savgs_ident.diagnose.engine.score import score_terms
 from savgs_ident.diagnose.positioner.agreement import estimates_of
 from savgs_ident.diagnose.positioner.diagnose import PositionerDiagnosis, diagnose_positioner
@@ -99,12 +100,12 @@ def test_the_same_cogging_is_in_both_recordings(real_folder: Path, real: Positio
     motion = motion_of(recording)
     law = next(each for each in PositionerPlant(motion).catalogue if each.term.name == "cogging")
     choices = pitch_choices(motion, law)
-    plant = PositionerPlant(motion, choices=choices)
+    plant = PositionerPlant(motion)
     search = search_of(plant, positioner_data(recording, motion, real.noise))
     others = tuple(each for each in plant.candidates if each.name in ("coulomb", "viscous_asymmetry"))
     base = climb(search, others, {}, None)
     # Of all pitches, and with a phase of its own: the encoder counts from where it was switched on.
-    (score,) = score_terms(search, base, [law.term], choices)
+    (score,) = score_terms(search, base, [law.term.at_multiples(choices)])
     found = climb(search, (*others, law.term), base.values | score.start, None)
     assert found.evidence > base.evidence + 5.0
     assert found.values["cogging_pitch"] == pytest.approx(pitch, rel=1e-3)
@@ -200,7 +201,9 @@ def test_slopes_and_columns_are_derivatives_of_the_rows(seed: int) -> None:
             [each.name for each in term.amplitudes],
             None,
         )
-        np.testing.assert_allclose(columns[plant.choices.index(1.0)], at_typical.slopes, atol=1e-12)
+        np.testing.assert_allclose(
+            columns[MULTIPLES.index(1.0) if term.shapes else 0], at_typical.slopes, atol=1e-12
+        )
 
 
 def test_a_law_at_its_null_does_nothing() -> None:

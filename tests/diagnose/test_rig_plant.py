@@ -3,8 +3,8 @@
 import numpy as np
 
 from savgs_ident.diagnose.engine.data import Data
-from savgs_ident.diagnose.engine.prediction import Term
-from savgs_ident.diagnose.rig.columns import SHAPES, impose, marched_effect, node_loads
+from savgs_ident.diagnose.engine.prediction import MULTIPLES, Term
+from savgs_ident.diagnose.rig.columns import impose, marched_effect, node_loads
 from savgs_ident.diagnose.rig.places import free_signal, nodes_of, places_of
 from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.effects.registry import CATALOGUE
@@ -57,7 +57,7 @@ def test_the_column_of_a_mount_is_that_of_the_model_that_has_one(
     plant, data = plant_and_data
     term = _term(plant, "mount_compliance")
     (columns,) = plant.columns((), {}, start, [term])
-    assert columns.shape == (len(SHAPES), data.measured.size, len(term.amplitudes))
+    assert columns.shape == (len(MULTIPLES), data.measured.size, len(term.amplitudes))
     amplitude = term.amplitudes[0]
     small = 0.02 * amplitude.scale
     typical = {shape.name: shape.centre for shape in term.shapes}
@@ -97,7 +97,7 @@ def test_a_force_that_is_imposed_acts_like_the_effect_that_makes_it(
     wave = -np.asarray(ports["rail"].velocity)
     imposed = impose(plant.complete(()), plant.likelihood, plant.orders, p, start, [("rail", wave)])[0]
     (columns,) = plant.columns((), {}, start, [_term(plant, "rail_viscous")])
-    assert _relative(imposed, columns[1][:, 0], data) < 1e-6
+    assert _relative(imposed, columns[0][:, 0], data) < 1e-6
 
 
 def test_every_port_is_a_place_and_explains_what_acts_there(
@@ -116,7 +116,7 @@ def test_every_port_is_a_place_and_explains_what_acts_there(
         ("accel_gain", "sensor.sprung_accel"),
     ):
         (columns,) = plant.columns((), {}, start, [_term(plant, effect)])
-        change = columns[1][:, 0] * weight
+        change = columns[0][:, 0] * weight
 
         def left(name: str, change: np.ndarray = change) -> float:
             law = places[name].law * weight[:, None]

@@ -17,13 +17,13 @@ from savgs_ident.diagnose.engine.coordinates import Coordinates, Linear, Logarit
 from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.prediction import Prediction, Term
 
-CHOICES = (0.5, 1.0, 2.0)
-
 STEP = 1e-6
 
 TERMS = (
     Term("bend", "spring", (Linear("c", "N", 0.0, 0.4),)),
-    Term("ripple", "sensor", (Linear("s", "N", 0.0, 0.4, lower=0.0),), (Logarithmic("w", "1", 6.0, 0.5),)),
+    Term(
+        "ripple", "sensor", (Linear("s", "N", 0.0, 0.4, lower=0.0),), (Logarithmic("w", "1", 6.0, 0.5),)
+    ).at_multiples((0.5, 1.0, 2.0)),
     Term("twist", "joint", (Linear("t", "1", 0.0, 0.4),)),
 )
 
@@ -70,13 +70,10 @@ class ToyPlant:
     ) -> list[NDArray[np.float64]]:
         found = []
         for term in candidates:
-            choices = []
-            for choice in CHOICES:
-                shapes = {each.name: choice * each.centre for each in term.shapes}
-                amplitudes = {each.name: each.centre for each in term.amplitudes}
-                names = [each.name for each in term.amplitudes]
-                choices.append(self.predict(terms, dict(values) | shapes | amplitudes, names, None).slopes)
-            found.append(np.stack(choices))
+            amplitudes = {each.name: each.centre for each in term.amplitudes}
+            names = [each.name for each in term.amplitudes]
+            here = [dict(values) | shapes | amplitudes for shapes in term.tried]
+            found.append(np.stack([self.predict(terms, each, names, None).slopes for each in here]))
         return found
 
 

@@ -4,7 +4,7 @@ To first order about the rig without any: effects without states by their deriva
 they do along its motion, for several of their shapes.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from savgs_ident.diagnose.blind.bench import ORDERS, Bench
 from savgs_ident.diagnose.blind.hiding import Hiding, first_order_sigma, noise_rows, rows_of
-from savgs_ident.diagnose.rig.columns import SHAPES, columns_with_states, shaped
+from savgs_ident.diagnose.engine.prediction import Term
+from savgs_ident.diagnose.rig.columns import columns_with_states
 from savgs_ident.diagnose.rig.coordinates import term_of
 from savgs_ident.effects.registry import CATALOGUE
 from savgs_ident.model.quarter_car import QuarterCar
@@ -33,19 +34,19 @@ Ways = Mapping[str, tuple[Real, ...]]
 
 def ways_of(bench: Bench, given: Mapping[str, float], solution: PeriodicSolution) -> Ways:
     """What every effect that the baseline lacks would do to a rig whose motions are ``solution``."""
-    absent = {name: each for name, each in CATALOGUE.items() if name not in bench.baseline}
+    terms = [term_of(each) for name, each in CATALOGUE.items() if name not in bench.baseline]
     model, noise = bench.model(()), noise_rows(bench)
-    plain = {name: tuple(each.null) for name, each in absent.items() if not each.states}
-    amplitudes = tuple(name for own in plain.values() for name in own)
-    ways: dict[str, list[Real]] = {name: [] for name in absent}
-    for choice in SHAPES:
-        p = bench.values(dict(given) | shaped([term_of(each) for each in absent.values()], choice))
-        slopes = harmonic_sensitivities(model, p, solution, amplitudes, ORDERS)
-        table = {name: rows_of(each) for name, each in zip(amplitudes, np.asarray(slopes), strict=True)}
-        for name, own in plain.items():
-            ways[name].append(np.stack([table[each] for each in own], axis=1) / noise[:, None])
-        for name, rows in _marched(bench, model, p, solution, choice).items():
-            ways[name].append(rows[:, None] / noise[:, None])
+    ways: dict[str, list[Real]] = {term.name: [] for term in terms}
+    for one in range(max(len(term.tried) for term in terms)):
+        some = [term for term in terms if len(term.tried) > one]
+        p = bench.values(
+            dict(given) | {name: value for term in some for name, value in term.tried[one].items()}
+        )
+        for name, rows in {
+            **_sloped(model, p, solution, some),
+            **_marched(bench, model, p, solution, some),
+        }.items():
+            ways[name].append(rows / noise[:, None])
     return {name: tuple(each) for name, each in ways.items()}
 
 
@@ -58,18 +59,26 @@ def alike(hiding: Hiding, change: Real, ways: Ways, name: str) -> tuple[str, ...
     )
 
 
-def _marched(
-    bench: Bench, model: QuarterCar, p: Values, solution: PeriodicSolution, choice: float
+def _sloped(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, terms: Sequence[Term]
 ) -> dict[str, Real]:
-    """Change of the rows by every effect with states at its typical size."""
-    effects = [each for name, each in CATALOGUE.items() if each.states and name not in bench.baseline]
-    typical = [
-        shaped([term_of(effect)], choice)
-        | {each.name: each.value for each in effect.parameters if each.name in effect.null}
-        for effect in effects
-    ]
+    """Derivatives of the rows in the amplitudes of every effect without states."""
+    plain = [term for term in terms if not CATALOGUE[term.name].states]
+    names = tuple(each.name for term in plain for each in term.amplitudes)
+    slopes = np.asarray(harmonic_sensitivities(model, p, solution, names, ORDERS)) if names else ()
+    table = {name: rows_of(each) for name, each in zip(names, slopes, strict=True)}
+    return {term.name: np.stack([table[each.name] for each in term.amplitudes], axis=1) for term in plain}
+
+
+def _marched(
+    bench: Bench, model: QuarterCar, p: Values, solution: PeriodicSolution, terms: Sequence[Term]
+) -> dict[str, Real]:
+    """Change of the rows by every effect with states at its typical size, (m, 1)."""
+    special = [term for term in terms if CATALOGUE[term.name].states]
+    effects = [CATALOGUE[term.name] for term in special]
+    typical = [{each.name: each.centre + 0.5 * each.scale for each in term.amplitudes} for term in special]
     rows = columns_with_states(model, _all_rows(bench), ORDERS, p, solution, effects, typical)
-    return {effect.name: each for effect, each in zip(effects, rows, strict=True)}
+    return {term.name: each[:, None] for term, each in zip(special, rows, strict=True)}
 
 
 def _all_rows(bench: Bench) -> Likelihood:

@@ -1,13 +1,17 @@
 """What the engine asks of a plant."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.diagnose.engine.coordinates import Coordinates
+
+MULTIPLES = (0.4, 1.0, 2.5)
+"""Shapes are tried at these multiples of their typical values, unless a term says otherwise."""
 
 
 class Prediction(NamedTuple):
@@ -31,17 +35,34 @@ class Term:
         place: where in the plant it sits.
         amplitudes: coordinates at whose centres it vanishes.
         shapes: coordinates that say nothing while it vanishes.
+        tries: values of shapes [SI] by name at which it is looked for; typical ones where left out.
     """
 
     name: str
     place: str
     amplitudes: Coordinates
     shapes: Coordinates = ()
+    tries: tuple[Mapping[str, float], ...] = ()
 
     @property
     def coordinates(self) -> Coordinates:
         """All its coordinates."""
         return self.amplitudes + self.shapes
+
+    @cached_property
+    def tried(self) -> tuple[dict[str, float], ...]:
+        """All its shapes [SI] by name, for every try."""
+        typical = {each.name: each.centre for each in self.shapes}
+        if self.tries or not self.shapes:
+            return tuple(typical | dict(each) for each in self.tries or ({},))
+        return tuple(self._at(multiple) for multiple in MULTIPLES)
+
+    def at_multiples(self, multiples: Sequence[float]) -> "Term":
+        """The same term, looked for at other multiples of its typical shapes."""
+        return replace(self, tries=tuple(self._at(multiple) for multiple in multiples))
+
+    def _at(self, multiple: float) -> dict[str, float]:
+        return {each.name: min(max(multiple * each.centre, each.lower), each.upper) for each in self.shapes}
 
 
 class Plant(Protocol):
@@ -62,7 +83,7 @@ class Plant(Protocol):
     def columns(
         self, terms: tuple[str, ...], values: Mapping[str, float], near: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
-        """First-order change of the rows per unit of each candidate's amplitudes, for some choices of its shapes.
+        """First-order change of the rows per unit of each candidate's amplitudes, wherever it is tried.
 
-        Shape (choices, m, amplitudes) each, about a point where the plant has ``near``.
+        Shape (tries, m, amplitudes) each, about a point where the plant has ``near``.
         """

@@ -44,30 +44,21 @@ class Score:
     direction: NDArray[np.float64]
 
 
-def score_terms(search: Search, mode: Mode, terms: list[Term], choices: tuple[float, ...]) -> list[Score]:
-    """Scores of candidates about a mode, best first.
-
-    ``choices`` are the multiples of their typical shapes that the plant tries.
-    """
+def score_terms(search: Search, mode: Mode, terms: list[Term]) -> list[Score]:
+    """Scores of candidates about a mode, best first."""
     columns = search.plant.columns(mode.terms, mode.values, mode.prediction.near, terms)
-    return scores_of(search, mode, terms, columns, choices)
+    return scores_of(search, mode, terms, columns)
 
 
 def scores_of(
-    search: Search,
-    mode: Mode,
-    terms: Sequence[Term],
-    columns: Sequence[NDArray[np.float64]],
-    choices: tuple[float, ...],
+    search: Search, mode: Mode, terms: Sequence[Term], columns: Sequence[NDArray[np.float64]]
 ) -> list[Score]:
-    """The same with known ``columns``, (choices, m, amplitudes) of each term, best first."""
-    found = [_score(search, mode, term, each, choices) for term, each in zip(terms, columns, strict=True)]
+    """The same with known ``columns``, (tries, m, amplitudes) of each term, best first."""
+    found = [_score(search, mode, term, each) for term, each in zip(terms, columns, strict=True)]
     return sorted(found, key=lambda each: -each.evidence)
 
 
-def _score(
-    search: Search, mode: Mode, term: Term, columns: NDArray[np.float64], choices: tuple[float, ...]
-) -> Score:
+def _score(search: Search, mode: Mode, term: Term, columns: NDArray[np.float64]) -> Score:
     residual = search.residual(mode.prediction)
     count = len(term.amplitudes)
     bounds = tuple(
@@ -76,7 +67,7 @@ def _score(
     )
     scales = np.array([each.scale for each in term.amplitudes])
     best: Score | None = None
-    for choice, column in zip(choices, columns, strict=True):
+    for shapes, column in zip(term.tried, columns, strict=True):
         moved = column * scales
         slopes = np.concatenate([mode.slopes, moved], axis=1)
         x = np.concatenate([mode.x, np.zeros(count)])
@@ -85,10 +76,7 @@ def _score(
         evidence = top.value - 0.5 * log_determinant(top.precision) + halved
         if best is None or evidence > best.evidence:
             found = dict(zip((c.name for c in term.amplitudes), top.x[-count:], strict=True))
-            start = {each.name: each.value(float(found[each.name])) for each in term.amplitudes} | {
-                each.name: float(np.clip(choice * each.centre, each.lower, each.upper))
-                for each in term.shapes
-            }
+            start = {each.name: each.value(float(found[each.name])) for each in term.amplitudes} | shapes
             direction = _direction(search, mode, moved @ _some(top.x[-count:]))
             sigma, smallest = (
                 _significance(search, mode, moved),

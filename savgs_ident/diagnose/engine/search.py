@@ -86,14 +86,12 @@ def left_over(search: Search, base: Mode, mode: Mode) -> float:
     return left / excess(search, base) if left > LITTLE else 0.0
 
 
-def find_terms(
-    search: Search, base: Mode, terms: Sequence[Term], choices: tuple[float, ...], tell: Tell
-) -> Findings:
+def find_terms(search: Search, base: Mode, terms: Sequence[Term], tell: Tell) -> Findings:
     """Hypotheses about what is missing in the baseline at its mode ``base``."""
     tell(f"scores of {len(terms)} effects")
     columns = search.plant.columns((), base.values, base.prediction.near, list(terms))
     alone = dict(zip((term.name for term in terms), columns, strict=True))
-    scores = scores_of(search, base, terms, columns, choices)
+    scores = scores_of(search, base, terms, columns)
     worth = [each for each in scores if each.evidence > base.evidence + NOTICED]
     ranked = _refined(search, _fitted(search, base, worth[:FIRST], terms, tell), terms, tell)
     later = worth[FIRST : FIRST + MORE]
@@ -105,9 +103,9 @@ def find_terms(
     if ranked and ranked[0].evidence > base.evidence + SURE:
         if left_over(search, base, ranked[0]) > EXPLAINED:
             for parent in ranked[:PARENTS]:
-                pairs += _with_partners(search, parent, terms, choices, pairs, tell)
+                pairs += _with_partners(search, parent, terms, pairs, tell)
         else:
-            pairs = _with_small_partners(search, ranked[0], terms, alone, choices, tell)
+            pairs = _with_small_partners(search, ranked[0], terms, alone, tell)
         pairs = _refined(search, pairs, terms, tell)
     modes = sorted([*ranked, *pairs], key=lambda mode: -mode.evidence)
     return Findings(base, tuple(scores), tuple(modes))
@@ -133,7 +131,6 @@ def _with_partners(
     search: Search,
     parent: Mode,
     terms: Sequence[Term],
-    choices: tuple[float, ...],
     known: Sequence[Mode],
     tell: Tell,
 ) -> list[Mode]:
@@ -145,7 +142,7 @@ def _with_partners(
         for term in terms
         if term.name not in parent.terms and frozenset({*parent.terms, term.name}) not in tried
     ]
-    scores = score_terms(search, parent, others, choices)
+    scores = score_terms(search, parent, others)
     worth = [each for each in scores if each.evidence > parent.evidence]
     return _fitted(search, parent, worth[:PARTNERS], terms, tell)
 
@@ -155,7 +152,6 @@ def _with_small_partners(
     parent: Mode,
     terms: Sequence[Term],
     alone: Mapping[str, NDArray[np.float64]],
-    choices: tuple[float, ...],
     tell: Tell,
 ) -> list[Mode]:
     """Pairs of a term that explains nearly all with partners so small that one alone does not show the other.
@@ -164,7 +160,7 @@ def _with_small_partners(
     say whether it is worth a fit.
     """
     others = [term for term in terms if term.name not in parent.terms]
-    scores = scores_of(search, parent, others, [alone[term.name] for term in others], choices)
+    scores = scores_of(search, parent, others, [alone[term.name] for term in others])
     worth = [each for each in scores if each.evidence > parent.evidence + NOTICED]
     return _fitted(search, parent, worth[:PARTNERS], terms, tell)
 

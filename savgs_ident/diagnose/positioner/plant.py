@@ -22,9 +22,6 @@ from savgs_ident.diagnose.positioner.recording import PositionerRecording
 BLOCK_S = 1.0
 """A test is a block of so much time [s]."""
 
-SHAPES = (0.4, 1.0, 2.5)
-"""Shapes are tried at these multiples of their typical values."""
-
 
 @dataclass(frozen=True)
 class PositionerPlant:
@@ -33,12 +30,10 @@ class PositionerPlant:
     Attributes:
         motion: what the carriage did.
         catalogue: laws that may be missing.
-        choices: multiples of their typical shapes that are tried.
     """
 
     motion: Motion
     catalogue: tuple[Law, ...] = CATALOGUE
-    choices: tuple[float, ...] = SHAPES
 
     @property
     def nuisances(self) -> Coordinates:
@@ -72,18 +67,12 @@ class PositionerPlant:
     def columns(
         self, terms: tuple[str, ...], values: Mapping[str, float], near: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
-        """Rows per unit of each candidate's amplitudes, (choices, m, amplitudes); the same about every point."""
-        return [self._columns(self._law(term.name)) for term in candidates]
+        """Rows per unit of each candidate's amplitudes, (tries, m, amplitudes); the same about every point."""
+        return [self._columns(term) for term in candidates]
 
-    def _columns(self, law: Law) -> NDArray[np.float64]:
-        found = []
-        for choice in self.choices:
-            shapes = {
-                each.name: float(np.clip(choice * each.centre, each.lower, each.upper))
-                for each in law.term.shapes
-            }
-            found.append(self.motion.thinned(law.basis(self.motion, shapes)).T)
-        return np.stack(found)
+    def _columns(self, term: Term) -> NDArray[np.float64]:
+        law, motion = self._law(term.name), self.motion
+        return np.stack([motion.thinned(law.basis(motion, shapes)).T for shapes in term.tried])
 
     def _law(self, name: str) -> Law:
         return next(law for law in self.catalogue if law.term.name == name)

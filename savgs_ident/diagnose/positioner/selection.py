@@ -111,25 +111,23 @@ def select_laws(plant: PositionerPlant, data: Data) -> Selection:
 class _Chooser:
     plant: PositionerPlant
     search: Search
-    pitches: Mapping[str, tuple[tuple[float, ...], NDArray[np.float64]]]
+    pitches: Mapping[str, tuple[Term, NDArray[np.float64]]]
 
     def terms(self, names: Sequence[str]) -> tuple[Term, ...]:
         return tuple(law.term for name in names for law in self.plant.catalogue if law.term.name == name)
 
     def scores(self, mode: Mode) -> list[Score]:
         """Scores of all laws that are not in ``mode``, best first."""
-        search, plant = self.search, self.plant
-        left = [law for law in plant.catalogue if law.term.name not in mode.terms]
-        plain = [law.term for law in left if law.term.name not in self.pitches]
-        found = score_terms(search, mode, plain, plant.choices)
-        for law in left:
-            if law.term.name in self.pitches:
-                choices, columns = self.pitches[law.term.name]
+        search = self.search
+        left = [law.term for law in self.plant.catalogue if law.term.name not in mode.terms]
+        terms = [term for term in left if term.name not in self.pitches]
+        for term in left:
+            if term.name in self.pitches:
+                every, columns = self.pitches[term.name]
                 power = np.sum((columns.transpose(0, 2, 1) @ search.residual(mode.prediction)) ** 2, axis=1)
-                likely = tuple(choices[place] for place in np.argsort(-power)[:PITCHES])
-                narrowed = replace(search, plant=replace(plant, choices=likely))
-                found += score_terms(narrowed, mode, [law.term], likely)
-        return sorted(found, key=lambda score: -score.evidence)
+                likely = tuple(every.tries[place] for place in np.argsort(-power)[:PITCHES])
+                terms.append(replace(term, tries=likely))
+        return score_terms(search, mode, terms)
 
     def heldout(self, mode: Mode, other: Mode) -> Gain:
         """Rise of the log predictive density over ``other`` in parts left out."""
@@ -140,14 +138,13 @@ class _Chooser:
         return Gain(float(rise.mean()), float(error))
 
 
-def _pitches(plant: PositionerPlant) -> dict[str, tuple[tuple[float, ...], NDArray[np.float64]]]:
-    """Multiples of the typical pitch, and the columns (choices, m, amplitudes) of the laws that have one."""
+def _pitches(plant: PositionerPlant) -> dict[str, tuple[Term, NDArray[np.float64]]]:
+    """The terms that have a pitch, looked for at every one, with their columns (tries, m, amplitudes)."""
     found = {}
     for law in plant.catalogue:
         if any(shape.unit == "m" for shape in law.term.shapes):
-            choices = pitch_choices(plant.motion, law)
-            columns = replace(plant, choices=choices).columns((), {}, None, [law.term])[0]
-            found[law.term.name] = (choices, columns)
+            every = law.term.at_multiples(pitch_choices(plant.motion, law))
+            found[law.term.name] = (every, plant.columns((), {}, None, [every])[0])
     return found
 
 

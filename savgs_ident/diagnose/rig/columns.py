@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
-from savgs_ident.diagnose.engine.prediction import Term
 from savgs_ident.model.effect import AbstractEffect, AbstractForce, AbstractSeries, Load, Port, PortSignals
 from savgs_ident.model.inputs import Imposed, nothing_imposed
 from savgs_ident.model.quarter_car import QuarterCar
@@ -25,9 +24,6 @@ from savgs_ident.posterior.likelihood import Likelihood
 from savgs_ident.simulate.imposed import answers, loads_at_nodes
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.stored import placed, stored
-
-SHAPES = (0.4, 1.0, 2.5)
-"""Shapes are tried at these multiples of their typical values."""
 
 SAMPLES = 384
 """Instants of a period along which states are marched."""
@@ -52,12 +48,6 @@ WAYS: Mapping[Port, str] = {
     Port.FRAME: "frame_way",
 }
 """Where what gives way at a port is imposed."""
-
-
-def shaped(candidates: Sequence[Term], choice: float) -> dict[str, float]:
-    """The shapes of all candidates at a multiple of their typical values, within their bounds."""
-    shapes = (shape for term in candidates for shape in term.shapes)
-    return {each.name: float(np.clip(choice * each.centre, each.lower, each.upper)) for each in shapes}
 
 
 def columns_with_states(

@@ -36,7 +36,7 @@ def term_of(effect: AbstractEffect) -> Term:
     own = [each for each in effect.parameters if each.tolerance == 0.0]
     amplitudes = tuple(_amplitude(each, effect.null[each.name]) for each in own if each.name in effect.null)
     shapes = tuple(_logarithmic(each, SHAPE) for each in own if each.name not in effect.null)
-    return Term(effect.name, effect.port.value, amplitudes, shapes)
+    return Term(effect.name, effect.port.value, amplitudes, shapes, tuple(effect.tried))
 
 
 def _amplitude(each: Parameter, null: float) -> AbstractCoordinate:

@@ -27,7 +27,7 @@ FORCES = (Port.STRUT, Port.SUSPENSION, Port.TYRE_RADIAL, Port.TYRE_LATERAL, Port
 SHARP = (0.01, 0.1)
 """Velocities over which friction-like functions turn round, as shares of the largest."""
 
-RESONANCES = (3.0, 6.0, 12.0, 25.0, 50.0)
+RESONANCES = (3.0, 4.0, 5.4, 7.3, 9.8, 13.0, 18.0, 24.0, 33.0, 50.0)
 """Natural frequencies [Hz] of what the frame may do."""
 
 FREE_ORDERS = 9

@@ -24,7 +24,7 @@ from savgs_ident.core.rig import Rig, merge_parameters
 from savgs_ident.diagnose.engine.coordinates import Coordinates
 from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.prediction import Prediction, Term
-from savgs_ident.diagnose.rig.columns import SHAPES, columns_with_states, shaped
+from savgs_ident.diagnose.rig.columns import columns_with_states
 from savgs_ident.diagnose.rig.coordinates import free_coordinate, term_of, tolerance_coordinate
 from savgs_ident.fit.problem import used_parameters
 from savgs_ident.fit.target import harmonic_target
@@ -183,28 +183,36 @@ class RigPlant:
     def columns(
         self, terms: tuple[str, ...], values: Mapping[str, float], near: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
-        """First-order change of the rows per unit of each candidate's amplitudes, (choices, m, amplitudes)."""
+        """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""
         model = self.complete(terms)
         found: dict[str, list[NDArray[np.float64]]] = {term.name: [] for term in candidates}
-        with_states = [term for term in candidates if self.catalogue[term.name].states]
+        for one in range(max(len(term.tried) for term in candidates)):
+            some = [term for term in candidates if len(term.tried) > one]
+            shapes = {name: value for term in some for name, value in term.tried[one].items()}
+            p = placed(self.values(dict(values) | shapes))
+            for term, columns in self._columns(model, p, near, some).items():
+                found[term].append(columns)
+        return [np.stack(found[term.name]) for term in candidates]
+
+    def _columns(
+        self, model: QuarterCar, p: Values, near: PeriodicSolution, candidates: Sequence[Term]
+    ) -> dict[str, NDArray[np.float64]]:
+        """The same for the shapes in ``p``, by name, (m, amplitudes)."""
         without = [term for term in candidates if not self.catalogue[term.name].states]
         names = [each.name for term in without for each in term.amplitudes]
-        for choice in SHAPES:
-            shapes = shaped(candidates, choice)
-            p = placed(self.values(dict(values) | shapes))
-            slopes = self._slopes(model, p, near, names)
-            for term in without:
-                places = [names.index(each.name) for each in term.amplitudes]
-                found[term.name].append(slopes[:, places])
-            typical = [
-                shapes | {each.name: each.centre + 0.5 * each.scale for each in term.amplitudes}
-                for term in with_states
-            ]
-            effects = [self.catalogue[term.name] for term in with_states]
-            moved = columns_with_states(model, self.likelihood, self.orders, p, near, effects, typical)
-            for term, rows in zip(with_states, moved, strict=True):
-                found[term.name].append(rows[:, None] / (0.5 * term.amplitudes[0].scale))
-        return [np.stack(found[term.name]) for term in candidates]
+        slopes = self._slopes(model, p, near, names)
+        found = {
+            term.name: slopes[:, [names.index(each.name) for each in term.amplitudes]] for term in without
+        }
+        with_states = [term for term in candidates if self.catalogue[term.name].states]
+        typical = [
+            {each.name: each.centre + 0.5 * each.scale for each in term.amplitudes} for term in with_states
+        ]
+        effects = [self.catalogue[term.name] for term in with_states]
+        moved = columns_with_states(model, self.likelihood, self.orders, p, near, effects, typical)
+        for term, rows in zip(with_states, moved, strict=True):
+            found[term.name] = rows[:, None] / (0.5 * term.amplitudes[0].scale)
+        return found
 
     def _slopes(
         self, model: QuarterCar, p: Values, solution: PeriodicSolution, names: Sequence[str]
