@@ -151,7 +151,7 @@ def judge(case: Case, tell: Progress) -> Judged:
     tell("attributing the gap to ports")
     p = plant.values(base.values)
     places = attribute(search, base, places_of(plant, (), p, base.prediction.near))
-    findings = find_terms(search, base, plant.candidates, tell)
+    findings = find_terms(search, base, plant.candidates, tell, plant.known)
     best = findings.best
     alone, besides = max(each.evidence for each in places), -np.inf
     left = left_over(search, base, best)

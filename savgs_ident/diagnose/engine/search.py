@@ -40,6 +40,9 @@ PARTNERS = 3
 PARENTS = 2
 """Best single terms that are tried with partners."""
 
+TYPICAL = 0.5
+"""Coordinate of a typical size: priors of amplitudes are two of them wide."""
+
 CLOSE = 300.0
 """Log evidence below the best from which on precision does not matter."""
 
@@ -86,8 +89,24 @@ def left_over(search: Search, base: Mode, mode: Mode) -> float:
     return left / excess(search, base) if left > LITTLE else 0.0
 
 
-def find_terms(search: Search, base: Mode, terms: Sequence[Term], tell: Tell) -> Findings:
-    """Hypotheses about what is missing in the baseline at its mode ``base``."""
+def find_terms(
+    search: Search,
+    base: Mode,
+    terms: Sequence[Term],
+    tell: Tell,
+    known: Sequence[tuple[str, ...]] = (),
+) -> Findings:
+    """Hypotheses about what is missing in the baseline at its mode ``base``.
+
+    ``known`` are sets of terms that are often missing together. They are fitted from their typical sizes, where the
+    search would not come from a baseline that lacks all of them and misses by as much as it moves.
+    """
+    fits = [_whole(search, base, names, terms, tell) for names in known]
+    wholes = _refined(search, [each for each in fits if np.isfinite(each.evidence)], terms, tell)
+    if any(left_over(search, base, whole) <= EXPLAINED for whole in wholes):
+        tell(f"{' + '.join(wholes[0].terms)}: nothing is left")
+        scores = score_terms(search, base, list(terms))
+        return Findings(base, tuple(scores), tuple(wholes))
     tell(f"scores of {len(terms)} effects")
     columns = search.plant.columns((), base.values, base.prediction.near, list(terms))
     alone = dict(zip((term.name for term in terms), columns, strict=True))
@@ -107,8 +126,17 @@ def find_terms(search: Search, base: Mode, terms: Sequence[Term], tell: Tell) ->
         else:
             pairs = _with_small_partners(search, ranked[0], terms, alone, tell)
         pairs = _refined(search, pairs, terms, tell)
-    modes = sorted([*ranked, *pairs], key=lambda mode: -mode.evidence)
+    modes = sorted([*wholes, *ranked, *pairs], key=lambda mode: -mode.evidence)
     return Findings(base, tuple(scores), tuple(modes))
+
+
+def _whole(search: Search, base: Mode, names: tuple[str, ...], terms: Sequence[Term], tell: Tell) -> Mode:
+    """The fit of several terms together, from their typical sizes."""
+    tell(f"fitting {' + '.join(names)} from typical sizes")
+    chosen = tuple(next(term for term in terms if term.name == name) for name in names)
+    start = {each.name: each.value(TYPICAL) for term in chosen for each in term.amplitudes}
+    start |= {each.name: each.centre for term in chosen for each in term.shapes}
+    return climb(search, chosen, base.values | start, base.prediction.near)
 
 
 def _refined(search: Search, modes: Sequence[Mode], terms: Sequence[Term], tell: Tell) -> list[Mode]:

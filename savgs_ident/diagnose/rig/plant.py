@@ -26,6 +26,7 @@ from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.prediction import Prediction, Term
 from savgs_ident.diagnose.rig.columns import columns_with_states
 from savgs_ident.diagnose.rig.coordinates import free_coordinate, term_of, tolerance_coordinate
+from savgs_ident.effects.registry import MODELS
 from savgs_ident.fit.problem import used_parameters
 from savgs_ident.fit.target import harmonic_target
 from savgs_ident.model.damper import damper_curve
@@ -118,6 +119,15 @@ class RigPlant:
         """All effects that the baseline does not have, but for those that its free parameters are."""
         terms = [term_of(effect) for name, effect in self.catalogue.items() if name not in self.baseline]
         return tuple(term for term in terms if term.amplitudes)
+
+    @property
+    def known(self) -> tuple[tuple[str, ...], ...]:
+        """What models of the paper have beyond the baseline, if more than one effect."""
+        mine, can = set(self.baseline), {term.name for term in self.candidates}
+        beyond = (
+            tuple(name for name in each if name not in mine) for each in MODELS.values() if mine < set(each)
+        )
+        return tuple(each for each in beyond if len(each) > 1 and can >= set(each))
 
     def model(self, terms: Sequence[str]) -> QuarterCar:
         """The baseline with ``terms``.
