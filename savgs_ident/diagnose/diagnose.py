@@ -1,25 +1,22 @@
 """The diagnosis of a campaign: recalibrate, attribute, score, fit, hold out, and say what is missing."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from savgs_ident.core.errors import InputError
 from savgs_ident.core.rig import Rig
 from savgs_ident.diagnose.candidates import candidates_of, confusable_of, not_judgeable_of
-from savgs_ident.diagnose.engine.attribution import Attribution, attribute
-from savgs_ident.diagnose.engine.climb import Mode, Search, climb, refine, search_of
-from savgs_ident.diagnose.engine.data import Data
+from savgs_ident.diagnose.engine.climb import Mode
 from savgs_ident.diagnose.engine.heldout import HeldOut, held_out_by_law, hold_out
 from savgs_ident.diagnose.engine.parallel import in_parallel
 from savgs_ident.diagnose.engine.prediction import Term
-from savgs_ident.diagnose.engine.search import EXPLAINED, Findings, find_terms, left_over
-from savgs_ident.diagnose.engine.strain import strain_of
+from savgs_ident.diagnose.engine.search import Tell
+from savgs_ident.diagnose.judgement import Case, Judged, judge, recalibrate
 from savgs_ident.diagnose.result import (
     Diagnosis,
     ForceLoop,
@@ -32,45 +29,15 @@ from savgs_ident.diagnose.result import (
 from savgs_ident.diagnose.rig.gap import Rows, shrinks
 from savgs_ident.diagnose.rig.loops import loops_of
 from savgs_ident.diagnose.rig.next_test import next_tests
-from savgs_ident.diagnose.rig.places import places_of
-from savgs_ident.diagnose.rig.plant import RigPlant, rig_plant
+from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.diagnose.rig.sweep import cam_sweep, sweep_gaps
 from savgs_ident.diagnose.rig.where import cycle_positions, gap_map
 from savgs_ident.diagnose.settings import DiagnosisSettings
-from savgs_ident.diagnose.verdict import Weighed, kind_of, probabilities, rivals_of, weigh
+from savgs_ident.diagnose.verdict import probabilities, rivals_of
 from savgs_ident.diagnose.words import verdict_of, warnings_of
 from savgs_ident.effects.registry import CATALOGUE, build_model
 from savgs_ident.recordings.recording import Recording
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-
-Progress = Callable[[str], None]
-"""Is told what is going on, a line at a time."""
-
-
-@dataclass(frozen=True)
-class Case:
-    """A rig as a plant, what it is held against, and the baseline as given and recalibrated.
-
-    ``given`` are the rows of the baseline as given, (m,).
-    """
-
-    plant: RigPlant
-    data: Data
-    search: Search
-    given: NDArray[np.float64]
-    base: Mode
-
-
-@dataclass(frozen=True)
-class Judged:
-    """What was found out about a case."""
-
-    findings: Findings
-    places: tuple[Attribution, ...]
-    weighed: tuple[Weighed, ...]
-    kind: Kind
-    chosen: Weighed
-    left: float
 
 
 def diagnose_response(
@@ -78,7 +45,7 @@ def diagnose_response(
     rig: Rig,
     settings: DiagnosisSettings | None = None,
     values: Mapping[str, float] | None = None,
-    progress: Progress | None = None,
+    progress: Tell | None = None,
     sweep: Recording | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between a rig's baseline model and a measured response.
@@ -101,7 +68,7 @@ def _diagnose(
     rig: Rig,
     options: DiagnosisSettings,
     values: Mapping[str, float],
-    tell: Progress,
+    tell: Tell,
     sweep: Recording | None,
 ) -> Diagnosis:
     began = time.perf_counter()
@@ -116,74 +83,7 @@ def _diagnose(
     return replace(found, sweep=swept.result(), wall_s=time.perf_counter() - began)
 
 
-def recalibrate(
-    measured: HarmonicResponse,
-    rig: Rig,
-    options: DiagnosisSettings,
-    values: Mapping[str, float],
-    tell: Progress,
-) -> Case:
-    """The baseline at its own best: what calibration alone can do."""
-    unknown = sorted({*options.without, *options.baseline} - set(CATALOGUE))
-    if unknown:
-        raise InputError(
-            f"there is no effect '{unknown[0]}'", remedy="choose among: " + ", ".join(sorted(CATALOGUE))
-        )
-    catalogue = {name: each for name, each in CATALOGUE.items() if name not in options.without}
-    tell("solving the baseline")
-    plant, data = rig_plant(
-        measured, rig, catalogue, options.baseline, options.free, options.orders, options.periodic
-    )
-    near = plant.start(values)
-    search = search_of(plant, data)
-    given = plant.predict((), values, [each.name for each in plant.nuisances], near)
-    tell("recalibrating the baseline")
-    base = climb(search, (), values, near)
-    if not np.isfinite(base.evidence):
-        raise InputError("the baseline cannot be recalibrated", remedy="mend the rig file")
-    base = refine(search, base, ())
-    return Case(plant, data, search, given.rows, base)
-
-
-def judge(case: Case, tell: Progress) -> Judged:
-    """Hypotheses, ports and the verdict's kind."""
-    plant, search, base = case.plant, case.search, case.base
-    tell("attributing the gap to ports")
-    p = plant.values(base.values)
-    places = attribute(search, base, places_of(plant, (), p, base.prediction.near))
-    findings = find_terms(search, base, plant.candidates, tell, plant.known)
-    best = findings.best
-    alone, besides = max(each.evidence for each in places), -np.inf
-    left = left_over(search, base, best)
-    if best.terms and left > EXPLAINED:
-        tell(f"what {' + '.join(best.terms)} leaves")
-        q = plant.values(best.values)
-        beyond = attribute(search, best, places_of(plant, best.terms, q, best.prediction.near))
-        besides = max(each.evidence for each in beyond)
-    strained = best.evidence + strain_of(best, plant.nuisances)
-    weighed = weigh(findings, alone, besides, strained)
-    kind, chosen = kind_of(weighed, _own_change(case, best), left)
-    return Judged(findings, tuple(places), tuple(weighed), kind, chosen, left)
-
-
-def _own_change(case: Case, mode: Mode) -> float:
-    """What the terms of a hypothesis do to the response, all other parameters as they are.
-
-    As a share of it, in the channel where they do most.
-    """
-    if not mode.terms:
-        return 0.0
-    own = {each.name for each in case.plant.nuisances}
-    values = {name: value for name, value in mode.values.items() if name in own}
-    without = case.plant.predict((), values, sorted(own), case.base.prediction.near)
-    if not without.solved:
-        return np.inf
-    change = np.bincount(case.plant.channel, (mode.prediction.rows - without.rows) ** 2)
-    whole = np.bincount(case.plant.channel, case.data.measured**2)
-    return float(np.sqrt(np.max(change[whole > 0.0] / whole[whole > 0.0])))
-
-
-def _hold_out_all(case: Case, judged: Judged, terms: dict[str, Term], tell: Progress) -> dict[str, HeldOut]:
+def _hold_out_all(case: Case, judged: Judged, terms: dict[str, Term], tell: Tell) -> dict[str, HeldOut]:
     """Left-out predictions of the baseline, the two best fitted hypotheses and the best learned law, by name."""
     modes = [case.base, *sorted(judged.findings.modes, key=lambda each: -each.evidence)[:2]]
 
@@ -193,7 +93,7 @@ def _hold_out_all(case: Case, judged: Judged, terms: dict[str, Term], tell: Prog
         return name, hold_out(case.search, mode, tuple(terms[each] for each in mode.terms))
 
     held = dict(in_parallel(without_parts, modes))
-    held["unknown"] = held_out_by_law(case.search, judged.places[0].held_out)
+    held["unknown"] = held_out_by_law(case.search, judged.place.held_out)
     return held
 
 
@@ -204,7 +104,7 @@ def _assemble(
     held: dict[str, HeldOut],
     measured: HarmonicResponse,
     options: DiagnosisSettings,
-    tell: Progress,
+    tell: Tell,
 ) -> Diagnosis:
     plant, data, base = case.plant, case.data, case.base
     after = named or base
@@ -217,9 +117,9 @@ def _assemble(
     together, by_channel = shrinks(data, rows)
     confusable = confusable_of(judged.findings)
     rivals = rivals_of(list(judged.weighed), judged.chosen)
-    verdict = verdict_of(judged.kind, judged.chosen, judged.places, rivals, together)
+    verdict = verdict_of(judged.kind, judged.chosen, judged.place, rivals, together)
     shares = probabilities(list(judged.weighed))
-    fitted = judged.places[0].held_out if judged.kind == "unknown" else after.prediction.rows
+    fitted = judged.place.held_out if judged.kind == "unknown" else after.prediction.rows
     tell("inferring the signal at the port")
     loops = _loops(case, judged, named, verdict.ports)
     return Diagnosis(
@@ -254,7 +154,7 @@ def _predict_sweep(
     named: Mode | None,
     values: Mapping[str, float],
     recording: Recording | None,
-    tell: Progress,
+    tell: Tell,
 ) -> SweepShrink | None:
     """The gap of a recorded sweep, predicted by the baseline as given, recalibrated, and with what is named."""
     sweep = None if recording is None else cam_sweep(recording)
@@ -293,7 +193,7 @@ def _loops(case: Case, judged: Judged, named: Mode | None, ports: Sequence[str])
 
 
 def _next_tests(
-    case: Case, judged: Judged, confusable_names: tuple[tuple[str, str], ...], tell: Progress
+    case: Case, judged: Judged, confusable_names: tuple[tuple[str, str], ...], tell: Tell
 ) -> tuple[NextTest, ...]:
     """Tests that separate the chosen hypothesis from the best fitted one that looks like it."""
     chosen = judged.chosen.mode

@@ -1,7 +1,5 @@
 """What a diagnosis says in words."""
 
-from collections.abc import Sequence
-
 from savgs_ident.diagnose.engine.attribution import Attribution
 from savgs_ident.diagnose.engine.climb import Mode
 from savgs_ident.diagnose.result import Kind, Shrink, Verdict
@@ -13,7 +11,7 @@ IMPERFECT = 0.005
 
 
 def verdict_of(
-    kind: Kind, chosen: Weighed, places: Sequence[Attribution], rivals: tuple[str, ...], gap: Shrink
+    kind: Kind, chosen: Weighed, place: Attribution, rivals: tuple[str, ...], gap: Shrink
 ) -> Verdict:
     """The verdict with its sentence."""
     told = rivals if kind == "effect" else ()
@@ -24,20 +22,20 @@ def verdict_of(
         )
         return Verdict(kind, (), (), (), sentence)
     if kind == "unknown":
-        best = max(places, key=lambda each: each.share)
         sentence = (
             f"Something is missing that no effect of the catalogue explains: a law learned at the port "
-            f"'{best.name}' accounts for {100.0 * best.share:.0f} % of the squared gap in tests left out, which "
+            f"'{place.name}' accounts for {100.0 * place.share:.0f} % of the squared gap in tests left out, which "
             f"shrinks from {_percent(gap.recalibrated)} recalibrated to {_percent(gap.after)} of the response; "
             f"the noise is {_percent(gap.floor)}."
         )
-        return Verdict(kind, (), (best.name,), (), sentence)
+        return Verdict(kind, (), (place.name,), (), sentence)
+    one = len(chosen.effects) == 1
     ports = tuple(dict.fromkeys(CATALOGUE[name].port.value for name in chosen.effects))
     names = " and ".join(chosen.effects)
     sentence = (
-        f"{names} at the port {' and '.join(ports)} {'is' if len(chosen.effects) == 1 else 'are'} missing in the "
-        f"model: with it the gap shrinks from {_percent(gap.recalibrated)} recalibrated "
-        f"({_percent(gap.before)} as given) to {_percent(gap.after)} of the response; the noise is "
+        f"{names} at the port{'' if len(ports) == 1 else 's'} {' and '.join(ports)} {'is' if one else 'are'} missing "
+        f"in the model: with {'it' if one else 'them'} the gap shrinks from {_percent(gap.recalibrated)} "
+        f"recalibrated ({_percent(gap.before)} as given) to {_percent(gap.after)} of the response; the noise is "
         f"{_percent(gap.floor)}."
     )
     if told:
@@ -60,4 +58,4 @@ def warnings_of(base: Mode, after: Mode, left: float, kind: Kind) -> tuple[str, 
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
+    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"

@@ -10,11 +10,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
@@ -26,6 +23,7 @@ from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.prediction import Prediction, Term
 from savgs_ident.diagnose.rig.columns import columns_with_states
 from savgs_ident.diagnose.rig.coordinates import free_coordinate, term_of, tolerance_coordinate
+from savgs_ident.diagnose.rig.rows import rows_of, slopes_of
 from savgs_ident.effects.registry import MODELS
 from savgs_ident.fit.problem import used_parameters
 from savgs_ident.fit.target import harmonic_target
@@ -42,12 +40,10 @@ from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
     adapt,
-    directional,
-    harmonics,
     resolve,
     simulate_periodic,
 )
-from savgs_ident.simulate.stored import placed, stored
+from savgs_ident.simulate.stored import placed
 
 WIDTH = 52
 """Directions that are solved for at a time: a program for each number would have to be compiled."""
@@ -186,7 +182,7 @@ class RigPlant:
         """Rows with ``terms`` at ``values``, with slopes in ``names``, on the nodes of ``near``."""
         model, p = self.model(terms), placed(self.values(values))
         solution = resolve(model, p, near, ITERATIONS, self._fitting(model, near))
-        rows = np.asarray(_rows(model, self.likelihood, p, solution, self.orders))
+        rows = np.asarray(rows_of(model, self.likelihood, p, solution, self.orders))
         solved = all(status.ok for status in solution.status())
         return Prediction(rows, self._slopes(model, p, solution, names), solved, solution)
 
@@ -233,7 +229,7 @@ class RigPlant:
             some = names[first : first + WIDTH]
             directions = np.zeros((WIDTH, len(self.names)))
             directions[np.arange(len(some)), [self.names.index(name) for name in some]] = 1.0
-            (slopes,) = _sloped(
+            (slopes,) = slopes_of(
                 model, self.likelihood, p, solution, placed(jnp.asarray(directions)), self.names, self.orders
             )
             parts.append(np.asarray(slopes)[: len(some)])
@@ -249,31 +245,6 @@ class RigPlant:
             return Trajectory(x[:lacking], y[:lacking])
         rest = jnp.zeros((lacking, x.shape[1]))
         return Trajectory(jnp.concatenate([x, rest]), jnp.concatenate([y, rest]))
-
-
-@eqx.filter_jit
-def _rows(
-    model: QuarterCar, likelihood: Likelihood, p: Values, solution: PeriodicSolution, orders: int
-) -> Array:
-    return likelihood.rows(harmonics(model, p, solution, orders))
-
-
-@eqx.filter_jit
-def _sloped(*args: Any) -> tuple[Array, ...]:
-    return stored(_directional_rows, *args)
-
-
-def _directional_rows(
-    model: QuarterCar,
-    likelihood: Likelihood,
-    p: Values,
-    solution: PeriodicSolution,
-    directions: Array,
-    names: tuple[str, ...],
-    orders: int,
-) -> tuple[Array]:
-    along = directional(model, p, solution, names, orders)
-    return (jax.lax.map(lambda direction: likelihood.rows(along(direction)), directions),)
 
 
 def rig_plant(

@@ -1,0 +1,120 @@
+"""The case before the court: the baseline recalibrated, hypotheses and ports, and what kind of verdict they allow."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.rig import Rig
+from savgs_ident.diagnose.engine.attribution import Attribution, attribute
+from savgs_ident.diagnose.engine.climb import Mode, Search, climb, refine, search_of
+from savgs_ident.diagnose.engine.data import Data
+from savgs_ident.diagnose.engine.search import EXPLAINED, Findings, Tell, find_terms, left_over
+from savgs_ident.diagnose.engine.strain import strain_of
+from savgs_ident.diagnose.result import Kind
+from savgs_ident.diagnose.rig.places import places_of
+from savgs_ident.diagnose.rig.plant import RigPlant, rig_plant
+from savgs_ident.diagnose.settings import DiagnosisSettings
+from savgs_ident.diagnose.verdict import Weighed, kind_of, weigh
+from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+
+
+@dataclass(frozen=True)
+class Case:
+    """A rig as a plant, what it is held against, and the baseline as given and recalibrated.
+
+    ``given`` are the rows of the baseline as given, (m,).
+    """
+
+    plant: RigPlant
+    data: Data
+    search: Search
+    given: NDArray[np.float64]
+    base: Mode
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What was found out about a case."""
+
+    findings: Findings
+    places: tuple[Attribution, ...]
+    weighed: tuple[Weighed, ...]
+    kind: Kind
+    chosen: Weighed
+    left: float
+
+    @property
+    def place(self) -> Attribution:
+        """Where something unknown would most probably sit."""
+        return max(self.places, key=lambda each: each.evidence)
+
+
+def recalibrate(
+    measured: HarmonicResponse,
+    rig: Rig,
+    options: DiagnosisSettings,
+    values: Mapping[str, float],
+    tell: Tell,
+) -> Case:
+    """The baseline at its own best: what calibration alone can do."""
+    unknown = sorted({*options.without, *options.baseline} - set(CATALOGUE))
+    if unknown:
+        raise InputError(
+            f"there is no effect '{unknown[0]}'", remedy="choose among: " + ", ".join(sorted(CATALOGUE))
+        )
+    catalogue = {name: each for name, each in CATALOGUE.items() if name not in options.without}
+    tell("solving the baseline")
+    plant, data = rig_plant(
+        measured, rig, catalogue, options.baseline, options.free, options.orders, options.periodic
+    )
+    near = plant.start(values)
+    search = search_of(plant, data)
+    given = plant.predict((), values, [each.name for each in plant.nuisances], near)
+    tell("recalibrating the baseline")
+    base = climb(search, (), values, near)
+    if not np.isfinite(base.evidence):
+        raise InputError("the baseline cannot be recalibrated", remedy="mend the rig file")
+    base = refine(search, base, ())
+    return Case(plant, data, search, given.rows, base)
+
+
+def judge(case: Case, tell: Tell) -> Judged:
+    """Hypotheses, ports and the verdict's kind."""
+    plant, search, base = case.plant, case.search, case.base
+    tell("attributing the gap to ports")
+    p = plant.values(base.values)
+    places = attribute(search, base, places_of(plant, (), p, base.prediction.near))
+    findings = find_terms(search, base, plant.candidates, tell, plant.known)
+    best = findings.best
+    alone, besides = max(each.evidence for each in places), -np.inf
+    left = left_over(search, base, best)
+    if best.terms and left > EXPLAINED:
+        tell(f"what {' + '.join(best.terms)} leaves")
+        q = plant.values(best.values)
+        beyond = attribute(search, best, places_of(plant, best.terms, q, best.prediction.near))
+        besides = max(each.evidence for each in beyond)
+    strained = best.evidence + strain_of(best, plant.nuisances)
+    weighed = weigh(findings, alone, besides, strained)
+    kind, chosen = kind_of(weighed, _own_change(case, best), left)
+    return Judged(findings, tuple(places), tuple(weighed), kind, chosen, left)
+
+
+def _own_change(case: Case, mode: Mode) -> float:
+    """What the terms of a hypothesis do to the response, all other parameters as they are.
+
+    As a share of it, in the channel where they do most.
+    """
+    if not mode.terms:
+        return 0.0
+    own = {each.name for each in case.plant.nuisances}
+    values = {name: value for name, value in mode.values.items() if name in own}
+    without = case.plant.predict((), values, sorted(own), case.base.prediction.near)
+    if not without.solved:
+        return np.inf
+    change = np.bincount(case.plant.channel, (mode.prediction.rows - without.rows) ** 2)
+    whole = np.bincount(case.plant.channel, case.data.measured**2)
+    return float(np.sqrt(np.max(change[whole > 0.0] / whole[whole > 0.0])))
