@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from savgs_ident.cli.console import Progress
-from savgs_ident.cli.reading import read_response
+from savgs_ident.cli.reading import first_sweep, read_response
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.rig import Rig, read_rig
 from savgs_ident.diagnose.blind.answer import Answer
@@ -118,8 +118,7 @@ def diagnose_folder(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping
     """The diagnosis of a recorded campaign as its ``diagnosis.json`` has it."""
     settings = DiagnosisSettings(without=without)
     campaign, measured = read_response(folder, None, settings.orders, None, SILENT)
-    sweep = next(iter(campaign.of_kind("sweep")), None)
-    diagnosis = diagnose_response(measured, rig, settings, sweep=sweep)
+    diagnosis = diagnose_response(measured, rig, settings, sweep=first_sweep(campaign))
     origin = origin_of(campaign, rig.name, (), (), measured.warnings)
     record: Mapping[str, Any] = json.loads(to_json(diagnosis_record(diagnosis, origin)))
     return record

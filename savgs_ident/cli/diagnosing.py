@@ -14,7 +14,7 @@ from savgs_ident.cli.models import (
     identified_in,
     rig_before,
 )
-from savgs_ident.cli.reading import read_response
+from savgs_ident.cli.reading import first_sweep, read_response
 from savgs_ident.core.rig import Rig, default_rig_path, read_rig
 from savgs_ident.diagnose.diagnose import diagnose_response
 from savgs_ident.diagnose.settings import DiagnosisSettings
@@ -54,7 +54,7 @@ def run_diagnosis(job: Job, voice: Voice, out: Path) -> int:
         campaign, measured = read_response(
             job.campaign, job.channels, job.orders, job.max_frequency, progress
         )
-        sweep = next(iter(campaign.of_kind("sweep")), None)
+        sweep = first_sweep(campaign)
         diagnosis = diagnose_response(measured, rig, settings, values, progress, sweep)
         progress("writing")
         origin = origin_of(campaign, source, job.command, PACKAGES, measured.warnings)

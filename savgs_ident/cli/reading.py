@@ -4,10 +4,13 @@ from pathlib import Path
 
 from savgs_ident.cli.console import Progress
 from savgs_ident.cli.selection import up_to_frequency
+from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.estimate import estimate_response
+from savgs_ident.responses.estimate_sweep import estimate_sweep_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.sweep_response import SweepResponse
 from savgs_ident.simulate.measured import MODELLED_CHANNELS
 
 
@@ -20,3 +23,13 @@ def read_response(
     progress("estimating responses")
     response = estimate_response(campaign.only(MODELLED_CHANNELS), orders)
     return campaign, up_to_frequency(response, max_frequency)
+
+
+def first_sweep(campaign: Campaign) -> SweepResponse | None:
+    """The response along the first sweep of a campaign; None if there is none that can be used."""
+    for recording in campaign.only(MODELLED_CHANNELS).of_kind("sweep"):
+        try:
+            return estimate_sweep_response(recording, source=campaign.source)
+        except InputError:
+            continue
+    return None

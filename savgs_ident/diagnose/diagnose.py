@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -30,14 +29,14 @@ from savgs_ident.diagnose.rig.gap import Rows, shrinks
 from savgs_ident.diagnose.rig.loops import loops_of
 from savgs_ident.diagnose.rig.next_test import next_tests
 from savgs_ident.diagnose.rig.plant import RigPlant
-from savgs_ident.diagnose.rig.sweep import cam_sweep, sweep_gaps
+from savgs_ident.diagnose.rig.sweep import Hypothesis, sweep_shrink
 from savgs_ident.diagnose.rig.where import cycle_positions, gap_map
 from savgs_ident.diagnose.settings import DiagnosisSettings
 from savgs_ident.diagnose.verdict import probabilities, rivals_of
 from savgs_ident.diagnose.words import verdict_of, warnings_of
-from savgs_ident.effects.registry import CATALOGUE, build_model
-from savgs_ident.recordings.recording import Recording
+from savgs_ident.effects.registry import CATALOGUE
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.sweep_response import SweepResponse
 
 
 def diagnose_response(
@@ -46,7 +45,7 @@ def diagnose_response(
     settings: DiagnosisSettings | None = None,
     values: Mapping[str, float] | None = None,
     progress: Tell | None = None,
-    sweep: Recording | None = None,
+    sweep: SweepResponse | None = None,
 ) -> Diagnosis:
     """Diagnose the gap between a rig's baseline model and a measured response.
 
@@ -69,18 +68,17 @@ def _diagnose(
     options: DiagnosisSettings,
     values: Mapping[str, float],
     tell: Tell,
-    sweep: Recording | None,
+    sweep: SweepResponse | None,
 ) -> Diagnosis:
     began = time.perf_counter()
     case = recalibrate(measured, rig, options, values, tell)
     judged = judge(case, tell)
     terms = {term.name: term for term in case.plant.candidates}
     named = judged.chosen.mode if judged.kind in ("effect", "several") else None
-    with ThreadPoolExecutor(1) as aside:
-        swept = aside.submit(_predict_sweep, case, judged.kind, named, values, sweep, tell)
-        held = _hold_out_all(case, judged, terms, tell)
-        found = _assemble(case, judged, named, held, measured, options, tell)
-    return replace(found, sweep=swept.result(), wall_s=time.perf_counter() - began)
+    held = _hold_out_all(case, judged, terms, tell)
+    swept = _predict_sweep(case, judged.kind, named, values, sweep, tell)
+    found = _assemble(case, judged, named, held, measured, options, tell)
+    return replace(found, sweep=swept, wall_s=time.perf_counter() - began)
 
 
 def _hold_out_all(case: Case, judged: Judged, terms: dict[str, Term], tell: Tell) -> dict[str, HeldOut]:
@@ -153,24 +151,19 @@ def _predict_sweep(
     kind: Kind,
     named: Mode | None,
     values: Mapping[str, float],
-    recording: Recording | None,
+    sweep: SweepResponse | None,
     tell: Tell,
 ) -> SweepShrink | None:
-    """The gap of a recorded sweep, predicted by the baseline as given, recalibrated, and with what is named."""
-    sweep = None if recording is None else cam_sweep(recording)
-    if recording is None or sweep is None:
+    """The gap of a recorded sweep: of the baseline as given, recalibrated, and with what is named."""
+    if sweep is None:
         return None
     tell("predicting the sweep")
-    plant, bare = case.plant, build_model(case.plant.rig, case.plant.baseline)
-    models = [(bare, plant.values(given)) for given in (values, case.base.values)]
-    if named is not None:
-        model = build_model(plant.rig, (*plant.baseline, *named.terms))
-        models.append((model, plant.values(named.values)))
-    before, recalibrated, *after = sweep_gaps(recording, sweep, models)
-    # A learned law stands for no model that could be simulated.
-    return SweepShrink(
-        before, recalibrated, after[0] if after else np.nan if kind == "unknown" else recalibrated
-    )
+    after = case.base if named is None else named
+    hypotheses: list[Hypothesis] = [((), values), ((), case.base.values)]
+    if kind != "unknown":
+        # A learned law stands for no model that could be solved.
+        hypotheses.append((after.terms, after.values))
+    return sweep_shrink(case.plant, sweep, hypotheses)
 
 
 def _responses(plant: RigPlant, *rows: NDArray[np.float64]) -> Responses:

@@ -122,11 +122,12 @@ class Shrink:
 
 @dataclass(frozen=True)
 class SweepShrink:
-    """The same on the recorded sweep, relative rms of the waveform; NaN where nothing was computed."""
+    """The same of the first harmonic along the recorded sweep; NaN where nothing was computed."""
 
     before: float
     recalibrated: float
     after: float
+    floor: float
 
 
 @dataclass(frozen=True)

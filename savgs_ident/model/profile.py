@@ -74,23 +74,20 @@ def _smooth_rise(share: Scalar) -> Scalar:
 
 
 class LinearSweep(AbstractProfile):
-    """amplitude cos(phi(t)) with a frequency dphi/dt that runs linearly and then stays.
+    """amplitude sin(phi(t)) with a frequency dphi/dt that runs linearly and then stays.
 
-    From ``start`` [Hz] at t = 0 to ``end`` [Hz] at t = ``duration`` [s]; phi is the integral of the frequency from
-    ``angle`` [rad] on, by default -pi/2: upwards from the middle. A sweep from 0 Hz starts at rest.
+    From ``start`` [Hz] at t = 0 to ``end`` [Hz] at t = ``duration`` [s]; phi is the integral of the frequency.
+    A sweep from 0 Hz starts at rest.
     """
 
     amplitude: Number = eqx.field(converter=jnp.asarray)
     start: Number = eqx.field(converter=jnp.asarray)
     end: Number = eqx.field(converter=jnp.asarray)
     duration: Number = eqx.field(converter=jnp.asarray)
-    angle: Number = eqx.field(converter=jnp.asarray, default=-np.pi / 2.0)
 
     def value(self, t: Scalar) -> Scalar:
         """The quantity at time ``t`` [s]."""
-        # As a sine it is exactly nought where the angle is -pi/2.
-        turned = SweptAngle(self.start, self.end, self.duration, self.angle + np.pi / 2.0)
-        return self.amplitude * jnp.sin(turned.value(t))
+        return self.amplitude * jnp.sin(SweptAngle(self.start, self.end, self.duration, 0.0).value(t))
 
 
 class SweptAngle(AbstractProfile):

@@ -58,15 +58,10 @@ def cam_road(peak_to_peak: float, frequency: float, settle: float = 0.0) -> Road
     return RoadMotion(Sine(peak_to_peak / 2.0, frequency, 0.0, 0.0, settle), angle)
 
 
-def sweep_road(
-    peak_to_peak: float, start: float, end: float, duration: float, angle: float = -np.pi / 2.0
-) -> RoadMotion:
-    """A cam [m] whose frequency runs from ``start`` to ``end`` [Hz] in ``duration`` [s].
-
-    ``angle`` [rad] is that of the cam at t = 0, from where it lifts highest: upwards from the middle by default.
-    """
-    turning = SweptAngle(start, end, duration, angle)
-    return RoadMotion(LinearSweep(peak_to_peak / 2.0, start, end, duration, angle), turning)
+def sweep_road(peak_to_peak: float, start: float, end: float, duration: float) -> RoadMotion:
+    """A cam [m] whose frequency runs from ``start`` to ``end`` [Hz] in ``duration`` [s], upwards first."""
+    angle = SweptAngle(start, end, duration, -np.pi / 2.0)
+    return RoadMotion(LinearSweep(peak_to_peak / 2.0, start, end, duration), angle)
 
 
 def tabulated_road(time: ArrayLike, height: ArrayLike, source: str = "") -> RoadMotion:

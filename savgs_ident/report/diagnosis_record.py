@@ -50,6 +50,7 @@ def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
             "before": diagnosis.sweep.before,
             "recalibrated": diagnosis.sweep.recalibrated,
             "after": diagnosis.sweep.after,
+            "floor": diagnosis.sweep.floor,
         },
         "identified": dict(diagnosis.identified),
         "converged": diagnosis.converged,

@@ -131,11 +131,11 @@ def shrink_table(diagnosis: Diagnosis) -> tuple[ShrinkRow, ...]:
         swept = diagnosis.sweep
         rows.append(
             ShrinkRow(
-                name="Recorded sweep, waveform",
+                name="Recorded sweep, first harmonic",
                 before=gap_percentage(swept.before),
                 recalibrated=gap_percentage(swept.recalibrated),
                 after=gap_percentage(swept.after),
-                floor=DASH,
+                floor=gap_percentage(swept.floor),
                 closed=DASH,
             )
         )

@@ -39,10 +39,11 @@ def shrink_rows(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
         for title, each in ((both | named) or {"both channels": diagnosis.shrink}).items()
     }
     if diagnosis.sweep is not None:
-        rows["sweep, waveform"] = {
+        rows["sweep"] = {
             "before": 100.0 * diagnosis.sweep.before,
             "recalibrated": 100.0 * diagnosis.sweep.recalibrated,
             "after": 100.0 * diagnosis.sweep.after,
+            "noise alone": 100.0 * diagnosis.sweep.floor,
         }
     return rows
 

@@ -53,8 +53,9 @@ def _gap(diagnosis: Diagnosis) -> RenderableType:
     rows = [cells("together", diagnosis.shrink)]
     rows += [cells(_channel(name), each) for name, each in diagnosis.by_channel.items()]
     if diagnosis.sweep is not None:
-        swept = (diagnosis.sweep.before, diagnosis.sweep.recalibrated, diagnosis.sweep.after)
-        rows.append(("sweep, waveform", *map(gap_percentage, swept), DASH, DASH))
+        swept = diagnosis.sweep
+        gaps = (swept.before, swept.recalibrated, swept.after, swept.floor)
+        rows.append(("sweep, first harmonic", *map(gap_percentage, gaps), DASH))
     headers = ("gap on tests left out", "before", "recali-\nbrated", "after", "floor", "share closed (95 %)")
     return table("How far it shrinks", headers, rows)
 

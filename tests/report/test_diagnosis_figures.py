@@ -218,7 +218,7 @@ def test_the_law_at_a_port_is_that_of_the_effect_there(by_kind: dict[str, Diagno
 
 def test_gaps_are_drawn_at_their_per_cent(diagnosis: Diagnosis) -> None:
     rows = shrink_rows(diagnosis)
-    assert list(rows) == ["both channels", "acceleration", "deflection", "sweep, waveform"]
+    assert list(rows) == ["both channels", "acceleration", "deflection", "sweep"]
     axes = shrink_figure(diagnosis).axes[0]
     assert axes.get_xlabel().endswith("[%]")
     drawn = {

@@ -230,7 +230,7 @@ def test_the_terminal_tells_the_verdict_first_in_80_columns(by_kind: dict[str, D
 def test_the_terminal_tells_the_numbers(diagnosis: Diagnosis) -> None:
     text = rendered(diagnosis)
     assert re.search(r"together +17\.3 % +8\.71 % +0\.47 % +0\.21 % +99\.9 % \(99\.9 % to > 99\.9 %\)", text)
-    assert re.search(rf"sweep, waveform +18\.8 % +9\.42 % +1\.32 % +{DASH} +{DASH}", text)
+    assert re.search(rf"sweep, first harmonic +18\.8 % +9\.42 % +1\.32 % +0\.21 % +{DASH}", text)
     assert re.search(r"rail_stribeck +98\.2 % +61\.2 +\+3\.41 +99\.9 %", text)
     assert "- stribeck_velocity: 0.1012 (0.0957 to 0.1066) m/s" in text
     assert "This campaign cannot tell it from: rail_preload." in text

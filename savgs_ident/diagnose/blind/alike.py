@@ -1,10 +1,11 @@
 """Effects that do the same to a campaign: nobody can tell from it which of them the rig has.
 
-To first order about the rig without any: effects without states by their derivatives, those with states by what
-they do along its motion, for several of their shapes.
+To first order about the rig without any it is seen which ones may: effects without states by their derivatives, those
+with states by what they do along its motion, for several of their shapes.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,7 +13,7 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.diagnose.blind.bench import ORDERS, Bench
-from savgs_ident.diagnose.blind.hiding import Hiding, first_order_sigma, noise_rows, rows_of
+from savgs_ident.diagnose.blind.hiding import Hiding, closest, noise_rows, rows_of
 from savgs_ident.diagnose.engine.prediction import Term
 from savgs_ident.diagnose.rig.columns import columns_with_states
 from savgs_ident.diagnose.rig.coordinates import term_of
@@ -23,40 +24,58 @@ from savgs_ident.posterior.likelihood import Likelihood
 from savgs_ident.posterior.scales import Scales
 from savgs_ident.simulate.periodic import PeriodicSolution, harmonic_sensitivities
 
-TOLD_APART = 5.0
-"""Standard deviations from which on two effects can be told apart."""
+SIMILAR = 0.4
+"""Share of its distance from the baseline that an effect keeps, to first order, from one that may do the same."""
 
 Real = NDArray[np.float64]
 
-Ways = Mapping[str, tuple[Real, ...]]
-"""By effect, for every shape that is tried: change of the rows in noise per unit of its amplitudes, (m, a)."""
+
+class Way(NamedTuple):
+    """What an effect does at given shapes [SI]: change of the rows in noise per unit of its amplitudes, (m, a)."""
+
+    shapes: Mapping[str, float]
+    columns: Real
+
+
+Ways = Mapping[str, tuple[Way, ...]]
+"""By effect, for every shape that is tried."""
 
 
 def ways_of(bench: Bench, given: Mapping[str, float], solution: PeriodicSolution) -> Ways:
     """What every effect that the baseline lacks would do to a rig whose motions are ``solution``."""
     terms = [term_of(each) for name, each in CATALOGUE.items() if name not in bench.baseline]
     model, noise = bench.model(()), noise_rows(bench)
-    ways: dict[str, list[Real]] = {term.name: [] for term in terms}
+    ways: dict[str, list[Way]] = {term.name: [] for term in terms}
     for one in range(max(len(term.tried) for term in terms)):
         some = [term for term in terms if len(term.tried) > one]
-        p = bench.values(
-            dict(given) | {name: value for term in some for name, value in term.tried[one].items()}
-        )
-        for name, rows in {
-            **_sloped(model, p, solution, some),
-            **_marched(bench, model, p, solution, some),
-        }.items():
-            ways[name].append(rows / noise[:, None])
+        shapes = {name: value for term in some for name, value in term.tried[one].items()}
+        p = bench.values({**given, **shapes})
+        rows = {**_sloped(model, p, solution, some), **_marched(bench, model, p, solution, some)}
+        for term in some:
+            ways[term.name].append(Way(term.tried[one], rows[term.name] / noise[:, None]))
     return {name: tuple(each) for name, each in ways.items()}
 
 
-def alike(hiding: Hiding, change: Real, ways: Ways, name: str) -> tuple[str, ...]:
-    """Effects other than ``name`` that, of some size, ``change`` the rows (m,) as it does."""
-    return tuple(
-        other
-        for other, columns in ways.items()
-        if other != name and min(first_order_sigma(hiding, change, each) for each in columns) < TOLD_APART
-    )
+def similar(hiding: Hiding, change: Real, ways: Ways, name: str) -> dict[str, dict[str, float]]:
+    """Effects other than ``name`` that ``change`` the rows (m,) nearly as it does, to first order.
+
+    With the parameters [SI] at which they do.
+    """
+    blank = np.zeros((change.size, 0))
+    limit = SIMILAR * closest(hiding, change, blank).sigma
+    found = {}
+    for other in ways:
+        if other == name:
+            continue
+        nearest = [(way, closest(hiding, change, way.columns)) for way in ways[other]]
+        way, best = min(nearest, key=lambda each: each[1].sigma)
+        if best.sigma < limit:
+            null = CATALOGUE[other].null
+            found[other] = {
+                **way.shapes,
+                **{each: null[each] + float(size) for each, size in zip(null, best.sizes, strict=True)},
+            }
+    return found
 
 
 def _sloped(
@@ -73,12 +92,15 @@ def _sloped(
 def _marched(
     bench: Bench, model: QuarterCar, p: Values, solution: PeriodicSolution, terms: Sequence[Term]
 ) -> dict[str, Real]:
-    """Change of the rows by every effect with states at its typical size, (m, 1)."""
+    """Change of the rows by every effect with states per unit of its amplitude, found at its typical size, (m, 1)."""
     special = [term for term in terms if CATALOGUE[term.name].states]
     effects = [CATALOGUE[term.name] for term in special]
     typical = [{each.name: each.centre + 0.5 * each.scale for each in term.amplitudes} for term in special]
     rows = columns_with_states(model, _all_rows(bench), ORDERS, p, solution, effects, typical)
-    return {term.name: each[:, None] for term, each in zip(special, rows, strict=True)}
+    return {
+        term.name: each[:, None] / (0.5 * term.amplitudes[0].scale)
+        for term, each in zip(special, rows, strict=True)
+    }
 
 
 def _all_rows(bench: Bench) -> Likelihood:

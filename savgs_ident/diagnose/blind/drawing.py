@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.diagnose.blind.alike import Ways, alike, ways_of
+from savgs_ident.diagnose.blind.alike import Ways, similar, ways_of
 from savgs_ident.diagnose.blind.bench import Bench, change_of
 from savgs_ident.diagnose.blind.hiding import (
     Hiding,
@@ -27,6 +27,9 @@ SMALLEST, LARGEST = 0.03, 0.25
 STANDS_OUT = 8.0
 """Standard deviations, expected, by which an effect must stand out of what calibration and tolerances do: with
 that it does so by five however noise and tolerances fall."""
+
+TOLD_APART = 5.0
+"""Standard deviations from which on two effects can be told apart."""
 
 NUDGE = 0.02
 """Share of an effect's size by which it is changed for a slope."""
@@ -141,8 +144,18 @@ class Drawing:
         }
 
     def imitators(self, present: Present) -> tuple[str, ...]:
-        """Effects that, of some size, do the same to first order."""
-        return alike(self.hiding, rows_of(present.response) - rows_of(self.response), self.ways, present.name)
+        """Effects that, of some size, do the same: the effect hardly stands out beside them."""
+        change = rows_of(present.response) - rows_of(self.response)
+        found = []
+        for name, parameters in similar(self.hiding, change, self.ways, present.name).items():
+            effect = CATALOGUE[name]
+            within = {
+                each.name: float(np.clip(parameters[each.name], each.lower, each.upper))
+                for each in effect.parameters
+            }
+            if self.sigma(present.response, Present(name, within, 0.0, self.response)) < TOLD_APART:
+                found.append(name)
+        return tuple(found)
 
     @cached_property
     def ways(self) -> Ways:

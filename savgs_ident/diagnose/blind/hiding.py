@@ -93,12 +93,20 @@ def _step(columns: Real, miss: Real, x: Real, known: int) -> Real:
     return step
 
 
-def first_order_sigma(hiding: Hiding, change: Real, flat: Real) -> float:
-    """How far ``change`` (m,) stands out to first order, with columns ``flat`` (m, k) that may have any size."""
+class Closest(NamedTuple):
+    """How far a change stands out of the nearest that can be done, and the sizes (k,) of free columns there."""
+
+    sigma: float
+    sizes: Real
+
+
+def closest(hiding: Hiding, change: Real, flat: Real) -> Closest:
+    """The nearest to ``change`` (m,) to first order, with columns ``flat`` (m, k) that may have any size."""
     columns, known = np.concatenate([hiding.columns, flat], axis=1), hiding.columns.shape[1]
     miss = change / hiding.noise
     x = _step(columns, miss, np.zeros(columns.shape[1]), known)
-    return float(np.sqrt(np.sum((miss - columns @ x) ** 2) + np.sum(x[:known] ** 2)))
+    sigma = float(np.sqrt(np.sum((miss - columns @ x) ** 2) + np.sum(x[:known] ** 2)))
+    return Closest(sigma, x[known:])
 
 
 def sigma_of(

@@ -14,7 +14,7 @@ from savgs_ident.diagnose.blind.answer import Answer
 from savgs_ident.diagnose.blind.bench import Bench
 from savgs_ident.diagnose.blind.programme import Sensors
 from savgs_ident.diagnose.blind.steady import Steady, steady_dwells
-from savgs_ident.diagnose.rig.sweep import CamSweep, simulated
+from savgs_ident.diagnose.blind.swept import sweep_readings
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values
 from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording, TestKind
@@ -72,15 +72,13 @@ def _dwell(bench: Bench, dwell: Steady, lift: float, angle: float, random: np.ra
 def _sweep(
     bench: Bench, model: QuarterCar, p: Values, lift: float, angle: float, random: np.random.Generator
 ) -> Recording:
-    """Raises :class:`InputError` for a rig whose sweep cannot be simulated."""
     programme = bench.programme
     stamps = _stamps(programme.sweep, bench.sensors, random)
-    sweep = CamSweep(lift, 0.0, programme.sweep_end, programme.sweep, -np.pi / 2.0)
-    curves = simulated(sweep, model, p)
-    if curves is None:
-        raise InputError("the sweep cannot be simulated", source="sweep", remedy="draw another rig")
+    times, readings = sweep_readings(model, p, programme.sweep, programme.sweep_end, bench.sensors.rate)
     turns = 0.5 * programme.sweep_end / programme.sweep * stamps**2
-    truth = np.stack([lift / 2.0 * np.sin(2.0 * np.pi * turns), *(each(stamps) for each in curves.values())])
+    truth = np.stack(
+        [lift / 2.0 * np.sin(2.0 * np.pi * turns), *CubicSpline(times, readings, axis=1)(stamps)]
+    )
     name = f"sweep_0_{programme.sweep_end:g}Hz_{programme.sweep:g}s"
     return _test(name, "sweep", None, stamps, truth, angle, bench.sensors, random)
 

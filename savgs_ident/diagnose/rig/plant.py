@@ -35,6 +35,7 @@ from savgs_ident.posterior.likelihood import Likelihood, likelihood_of
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.excitation import Excitation
+from savgs_ident.simulate.layout import Layout, layout_for
 from savgs_ident.simulate.measured import measured_excitation
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
@@ -75,6 +76,11 @@ class RigPlant:
     likelihood: Likelihood
     shape: tuple[int, int, int]
     settings: PeriodicSettings
+
+    @cached_property
+    def layout(self) -> Layout:
+        """How nodes share arrays."""
+        return layout_for(np.asarray(self.excitation.frequency), self.settings.nodes, self.settings.slow)
 
     @property
     def orders(self) -> int:
@@ -157,7 +163,8 @@ class RigPlant:
 
         Raises :class:`InputError` if there are none.
         """
-        solution = simulate_periodic(self.model(()), self.values(values), self.excitation, self.settings)
+        model, p = self.model(()), self.values(values)
+        solution = simulate_periodic(model, p, self.excitation, self.settings, self.layout)
         if not all(status.ok for status in solution.status()):
             lost = [
                 f"{f:.4g} Hz"

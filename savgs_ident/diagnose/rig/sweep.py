@@ -1,131 +1,120 @@
-"""The recorded sweep, which nothing was fitted to: its waveform held against that of every model.
+"""The recorded sweep, which nothing was fitted to: its first harmonic held against that of every model.
 
-The cam's angle is found from the recorded road, so that the models are driven by the motion itself and not by the
-noise of its sensor. A model's readings are simulated from rest at even instants and interpolated at the stamps.
+A sweep is slow: at every instant the rig moves nearly as in a dwell of the frequency of that instant. The first
+harmonic X of the periodic motions is a smooth function of the angular frequency w, and
+
+    X(w) - (i / 2) wd d^2 X / dw^2
+
+is that of the sweep, to the next order of its rate wd: peaks come a little late. So a sweep is predicted without a
+program of its own. Below the slowest dwell of the campaign nothing is compared.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from diffrax import RESULTS
-from jaxtyping import Array
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.optimize import least_squares
 
-from savgs_ident.model.actuation import ImposedLink, held_link
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.road import RoadMotion, sweep_road
+from savgs_ident.diagnose.result import SweepShrink
+from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.model.sensors import RESPONSE_CHANNELS
-from savgs_ident.model.values import Values
-from savgs_ident.recordings.recording import Recording
-from savgs_ident.responses.road_phase import crossing_times
-from savgs_ident.simulate.stored import placed
-from savgs_ident.simulate.transient import simulate_transient
+from savgs_ident.responses.sweep_response import SweepResponse
+from savgs_ident.simulate.excitation import Excitation
+from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 
-RATE = 500.0
-"""Instants a second at which readings are simulated [Hz]: the corners of stick and slip lie between no two."""
-
-PRECISION = 1e-6
-"""Relative tolerance of a step of the integration."""
-
-CROSSINGS = 12
-"""Passages of the road through its middle that a sweep needs."""
-
-MISSED = 0.02
-"""Share of the road's amplitude by which a sweep may miss the recorded road, rms."""
+DWELLS = 6
+"""Dwells of the campaign that must lie in the sweep's range: then the motions between them can be found, too."""
 
 Signal = NDArray[np.float64]
 
-
-class CamSweep(NamedTuple):
-    """Height from top to bottom [m]; frequencies [Hz] at the first stamp and after ``duration`` [s]; the angle
-    [rad] at the first stamp, from where the cam lifts highest."""
-
-    peak_to_peak: float
-    start: float
-    end: float
-    duration: float
-    angle: float
-
-    def road(self) -> RoadMotion:
-        """The plate's motion, time counted from the first stamp."""
-        return sweep_road(self.peak_to_peak, self.start, self.end, self.duration, self.angle)
+Hypothesis = tuple[tuple[str, ...], Mapping[str, float]]
+"""Terms, and values by name [SI]."""
 
 
-def cam_sweep(recording: Recording) -> CamSweep | None:
-    """The sweep of the cam that a recorded road shows; None where it is none or was not recorded."""
-    channel = recording.channels.get("road_height")
-    if channel is None or not (np.isfinite(channel.values).all() and np.ptp(channel.values) > 0.0):
+def sweep_shrink(
+    plant: RigPlant, sweep: SweepResponse, hypotheses: Sequence[Hypothesis]
+) -> SweepShrink | None:
+    """The gap of a sweep before, recalibrated and after, for three ``hypotheses``; two if nothing is to come after.
+
+    None where too few dwells of the campaign lie in the sweep's range. NaN for a hypothesis without motion.
+    """
+    frequencies = frequencies_of(np.asarray(plant.excitation.frequency), sweep)
+    if frequencies is None:
         return None
-    time, height = channel.time - channel.time[0], channel.values - channel.values.mean()
-    crossings = crossing_times(time, height)
-    if crossings.size < CROSSINGS:
-        return None
-    upwards = np.interp(crossings[0] + 0.25 * (crossings[1] - crossings[0]), time, height) > 0.0
-    passed = np.pi * np.arange(crossings.size) - (np.pi / 2.0 if upwards else -np.pi / 2.0)
-    bend, speed, angle = np.polyfit(crossings, passed, 2)
-
-    def shape(x: Signal) -> Signal:
-        return np.asarray(np.cos(x[0] + x[1] * time + x[2] * time**2))
-
-    def missed(x: Signal) -> Signal:
-        return np.asarray(height - x[3] * shape(x) - x[4])
-
-    amplitude = np.ptp(height) / 2.0
-    start = np.array([angle, speed, bend, amplitude, 0.0])
-    spread = np.array([0.1, 0.1, 0.01, amplitude, amplitude])
-    found = least_squares(missed, start, x_scale=spread)
-    if not found.success or np.sqrt(np.mean(found.fun**2)) > MISSED * abs(found.x[3]):
-        return None
-    duration = float(time[-1])
-    first = float(found.x[1]) / (2.0 * np.pi)
-    last = first + float(found.x[2]) * duration / np.pi
-    return CamSweep(2.0 * float(found.x[3]), first, last, duration, float(found.x[0]))
-
-
-def sweep_gaps(
-    recording: Recording, sweep: CamSweep, models: Sequence[tuple[QuarterCar, Values]]
-) -> tuple[float, ...]:
-    """Relative rms gap of each model's waveform over the sweep, both channels counting alike; NaN where a model
-    cannot be simulated."""
-    return tuple(_gap(recording, simulated(sweep, model, p)) for model, p in models)
-
-
-def simulated(sweep: CamSweep, model: QuarterCar, p: Values) -> Mapping[str, CubicSpline] | None:
-    """A model's readings over the time since the first stamp, by channel; None where it cannot be simulated."""
-    times = np.arange(int(np.ceil(sweep.duration * RATE)) + 1) / RATE
-    link = held_link(float(p["psi_nominal"]))
-    shown, ended = _swept(model, *placed((p, sweep.road(), link, jnp.asarray(times))))
-    readings = np.asarray(shown)
-    if not (bool(ended) and np.isfinite(readings).all()):
-        return None
-    return {
-        name: CubicSpline(times, values) for name, values in zip(RESPONSE_CHANNELS, readings, strict=True)
+    inside = (sweep.frequency >= frequencies[0]) & (sweep.frequency <= frequencies[-1])
+    shown = {
+        name: inside & sweep.valid[:, sweep.channel(name)]
+        for name in RESPONSE_CHANNELS
+        if name in sweep.channels
     }
+    shown = {name: rows for name, rows in shown.items() if rows.any()}
+    if not shown:
+        return None
+    gaps = [_gap(sweep, shown, first_harmonic(plant, sweep, frequencies, *each)) for each in hypotheses]
+    return SweepShrink(gaps[0], gaps[1], gaps[2] if len(gaps) > 2 else np.nan, _floor(sweep, shown))
 
 
-def _gap(recording: Recording, model: Mapping[str, CubicSpline] | None) -> float:
-    if model is None:
+def frequencies_of(dwells: Signal, sweep: SweepResponse) -> Signal | None:
+    """As many frequencies [Hz] as there are dwells: those in the sweep's range, its end, and what lies between."""
+    lowest, highest = float(sweep.frequency.min()), float(sweep.frequency.max())
+    inside = np.unique(dwells[(dwells >= lowest) & (dwells < highest)])
+    if inside.size < DWELLS or inside.size == dwells.size:
+        return None
+    found = [*inside.tolist(), highest]
+    while len(found) < dwells.size:
+        place = int(np.argmax(np.diff(found)))
+        found.insert(place + 1, (found[place] + found[place + 1]) / 2.0)
+    return np.array(found)
+
+
+def first_harmonic(
+    plant: RigPlant,
+    sweep: SweepResponse,
+    frequencies: Signal,
+    terms: tuple[str, ...],
+    values: Mapping[str, float],
+) -> NDArray[np.complex128] | None:
+    """First harmonic per metre of road at the instants of a sweep, (W, 2), from motions at frequencies [Hz], (D,).
+
+    None where a motion is not found. Slow motions take the places of slow dwells, which have the nodes for it: no
+    program is compiled anew.
+    """
+    dwells, amplitude = plant.excitation, float(np.median(sweep.road_amplitude))
+    place = np.argsort(np.argsort(np.asarray(dwells.frequency)))
+    road, link = np.zeros(dwells.road.shape, complex), np.zeros(dwells.link.shape, complex)
+    road[:, 1] = amplitude
+    link[:, 0] = np.mean(np.asarray(dwells.link)[:, 0])
+    there = Excitation(jnp.asarray(frequencies[place]), jnp.asarray(road), jnp.asarray(link))
+    model, p = plant.model(terms), plant.values(values)
+    solution = simulate_periodic(model, p, there, plant.settings, plant.layout)
+    if not all(status.ok for status in solution.status()):
+        return None
+    first = np.asarray(harmonics(model, p, solution, plant.orders))[np.argsort(place), :, 1] / amplitude
+    curve, omega = CubicSpline(2.0 * np.pi * frequencies, first), 2.0 * np.pi * sweep.frequency
+    late = 0.5j * 2.0 * np.pi * sweep.sweep_rate[:, None] * curve(omega, 2)
+    return np.asarray(curve(omega) - late)
+
+
+def _gap(
+    sweep: SweepResponse, shown: Mapping[str, NDArray[np.bool_]], told: NDArray[np.complex128] | None
+) -> float:
+    """Relative rms over the instants shown, both channels counting alike."""
+    if told is None:
         return np.nan
-    first = recording.channels["road_height"].time[0]
-    missed = shown = 0.0
-    for name, curve in model.items():
-        channel = recording.channels.get(name)
-        if channel is None or not np.isfinite(channel.values).all():
-            continue
-        apart = channel.values - curve(channel.time - first)
-        power = float(np.var(channel.values))
-        missed, shown = missed + float(np.var(apart)) / power, shown + 1.0
-    return float(np.sqrt(missed / shown)) if shown else np.nan
+    shares = []
+    for name, rows in shown.items():
+        seen = sweep.response[rows, sweep.channel(name)]
+        miss = seen - told[rows, RESPONSE_CHANNELS.index(name)]
+        shares.append(np.sum(np.abs(miss) ** 2) / np.sum(np.abs(seen) ** 2))
+    return float(np.sqrt(np.mean(shares)))
 
 
-@eqx.filter_jit
-def _swept(
-    model: QuarterCar, p: Values, road: RoadMotion, link: ImposedLink, times: Array
-) -> tuple[Array, Array]:
-    found = simulate_transient(model, p, road, link, times, tolerance=PRECISION)
-    return jnp.stack(found.readings), jnp.asarray(found.result == RESULTS.successful)
+def _floor(sweep: SweepResponse, shown: Mapping[str, NDArray[np.bool_]]) -> float:
+    """The same of the noise alone."""
+    shares = []
+    for name, rows in shown.items():
+        place = sweep.channel(name)
+        seen = np.sum(np.abs(sweep.response[rows, place]) ** 2)
+        shares.append(2.0 * np.sum(sweep.response_sd[rows, place] ** 2) / seen)
+    return float(np.sqrt(np.mean(shares)))
