@@ -90,9 +90,19 @@ def first_harmonic(
     solution = simulate_periodic(model, p, there, plant.settings, plant.layout)
     if not all(status.ok for status in solution.status()):
         return None
-    first = np.asarray(harmonics(model, p, solution, plant.orders))[np.argsort(place), :, 1] / amplitude
-    curve, omega = CubicSpline(2.0 * np.pi * frequencies, first), 2.0 * np.pi * sweep.frequency
-    late = 0.5j * 2.0 * np.pi * sweep.sweep_rate[:, None] * curve(omega, 2)
+    found = np.asarray(harmonics(model, p, solution, plant.orders), np.complex128)
+    return along(frequencies, found[np.argsort(place), :, 1] / amplitude, sweep.frequency, sweep.sweep_rate)
+
+
+def along(
+    frequencies: Signal, steady: NDArray[np.complex128], frequency: Signal, rate: Signal
+) -> NDArray[np.complex128]:
+    """First harmonic (W, C) of a sweep that passes ``frequency`` [Hz] at ``rate`` [Hz/s], (W,).
+
+    From ``steady`` ones, (D, C), at ``frequencies`` [Hz], (D,), increasing.
+    """
+    curve, omega = CubicSpline(2.0 * np.pi * frequencies, steady), 2.0 * np.pi * frequency
+    late = 0.5j * 2.0 * np.pi * rate[:, None] * curve(omega, 2)
     return np.asarray(curve(omega) - late)
 
 
