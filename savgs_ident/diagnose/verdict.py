@@ -16,6 +16,9 @@ PRIOR_PAIR = 0.1
 PRIOR_UNKNOWN = 0.1
 """Prior probabilities that nothing is missing, one effect, two, or something that the catalogue does not have."""
 
+PRIOR_STRAINED = 0.01
+"""Prior probability that, beside what a hypothesis says, one of the sheet's tolerances does not hold."""
+
 SURE = 10.0
 """Log odds against the baseline from which on something is said to be missing."""
 
@@ -46,8 +49,8 @@ def weigh(findings: Findings, alone: float, besides: float, strained: float) -> 
     """All hypotheses by falling weight.
 
     ``alone`` is the log evidence of the best law learned at a port; ``besides`` that of the best one beside the best
-    effects, and ``strained`` that of these if a tolerance does not hold, both no more probable beforehand than
-    these effects are.
+    effects, and ``strained`` that of these if a tolerance does not hold, both less probable beforehand than these
+    effects are.
     """
     count = max(len(findings.scores), 1)
     single, pair = log(PRIOR_SINGLE / count), log(PRIOR_PAIR / max(count * (count - 1) / 2, 1))
@@ -55,8 +58,11 @@ def weigh(findings: Findings, alone: float, besides: float, strained: float) -> 
     def prior(mode: Mode) -> float:
         return {0: log(PRIOR_NONE), 1: single}.get(len(mode.terms), pair)
 
-    most = max(besides, strained) + prior(findings.best)
-    unknown = max(alone, most) + log(PRIOR_UNKNOWN)
+    unknown = max(
+        alone + log(PRIOR_UNKNOWN),
+        besides + log(PRIOR_UNKNOWN) + prior(findings.best),
+        strained + log(PRIOR_STRAINED) + prior(findings.best),
+    )
     found = [
         Weighed("none", (), findings.base.evidence + log(PRIOR_NONE), findings.base),
         Weighed("unknown", (), unknown, None),
