@@ -5,6 +5,7 @@ import numpy as np
 from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.prediction import MULTIPLES, Term
 from savgs_ident.diagnose.rig.columns import impose, marched_effect, node_loads
+from savgs_ident.diagnose.rig.loops import strut_force
 from savgs_ident.diagnose.rig.places import free_signal, nodes_of, places_of
 from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.effects.registry import CATALOGUE
@@ -138,3 +139,17 @@ def test_a_free_signal_is_the_sum_of_its_harmonics(start: PeriodicSolution) -> N
     np.testing.assert_allclose(
         free_signal(coefficients, phase), 3.0 * np.cos(2 * phase) - 2.0 * np.sin(3 * phase), atol=1e-12
     )
+
+
+def test_a_mount_is_drawn_as_the_force_that_does_the_same(
+    plant_and_data: Case, start: PeriodicSolution
+) -> None:
+    """But for the damper, which is drawn with its mean slope."""
+    plant, data = plant_and_data
+    p = plant.values({"mount_compliance": 2e-7, "mount_damping": 500.0})
+    along = marched_effect(plant.complete(()), p, start, CATALOGUE["mount_compliance"])
+    force = strut_force(p, *along.T, in_damper=False)
+    signals = [("mount_way", along), ("strut", force)]
+    way, same = impose(plant.complete(()), plant.likelihood, plant.orders, p, start, signals)
+    assert _relative(same, way, data) < 0.3
+    assert _relative(-same, way, data) > 1.5

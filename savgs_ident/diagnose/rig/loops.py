@@ -12,7 +12,14 @@ from savgs_ident.diagnose.result import ForceLoop
 from savgs_ident.diagnose.rig.columns import marched_effect, node_loads
 from savgs_ident.diagnose.rig.places import free_signal
 from savgs_ident.diagnose.rig.plant import RigPlant
-from savgs_ident.model.effect import AbstractEffect, AbstractForce, AbstractGrip, AbstractSeries, PortSignals
+from savgs_ident.model.effect import (
+    AbstractEffect,
+    AbstractForce,
+    AbstractGrip,
+    AbstractSeries,
+    Port,
+    PortSignals,
+)
 from savgs_ident.model.values import Values
 from savgs_ident.simulate.periodic import PeriodicSolution
 
@@ -103,7 +110,17 @@ def _law(
         return -np.asarray(jnp.where(side > 0.0, grip.against_up, grip.against_down) * side)
     if isinstance(effect, AbstractForce) and not effect.states and signals is not None:
         return np.asarray(jax.vmap(lambda each: effect.force(p, each, jnp.zeros(0)))(signals))
-    if isinstance(effect, AbstractForce | AbstractSeries):
-        along = marched_effect(plant.complete(()), p, solution, effect)
-        return along if along.ndim == 1 else along[:, 0]
+    if isinstance(effect, AbstractForce):
+        return marched_effect(plant.complete(()), p, solution, effect)
+    if isinstance(effect, AbstractSeries) and effect.port is not Port.TYRE_LATERAL:
+        way, rate = marched_effect(plant.complete(()), p, solution, effect).T
+        return strut_force(p, way, rate, effect.in_damper) if effect.port is Port.STRUT else way
     return None
+
+
+def strut_force(
+    p: Values, way: NDArray[np.float64], rate: NDArray[np.float64], in_damper: bool
+) -> NDArray[np.float64]:
+    """By how much spring and damper push more, apart, where something in series with them gives way [m], [m/s]."""
+    spring = 0.0 if in_damper else float(p["k_sd"])
+    return -(spring * way + float(p["c_sd"]) * rate)
