@@ -21,8 +21,8 @@ from benchmarks.suite import NAMES, Size, run_suite
 from benchmarks.table import make_table, print_table
 from benchmarks.task import DWELLS_HZ, QUICK_HZ
 
-FULL = Size(DWELLS_HZ, 60.0, target_ess=1000.0, integrations=308, stretch_steps=150_000)
-QUICK = Size(QUICK_HZ, 2.0, target_ess=100.0, integrations=24, stretch_steps=5000)
+FULL = Size(DWELLS_HZ, 60.0, 1000.0, 308, 150_000, Path("out/blind"))
+QUICK = Size(QUICK_HZ, 2.0, 100.0, 24, 5000, Path("out/blind"))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -33,11 +33,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--only", nargs="+", action="extend", choices=NAMES, metavar="NAME", help=", ".join(NAMES)
     )
     parser.add_argument("--quick", action="store_true", help="four dwells, two minutes of MCAP, few draws")
+    parser.add_argument(
+        "--trials",
+        type=Path,
+        metavar="DIR",
+        default=FULL.trials,
+        help="what `savgs-ident blind` wrote, for `sindy`",
+    )
     options = parser.parse_args(arguments)
 
     # Results are fetched at once everywhere here; handing each call to another thread only delays them.
     jax.config.update("jax_cpu_enable_async_dispatch", False)
-    began, size = time.perf_counter(), QUICK if options.quick else FULL
+    began = time.perf_counter()
+    size = (QUICK if options.quick else FULL)._replace(trials=options.trials)
 
     def tell(line: str) -> None:
         print(f"{time.perf_counter() - began:7.1f} s  {line}", file=sys.stderr, flush=True)

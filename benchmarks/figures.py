@@ -86,6 +86,19 @@ FIGURES: dict[str, Figure] = {
     "collocation_worst_sd": Figure(
         "", ".2f", "Furthest that one of the four parameters is from the fit, in standard errors of the fit."
     ),
+    "diagnose_cold_s": Figure(
+        "s", ".1f", "`savgs-ident diagnose` on the shipped campaign, no friction in the baseline, first time."
+    ),
+    "diagnose_cached_s": Figure("s", ".1f", "The same again, with the compiled programs on disk."),
+    "diagnose_peak_mb": Figure("MB", ".0f", "Most memory that either took."),
+    "trials_effects": Figure("", ".0f", "Blind trials with one effect of the catalogue."),
+    "trials_nothing": Figure("", ".0f", "Blind trials with nothing missing."),
+    "top1_percent_ours": Figure("%", ".0f", "Effects that the diagnosis names first and by their own name."),
+    "top1_percent_stlsq": Figure("%", ".0f", "The same by pySINDy's STLSQ on our residuals and library."),
+    "top1_percent_frols": Figure("%", ".0f", "The same by pySINDy's FROLS."),
+    "false_alarms_percent_ours": Figure("%", ".0f", "Where nothing is missing: something said to be."),
+    "false_alarms_percent_stlsq": Figure("%", ".0f", "The same by STLSQ."),
+    "false_alarms_percent_frols": Figure("%", ".0f", "The same by FROLS."),
     "mcap_samples_per_s": Figure(
         "1/s", ",.0f", "Samples (of six channels) read per second from a long MCAP file."
     ),

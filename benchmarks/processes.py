@@ -40,22 +40,31 @@ def run_process(arguments: Sequence[str], environment: Mapping[str, str] | None 
 
 def measure_fit(tell: Tell) -> Outcome:
     """``savgs-ident fit`` on the shipped campaign, without and with compiled programs in the cache."""
+    return _cold_and_cached("fit", (), tell)
+
+
+def measure_diagnosis(tell: Tell) -> Outcome:
+    """``savgs-ident diagnose`` on the shipped campaign, from the baseline without any friction; both as above."""
+    return _cold_and_cached("diagnose", ("--model", "simqc"), tell)
+
+
+def _cold_and_cached(command: str, options: Sequence[str], tell: Tell) -> Outcome:
     with TemporaryDirectory() as folder:
-        arguments = ["-m", "savgs_ident.cli", "fit", str(default_campaign_path())]
+        arguments = ["-m", "savgs_ident.cli", command, str(default_campaign_path()), *options]
         arguments += ["--out", str(Path(folder) / "out"), "--quiet"]
         environment = {"SAVGS_IDENT_CACHE": str(Path(folder) / "cache")}
-        tell("fit: first time")
+        tell(f"{command}: first time")
         cold = run_process(arguments, environment)
-        tell("fit: with the cache")
+        tell(f"{command}: with the cache")
         cached = run_process(arguments, environment)
     ended = {cold.code, cached.code} - {0}
     return Outcome(
         {
-            "fit_cold_s": cold.seconds,
-            "fit_cached_s": cached.seconds,
-            "fit_peak_mb": max(cold.peak_mb, cached.peak_mb),
+            f"{command}_cold_s": cold.seconds,
+            f"{command}_cached_s": cached.seconds,
+            f"{command}_peak_mb": max(cold.peak_mb, cached.peak_mb),
         },
-        (f"fit: ended with exit code {max(ended)}, so its figures mean nothing",) if ended else (),
+        (f"{command}: ended with exit code {max(ended)}, so its figures mean nothing",) if ended else (),
     )
 
 

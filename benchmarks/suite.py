@@ -1,6 +1,7 @@
 """The benchmarks by name, and the run of those that were asked for."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.outcome import Outcome, Tell
@@ -8,6 +9,7 @@ from benchmarks.task import DWELLS_HZ
 
 NAMES = (
     "response", "harmonicbalance", "scipy", "diffrax", "fit", "posterior", "posterior-scipy", "collocation", "mcap",
+    "diagnosis", "sindy",
 )  # fmt: skip
 """What can be asked for."""
 
@@ -23,6 +25,7 @@ class Size(NamedTuple):
         target_ess: effective sample size that the posterior's samplers are to reach.
         integrations: of single dwells by scipy, for the time of a likelihood.
         stretch_steps: of emcee's own move, at most.
+        trials: folder of blind trials on which the diagnosis is compared.
     """
 
     dwells_hz: tuple[float, ...]
@@ -30,6 +33,7 @@ class Size(NamedTuple):
     target_ess: float
     integrations: int
     stretch_steps: int
+    trials: Path
 
 
 def run_suite(names: Sequence[str], size: Size, tell: Tell) -> Outcome:
@@ -46,6 +50,10 @@ def run_suite(names: Sequence[str], size: Size, tell: Tell) -> Outcome:
         from benchmarks import cross_check
 
         outcome += cross_check.measure(size.dwells_hz, tell)
+    if "sindy" in names:
+        from benchmarks import diagnosis_by_sindy
+
+        outcome += diagnosis_by_sindy.measure(size.trials, tell)
     return outcome + Outcome(speedups(outcome.figures) | posterior_speedup(outcome.figures, size.dwells_hz))
 
 
@@ -59,6 +67,10 @@ def _processes(names: Sequence[str], size: Size, tell: Tell) -> Outcome:
         from benchmarks.posterior_process import measure_posterior
 
         outcome += measure_posterior(size.target_ess, tell)
+    if "diagnosis" in names:
+        from benchmarks.processes import measure_diagnosis
+
+        outcome += measure_diagnosis(tell)
     if "mcap" in names:
         from benchmarks.processes import measure_mcap
 
