@@ -11,6 +11,9 @@ from typing import TypeVar
 
 Result = TypeVar("Result")
 
+TASKS = 6
+"""Tasks of a process before all make room for new ones: compiled programs would fill the memory in time."""
+
 
 def side_by_side(work: Callable[[int], Result], numbers: Sequence[int], jobs: int) -> Iterator[Result]:
     """The results of ``work``, defined at the top of a module, as they come; ``jobs`` at a time.
@@ -20,6 +23,12 @@ def side_by_side(work: Callable[[int], Result], numbers: Sequence[int], jobs: in
     if jobs == 1 or len(numbers) < 2:
         yield from map(work, numbers)
         return
+    for first in range(0, len(numbers), TASKS * jobs):
+        yield from _batch(work, numbers[first : first + TASKS * jobs], jobs)
+
+
+def _batch(work: Callable[[int], Result], numbers: Sequence[int], jobs: int) -> Iterator[Result]:
+    """The same in processes of their own."""
     # Forked processes would share the threads of JAX.
     context = multiprocessing.get_context("spawn")
     before = set(multiprocessing.active_children())
