@@ -1,5 +1,7 @@
 """The rig as a plant: slopes, columns of effects at their null, signals imposed at ports."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from savgs_ident.diagnose.engine.data import Data
@@ -35,6 +37,18 @@ def test_candidates_are_what_the_baseline_lacks(plant_and_data: Case) -> None:
     assert {"m_s", "k_t", "accel_gain"} < names
     own = {each.name for term in plant.candidates for each in term.coordinates}
     assert not own & names
+
+
+def test_what_the_papers_models_have_beyond_the_baseline_is_known_to_be_missing_together(
+    plant_and_data: Case,
+) -> None:
+    plant, _ = plant_and_data
+    both = ("rail_coulomb", "tyre_friction")
+    assert plant.known == ()
+    assert replace(plant, baseline=()).known == (both,)
+    assert replace(plant, baseline=both[:1]).known == ()
+    less = {name: effect for name, effect in CATALOGUE.items() if name != "rail_coulomb"}
+    assert replace(plant, baseline=(), catalogue=less).known == ()
 
 
 def test_slopes_are_those_of_differences(plant_and_data: Case, start: PeriodicSolution) -> None:
