@@ -15,7 +15,7 @@ from savgs_ident.diagnose.engine.heldout import HeldOut, held_out_by_law, hold_o
 from savgs_ident.diagnose.engine.parallel import in_parallel
 from savgs_ident.diagnose.engine.prediction import Term
 from savgs_ident.diagnose.engine.search import Tell
-from savgs_ident.diagnose.judgement import Case, Judged, judge, recalibrate
+from savgs_ident.diagnose.judgement import Case, Judged, judge, recalibrate, settle
 from savgs_ident.diagnose.result import (
     Diagnosis,
     ForceLoop,
@@ -72,7 +72,7 @@ def _diagnose(
 ) -> Diagnosis:
     began = time.perf_counter()
     case = recalibrate(measured, rig, options, values, tell)
-    judged = judge(case, tell)
+    case, judged = settle(case, judge(case, tell), tell)
     terms = {term.name: term for term in case.plant.candidates}
     named = judged.chosen.mode if judged.kind in ("effect", "several") else None
     held = _hold_out_all(case, judged, terms, tell)

@@ -1,7 +1,7 @@
 """The case before the court: the baseline recalibrated, hypotheses and ports, and what kind of verdict they allow."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,6 +101,27 @@ def judge(case: Case, tell: Tell) -> Judged:
     weighed = weigh(findings, alone, besides, strained)
     kind, chosen = kind_of(weighed, _own_change(case, best), left)
     return Judged(findings, tuple(places), tuple(weighed), kind, chosen, left)
+
+
+def settle(case: Case, judged: Judged, tell: Tell) -> tuple[Case, Judged]:
+    """The case and its judgement with the named effects found again, free of what finitely many nodes cost."""
+    mode = judged.chosen.mode
+    if judged.kind not in ("effect", "several") or mode is None:
+        return case, judged
+    tell(f"settling {' + '.join(mode.terms)}")
+    plant = case.plant.corrected(mode.terms, mode.values, mode.prediction.near)
+    search = search_of(plant, case.data)
+    terms = {term.name: term for term in plant.candidates}
+    found = climb(search, tuple(terms[name] for name in mode.terms), mode.values, mode.prediction.near)
+    if not np.isfinite(found.evidence):
+        return case, judged
+    chosen = replace(judged.chosen, mode=found)
+    weighed = tuple(chosen if each is judged.chosen else each for each in judged.weighed)
+    modes = tuple(found if each is mode else each for each in judged.findings.modes)
+    findings = replace(judged.findings, modes=modes)
+    return replace(case, plant=plant, search=search), replace(
+        judged, findings=findings, weighed=weighed, chosen=chosen
+    )
 
 
 def _own_change(case: Case, mode: Mode) -> float:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.prediction import MULTIPLES, Term
@@ -167,3 +168,35 @@ def test_a_mount_is_drawn_as_the_force_that_does_the_same(
     way, same = impose(plant.complete(()), plant.likelihood, plant.orders, p, start, signals)
     assert _relative(same, way, data) < 0.3
     assert _relative(-same, way, data) > 1.5
+
+
+@pytest.mark.slow
+def test_corrected_rows_are_those_of_many_nodes(plant_and_data: Case, start: PeriodicSolution) -> None:
+    """A frame's resonance is where a coarse rule puts it wrong."""
+    plant, data = plant_and_data
+    values = {"frame_mobility": 1e-3, "frame_frequency": 12.0, "frame_damping_ratio": 0.05}
+    terms = ("frame_mode",)
+    coarse = plant.predict(
+        terms, values, ["m_s"], plant.refined(terms, values, _near(plant, terms, values, start))
+    )
+    better = plant.corrected(terms, values, coarse.near).predict(terms, values, ["m_s"], coarse.near)
+    fine = replace(plant, settings=replace(plant.settings, nodes=2048))
+    truth = fine.predict(terms, values, ["m_s"], _near(fine, terms, values, fine.start({})))
+    truth = fine.predict(terms, values, ["m_s"], fine.refined(terms, values, truth.near))
+    assert coarse.solved
+    assert better.solved
+    assert truth.solved
+    weight = 1.0 / data.reach
+    before, after = (np.linalg.norm((each.rows - truth.rows) * weight) for each in (coarse, better))
+    assert after < 0.3 * before
+    # Under other terms nothing is corrected.
+    np.testing.assert_array_equal(
+        plant.predict((), {}, ["m_s"], start).rows,
+        plant.corrected(terms, values, coarse.near).predict((), {}, ["m_s"], start).rows,
+    )
+
+
+def _near(
+    plant: RigPlant, terms: tuple[str, ...], values: dict[str, float], start: PeriodicSolution
+) -> PeriodicSolution:
+    return plant.predict(terms, values, ["m_s"], start).near

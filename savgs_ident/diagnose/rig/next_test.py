@@ -103,7 +103,7 @@ def _run(
     )
     moved = eqx.tree_at(lambda each: each.excitation, near, there)
     values = _loaded(mode.values, plant, condition.payload)
-    return replace(plant, excitation=there).predict(mode.terms, values, names, moved)
+    return replace(plant, excitation=there, corrections={}).predict(mode.terms, values, names, moved)
 
 
 def _expected(search: Search, plant: RigPlant, other: Mode, draft: _Draft) -> float:

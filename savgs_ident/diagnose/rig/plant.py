@@ -6,7 +6,7 @@ those of the rig, effects at their null.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -66,6 +66,7 @@ class RigPlant:
         likelihood: what is compared, as rows.
         shape: tests, channels and orders of the harmonics that the likelihood takes.
         settings: how finely to solve.
+        corrections: by terms, what is added to the rows, (m,), for the motions that are found on finitely many nodes.
     """
 
     rig: Rig
@@ -76,6 +77,7 @@ class RigPlant:
     likelihood: Likelihood
     shape: tuple[int, int, int]
     settings: PeriodicSettings
+    corrections: Mapping[tuple[str, ...], NDArray[np.float64]] = field(default_factory=dict)
 
     @cached_property
     def layout(self) -> Layout:
@@ -190,8 +192,28 @@ class RigPlant:
         model, p = self.model(terms), placed(self.values(values))
         solution = resolve(model, p, near, ITERATIONS, self._fitting(model, near))
         rows = np.asarray(rows_of(model, self.likelihood, p, solution, self.orders))
+        rows = rows + self.corrections.get(terms, 0.0)
         solved = all(status.ok for status in solution.status())
         return Prediction(rows, self._slopes(model, p, solution, names), solved, solution)
+
+    def corrected(
+        self, terms: tuple[str, ...], values: Mapping[str, float], near: PeriodicSolution
+    ) -> "RigPlant":
+        """The plant with rows as they would be on nodes without end, about ``values``.
+
+        The rule of the collocation is of second order: four thirds of what twice the nodes change. The plant as it
+        is where they do not lead to a motion.
+        """
+        model, p, layout = self.model(terms), placed(self.values(values)), near.mesh.layout
+        doubled = Layout(tuple(2 * count for count in layout.counts))
+        coarse = resolve(model, p, near, ITERATIONS)
+        fine = adapt(model, p, coarse, doubled, self.settings.iterations)
+        if not all(status.ok for each in (coarse, fine) for status in each.status()):
+            return self
+        less, more = (
+            np.asarray(rows_of(model, self.likelihood, p, each, self.orders)) for each in (coarse, fine)
+        )
+        return replace(self, corrections={**self.corrections, terms: 4.0 / 3.0 * (more - less)})
 
     def columns(
         self, terms: tuple[str, ...], values: Mapping[str, float], near: Any, candidates: Sequence[Term]
