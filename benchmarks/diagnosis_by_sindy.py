@@ -7,7 +7,9 @@ terms that matter. The threshold below which it drops a term is chosen for it kn
 """
 
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.outcome import Outcome, Tell
+from savgs_ident.cli.blind_workers import side_by_side
 from savgs_ident.core.rig import Rig, default_rig_path, read_rig
 from savgs_ident.diagnose.judgement import recalibrate
 from savgs_ident.diagnose.settings import DiagnosisSettings
@@ -65,13 +68,11 @@ class Marks(NamedTuple):
 
 def measure(folder: Path, tell: Tell) -> Outcome:
     """Both on the trials of one effect or none in a folder that ``savgs-ident blind`` wrote."""
-    folders = [each for each in sorted(folder.glob("trial_*")) if (each / "diagnosis.json").is_file()]
-    rig = read_rig(default_rig_path())
-    trials = []
-    for place, each in enumerate(folders):
-        tell(f"sindy: trial {place + 1} of {len(folders)}")
-        if json.loads((each / "answer.json").read_text())["answer"]["kind"] in ("none", "effect"):
-            trials.append(read_trial(each, rig))
+    folders = [each for each in sorted(folder.glob("trial_*")) if _is_wanted(each)]
+    trials: list[Trial] = []
+    for each in side_by_side(partial(_one_of, folders), range(len(folders)), os.cpu_count() or 1):
+        trials.append(each)
+        tell(f"sindy: {len(trials)} of {len(folders)} trials")
     if not trials:
         return Outcome({}, (f"sindy: no trials in {folder}; `savgs-ident blind --out {folder}` makes some.",))
     ours = marks_of([each.ours for each in trials], trials)
@@ -80,6 +81,18 @@ def measure(folder: Path, tell: Tell) -> Outcome:
         figures[f"top1_percent_{name}"] = 100.0 * marks.right / max(marks.effects, 1)
         figures[f"false_alarms_percent_{name}"] = 100.0 * marks.alarms / max(marks.nothing, 1)
     return Outcome(figures, ("sindy: thresholds chosen knowing all answers.",))
+
+
+def _is_wanted(folder: Path) -> bool:
+    """Whether the trial was diagnosed, and is one of one effect or of none."""
+    if not (folder / "diagnosis.json").is_file():
+        return False
+    kind: str = json.loads((folder / "answer.json").read_text())["answer"]["kind"]
+    return kind in ("none", "effect")
+
+
+def _one_of(folders: Sequence[Path], place: int) -> Trial:
+    return read_trial(folders[place], read_rig(default_rig_path()))
 
 
 def peers(trials: Sequence[Trial]) -> dict[str, Marks]:
