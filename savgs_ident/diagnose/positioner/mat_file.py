@@ -55,9 +55,10 @@ def read_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float6
         _check_listed(path, name, [each for each in listed if each[0] == name])
     try:
         contents = loadmat(path, variable_names=list(names))
-        return {name: _real(path, name, np.asarray(contents[name])) for name in names}
+        found = {name: np.asarray(contents[name]) for name in names}
     except _MALFORMED as error:
         raise InputError(f"its contents cannot be read ({error})", source=path, remedy=_SAVE) from error
+    return {name: _real(path, name, array) for name, array in found.items()}
 
 
 def _weigh(path: Path) -> None:
