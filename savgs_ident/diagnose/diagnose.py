@@ -12,7 +12,7 @@ from savgs_ident.core.rig import Rig
 from savgs_ident.diagnose.candidates import candidates_of, confusable_of, not_judgeable_of
 from savgs_ident.diagnose.engine.climb import Mode
 from savgs_ident.diagnose.engine.heldout import HeldOut, held_out_by_law, hold_out
-from savgs_ident.diagnose.engine.parallel import in_parallel
+from savgs_ident.diagnose.engine.parallel import in_parallel, side_by_side
 from savgs_ident.diagnose.engine.prediction import Term
 from savgs_ident.diagnose.engine.search import Tell
 from savgs_ident.diagnose.judgement import Case, Judged, judge, recalibrate, settle
@@ -72,27 +72,38 @@ def _diagnose(
 ) -> Diagnosis:
     began = time.perf_counter()
     case = recalibrate(measured, rig, options, values, tell)
-    case, judged = settle(case, judge(case, tell), tell)
-    terms = {term.name: term for term in case.plant.candidates}
+    first = judge(case, tell)
+    aside = [each for each in _compared(case, first) if each is not first.chosen.mode]
+    (case, judged), (tests, held) = side_by_side(
+        lambda: settle(case, first, tell),
+        lambda: (_next_tests(case, first, tell), _held_out(case, aside, tell)),
+    )
     named = judged.chosen.mode if judged.kind in ("effect", "several") else None
-    held = _hold_out_all(case, judged, terms, tell)
-    swept = _predict_sweep(case, judged.kind, named, values, sweep, tell)
+    chosen = [] if judged.chosen.mode is None else [judged.chosen.mode]
+    last, swept = side_by_side(
+        lambda: _held_out(case, chosen, tell),
+        lambda: _predict_sweep(case, judged.kind, named, values, sweep, tell),
+    )
+    held = {**held, **last, "unknown": held_out_by_law(case.search, judged.place.held_out)}
     found = _assemble(case, judged, named, held, measured, options, tell)
-    return replace(found, sweep=swept, wall_s=time.perf_counter() - began)
+    return replace(found, sweep=swept, next_tests=tests, wall_s=time.perf_counter() - began)
 
 
-def _hold_out_all(case: Case, judged: Judged, terms: dict[str, Term], tell: Tell) -> dict[str, HeldOut]:
-    """Left-out predictions of the baseline, the two best fitted hypotheses and the best learned law, by name."""
-    modes = [case.base, *sorted(judged.findings.modes, key=lambda each: -each.evidence)[:2]]
+def _compared(case: Case, judged: Judged) -> list[Mode]:
+    """The baseline and the two best fitted hypotheses: those that predict tests that they were not fitted to."""
+    return [case.base, *sorted(judged.findings.modes, key=lambda each: -each.evidence)[:2]]
+
+
+def _held_out(case: Case, modes: Sequence[Mode], tell: Tell) -> dict[str, HeldOut]:
+    """Left-out predictions by name of the hypothesis."""
+    terms = {term.name: term for term in case.plant.candidates}
 
     def without_parts(mode: Mode) -> tuple[str, HeldOut]:
         name = " + ".join(mode.terms) or "none"
         tell(f"leaving tests out: {name}")
         return name, hold_out(case.search, mode, tuple(terms[each] for each in mode.terms))
 
-    held = dict(in_parallel(without_parts, modes))
-    held["unknown"] = held_out_by_law(case.search, judged.place.held_out)
-    return held
+    return dict(in_parallel(without_parts, modes))
 
 
 def _assemble(
@@ -134,7 +145,7 @@ def _assemble(
         shrink=together,
         by_channel=by_channel,
         sweep=None,
-        next_tests=_next_tests(case, judged, tuple(each.effects for each in confusable), tell),
+        next_tests=(),
         not_judgeable=not_judgeable_of(judged.findings),
         confusable=confusable,
         loops=loops,
@@ -185,14 +196,13 @@ def _loops(case: Case, judged: Judged, named: Mode | None, ports: Sequence[str])
     return loops_of(case.plant, case.plant.values(values), case.base.prediction.near, found, effect)
 
 
-def _next_tests(
-    case: Case, judged: Judged, confusable_names: tuple[tuple[str, str], ...], tell: Tell
-) -> tuple[NextTest, ...]:
+def _next_tests(case: Case, judged: Judged, tell: Tell) -> tuple[NextTest, ...]:
     """Tests that separate the chosen hypothesis from the best fitted one that looks like it."""
     chosen = judged.chosen.mode
     if chosen is None or len(chosen.terms) != 1:
         return ()
-    alike = {name for pair in confusable_names if chosen.terms[0] in pair for name in pair}
+    pairs = [each.effects for each in confusable_of(judged.findings)]
+    alike = {name for pair in pairs if chosen.terms[0] in pair for name in pair}
     rivals = [
         mode
         for mode in judged.findings.modes

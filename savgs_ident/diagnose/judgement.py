@@ -1,23 +1,25 @@
 """The case before the court: the baseline recalibrated, hypotheses and ports, and what kind of verdict they allow."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.rig import Rig
-from savgs_ident.diagnose.engine.attribution import Attribution, attribute
+from savgs_ident.diagnose.engine.attribution import Attribution, anywhere, attribute
 from savgs_ident.diagnose.engine.climb import Mode, Search, climb, refine, search_of
 from savgs_ident.diagnose.engine.data import Data
+from savgs_ident.diagnose.engine.parallel import side_by_side
 from savgs_ident.diagnose.engine.search import EXPLAINED, Findings, Tell, find_terms, left_over
 from savgs_ident.diagnose.engine.strain import strain_of
 from savgs_ident.diagnose.result import Kind
 from savgs_ident.diagnose.rig.places import places_of
 from savgs_ident.diagnose.rig.plant import RigPlant, rig_plant
 from savgs_ident.diagnose.settings import DiagnosisSettings
-from savgs_ident.diagnose.verdict import Weighed, kind_of, weigh
+from savgs_ident.diagnose.verdict import Weighed, kind_of, of_material_parts, weigh
 from savgs_ident.effects.registry import CATALOGUE
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
@@ -85,21 +87,21 @@ def recalibrate(
 def judge(case: Case, tell: Tell) -> Judged:
     """Hypotheses, ports and the verdict's kind."""
     plant, search, base = case.plant, case.search, case.base
-    tell("attributing the gap to ports")
-    p = plant.values(base.values)
-    places = attribute(search, base, places_of(plant, (), p, base.prediction.near))
-    findings = find_terms(search, base, plant.candidates, tell, plant.known)
+    tell("attributing the gap to ports, and looking for its cause")
+    findings, places = side_by_side(
+        lambda: find_terms(search, base, plant.candidates, tell, plant.known),
+        lambda: _attributed(case, base),
+    )
+    findings = of_material_parts(findings, partial(_change_without, case))
     best = findings.best
-    alone, besides = max(each.evidence for each in places), -np.inf
+    alone, besides = anywhere(places), -np.inf
     left = left_over(search, base, best)
     if best.terms and left > EXPLAINED:
         tell(f"what {' + '.join(best.terms)} leaves")
-        q = plant.values(best.values)
-        beyond = attribute(search, best, places_of(plant, best.terms, q, best.prediction.near))
-        besides = max(each.evidence for each in beyond)
+        besides = anywhere(_attributed(case, best))
     strained = best.evidence + strain_of(best, plant.nuisances)
     weighed = weigh(findings, alone, besides, strained)
-    kind, chosen = kind_of(weighed, _own_change(case, best), left)
+    kind, chosen = kind_of(weighed, _change_without(case, best, best.terms), left)
     return Judged(findings, tuple(places), tuple(weighed), kind, chosen, left)
 
 
@@ -124,16 +126,24 @@ def settle(case: Case, judged: Judged, tell: Tell) -> tuple[Case, Judged]:
     )
 
 
-def _own_change(case: Case, mode: Mode) -> float:
-    """What the terms of a hypothesis do to the response, all other parameters as they are.
+def _attributed(case: Case, mode: Mode) -> list[Attribution]:
+    """What a law at each port would explain beyond a hypothesis."""
+    p = case.plant.values(mode.values)
+    return attribute(case.search, mode, places_of(case.plant, mode.terms, p, mode.prediction.near))
 
-    As a share of it, in the channel where they do most.
+
+def _change_without(case: Case, mode: Mode, gone: Sequence[str]) -> float:
+    """What some terms of a hypothesis do to the response, all other parameters as they are.
+
+    As a share of it, in the channel where they do most; infinite where there is no motion without them.
     """
-    if not mode.terms:
+    if not gone:
         return 0.0
-    own = {each.name for each in case.plant.nuisances}
-    values = {name: value for name, value in mode.values.items() if name in own}
-    without = case.plant.predict((), values, sorted(own), case.base.prediction.near)
+    left = tuple(name for name in mode.terms if name not in gone)
+    wanted = [each.name for each in case.plant.nuisances]
+    taken = {each.name for name in gone for each in case.plant.catalogue[name].parameters}
+    values = {name: value for name, value in mode.values.items() if name not in taken or name in wanted}
+    without = case.plant.predict(left, values, wanted, case.base.prediction.near)
     if not without.solved:
         return np.inf
     change = np.bincount(case.plant.channel, (mode.prediction.rows - without.rows) ** 2)

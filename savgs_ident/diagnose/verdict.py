@@ -1,6 +1,7 @@
 """From hypotheses to a verdict: probabilities, and what may be said."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from math import log
 
 import numpy as np
@@ -43,6 +44,19 @@ class Weighed:
     effects: tuple[str, ...]
     weight: float
     mode: Mode | None
+
+
+def of_material_parts(findings: Findings, change: Callable[[Mode, Sequence[str]], float]) -> Findings:
+    """The findings less the best ones that need an effect which does too little to matter.
+
+    What a wrong effect leaves, a trace of a second one often takes away: that does not make both of them right.
+    ``change`` is what some terms of a hypothesis do to the response, as a share of it.
+    """
+    best = findings.best
+    while len(best.terms) > 1 and any(change(best, (name,)) < MATERIAL for name in best.terms):
+        findings = replace(findings, modes=tuple(each for each in findings.modes if each is not best))
+        best = findings.best
+    return findings
 
 
 def weigh(findings: Findings, alone: float, besides: float, strained: float) -> list[Weighed]:

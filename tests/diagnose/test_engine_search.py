@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from savgs_ident.diagnose.engine.attribution import Place, attribute
+from savgs_ident.diagnose.engine.attribution import SIZES, Attribution, Place, anywhere, attribute
 from savgs_ident.diagnose.engine.climb import Mode, Search, climb, search_of
 from savgs_ident.diagnose.engine.heldout import FOLDS, hold_out
 from savgs_ident.diagnose.engine.misfit import misfit_of
@@ -164,3 +164,20 @@ def test_excess_is_what_the_noise_does_not_explain() -> None:
     base = climb(search, (), {}, None)
     assert excess(search, base) == pytest.approx((0.05 / NOISE) ** 2, rel=0.3)
     assert misfit_of(data, search.residual(base.prediction)).discrepancy == pytest.approx(0.05, rel=0.25)
+
+
+def test_a_law_anywhere_is_as_probable_as_its_places_are_on_average() -> None:
+    places = [
+        Attribution(name, 0.0, 0.0, evidence, np.zeros(0), np.zeros((0, 0)))
+        for name, evidence in (("strut", -700.0), ("rail", -701.0), ("link", -900.0))
+    ]
+    assert anywhere(places) == pytest.approx(-700.0 + np.log((1.0 + np.exp(-1.0)) / 3.0))
+
+
+def test_a_law_that_explains_nothing_is_less_probable_than_no_law() -> None:
+    """By Occam's factor, which the widest prior over as many rows bounds."""
+    search = search_of(PLANT, draw(PLANT, {"a": 1.1}, NOISE, 3))
+    base = climb(search, (), {}, None)
+    place = Place("spring", PLANT.x[:, None] ** 2, PLANT.x[:, None] ** 2)
+    (found,) = attribute(search, base, [place])
+    assert base.evidence - np.log(max(SIZES) * PLANT.tests * PLANT.points) < found.evidence < base.evidence

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from savgs_ident.diagnose.engine.climb import Mode
+from savgs_ident.diagnose.engine.search import Findings
 from savgs_ident.diagnose.verdict import (
     CONFUSED,
     LEFT,
@@ -15,6 +16,7 @@ from savgs_ident.diagnose.verdict import (
     SURE,
     Weighed,
     kind_of,
+    of_material_parts,
     probabilities,
     rivals_of,
 )
@@ -81,3 +83,24 @@ def test_rivals_are_single_effects_that_the_data_hardly_tell_apart() -> None:
     weighed = _weighed(weights)
     chosen = next(each for each in weighed if each.name == "mount_compliance")
     assert rivals_of(weighed, chosen) == ("gear_compliance",)
+
+
+def _mode(evidence: float, *terms: str) -> Mode:
+    return cast(Mode, SimpleNamespace(terms=terms, evidence=evidence))
+
+
+@pytest.mark.parametrize(
+    ("trace", "best"),
+    [(2.0 * MATERIAL, ("strut_friction", "rail_stribeck")), (0.5 * MATERIAL, ("strut_friction",))],
+)
+def test_an_effect_that_does_too_little_to_matter_is_no_part_of_a_pair(
+    trace: float, best: tuple[str, ...]
+) -> None:
+    alone = _mode(500.0, "strut_friction")
+    pair = _mode(800.0, "strut_friction", "rail_stribeck")
+    changes = {"strut_friction": 0.1, "rail_stribeck": trace}
+    findings = of_material_parts(
+        Findings(_mode(0.0), (), (pair, alone)), lambda _, gone: sum(changes[name] for name in gone)
+    )
+    assert findings.best.terms == best
+    assert alone in findings.modes

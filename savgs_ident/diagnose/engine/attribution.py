@@ -6,8 +6,9 @@ sum of given functions of what the place sees, with normal coefficients; the bas
 beside it, so that it gets no credit for what recalibration can do.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import log
+from math import exp, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +52,7 @@ class Attribution:
         name: name of the place.
         share: share of the gap in left-out tests that the law explains; 0 if it makes it worse.
         reach: share that a free signal explains.
-        evidence: log evidence of the baseline with the law, linearised.
+        evidence: log evidence of the baseline with the law, linearised, over all widths of its prior.
         held_out: rows (m,) of each test, predicted by the law and parameters that the others set.
         coefficients: those of the free signal by test, (tests, f).
     """
@@ -68,6 +69,17 @@ def attribute(search: Search, mode: Mode, places: list[Place]) -> list[Attributi
     """What every place explains beyond a mode, the largest share first."""
     found = [_attribution(search, mode, place) for place in places]
     return sorted(found, key=lambda each: -each.share)
+
+
+def anywhere(places: Sequence[Attribution]) -> float:
+    """Log evidence of a law at one of the places, no matter which."""
+    return _mean_of([each.evidence for each in places])
+
+
+def _mean_of(evidences: Sequence[float]) -> float:
+    """Log of the mean of what has these logs: any may hold, none is preferred."""
+    best = max(evidences)
+    return best + log(sum(exp(each - best) for each in evidences) / len(evidences))
 
 
 def _attribution(search: Search, mode: Mode, place: Place) -> Attribution:
@@ -95,13 +107,11 @@ def _best_size(search: Search, mode: Mode, law: Matrix) -> tuple[float, float]:
     bounds = np.concatenate([lower, -wide]), np.concatenate([upper, wide])
     start = np.concatenate([mode.x, np.zeros(law.shape[1])])
     halved = log(2.0) * sum(each.halved for each in mode.coordinates)
-    best = 0.0, -np.inf
+    found = []
     for size in SIZES:
         top = best_of(search.data, residual, np.concatenate([mode.slopes, size * law], axis=1), start, bounds)
-        evidence = top.value - 0.5 * log_determinant(top.precision) + halved
-        if evidence > best[1]:
-            best = size, evidence
-    return best
+        found.append(top.value - 0.5 * log_determinant(top.precision) + halved)
+    return SIZES[int(np.argmax(found))], _mean_of(found)
 
 
 def _left_out(search: Search, mode: Mode, law: Matrix, weight: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+Other = TypeVar("Other")
 
 
 def in_parallel(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
@@ -14,3 +15,10 @@ def in_parallel(work: Callable[[Item], Result], items: Sequence[Item]) -> list[R
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     with ThreadPoolExecutor(cores) as pool:
         return list(pool.map(work, items))
+
+
+def side_by_side(one: Callable[[], Result], other: Callable[[], Other]) -> tuple[Result, Other]:
+    """Two pieces of work at the same time, and both results."""
+    with ThreadPoolExecutor(1) as pool:
+        begun = pool.submit(other)
+        return one(), begun.result()

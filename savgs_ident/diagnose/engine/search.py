@@ -20,7 +20,7 @@ Tell = Callable[[str], None]
 """Is told what is going on, a line at a time."""
 
 FIRST = 2
-"""Single terms that are fitted in full at first."""
+"""Single terms that are fitted in full at first, with those that look like the very first."""
 
 MORE = 4
 """Further ones that are, if the first leave something."""
@@ -112,11 +112,14 @@ def find_terms(
     alone = dict(zip((term.name for term in terms), columns, strict=True))
     scores = scores_of(search, base, terms, columns)
     worth = [each for each in scores if each.evidence > base.evidence + NOTICED]
-    ranked = _refined(search, _fitted(search, base, worth[:FIRST], terms, tell), terms, tell)
-    later = worth[FIRST : FIRST + MORE]
+    first = worth[:FIRST] + _alike(worth[FIRST : FIRST + MORE], worth[:1])
+    ranked = _refined(search, _fitted(search, base, first, terms, tell), terms, tell)
+    begun = {each.term.name for each in first}
+    later = [each for each in worth if each.term.name not in begun]
     if ranked and left_over(search, base, ranked[0]) <= EXPLAINED:
-        named = next(each for each in scores if each.term.name == ranked[0].terms[0])
-        later = [each for each in worth[FIRST:] if abs(cosine(each, named)) > ALIKE]
+        later = _alike(later, [each for each in scores if each.term.name == ranked[0].terms[0]])
+    else:
+        later = later[:MORE]
     ranked = _refined(search, [*ranked, *_fitted(search, base, later, terms, tell)], terms, tell)
     pairs: list[Mode] = []
     if ranked and ranked[0].evidence > base.evidence + SURE:
@@ -128,6 +131,11 @@ def find_terms(
         pairs = _refined(search, pairs, terms, tell)
     modes = sorted([*wholes, *ranked, *pairs], key=lambda mode: -mode.evidence)
     return Findings(base, tuple(scores), tuple(modes))
+
+
+def _alike(scores: Sequence[Score], to: Sequence[Score]) -> list[Score]:
+    """Those that look like any of the others."""
+    return [each for each in scores if any(abs(cosine(each, other)) > ALIKE for other in to)]
 
 
 def _whole(search: Search, base: Mode, names: tuple[str, ...], terms: Sequence[Term], tell: Tell) -> Mode:
