@@ -1,16 +1,15 @@
 """Trials one after the other, each kept as soon as it is there."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from savgs_ident.cli.console import Progress, Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
+from savgs_ident.cli.kept_trials import begin_trials, keep_trial, known_trials
 from savgs_ident.cli.models import effects_in, identified_in, rig_before
 from savgs_ident.cli.reading import read_response
 from savgs_ident.cli.selection import every_so_many
-from savgs_ident.core.errors import InputError
 from savgs_ident.core.rig import Rig, read_rig
 from savgs_ident.posterior.calibration import Trial, calibrator
 from savgs_ident.posterior.result import Sampler
@@ -56,9 +55,9 @@ def calibrate_by_trials(job: Job, voice: Voice, out: Path) -> int:
     prepare_folder(out)
     use_persistent_cache()
     kept = out / "trials.jsonl"
-    done = known_trials(kept, job) if job.resume else []
+    done = known_trials(kept, job.marks(), Trial) if job.resume else []
     if not done:
-        kept.write_text(json.dumps(job.marks()) + "\n")
+        begin_trials(kept, job.marks())
     with voice.working() as progress:
         rig = read_rig(job.model)
         trials = _run(job, rig, kept, done, progress)
@@ -89,29 +88,5 @@ def _run(job: Job, rig: Rig, kept: Path, done: list[Trial], progress: Progress) 
     for number in range(len(done), job.trials):
         progress(f"trial {number + 1} of {job.trials}")
         trials.append(work.trial(number))
-        with kept.open("a") as stream:
-            stream.write(json.dumps(asdict(trials[-1])) + "\n")
+        keep_trial(kept, asdict(trials[-1]))
     return trials[: job.trials]
-
-
-def known_trials(kept: Path, job: Job) -> list[Trial]:
-    """The whole trials of an earlier run; a last line that was cut off is left out and the file mended.
-
-    Raises :class:`InputError` for trials of another job, and for a file that is no list of trials.
-    """
-    if not kept.exists():
-        return []
-    lines = kept.read_text().split("\n")[:-1]
-    try:
-        marks, *trials = (json.loads(line) for line in lines)
-        found = [Trial(**each) for each in trials]
-    except (ValueError, TypeError) as error:
-        raise InputError("is no list of trials", source=kept, remedy="leave out --resume") from error
-    if marks != job.marks():
-        raise InputError(
-            "holds trials of another model, campaign, sampler or seed",
-            source=kept,
-            remedy="leave out --resume, or name another --out DIR",
-        )
-    kept.write_text("\n".join(lines) + "\n")
-    return found

@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from savgs_ident import __version__
+from savgs_ident.cli.alarms_command import false_alarms
 from savgs_ident.cli.arguments import spread_values
 from savgs_ident.cli.blind_command import blind
 from savgs_ident.cli.bode_command import bode
@@ -49,7 +50,7 @@ def _root(
     """
 
 
-for _command in (demo, inspect, fit, bode, simulate, posterior, calibrate, diagnose, blind):
+for _command in (demo, inspect, fit, bode, simulate, posterior, calibrate, diagnose, false_alarms, blind):
     app.command()(_command)
 
 

@@ -13,7 +13,6 @@ from savgs_ident.diagnose.candidates import candidates_of, confusable_of, not_ju
 from savgs_ident.diagnose.engine.climb import Mode
 from savgs_ident.diagnose.engine.heldout import HeldOut, held_out_by_law, hold_out
 from savgs_ident.diagnose.engine.parallel import in_parallel, side_by_side
-from savgs_ident.diagnose.engine.prediction import Term
 from savgs_ident.diagnose.engine.search import Tell
 from savgs_ident.diagnose.judgement import Case, Judged, judge, recalibrate, settle
 from savgs_ident.diagnose.result import (

@@ -101,6 +101,14 @@ def probabilities(weighed: list[Weighed]) -> NDArray[np.float64]:
     return np.asarray(shares / shares.sum())
 
 
+def odds_of(weighed: Sequence[Weighed]) -> float:
+    """Log odds that something is missing, the best fitted hypothesis or an unknown one, against nothing."""
+    something = [
+        each.weight for each in weighed if each.name == "unknown" or (each.effects and each.mode is not None)
+    ]
+    return max(something) - next(each.weight for each in weighed if each.name == "none")
+
+
 def kind_of(weighed: list[Weighed], change: float, left: float) -> tuple[Kind, Weighed]:
     """What may be said, and the hypothesis that it rests on.
 
@@ -111,7 +119,7 @@ def kind_of(weighed: list[Weighed], change: float, left: float) -> tuple[Kind, W
     none, unknown = by_name["none"], by_name["unknown"]
     fitted = [each for each in weighed if each.mode is not None and each.effects]
     best = fitted[0] if fitted else none
-    if max(best.weight, unknown.weight) < none.weight + SURE:
+    if odds_of(weighed) < SURE:
         return "none", none
     if unknown.weight > best.weight or left > LEFT:
         return "unknown", unknown

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from savgs_ident.cli.calibrating import Job, known_trials
+from savgs_ident.cli.calibrating import Job
+from savgs_ident.cli.kept_trials import known_trials
 from savgs_ident.core.errors import InputError
 from savgs_ident.posterior.calibration import RANKED, Trial
 from savgs_ident.report.calibration import calibration_figure, calibration_record
@@ -45,22 +46,22 @@ def test_whole_trials_are_kept_and_a_line_that_was_cut_off_is_not(tmp_path: Path
     kept, trials = tmp_path / "trials.jsonl", _trials(5, 0.95, 1)
     _written(kept, _job(), trials)
     kept.write_text(kept.read_text()[:-20])
-    assert known_trials(kept, _job()) == trials[:4]
-    assert known_trials(kept, _job()) == trials[:4]
+    assert known_trials(kept, _job().marks(), Trial) == trials[:4]
+    assert known_trials(kept, _job().marks(), Trial) == trials[:4]
 
 
 def test_trials_of_another_seed_are_refused(tmp_path: Path) -> None:
     kept = tmp_path / "trials.jsonl"
     _written(kept, _job(), _trials(2, 0.95, 1))
-    with pytest.raises(InputError, match="trials of another"):
-        known_trials(kept, _job(seed=2))
+    with pytest.raises(InputError, match=r"trials of something else \(seed\)"):
+        known_trials(kept, _job(seed=2).marks(), Trial)
 
 
 def test_what_is_no_list_of_trials_is_refused(tmp_path: Path) -> None:
     kept = tmp_path / "trials.jsonl"
     kept.write_text("nonsense\n")
     with pytest.raises(InputError, match="no list of trials"):
-        known_trials(kept, _job())
+        known_trials(kept, _job().marks(), Trial)
 
 
 def test_a_right_sampler_is_found_right_and_a_bold_one_is_not() -> None:
