@@ -11,7 +11,8 @@ from savgs_ident.fit.minimise import Minimum
 from savgs_ident.fit.result import Estimate, Fit, Verdict
 from savgs_ident.fit.task import Task
 from savgs_ident.model.values import as_values
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import simulate_periodic
 
 
 class Outcome(NamedTuple):

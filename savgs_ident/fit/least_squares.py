@@ -22,7 +22,8 @@ from savgs_ident.fit.result import Fit
 from savgs_ident.fit.settings import FitSettings
 from savgs_ident.fit.task import Task, plan_task
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.periodic import adapt, harmonics, simulate_periodic
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import adapt, simulate_periodic
 
 FREE = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
 """The four parameters that the paper identifies."""

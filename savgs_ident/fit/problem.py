@@ -21,12 +21,9 @@ from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
 from savgs_ident.model.values import Values, as_values
-from savgs_ident.simulate.periodic import (
-    PeriodicSolution,
-    harmonic_sensitivities,
-    harmonics,
-    resolve,
-)
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import PeriodicSolution, resolve
+from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 from savgs_ident.simulate.stored import placed, stored
 
 

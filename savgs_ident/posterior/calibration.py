@@ -34,7 +34,8 @@ from savgs_ident.posterior.samplers import SAMPLERS
 from savgs_ident.posterior.scales import Scales
 from savgs_ident.posterior.settings import SamplingSettings
 from savgs_ident.posterior.values import values_of
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, simulate_periodic
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 
 SPREAD = 0.15
 """Relative standard deviation of the identified parameters."""

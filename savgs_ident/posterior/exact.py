@@ -19,15 +19,9 @@ from jaxtyping import Array, Complex, Float
 from savgs_ident.fit.problem import Problem
 from savgs_ident.posterior.likelihood import Likelihood
 from savgs_ident.simulate.collocation import Trajectory
-from savgs_ident.simulate.periodic import (
-    PeriodicSolution,
-    harmonic_sensitivities,
-    harmonics,
-    harmonics_of,
-    resolve,
-    solve_near,
-    trajectory_sensitivities,
-)
+from savgs_ident.simulate.harmonics import harmonics, harmonics_of
+from savgs_ident.simulate.periodic import PeriodicSolution, resolve, solve_near
+from savgs_ident.simulate.sensitivity import harmonic_sensitivities, trajectory_sensitivities
 from savgs_ident.simulate.stored import placed, stored
 
 ENOUGH = 1e-4

@@ -18,8 +18,9 @@ from savgs_ident.effects.registry import CATALOGUE, build_model, model_parameter
 from savgs_ident.model.values import as_values
 from savgs_ident.report.curves import ModelCurve, model_curve
 from savgs_ident.simulate.excitation import Excitation
+from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.layout import Layout, layout_for
-from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 
 
 @dataclass(frozen=True)

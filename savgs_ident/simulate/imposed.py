@@ -11,7 +11,9 @@ from savgs_ident.model.quarter_car import Loads, QuarterCar
 from savgs_ident.model.values import Values
 from savgs_ident.simulate.collocation import Trajectory, node_motion, residual_at_nodes
 from savgs_ident.simulate.excitation import inputs_at
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonics_of, linear_response
+from savgs_ident.simulate.harmonics import harmonics_of
+from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.sensitivity import linear_response
 
 
 def answers(

@@ -6,22 +6,19 @@ where the accelerations change, the nodes move there, and the solution is repeat
 serve any nearby parameter set, which is how fits warm-start.
 
     solution = simulate_periodic(model, p, cam_excitation([2.0, 2.35], 0.0275, np.pi / 2))
-    response = harmonics(model, p, solution, orders=9)   # complex, (2 dwells, 2 channels, 10)
 
-What the truncation to a finite number of nodes costs is stated by :func:`truncation_error`, which solves once
-more on twice as many nodes.
+:mod:`savgs_ident.simulate.harmonics` says what sensors read along it, and
+:mod:`savgs_ident.simulate.sensitivity` how that changes with the parameters.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Complex, Float, Int
+from jaxtyping import Array, Float, Int
 
 from savgs_ident.core.status import Status
 from savgs_ident.model.quarter_car import QuarterCar
@@ -30,14 +27,10 @@ from savgs_ident.model.values import Values, as_values
 from savgs_ident.simulate.collocation import (
     Linearised,
     Trajectory,
-    residual_at_nodes,
-    solve_linearised,
-    step_defects,
 )
-from savgs_ident.simulate.cyclic import solve_nodes
 from savgs_ident.simulate.excitation import Excitation, inputs_at
 from savgs_ident.simulate.layout import Layout, layout_for
-from savgs_ident.simulate.mesh import Mesh, adapted_mesh, turns, uniform_mesh
+from savgs_ident.simulate.mesh import Mesh, adapted_mesh, uniform_mesh
 from savgs_ident.simulate.newton import TOLERANCE, motion_scale, newton_structure, solve_newton
 from savgs_ident.simulate.stored import placed, stored
 
@@ -83,7 +76,8 @@ class PeriodicSolution(eqx.Module):
         )
 
 
-def _steps(excitation: Excitation, mesh: Mesh) -> Array:
+def node_steps(excitation: Excitation, mesh: Mesh) -> Float[Array, " P"]:
+    """Time from each node to the next [s]."""
     return jnp.asarray(mesh.gap) / (2.0 * jnp.pi * excitation.frequency[mesh.layout.dwell])
 
 
@@ -112,7 +106,7 @@ def _solve(
     enough: Array,
 ) -> tuple[Array, ...]:
     inputs = inputs_at(excitation, mesh)
-    layout, steps = mesh.layout, _steps(excitation, mesh)
+    layout, steps = mesh.layout, node_steps(excitation, mesh)
     scale = motion_scale(model, inputs, excitation.frequency, layout)
     return tuple(jax.tree.leaves(solve_newton(model, p, start, inputs, layout, steps, scale, limit, enough)))
 
@@ -202,130 +196,3 @@ def resolve(
     """The solution at other parameters, on the same nodes, started from ``solution`` or a better ``start``."""
     begin = solution.trajectory if start is None else start
     return solve_on_mesh(model, as_values(p), solution.excitation, solution.mesh, begin, limit)
-
-
-def _readings(model: QuarterCar, p: Values, trajectory: Trajectory) -> Float[Array, "P C"]:
-    at_nodes = jax.vmap(partial(model.read, p))
-    return jnp.stack(at_nodes(trajectory.x[1], trajectory.y[0]), axis=-1)
-
-
-def _analyse(signals: Float[Array, "P C"], mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
-    twice = jnp.full(orders + 1, 2.0).at[0].set(1.0)
-    kernel = twice * jnp.conj(turns(mesh.phase, orders))
-    terms = signals[:, :, None] * (kernel * jnp.asarray(mesh.weight)[:, None])[:, None, :]
-    layout = mesh.layout
-    return jax.ops.segment_sum(terms, layout.dwell, len(layout.counts), indices_are_sorted=True)
-
-
-@eqx.filter_jit
-def harmonics(
-    model: QuarterCar, p: Values, solution: PeriodicSolution, orders: int
-) -> Complex[Array, "D C K"]:
-    """Complex harmonics 0..orders of the sensor readings, (D, 2, orders + 1), in the channels' SI units.
-
-    Channels are those of :data:`savgs_ident.model.sensors.RESPONSE_CHANNELS`.
-    """
-    return harmonics_of(model, p, solution.trajectory, solution, orders)
-
-
-def harmonics_of(
-    model: QuarterCar, p: Values, motions: Trajectory, known: PeriodicSolution, orders: int
-) -> Complex[Array, "D C K"]:
-    """The same of motions on the nodes of a ``known`` solution, as a part of a larger program that is compiled."""
-    seen = _analyse(_readings(model, p, motions), known.mesh, orders)
-    return seen * _sensors(model, p, known.excitation.frequency, orders)
-
-
-def _sensors(
-    model: QuarterCar, p: Values, frequency: Float[Array, " D"], orders: int
-) -> Complex[Array, "D C K"]:
-    """What the sensors make of each order."""
-    order = jnp.arange(orders + 1, dtype=frequency.dtype)
-    return jnp.moveaxis(model.transfers(p, frequency[:, None] * order), 0, 1)
-
-
-@eqx.filter_jit
-def harmonic_sensitivities(
-    model: QuarterCar, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
-) -> Complex[Array, "n D C K"]:
-    """Derivatives of :func:`harmonics` in the named parameters, by the implicit function theorem.
-
-    One factorisation, that of the last Newton step, serves all parameters.
-    """
-    return jax.lax.map(directional(model, p, solution, names, orders), jnp.eye(len(names)))
-
-
-def directional(
-    model: QuarterCar, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
-) -> Callable[[Float[Array, " n"]], Complex[Array, "D C K"]]:
-    """Derivatives of :func:`harmonics` along directions (n,) of the named parameters, to be mapped over."""
-    at = solution.trajectory
-    moved_along = _linear_motion(model, p, solution)
-
-    def seen(q: dict[str, Array], motions: Trajectory) -> Array:
-        return harmonics_of(model, q, motions, solution, orders)
-
-    def along(direction: Float[Array, " n"]) -> Complex[Array, "D C K"]:
-        tangent = _tangent(p, names, direction)
-        change: Array = jax.jvp(seen, (dict(p), at), (tangent, moved_along(tangent)))[1]
-        return change
-
-    return along
-
-
-def trajectory_sensitivities(
-    model: QuarterCar, p: Values, solution: PeriodicSolution, names: tuple[str, ...]
-) -> Trajectory:
-    """Derivatives of the trajectory itself in the named parameters, each field with a leading axis (n,)."""
-    moved_along = _linear_motion(model, p, solution)
-    directions = jnp.eye(len(names))
-    return jax.lax.map(lambda direction: moved_along(_tangent(p, names, direction)), directions)
-
-
-def _tangent(p: Values, names: tuple[str, ...], direction: Array) -> dict[str, Array]:
-    return {name: jnp.zeros_like(p[name]) for name in p} | dict(zip(names, direction, strict=True))
-
-
-def _linear_motion(
-    model: QuarterCar, p: Values, solution: PeriodicSolution
-) -> Callable[[dict[str, Array]], Trajectory]:
-    """The change of the trajectory that a change of the parameters brings about."""
-    at, inputs = solution.trajectory, inputs_at(solution.excitation, solution.mesh)
-    parts, respond = (*at.x, *at.y), linear_response(model, p, solution)
-
-    def moved(tangent: dict[str, Array]) -> Trajectory:
-        _, change = jax.jvp(
-            lambda q: residual_at_nodes(model, q, model.curves(q), parts, inputs), (dict(p),), (tangent,)
-        )
-        return respond(change)
-
-    return moved
-
-
-def linear_response(
-    model: QuarterCar, p: Values, solution: PeriodicSolution
-) -> Callable[[Float[Array, "k P"]], Trajectory]:
-    """The change of the trajectory that a change of the residual at the nodes, (2 + s, P), brings about."""
-    lin, at, layout = solution.linearised, solution.trajectory, solution.mesh.layout
-    steps = _steps(solution.excitation, solution.mesh)
-    still = Trajectory(jnp.zeros_like(at.x), jnp.zeros_like(at.y))
-
-    def respond(change: Float[Array, "k P"]) -> Trajectory:
-        imbalance = -solve_nodes(lin.mass, change[:, None])[:, 0]
-        rate = jnp.concatenate([jnp.zeros_like(at.x[2:4]), imbalance])
-        return solve_linearised(layout, lin, step_defects(model, still, rate, layout, steps), imbalance)
-
-    return respond
-
-
-def truncation_error(
-    model: QuarterCar, p: Values, solution: PeriodicSolution, orders: int
-) -> Float[Array, "D C"]:
-    """Largest change of any order 1..orders when the nodes are doubled, relative to the first harmonic.
-
-    The error of ``solution`` itself is about four thirds of it (the rule is of second order).
-    """
-    doubled = Layout(tuple(2 * count for count in solution.mesh.layout.counts))
-    finer = adapt(model, p, solution, doubled, PeriodicSettings.iterations)
-    coarse, fine = (harmonics(model, p, each, orders) for each in (solution, finer))
-    return jnp.max(jnp.abs(coarse - fine)[..., 1:], axis=-1) / jnp.abs(fine[..., 1])

@@ -19,7 +19,8 @@ from savgs_ident.fit.least_squares import FREE
 from savgs_ident.fit.settings import FitSettings
 from savgs_ident.fit.task import Task, plan_task
 from savgs_ident.model.section import SectionCurves, section_curves
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import simulate_periodic
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,8 @@ from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.road import cam_road
 from savgs_ident.model.values import Values, as_values
 from savgs_ident.simulate.excitation import cam_excitation
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, simulate_periodic
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 from savgs_ident.simulate.transient import simulate_transient
 
 from ..relaxed import with_kept_programs

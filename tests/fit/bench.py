@@ -16,7 +16,8 @@ from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.settings import FitSettings
 from savgs_ident.fit.task import plan_task
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.periodic import harmonics, resolve, simulate_periodic
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import resolve, simulate_periodic
 
 TRUTH: Mapping[str, float] = {
     "mu_r": 0.03,

@@ -13,7 +13,8 @@ from savgs_ident.fit.least_squares import FREE, fit_least_squares
 from savgs_ident.fit.settings import FitSettings
 from savgs_ident.fit.task import plan_task
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import simulate_periodic
 
 from .bench import TRUTH, true_rig
 

@@ -16,7 +16,8 @@ from savgs_ident.posterior.sample import Question, case_of, locate, plan
 from savgs_ident.posterior.settings import SamplingSettings
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.responses.estimate import estimate_response
-from savgs_ident.simulate.periodic import harmonics, resolve
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import resolve
 
 from ..fit.bench import only, silent, true_rig
 

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values, as_values
 from savgs_ident.simulate.excitation import Excitation, cam_excitation
+from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.layout import Layout
-from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, adapt, harmonics
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, adapt
 
 STROKE = 0.0275
 LINK = np.pi / 2.0

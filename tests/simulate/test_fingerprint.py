@@ -14,9 +14,10 @@ from savgs_ident.effects.tyre_friction import TyreFriction
 from savgs_ident.model.damper import damper_curve
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.simulate.fingerprint import fingerprint
+from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.layout import Layout
 from savgs_ident.simulate.mesh import uniform_mesh
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import simulate_periodic
 
 
 def _of(*args: object) -> str:

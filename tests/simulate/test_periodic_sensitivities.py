@@ -8,7 +8,8 @@ from savgs_ident.effects.registry import MODELS, model_parameters
 from savgs_ident.fit.problem import used_parameters
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonic_sensitivities, resolve
+from savgs_ident.simulate.periodic import PeriodicSolution, resolve
+from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 
 from .programme import altered, orders
 

@@ -5,7 +5,8 @@ import pytest
 
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values
-from savgs_ident.simulate.periodic import PeriodicSolution, truncation_error
+from savgs_ident.simulate.harmonics import truncation_error
+from savgs_ident.simulate.periodic import PeriodicSolution
 
 from .programme import distance, finer, orders
 

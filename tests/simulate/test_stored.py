@@ -16,7 +16,8 @@ from savgs_ident.effects.registry import MODELS, build_model, model_parameters
 from savgs_ident.model.values import as_values
 from savgs_ident.simulate.compilation import use_persistent_cache
 from savgs_ident.simulate.excitation import cam_excitation
-from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 
 if {kept}:
     use_persistent_cache()

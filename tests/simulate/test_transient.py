@@ -21,7 +21,8 @@ from savgs_ident.model.road import cam_road, flat_road
 from savgs_ident.model.section import section_curves
 from savgs_ident.simulate import transient
 from savgs_ident.simulate.excitation import cam_excitation
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.transient import (
     TransientSolution,
     rest_state,

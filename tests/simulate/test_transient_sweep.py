@@ -15,7 +15,8 @@ from savgs_ident.model.road import recorded_road, sweep_road
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.simulate.excitation import cam_excitation
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.transient import simulate_transient
 
 pytestmark = pytest.mark.slow

@@ -22,7 +22,8 @@ from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values
 from savgs_ident.posterior.likelihood import Likelihood
 from savgs_ident.posterior.scales import Scales
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonic_sensitivities
+from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 
 SIMILAR = 0.4
 """Share of its distance from the baseline that an effect keeps, to first order, from one that may do the same."""

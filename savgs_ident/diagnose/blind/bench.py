@@ -18,13 +18,8 @@ from savgs_ident.effects.registry import CATALOGUE, build_model
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values, as_values
 from savgs_ident.simulate.excitation import Excitation, cam_excitation
-from savgs_ident.simulate.periodic import (
-    PeriodicSettings,
-    PeriodicSolution,
-    harmonics,
-    resolve,
-    simulate_periodic,
-)
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, resolve, simulate_periodic
 from savgs_ident.simulate.stored import placed
 
 ORDERS = 9

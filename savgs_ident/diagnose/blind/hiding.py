@@ -20,7 +20,8 @@ from savgs_ident.core.free_vector import known_to_tolerance
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.diagnose.blind.bench import ORDERS, Bench
 from savgs_ident.fit.problem import used_parameters
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonic_sensitivities
+from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 
 STEPS = 12
 """Steps of the search at most."""

@@ -17,7 +17,8 @@ from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.model.effect import Port
 from savgs_ident.model.sensors import RESPONSE_CHANNELS
 from savgs_ident.model.values import Values
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonics
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import PeriodicSolution
 
 Signal = NDArray[np.float64]
 

@@ -9,7 +9,9 @@ from jaxtyping import Array
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values
 from savgs_ident.posterior.likelihood import Likelihood
-from savgs_ident.simulate.periodic import PeriodicSolution, directional, harmonics
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.sensitivity import directional
 from savgs_ident.simulate.stored import stored
 
 

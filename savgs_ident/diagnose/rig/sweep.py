@@ -21,7 +21,8 @@ from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.model.sensors import RESPONSE_CHANNELS
 from savgs_ident.responses.sweep_response import SweepResponse
 from savgs_ident.simulate.excitation import Excitation
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import simulate_periodic
 
 DWELLS = 6
 """Dwells of the campaign that must lie in the sweep's range: then the motions between them can be found, too."""

@@ -1,0 +1,74 @@
+"""What the sensors read along periodic motions, as complex harmonics.
+
+    response = harmonics(model, p, solution, orders=9)   # complex, (dwells, 2 channels, 10)
+
+What the truncation to a finite number of nodes costs is stated by :func:`truncation_error`, which solves once
+more on twice as many nodes.
+"""
+
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Complex, Float
+
+from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.values import Values
+from savgs_ident.simulate.collocation import Trajectory
+from savgs_ident.simulate.layout import Layout
+from savgs_ident.simulate.mesh import Mesh, turns
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, adapt
+
+
+def _readings(model: QuarterCar, p: Values, trajectory: Trajectory) -> Float[Array, "P C"]:
+    at_nodes = jax.vmap(partial(model.read, p))
+    return jnp.stack(at_nodes(trajectory.x[1], trajectory.y[0]), axis=-1)
+
+
+def _analyse(signals: Float[Array, "P C"], mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
+    twice = jnp.full(orders + 1, 2.0).at[0].set(1.0)
+    kernel = twice * jnp.conj(turns(mesh.phase, orders))
+    terms = signals[:, :, None] * (kernel * jnp.asarray(mesh.weight)[:, None])[:, None, :]
+    layout = mesh.layout
+    return jax.ops.segment_sum(terms, layout.dwell, len(layout.counts), indices_are_sorted=True)
+
+
+@eqx.filter_jit
+def harmonics(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, orders: int
+) -> Complex[Array, "D C K"]:
+    """Complex harmonics 0..orders of the sensor readings, (D, 2, orders + 1), in the channels' SI units.
+
+    Channels are those of :data:`savgs_ident.model.sensors.RESPONSE_CHANNELS`.
+    """
+    return harmonics_of(model, p, solution.trajectory, solution, orders)
+
+
+def harmonics_of(
+    model: QuarterCar, p: Values, motions: Trajectory, known: PeriodicSolution, orders: int
+) -> Complex[Array, "D C K"]:
+    """The same of motions on the nodes of a ``known`` solution, as a part of a larger program that is compiled."""
+    seen = _analyse(_readings(model, p, motions), known.mesh, orders)
+    return seen * _sensors(model, p, known.excitation.frequency, orders)
+
+
+def _sensors(
+    model: QuarterCar, p: Values, frequency: Float[Array, " D"], orders: int
+) -> Complex[Array, "D C K"]:
+    """What the sensors make of each order."""
+    order = jnp.arange(orders + 1, dtype=frequency.dtype)
+    return jnp.moveaxis(model.transfers(p, frequency[:, None] * order), 0, 1)
+
+
+def truncation_error(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, orders: int
+) -> Float[Array, "D C"]:
+    """Largest change of any order 1..orders when the nodes are doubled, relative to the first harmonic.
+
+    The error of ``solution`` itself is about four thirds of it (the rule is of second order).
+    """
+    doubled = Layout(tuple(2 * count for count in solution.mesh.layout.counts))
+    finer = adapt(model, p, solution, doubled, PeriodicSettings.iterations)
+    coarse, fine = (harmonics(model, p, each, orders) for each in (solution, finer))
+    return jnp.max(jnp.abs(coarse - fine)[..., 1:], axis=-1) / jnp.abs(fine[..., 1])
