@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,9 +10,13 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.rig import Rig
 from savgs_ident.core.status import Status
+from savgs_ident.diagnose.result import Diagnosis
 from savgs_ident.fit.result import Estimate, Fit, Verdict
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.peak_to_peak import peak_to_peak
+
+from .diagnosis_synthetic import KINDS, synthetic_diagnosis
+from .posterior_synthetic import nominal_response
 
 ORDERS = 5
 FREQUENCY = np.array([0.5, 1.0, 1.5, 2.0, 2.35, 3.0, 4.5, 6.0])
@@ -101,3 +106,16 @@ def fit(measured: HarmonicResponse, rig: Rig) -> Fit:
 def mass_on_spring() -> Callable[[NDArray[np.float64], float], NDArray[np.complex128]]:
     """The responses behind ``measured``, at any frequency [Hz] and damping ratio."""
     return resonance
+
+
+@pytest.fixture(scope="package")
+def by_kind(nominal_campaign: Path) -> dict[str, Diagnosis]:
+    """A synthetic diagnosis of each kind."""
+    measured = nominal_response(nominal_campaign)
+    return {kind: synthetic_diagnosis(measured, kind) for kind in KINDS}
+
+
+@pytest.fixture(scope="package")
+def diagnosis(by_kind: dict[str, Diagnosis]) -> Diagnosis:
+    """The one that names an effect."""
+    return by_kind["effect"]

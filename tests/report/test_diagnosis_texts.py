@@ -1,25 +1,17 @@
-"""Record, terminal and page of a diagnosis say its numbers, the verdict first, and hostile names as text."""
+"""Terminal and page of a diagnosis say its numbers, the verdict first, and hostile names as text."""
 
 import base64
-import io
 import json
 import re
-from collections.abc import Mapping
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
 
 import pytest
-from rich.console import Console
 
-from savgs_ident.core.errors import DataWarning
 from savgs_ident.diagnose.result import Diagnosis, Estimate, NotJudgeable
 from savgs_ident.report.diagnosis_files import write_diagnosis
 from savgs_ident.report.diagnosis_html import diagnosis_html
-from savgs_ident.report.diagnosis_record import diagnosis_record
 from savgs_ident.report.diagnosis_rows import parameter_table
-from savgs_ident.report.diagnosis_text import diagnosis_text
 from savgs_ident.report.diagnosis_words import (
     closed_words,
     estimate_words,
@@ -29,66 +21,19 @@ from savgs_ident.report.diagnosis_words import (
     shown_candidates,
     smallest_words,
 )
-from savgs_ident.report.files import to_json
 from savgs_ident.report.numerals import DASH
 from savgs_ident.report.origin import Origin
 
+from .diagnosis_reading import HOSTILE, ORIGIN, SHOWN, Reader, record_of, rendered
 from .diagnosis_synthetic import (
     KINDS,
     NO_SHRINK,
     SENTENCES,
-    SHARES,
-    SHRINK,
     hostile,
-    synthetic_diagnosis,
     unconverged,
 )
-from .posterior_synthetic import nominal_response
 
-HOSTILE = "<script>x</script>\"'&[bold red]\x1b[2J\u202etxt"
-SHOWN = HOSTILE.replace("\x1b", "\\x1b").replace("\u202e", "\\u202e")
-ORIGIN = Origin(
-    ("savgs-ident", "diagnose", "a & b.csv"), "runs/a<b>.csv", "ab" * 32, "m & m.toml", {"savgs-ident": "0.1.0"},
-    (DataWarning("odd", "something", test="dwell_2"),),
-)  # fmt: skip
 SECTIONS = ["where", "response", "loops", "which", "shrink", "map", "next", "limits", "origin"]
-
-
-class Reader(HTMLParser):
-    """Texts and tags of a page, in order."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.texts: list[str] = []
-        self._styling = False
-        self.feed(page)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-        self._styling = tag in ("style", "title")
-
-    def handle_endtag(self, tag: str) -> None:
-        self._styling = self._styling and tag not in ("style", "title")
-
-    def handle_data(self, data: str) -> None:
-        if data.strip() and not self._styling:
-            self.texts.append(" ".join(data.split()))
-
-    @property
-    def pictures(self) -> list[dict[str, str | None]]:
-        return [attributes for tag, attributes in self.tags if tag == "img"]
-
-
-@pytest.fixture(scope="module")
-def by_kind(nominal_campaign: Path) -> dict[str, Diagnosis]:
-    measured = nominal_response(nominal_campaign)
-    return {kind: synthetic_diagnosis(measured, kind) for kind in KINDS}
-
-
-@pytest.fixture(scope="module")
-def diagnosis(by_kind: dict[str, Diagnosis]) -> Diagnosis:
-    return by_kind["effect"]
 
 
 @pytest.fixture(scope="module")
@@ -99,117 +44,6 @@ def source(diagnosis: Diagnosis) -> str:
 @pytest.fixture(scope="module")
 def page(source: str) -> Reader:
     return Reader(source)
-
-
-def rendered(diagnosis: Diagnosis, width: int = 100) -> str:
-    stream = io.StringIO()
-    Console(file=stream, width=width, highlight=False).print(diagnosis_text(diagnosis))
-    return stream.getvalue()
-
-
-def record_of(diagnosis: Diagnosis) -> dict[str, Any]:
-    return dict(json.loads(to_json(diagnosis_record(diagnosis, ORIGIN))))
-
-
-def has_form(value: object, form: object) -> bool:
-    """Whether a JSON value is of this form: types, lists of one form, and objects with at least these keys."""
-    if isinstance(form, Mapping):
-        return isinstance(value, dict) and all(
-            key in value and has_form(value[key], each) for key, each in form.items()
-        )
-    if isinstance(form, list):
-        return isinstance(value, list) and all(has_form(entry, form[0]) for entry in value)
-    return isinstance(value, form) and not isinstance(value, bool)  # type: ignore[arg-type]  # A type or several.
-
-
-NUMBER = (int, float)
-MAYBE = (int, float, type(None))
-CONTRACT: dict[str, object] = {
-    "schema": int,
-    "baseline": {"model": str, "parameters": {"mu_r": NUMBER, "c_sd": NUMBER}},
-    "verdict": {"kind": str, "effects": [str], "ports": [str], "confusable_with": [str], "sentence": str},
-    "where": {
-        "ports": [{"port": str, "share": NUMBER}],
-        "map": [
-            {"channel": str, "frequency_hz": NUMBER, "order": int, "gap_percent": NUMBER, "gap_sigma": NUMBER}
-        ],
-    },
-    "which": [
-        {
-            "effect": str,
-            "probability": NUMBER,
-            "score_sigma": NUMBER,
-            "heldout_gain": NUMBER,
-            "parameters": {},
-        }
-    ],
-    "shrink": {
-        "before": NUMBER,
-        "recalibrated": NUMBER,
-        "after": NUMBER,
-        "floor": NUMBER,
-        "share_closed": MAYBE,
-        "interval": [MAYBE],
-        "by_channel": {"sprung_accel": {"before": NUMBER}, "susp_deflection": {"before": NUMBER}},
-    },
-    "next_test": [{"test": str, "separates": [str], "expected_sigma": NUMBER}],
-}
-"""The object of diagnosis.json."""
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_record_is_the_object_of_the_contract(by_kind: dict[str, Diagnosis], kind: str) -> None:
-    record = record_of(by_kind[kind])
-    assert list(record)[: len(CONTRACT)] == list(CONTRACT)
-    assert has_form(record, CONTRACT)
-    assert record["schema"] == 1
-    assert record["verdict"]["kind"] == kind
-    assert {"none", "unknown"} <= {entry["effect"] for entry in record["which"]}
-    assert sum(entry["probability"] for entry in record["which"]) == pytest.approx(1.0, abs=1e-12)
-    for entry in record["which"]:
-        for parameter in entry["parameters"].values():
-            assert has_form(parameter, {"value": NUMBER, "lo": NUMBER, "hi": NUMBER, "unit": str})
-
-
-def test_the_form_of_the_contract_refuses_what_is_not_of_it(diagnosis: Diagnosis) -> None:
-    record = record_of(diagnosis)
-    assert not has_form({**record, "schema": "1"}, CONTRACT)
-    assert not has_form({key: value for key, value in record.items() if key != "shrink"}, CONTRACT)
-    assert not has_form({**record, "next_test": [{"test": "x"}]}, CONTRACT)
-
-
-def test_the_record_holds_the_numbers_of_the_diagnosis(diagnosis: Diagnosis) -> None:
-    record = record_of(diagnosis)
-    assert record["baseline"]["parameters"]["c_sd"] == 5391.2
-    assert record["identified"]["c_sd"] == 5386.1
-    assert record["verdict"]["effects"] == ["rail_stribeck"]
-    assert record["verdict"]["confusable_with"] == ["rail_preload"]
-    assert {entry["port"]: (entry["share"], entry["reach"]) for entry in record["where"]["ports"]} == SHARES
-    # 28 dwells, two channels, nine orders: none is left out where all were measured.
-    assert len(record["where"]["map"]) == len(diagnosis.map) == 504
-    assert record["which"][0]["parameters"]["stribeck_velocity"] == {
-        "value": 0.1012, "lo": 0.0957, "hi": 0.1066, "unit": "m/s"
-    }  # fmt: skip
-    assert record["shrink"]["share_closed"] == SHRINK.share_closed
-    assert record["shrink"]["interval"] == list(SHRINK.interval)
-    assert record["shrink"]["by_channel"]["susp_deflection"]["floor"] == 0.0009
-    assert record["next_test"][0]["separates"] == ["rail_stribeck", "rail_preload"]
-    assert record["not_judgeable"][0] == {
-        "effect": "bump_stop", "parameter": "bump_stop_stiffness", "smallest": 3.2e4, "unit": "N/m"
-    }  # fmt: skip
-    assert record["confusable"][1]["cosine"] == -0.951
-    assert record["sweep"]["after"] == 0.0132
-    assert record["converged"] is True
-    assert record["provenance"]["data_sha256"] == "ab" * 32
-    assert record["provenance"]["warnings"][0]["code"] == "odd"
-
-
-def test_what_was_not_computed_is_null_in_the_record(by_kind: dict[str, Diagnosis]) -> None:
-    record = record_of(replace(by_kind["none"], sweep=None))
-    assert record["sweep"] is None
-    assert record["shrink"]["share_closed"] is None
-    assert record["shrink"]["interval"] == [None, None]
-    assert record["which"][-1]["share_closed"] is None
 
 
 @pytest.mark.parametrize("kind", KINDS)

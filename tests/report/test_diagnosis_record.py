@@ -1,0 +1,116 @@
+"""diagnosis.json is the object of the contract, and holds the numbers of the diagnosis."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import pytest
+
+from savgs_ident.diagnose.result import Diagnosis
+
+from .diagnosis_reading import record_of
+from .diagnosis_synthetic import (
+    KINDS,
+    SHARES,
+    SHRINK,
+)
+
+
+def has_form(value: object, form: object) -> bool:
+    """Whether a JSON value is of this form: types, lists of one form, and objects with at least these keys."""
+    if isinstance(form, Mapping):
+        return isinstance(value, dict) and all(
+            key in value and has_form(value[key], each) for key, each in form.items()
+        )
+    if isinstance(form, list):
+        return isinstance(value, list) and all(has_form(entry, form[0]) for entry in value)
+    return isinstance(value, form) and not isinstance(value, bool)  # type: ignore[arg-type]  # A type or several.
+
+
+NUMBER = (int, float)
+MAYBE = (int, float, type(None))
+CONTRACT: dict[str, object] = {
+    "schema": int,
+    "baseline": {"model": str, "parameters": {"mu_r": NUMBER, "c_sd": NUMBER}},
+    "verdict": {"kind": str, "effects": [str], "ports": [str], "confusable_with": [str], "sentence": str},
+    "where": {
+        "ports": [{"port": str, "share": NUMBER}],
+        "map": [
+            {"channel": str, "frequency_hz": NUMBER, "order": int, "gap_percent": NUMBER, "gap_sigma": NUMBER}
+        ],
+    },
+    "which": [
+        {
+            "effect": str,
+            "probability": NUMBER,
+            "score_sigma": NUMBER,
+            "heldout_gain": NUMBER,
+            "parameters": {},
+        }
+    ],
+    "shrink": {
+        "before": NUMBER,
+        "recalibrated": NUMBER,
+        "after": NUMBER,
+        "floor": NUMBER,
+        "share_closed": MAYBE,
+        "interval": [MAYBE],
+        "by_channel": {"sprung_accel": {"before": NUMBER}, "susp_deflection": {"before": NUMBER}},
+    },
+    "next_test": [{"test": str, "separates": [str], "expected_sigma": NUMBER}],
+}
+"""The object of diagnosis.json."""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_record_is_the_object_of_the_contract(by_kind: dict[str, Diagnosis], kind: str) -> None:
+    record = record_of(by_kind[kind])
+    assert list(record)[: len(CONTRACT)] == list(CONTRACT)
+    assert has_form(record, CONTRACT)
+    assert record["schema"] == 1
+    assert record["verdict"]["kind"] == kind
+    assert {"none", "unknown"} <= {entry["effect"] for entry in record["which"]}
+    assert sum(entry["probability"] for entry in record["which"]) == pytest.approx(1.0, abs=1e-12)
+    for entry in record["which"]:
+        for parameter in entry["parameters"].values():
+            assert has_form(parameter, {"value": NUMBER, "lo": NUMBER, "hi": NUMBER, "unit": str})
+
+
+def test_the_form_of_the_contract_refuses_what_is_not_of_it(diagnosis: Diagnosis) -> None:
+    record = record_of(diagnosis)
+    assert not has_form({**record, "schema": "1"}, CONTRACT)
+    assert not has_form({key: value for key, value in record.items() if key != "shrink"}, CONTRACT)
+    assert not has_form({**record, "next_test": [{"test": "x"}]}, CONTRACT)
+
+
+def test_the_record_holds_the_numbers_of_the_diagnosis(diagnosis: Diagnosis) -> None:
+    record = record_of(diagnosis)
+    assert record["baseline"]["parameters"]["c_sd"] == 5391.2
+    assert record["identified"]["c_sd"] == 5386.1
+    assert record["verdict"]["effects"] == ["rail_stribeck"]
+    assert record["verdict"]["confusable_with"] == ["rail_preload"]
+    assert {entry["port"]: (entry["share"], entry["reach"]) for entry in record["where"]["ports"]} == SHARES
+    # 28 dwells, two channels, nine orders: none is left out where all were measured.
+    assert len(record["where"]["map"]) == len(diagnosis.map) == 504
+    assert record["which"][0]["parameters"]["stribeck_velocity"] == {
+        "value": 0.1012, "lo": 0.0957, "hi": 0.1066, "unit": "m/s"
+    }  # fmt: skip
+    assert record["shrink"]["share_closed"] == SHRINK.share_closed
+    assert record["shrink"]["interval"] == list(SHRINK.interval)
+    assert record["shrink"]["by_channel"]["susp_deflection"]["floor"] == 0.0009
+    assert record["next_test"][0]["separates"] == ["rail_stribeck", "rail_preload"]
+    assert record["not_judgeable"][0] == {
+        "effect": "bump_stop", "parameter": "bump_stop_stiffness", "smallest": 3.2e4, "unit": "N/m"
+    }  # fmt: skip
+    assert record["confusable"][1]["cosine"] == -0.951
+    assert record["sweep"]["after"] == 0.0132
+    assert record["converged"] is True
+    assert record["provenance"]["data_sha256"] == "ab" * 32
+    assert record["provenance"]["warnings"][0]["code"] == "odd"
+
+
+def test_what_was_not_computed_is_null_in_the_record(by_kind: dict[str, Diagnosis]) -> None:
+    record = record_of(replace(by_kind["none"], sweep=None))
+    assert record["sweep"] is None
+    assert record["shrink"]["share_closed"] is None
+    assert record["shrink"]["interval"] == [None, None]
+    assert record["which"][-1]["share_closed"] is None
