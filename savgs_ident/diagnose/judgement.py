@@ -16,8 +16,9 @@ from savgs_ident.diagnose.engine.parallel import side_by_side
 from savgs_ident.diagnose.engine.search import EXPLAINED, Findings, Tell, find_terms, left_over
 from savgs_ident.diagnose.engine.strain import strain_of
 from savgs_ident.diagnose.result import Kind
+from savgs_ident.diagnose.rig.comparison import rig_plant
 from savgs_ident.diagnose.rig.places import places_of
-from savgs_ident.diagnose.rig.plant import RigPlant, rig_plant
+from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.diagnose.settings import DiagnosisSettings
 from savgs_ident.diagnose.verdict import Weighed, kind_of, of_material_parts, weigh
 from savgs_ident.effects.registry import CATALOGUE

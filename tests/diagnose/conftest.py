@@ -8,7 +8,8 @@ import pytest
 
 from savgs_ident.core.rig import Rig
 from savgs_ident.diagnose.engine.data import Data
-from savgs_ident.diagnose.rig.plant import RigPlant, rig_plant
+from savgs_ident.diagnose.rig.comparison import rig_plant
+from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.diagnose.settings import FREE
 from savgs_ident.effects.registry import CATALOGUE, MODELS
 from savgs_ident.recordings.read import read_campaign

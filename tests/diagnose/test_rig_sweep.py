@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from savgs_ident.core.rig import Rig
 from savgs_ident.diagnose.blind.swept import sweep_readings
 from savgs_ident.diagnose.rig import sweep as module
-from savgs_ident.diagnose.rig.plant import rig_plant
+from savgs_ident.diagnose.rig.comparison import rig_plant
 from savgs_ident.diagnose.rig.sweep import along, first_harmonic, frequencies_of, sweep_shrink
 from savgs_ident.diagnose.settings import FREE
 from savgs_ident.effects.registry import CATALOGUE, MODELS, build_model

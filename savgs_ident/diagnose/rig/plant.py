@@ -19,24 +19,20 @@ from savgs_ident.core.free_vector import known_to_tolerance
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.rig import Rig, merge_parameters
 from savgs_ident.diagnose.engine.coordinates import Coordinates
-from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.prediction import Prediction, Term
 from savgs_ident.diagnose.rig.columns import columns_with_states
 from savgs_ident.diagnose.rig.coordinates import free_coordinate, term_of, tolerance_coordinate
 from savgs_ident.diagnose.rig.rows import rows_of, slopes_of
 from savgs_ident.effects.registry import MODELS
 from savgs_ident.fit.problem import used_parameters
-from savgs_ident.fit.target import harmonic_target
 from savgs_ident.model.damper import damper_curve
 from savgs_ident.model.effect import AbstractEffect
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values, as_values
-from savgs_ident.posterior.likelihood import Likelihood, likelihood_of
-from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.posterior.likelihood import Likelihood
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.excitation import Excitation
 from savgs_ident.simulate.layout import Layout, layout_for
-from savgs_ident.simulate.measured import measured_excitation
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
@@ -274,37 +270,3 @@ class RigPlant:
             return Trajectory(x[:lacking], y[:lacking])
         rest = jnp.zeros((lacking, x.shape[1]))
         return Trajectory(jnp.concatenate([x, rest]), jnp.concatenate([y, rest]))
-
-
-def rig_plant(
-    measured: HarmonicResponse,
-    rig: Rig,
-    catalogue: Mapping[str, AbstractEffect],
-    baseline: tuple[str, ...],
-    free: tuple[str, ...],
-    orders: int = 9,
-    settings: PeriodicSettings | None = None,
-) -> tuple[RigPlant, Data]:
-    """The plant of a measured response, and the response as data.
-
-    Raises :class:`InputError` for a response that cannot be used.
-    """
-    target = harmonic_target(measured, orders)
-    likelihood = likelihood_of(target)
-    excitation = measured_excitation(measured, rig.parameters["psi_nominal"].value)
-    plant = RigPlant(
-        rig=rig,
-        catalogue=catalogue,
-        baseline=baseline,
-        free=free,
-        excitation=excitation,
-        likelihood=likelihood,
-        shape=(int(target.used.shape[0]), int(target.used.shape[1]), int(target.used.shape[2])),
-        settings=settings or PeriodicSettings(),
-    )
-    shape = target.used.shape
-    dwell = np.repeat(np.arange(shape[0]), 2 * shape[1] * shape[2])[likelihood.place]
-    data = Data(
-        np.asarray(likelihood.measured), np.asarray(likelihood.variance), np.asarray(likelihood.reach), dwell
-    )
-    return plant, data
