@@ -35,6 +35,9 @@ TRUST = 0.5
 LEAST_SHARE = 1.0 / 8.0
 """The strongest damping."""
 
+LINK = 0.01
+"""Typical length of a link [m]: how far it moves things where the road stands still."""
+
 
 class NewtonResult(NamedTuple):
     """A trajectory, its linearisation, the last relative step of each dwell (D,), and iterations used."""
@@ -61,8 +64,8 @@ class _Progress(NamedTuple):
 def motion_scale(
     model: QuarterCar, inputs: Inputs, frequency: Float[Array, " D"], layout: Layout
 ) -> Float[Array, "m P"]:
-    """A typical size of every state: that of the road's motion, seen over an arm of a third of a metre."""
-    lift = _amplitude(inputs.road.height, layout)
+    """A typical size of every state: what moves road and link, seen over an arm of a third of a metre."""
+    lift = _amplitude(inputs.road.height, layout) + LINK * _amplitude(inputs.link.angle, layout)
     speed = 2.0 * jnp.pi * frequency * lift
     states = [jnp.full_like(lift, state.scale) for state in model.states]
     return jnp.stack([lift, 3.0 * lift, speed, 3.0 * speed, *states])[:, layout.dwell]

@@ -1,8 +1,8 @@
 """The next test: the one that would best tell two hypotheses apart that this campaign hardly can.
 
 Both are taken as fitted to this campaign and predict further ones: another lift of the cam, another angle of the
-link, more payload. The difference that the rival could not make up by moving its parameters as far as this campaign
-allows, in units of the noise, is the significance to expect.
+link, more payload, or the link swung while the road stands still. The difference that the rival could not make up by
+moving its parameters as far as this campaign allows, in units of the noise, is the significance to expect.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,6 +20,7 @@ from savgs_ident.diagnose.engine.parallel import in_parallel
 from savgs_ident.diagnose.engine.prediction import Prediction
 from savgs_ident.diagnose.result import NextTest
 from savgs_ident.diagnose.rig.plant import RigPlant
+from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.periodic import PeriodicSolution
 
 DWELLS = 4
@@ -31,14 +32,16 @@ PROPOSED = 2
 
 @dataclass(frozen=True)
 class Condition:
-    """How the rig is run: the cam's lift and the link's angle changed, payload added.
+    """How the rig is run: the cam's lift and the link's angle changed, the link swung, payload added.
 
-    ``lift`` is a factor [1], ``turn`` is added to the link angle [rad], ``payload`` [kg] to the sprung mass.
+    ``lift`` is a factor [1], ``turn`` is added to the link angle [rad], about which it swings by ``swing`` [rad] to
+    either side; ``payload`` [kg] is added to the sprung mass.
     """
 
     text: str
     lift: float = 1.0
     turn: float = 0.0
+    swing: float = 0.0
     payload: float = 0.0
 
 
@@ -49,6 +52,7 @@ CONDITIONS = (
     Condition("the link at 60 deg", turn=-np.pi / 6.0),
     Condition("the link at 120 deg", turn=np.pi / 6.0),
     Condition("50 kg of payload", payload=50.0),
+    Condition("the road standing still and the link swung by 10 deg", lift=0.0, swing=np.pi / 18.0),
 )
 
 
@@ -81,7 +85,7 @@ def _drafts(search: Search, plant: RigPlant, one: Mode, other: Mode) -> list[_Dr
     """A draft for every condition under which both hypotheses can be solved."""
 
     def draft(condition: Condition) -> _Draft | None:
-        found, rival = (_run(plant, mode, condition, (), mode.prediction.near) for mode in (one, other))
+        found, rival = (predicted(plant, mode, condition) for mode in (one, other))
         if not (found.solved and rival.solved):
             return None
         miss = found.rows - rival.rows
@@ -92,24 +96,39 @@ def _drafts(search: Search, plant: RigPlant, one: Mode, other: Mode) -> list[_Dr
     return [each for each in in_parallel(draft, CONDITIONS) if each is not None]
 
 
-def _run(
-    plant: RigPlant, mode: Mode, condition: Condition, names: Sequence[str], near: PeriodicSolution
+def predicted(
+    plant: RigPlant,
+    mode: Mode,
+    condition: Condition,
+    names: Sequence[str] = (),
+    near: PeriodicSolution | None = None,
 ) -> Prediction:
-    """A hypothesis under a condition."""
+    """A hypothesis under a condition, with slopes in the named parameters, from motions ``near`` it if known."""
+    near = _begin(mode, condition) if near is None else near
     excitation = plant.excitation
+    link = jnp.asarray(excitation.link).at[:, 0].add(condition.turn)
+    # Where the link was not recorded it has no harmonics, and JAX leaves out what would be added to them.
     there = excitation._replace(
-        road=condition.lift * excitation.road,
-        link=jnp.asarray(excitation.link).at[:, 0].add(condition.turn),
+        road=condition.lift * excitation.road, link=link.at[:, 1].add(condition.swing)
     )
     moved = eqx.tree_at(lambda each: each.excitation, near, there)
     values = _loaded(mode.values, plant, condition.payload)
     return replace(plant, excitation=there, corrections={}).predict(mode.terms, values, names, moved)
 
 
+def _begin(mode: Mode, condition: Condition) -> PeriodicSolution:
+    """Where to look for the motion of a hypothesis from: its own, or rest."""
+    near: PeriodicSolution = mode.prediction.near
+    if condition.lift > 0.0:
+        return near
+    rest = Trajectory(*(jnp.zeros_like(part) for part in near.trajectory))
+    return eqx.tree_at(lambda each: each.trajectory, near, rest)
+
+
 def _expected(search: Search, plant: RigPlant, other: Mode, draft: _Draft) -> float:
     """Significance of a draft once the rival has moved its parameters as far as the campaign allows."""
     names = [each.name for each in other.coordinates]
-    rival = _run(plant, other, draft.condition, names, draft.near)
+    rival = predicted(plant, other, draft.condition, names, draft.near)
     chosen = np.isin(search.data.test, draft.tests)
     slopes = (rival.slopes * slopes_at(other.coordinates, other.x))[chosen]
     spread = np.diag(search.data.variance[chosen]) + slopes @ other.covariance() @ slopes.T
