@@ -45,17 +45,17 @@ def count_false_alarms(job: Job, voice: Voice, out: Path) -> int:
     use_persistent_cache()
     kept = out / "draws.jsonl"
     done = known_trials(kept, job.marks(), NullDraw) if job.resume else []
-    if not done:
-        begin_trials(kept, job.marks())
     with voice.working() as progress:
         bench = _bench(job, progress)
+        if not done:
+            begin_trials(kept, job.marks())
         draws = _drawn(job, bench, kept, done, progress)
         record = alarms_record(draws, bench.odds, job.diagnosis.command)
         files = [write_json(out / "false_alarms.json", record), kept]
         files += write_figure(out, "false_alarms", alarms_figure(draws, bench.odds))
     voice.show(plain(alarms_text(record)), plain("Written: " + ", ".join(str(file) for file in files)))
     voice.hand_over(record)
-    if record["calibrated"]:
+    if record["few_enough"]:
         return OK
     complain("Not to be trusted: there are more false alarms than there may be.")
     return NOT_TRUSTED

@@ -16,7 +16,11 @@ def _is_number(word: str) -> bool:
     return True
 
 
-SEVERAL: dict[str, Callable[[str], bool]] = {"--free": _is_name, "--frequency": _is_number}
+SEVERAL: dict[str, Callable[[str], bool]] = {
+    "--free": _is_name,
+    "--without": _is_name,
+    "--frequency": _is_number,
+}
 """The options, and what a further value of each looks like; a word that does not is an argument."""
 
 

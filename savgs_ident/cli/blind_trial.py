@@ -127,8 +127,9 @@ def diagnose_folder(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping
 def _diagnosed(diagnose: Diagnose, folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
     try:
         return diagnose(folder, rig, without)
-    except InputError as error:
-        return failed(str(error))
+    except (InputError, ArithmeticError, ValueError) as error:
+        # A diagnosis that breaks is one that is not right; the other trials go on.
+        return failed(f"{type(error).__name__}: {error}")
 
 
 def draw_and_record(plan: Plan, bench: Bench, number: int) -> Drawn:

@@ -18,8 +18,8 @@ def known_trials(kept: Path, marks: Mapping[str, object], trial: Callable[..., T
     """
     if not kept.exists():
         return []
-    lines = kept.read_text().split("\n")[:-1]
     try:
+        lines = kept.read_text().split("\n")[:-1]
         of, *trials = (json.loads(line) for line in lines)
         found = [trial(**each) for each in trials]
     except (ValueError, TypeError) as error:

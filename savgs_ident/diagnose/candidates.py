@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from savgs_ident.diagnose.engine.climb import Mode, Search
 from savgs_ident.diagnose.engine.heldout import HeldOut
 from savgs_ident.diagnose.engine.score import Score, cosine
-from savgs_ident.diagnose.engine.search import ALIKE, Findings, left_over
+from savgs_ident.diagnose.engine.search import ALIKE, LITTLE, Findings, excess, left_over
 from savgs_ident.diagnose.result import Candidate, Confusable, Estimate, NotJudgeable
 from savgs_ident.diagnose.verdict import Weighed
 
@@ -28,12 +28,12 @@ def candidates_of(
 ) -> tuple[Candidate, ...]:
     """All hypotheses, the most probable first."""
     scores = {score.term.name: score for score in findings.scores}
-    found = []
+    gap, found = excess(search, findings.base), []
     for each, share in zip(weighed, probability, strict=True):
         sigma = np.sqrt(sum(scores[name].sigma ** 2 for name in each.effects if name in scores))
         gain = held[each.name].mean - held["none"].mean if each.name in held else float("nan")
         closed = float("nan")
-        if each.mode is not None:
+        if each.mode is not None and gap > LITTLE:
             closed = 1.0 - left_over(search, findings.base, each.mode) if each.effects else 0.0
         found.append(
             Candidate(

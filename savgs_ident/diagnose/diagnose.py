@@ -125,7 +125,7 @@ def _assemble(
     together, by_channel = shrinks(data, rows)
     confusable = confusable_of(judged.findings)
     rivals = rivals_of(list(judged.weighed), judged.chosen)
-    verdict = verdict_of(judged.kind, judged.chosen, judged.place, rivals, together)
+    verdict = verdict_of(judged, rivals, together)
     shares = probabilities(list(judged.weighed))
     fitted = judged.place.held_out if judged.kind == "unknown" else after.prediction.rows
     tell("inferring the signal at the port")
@@ -151,7 +151,7 @@ def _assemble(
         responses=_responses(plant, case.given, base.prediction.rows, fitted),
         measured=measured,
         converged=base.status.ok and after.status.ok,
-        warnings=warnings_of(case.base, after, judged.left, judged.kind),
+        warnings=warnings_of(case, after, judged),
         wall_s=0.0,
     )
 

@@ -1,7 +1,8 @@
 """How often a diagnosis would cry wolf: campaigns like a recorded one in which nothing is missing.
 
 The recalibrated baseline is the truth of every one of them: parameters drawn from what the recorded campaign leaves
-open about them, the noise of the record, nothing else. Each is diagnosed as any other. The share of those in which
+open about them, the noise of the record, which a diagnosis knows no better than that of a record, nothing else. Each
+is diagnosed as any other. The share of those in which
 something is said to be missing is the false-alarm rate of this campaign, and their odds are what its own odds are to
 be compared with.
 """
@@ -23,6 +24,7 @@ from savgs_ident.diagnose.engine.search import Tell
 from savgs_ident.diagnose.judgement import Case, judge, recalibrate
 from savgs_ident.diagnose.settings import DiagnosisSettings
 from savgs_ident.diagnose.verdict import odds_of
+from savgs_ident.model.sensors import RESPONSE_CHANNELS
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 CONFIDENCE = 0.95
@@ -50,11 +52,18 @@ class NullDraw:
 class AlarmBench:
     """A recorded campaign, recalibrated: what campaigns with nothing missing are drawn from.
 
-    ``odds`` are its own.
+    Attributes:
+        case: the campaign as a case.
+        odds: its own log odds that something is missing.
+        dof: degrees of freedom of the noise level behind each row, (m,); infinite where it is known.
+        level: which level that is, (m,).
+        seed: of all random numbers.
     """
 
     case: Case
     odds: float
+    dof: NDArray[np.float64]
+    level: NDArray[np.intp]
     seed: int
 
     def draw(self, number: int) -> NullDraw:
@@ -81,12 +90,23 @@ class AlarmBench:
         there = plant.predict((), truth, asked, plant.refined((), truth, found.near))
         noise = base.misfit.noise * np.sqrt(self.case.data.variance)
         rows = there.rows + noise * random.standard_normal(there.rows.size)
-        return self._recalibrated(rows) if there.solved else None
+        return self._recalibrated(rows, self._estimated_variance(random)) if there.solved else None
 
-    def _recalibrated(self, rows: NDArray[np.float64]) -> Case | None:
+    def _estimated_variance(self, random: np.random.Generator) -> NDArray[np.float64]:
+        """The variances (m,) as a record of the same length would show them."""
+        _, first, level = np.unique(self.level, return_index=True, return_inverse=True)
+        dof = self.dof[first]
+        known = np.isinf(dof)
+        shown = np.where(known, 1.0, random.chisquare(np.where(known, 1.0, dof)) / np.where(known, 1.0, dof))
+        return np.asarray(self.case.data.variance * shown[level])
+
+    def _recalibrated(self, rows: NDArray[np.float64], variance: NDArray[np.float64]) -> Case | None:
         known = self.case
         likelihood = eqx.tree_at(lambda each: each.measured, known.plant.likelihood, jnp.asarray(rows))
-        plant, data = replace(known.plant, likelihood=likelihood), replace(known.data, measured=rows)
+        plant, data = (
+            replace(known.plant, likelihood=likelihood),
+            replace(known.data, measured=rows, variance=variance),
+        )
         search = search_of(plant, data)
         base = climb(search, (), known.base.values, known.base.prediction.near)
         if not np.isfinite(base.evidence):
@@ -108,7 +128,19 @@ def alarm_bench(
     """
     with threadpool_limits(1, "blas"):
         case = recalibrate(measured, rig, settings, values, tell)
-        return AlarmBench(case, odds_of(judge(case, tell).weighed), seed)
+        odds = odds_of(judge(case, tell).weighed)
+    level = case.data.test * len(RESPONSE_CHANNELS) + case.plant.channel
+    return AlarmBench(case, odds, _degrees_of_freedom(measured, case), level, seed)
+
+
+def _degrees_of_freedom(measured: HarmonicResponse, case: Case) -> NDArray[np.float64]:
+    """Of the noise level behind each row, (m,)."""
+    if measured.covariance_dof is None:
+        return np.full(case.data.measured.size, np.inf)
+    channels = [name for name in RESPONSE_CHANNELS if name in measured.channels]
+    first = {RESPONSE_CHANNELS.index(name): measured.channel(name) for name in channels}
+    places = np.array([first[channel] for channel in case.plant.channel])
+    return np.asarray(measured.covariance_dof[case.data.test, places, 1])
 
 
 def rate_bound(alarms: int, drawn: int) -> float:

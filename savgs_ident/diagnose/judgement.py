@@ -14,13 +14,21 @@ from savgs_ident.diagnose.engine.climb import Mode, Search, climb, refine, searc
 from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.parallel import side_by_side
 from savgs_ident.diagnose.engine.search import EXPLAINED, Findings, Tell, find_terms, left_over
-from savgs_ident.diagnose.engine.strain import strain_of
+from savgs_ident.diagnose.engine.strain import Strain, strain_of
 from savgs_ident.diagnose.result import Kind
 from savgs_ident.diagnose.rig.comparison import rig_plant
 from savgs_ident.diagnose.rig.places import places_of
 from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.diagnose.settings import DiagnosisSettings
-from savgs_ident.diagnose.verdict import Weighed, kind_of, of_material_parts, weigh
+from savgs_ident.diagnose.verdict import (
+    Unknown,
+    Weighed,
+    heaviest,
+    kind_of,
+    of_material_parts,
+    unknown_of,
+    weigh,
+)
 from savgs_ident.effects.registry import CATALOGUE
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
@@ -41,14 +49,29 @@ class Case:
 
 @dataclass(frozen=True)
 class Judged:
-    """What was found out about a case."""
+    """What was found out about a case.
+
+    Attributes:
+        findings: all hypotheses that were scored and fitted.
+        places: what a law at each port would explain.
+        weighed: hypotheses by falling weight.
+        unknown: what speaks most for something that the catalogue lacks.
+        strain: what the heaviest hypothesis asks of the sheet's tolerances.
+        kind: what may be said.
+        chosen: the hypothesis that it rests on.
+        left: share of the baseline's excess misfit that the heaviest hypothesis leaves.
+        settled: whether the parameters of what is named are free of what finitely many nodes cost.
+    """
 
     findings: Findings
     places: tuple[Attribution, ...]
     weighed: tuple[Weighed, ...]
+    unknown: Unknown
+    strain: Strain
     kind: Kind
     chosen: Weighed
     left: float
+    settled: bool = True
 
     @property
     def place(self) -> Attribution:
@@ -68,6 +91,12 @@ def recalibrate(
     if unknown:
         raise InputError(
             f"there is no effect '{unknown[0]}'", remedy="choose among: " + ", ".join(sorted(CATALOGUE))
+        )
+    needed = sorted({*options.without} & {*options.baseline})
+    if needed:
+        raise InputError(
+            f"the effect '{needed[0]}' is part of the baseline",
+            remedy="leave out effects that the baseline lacks",
         )
     catalogue = {name: each for name, each in CATALOGUE.items() if name not in options.without}
     tell("solving the baseline")
@@ -94,16 +123,16 @@ def judge(case: Case, tell: Tell) -> Judged:
         lambda: _attributed(case, base),
     )
     findings = of_material_parts(findings, partial(_change_without, case))
-    best = findings.best
-    alone, besides = anywhere(places), -np.inf
+    best, besides = heaviest(findings), -np.inf
     left = left_over(search, base, best)
     if best.terms and left > EXPLAINED:
         tell(f"what {' + '.join(best.terms)} leaves")
         besides = anywhere(_attributed(case, best))
-    strained = best.evidence + strain_of(best, plant.nuisances)
-    weighed = weigh(findings, alone, besides, strained)
+    strain = strain_of(best, plant.nuisances)
+    unknown = unknown_of(findings, anywhere(places), besides, best.evidence + strain.gain)
+    weighed = weigh(findings, unknown)
     kind, chosen = kind_of(weighed, _change_without(case, best, best.terms), left)
-    return Judged(findings, tuple(places), tuple(weighed), kind, chosen, left)
+    return Judged(findings, tuple(places), tuple(weighed), unknown, strain, kind, chosen, left)
 
 
 def settle(case: Case, judged: Judged, tell: Tell) -> tuple[Case, Judged]:
@@ -116,8 +145,8 @@ def settle(case: Case, judged: Judged, tell: Tell) -> tuple[Case, Judged]:
     search = search_of(plant, case.data)
     terms = {term.name: term for term in plant.candidates}
     found = climb(search, tuple(terms[name] for name in mode.terms), mode.values, mode.prediction.near)
-    if not np.isfinite(found.evidence):
-        return case, judged
+    if plant is case.plant or not np.isfinite(found.evidence):
+        return case, replace(judged, settled=False)
     chosen = replace(judged.chosen, mode=found)
     weighed = tuple(chosen if each is judged.chosen else each for each in judged.weighed)
     modes = tuple(found if each is mode else each for each in judged.findings.modes)

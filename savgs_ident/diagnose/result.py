@@ -89,7 +89,8 @@ class Candidate:
         probability: its probability, all hypotheses sum to 1.
         score_sigma: significance at the null, nuisances projected out.
         heldout_gain: rise of the log predictive density of left-out tests over the baseline, per datum.
-        share_closed: share of the recalibrated gap that it closes, all tests.
+        share_closed: share that it explains of what the recalibrated baseline leaves beyond the noise, all tests; NaN
+            where it leaves nothing.
         parameters: those of its effects.
         refitted: whether it was fitted in full, or judged by its score alone.
     """

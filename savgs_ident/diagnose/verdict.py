@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import log
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,48 +47,75 @@ class Weighed:
     mode: Mode | None
 
 
+Reason = Literal["law", "besides", "strain"]
+"""What speaks for something unknown: a law at a port, one besides the best effects, a tolerance that is broken."""
+
+
+class Unknown(NamedTuple):
+    """What speaks most for something that the catalogue does not have: log weight, prior included, and why."""
+
+    weight: float
+    reason: Reason
+
+
+def prior_of(terms: Sequence[str], count: int) -> float:
+    """Log prior of a hypothesis of so many terms out of ``count``."""
+    if not terms:
+        return log(PRIOR_NONE)
+    singles, pairs = max(count, 1), max(count * (count - 1) / 2, 1)
+    return log(PRIOR_SINGLE / singles) if len(terms) == 1 else log(PRIOR_PAIR / pairs)
+
+
+def heaviest(findings: Findings) -> Mode:
+    """The fitted hypothesis with the greatest weight, evidence and prior."""
+    count = len(findings.scores)
+    return max((findings.base, *findings.modes), key=lambda mode: mode.evidence + prior_of(mode.terms, count))
+
+
 def of_material_parts(findings: Findings, change: Callable[[Mode, Sequence[str]], float]) -> Findings:
-    """The findings less the best ones that need an effect which does too little to matter.
+    """The findings less the heaviest ones that need an effect which does too little to matter.
 
     What a wrong effect leaves, a trace of a second one often takes away: that does not make both of them right.
     ``change`` is what some terms of a hypothesis do to the response, as a share of it.
     """
-    best = findings.best
+    best = heaviest(findings)
     while len(best.terms) > 1 and any(change(best, (name,)) < MATERIAL for name in best.terms):
         findings = replace(findings, modes=tuple(each for each in findings.modes if each is not best))
-        best = findings.best
+        best = heaviest(findings)
     return findings
 
 
-def weigh(findings: Findings, alone: float, besides: float, strained: float) -> list[Weighed]:
-    """All hypotheses by falling weight.
+def unknown_of(findings: Findings, alone: float, besides: float, strained: float) -> Unknown:
+    """What speaks most for something unknown.
 
-    ``alone`` is the log evidence of the best law learned at a port; ``besides`` that of the best one beside the best
-    effects, and ``strained`` that of these if a tolerance does not hold, both less probable beforehand than these
-    effects are.
+    ``alone`` is the log evidence of a law learned at some port; ``besides`` that of one beside the heaviest
+    hypothesis, and ``strained`` that of this one if a tolerance does not hold: both less probable beforehand than it.
     """
-    count = max(len(findings.scores), 1)
-    single, pair = log(PRIOR_SINGLE / count), log(PRIOR_PAIR / max(count * (count - 1) / 2, 1))
-
-    def prior(mode: Mode) -> float:
-        return {0: log(PRIOR_NONE), 1: single}.get(len(mode.terms), pair)
-
-    unknown = max(
-        alone + log(PRIOR_UNKNOWN),
-        besides + log(PRIOR_UNKNOWN) + prior(findings.best),
-        strained + log(PRIOR_STRAINED) + prior(findings.best),
+    prior = prior_of(heaviest(findings).terms, len(findings.scores))
+    found = (
+        Unknown(alone + log(PRIOR_UNKNOWN), "law"),
+        Unknown(besides + log(PRIOR_UNKNOWN) + prior, "besides"),
+        Unknown(strained + log(PRIOR_STRAINED) + prior, "strain"),
     )
+    return max(found, key=lambda each: each.weight)
+
+
+def weigh(findings: Findings, unknown: Unknown) -> list[Weighed]:
+    """All hypotheses by falling weight, but for those whose fit was lost."""
+    count = len(findings.scores)
     found = [
-        Weighed("none", (), findings.base.evidence + log(PRIOR_NONE), findings.base),
-        Weighed("unknown", (), unknown, None),
+        Weighed("none", (), findings.base.evidence + prior_of((), count), findings.base),
+        Weighed("unknown", (), unknown.weight, None),
     ]
     found += [
-        Weighed(" + ".join(mode.terms), mode.terms, mode.evidence + prior(mode), mode)
+        Weighed(" + ".join(mode.terms), mode.terms, mode.evidence + prior_of(mode.terms, count), mode)
         for mode in findings.modes
     ]
-    fitted = {mode.terms for mode in findings.modes}
+    fitted = {*(mode.terms for mode in findings.modes), *findings.lost}
     found += [
-        Weighed(score.term.name, (score.term.name,), score.evidence + single, None)
+        Weighed(
+            score.term.name, (score.term.name,), score.evidence + prior_of((score.term.name,), count), None
+        )
         for score in findings.scores
         if (score.term.name,) not in fitted
     ]

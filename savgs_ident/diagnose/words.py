@@ -1,26 +1,25 @@
 """What a diagnosis says in words."""
 
-from savgs_ident.diagnose.engine.attribution import Attribution
 from savgs_ident.diagnose.engine.climb import Mode
-from savgs_ident.diagnose.result import Kind, Shrink, Verdict
-from savgs_ident.diagnose.verdict import Weighed
+from savgs_ident.diagnose.judgement import Case, Judged
+from savgs_ident.diagnose.result import Shrink, Verdict
+from savgs_ident.diagnose.verdict import MATERIAL, SURE, heaviest, odds_of
 from savgs_ident.effects.registry import CATALOGUE
 
 IMPERFECT = 0.005
 """Share of the excess misfit left from which on named effects are said not to explain all."""
 
 
-def verdict_of(
-    kind: Kind, chosen: Weighed, place: Attribution, rivals: tuple[str, ...], gap: Shrink
-) -> Verdict:
+def verdict_of(judged: Judged, rivals: tuple[str, ...], gap: Shrink) -> Verdict:
     """The verdict with its sentence."""
+    kind, chosen, place = judged.kind, judged.chosen, judged.place
     told = rivals if kind == "effect" else ()
     if kind == "none":
         sentence = (
             f"Nothing is missing that these data show: recalibrated, the model misses by "
             f"{_percent(gap.recalibrated)} of the response, of which the noise is {_percent(gap.floor)}."
         )
-        return Verdict(kind, (), (), (), sentence)
+        return Verdict(kind, (), (), (), sentence + _doubted(odds_of(judged.weighed)))
     if kind == "unknown":
         sentence = (
             f"Something is missing that no effect of the catalogue explains: a law learned at the port "
@@ -28,7 +27,7 @@ def verdict_of(
             f"shrinks from {_percent(gap.recalibrated)} recalibrated to {_percent(gap.after)} of the response; "
             f"the noise is {_percent(gap.floor)}."
         )
-        return Verdict(kind, (), (place.name,), (), sentence)
+        return Verdict(kind, (), (place.name,), (), sentence + _nearest(judged))
     one = len(chosen.effects) == 1
     ports = tuple(dict.fromkeys(CATALOGUE[name].port.value for name in chosen.effects))
     names = " and ".join(chosen.effects)
@@ -43,9 +42,45 @@ def verdict_of(
     return Verdict(kind, chosen.effects, ports, told, sentence)
 
 
-def warnings_of(base: Mode, after: Mode, left: float, kind: Kind) -> tuple[str, ...]:
+def _doubted(odds: float) -> str:
+    """What speaks for something missing where nothing is named."""
+    if odds <= 0.0:
+        return ""
+    if odds < SURE:
+        return (
+            f" Evidence of {odds:.1f} nat speaks for something missing: less than the {SURE:.0f} asked for."
+        )
+    return f" What would explain more changes the response by less than {_percent(MATERIAL)}: too little to matter."
+
+
+def _nearest(judged: Judged) -> str:
+    """How far the catalogue comes to something unknown."""
+    effects = " and ".join(heaviest(judged.findings).terms)
+    strain = judged.strain
+    if judged.unknown.reason == "strain" and judged.weighed[0].name == "unknown":
+        short = f"With {effects} the" if effects else "The"
+        return (
+            f" {short} model would need {strain.parameter} {abs(strain.tolerances):.1f} tolerances "
+            f"{'above' if strain.tolerances > 0.0 else 'below'} its sheet."
+        )
+    if not effects:
+        return ""
+    left = 100.0 * judged.left
+    return f" The nearest in the catalogue, {effects}, leaves {left:.2g} % of the misfit beyond the noise."
+
+
+def warnings_of(case: Case, after: Mode, judged: Judged) -> tuple[str, ...]:
     """What a reader must know."""
-    found = []
+    base, left, kind = case.base, judged.left, judged.kind
+    found = [
+        f"The fit of {' + '.join(terms)} found no motion of the rig: it is not judged."
+        for terms in judged.findings.lost
+    ]
+    if not judged.settled:
+        found.append(
+            "The named effects could not be found again on twice the nodes: what finitely many cost is still in the "
+            "parameters."
+        )
     for mode, name in ((base, "the recalibrated baseline"), (after, "the model with the named effects")):
         if not mode.status.ok:
             found.append(f"The search for {name} did not end well: {mode.status.advice}.")

@@ -62,9 +62,7 @@ def force_figure(loop: ForceLoop, law: str) -> Figure:
 
 def _quantity(unit: str) -> str:
     """What a signal in this unit is."""
-    if unit == "N":
-        return "force"
-    return "moment" if unit == "N m" else "signal"
+    return "force" if unit == "N" else "signal"
 
 
 def _from_middle(displacement: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -90,14 +90,15 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
 def _facts(diagnosis: Diagnosis) -> tuple[dict[str, object], ...]:
     """Four numbers that tell at a glance what was found."""
     verdict, shrink = diagnosis.verdict, diagnosis.shrink
-    first = diagnosis.candidates[0] if diagnosis.candidates else None
+    said = verdict.effects or (verdict.kind,)
+    named = next((each for each in diagnosis.candidates if (each.effects or (each.name,)) == said), None)
     low, high = (percentage(end) for end in shrink.interval)
     known = np.isfinite(shrink.share_closed)
     return (
         {
             "name": "Missing",
             "value": KIND_WORDS[verdict.kind],
-            "then": f"probability {probability_words(first.probability)}" if first else DASH,
+            "then": f"probability {probability_words(named.probability)}" if named else DASH,
             "bad": not diagnosis.converged,
         },
         {

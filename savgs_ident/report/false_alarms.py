@@ -21,7 +21,7 @@ def alarms_record(draws: Sequence[NullDraw], odds: float, command: Sequence[str]
     alarms = sum(each.alarm for each in draws)
     return {
         "schema": 1,
-        "calibrated": bool(solved) and alarms <= MOST * len(solved),
+        "few_enough": bool(solved) and alarms <= MOST * len(solved),
         "drawn": len(solved),
         "not_solved": len(draws) - len(solved),
         "alarms": alarms,

@@ -3,8 +3,7 @@
 from collections.abc import Callable
 
 import jax
-import jax.numpy as jnp
-from jaxtyping import Array, Complex, Float
+from jaxtyping import Array, Complex
 
 from savgs_ident.model.inputs import Imposed, Inputs, nothing_imposed
 from savgs_ident.model.quarter_car import Loads, QuarterCar
@@ -49,9 +48,3 @@ def loads_at_nodes(model: QuarterCar, p: Values, solution: PeriodicSolution) -> 
         return model.loads(p, motion, s, sd, inputs, curves)
 
     return jax.vmap(one)(inputs, *at.x, *at.y)
-
-
-def as_imposed(port: str, values: Float[Array, "P *two"]) -> Imposed:
-    """The given signal at one of the fields of :class:`Imposed`, zeros at all others."""
-    nothing = nothing_imposed(jnp.zeros(values.shape[0]))
-    return nothing._replace(**{port: values})

@@ -61,6 +61,11 @@ def test_an_effect_that_does_not_exist_is_refused(measure: Measure, rig: Rig) ->
         diagnose_response(measure("nominal"), rig, DiagnosisSettings(without=("rail_stribek",)))
 
 
+def test_an_effect_of_the_baseline_cannot_be_left_out(measure: Measure, rig: Rig) -> None:
+    with pytest.raises(InputError, match="'rail_coulomb' is part of the baseline"):
+        diagnose_response(measure("nominal"), rig, DiagnosisSettings(without=("rail_coulomb",)))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TRUTH)
 def test_labelled_campaigns(measure: Measure, rig: Rig, name: str) -> None:

@@ -1,5 +1,9 @@
 """The search for what is missing, on a plant that can be checked by hand."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -8,6 +12,7 @@ from savgs_ident.diagnose.engine.attribution import SIZES, Attribution, Place, a
 from savgs_ident.diagnose.engine.climb import Mode, Search, climb, search_of
 from savgs_ident.diagnose.engine.heldout import FOLDS, hold_out
 from savgs_ident.diagnose.engine.misfit import misfit_of
+from savgs_ident.diagnose.engine.prediction import Prediction, Term
 from savgs_ident.diagnose.engine.score import cosine, score_terms
 from savgs_ident.diagnose.engine.search import Findings, excess, find_terms, left_over
 
@@ -181,3 +186,41 @@ def test_a_law_that_explains_nothing_is_less_probable_than_no_law() -> None:
     place = Place("spring", PLANT.x[:, None] ** 2, PLANT.x[:, None] ** 2)
     (found,) = attribute(search, base, [place])
     assert base.evidence - np.log(max(SIZES) * PLANT.tests * PLANT.points) < found.evidence < base.evidence
+
+
+def test_what_leaves_more_than_a_baseline_that_left_nothing_explains_nothing() -> None:
+    search = search_of(PLANT, draw(PLANT, {"a": 1.1}, NOISE, 2))
+    base = climb(search, (), {}, None)
+    off = replace(base, prediction=base.prediction._replace(rows=base.prediction.rows + 3.0 * NOISE))
+    perfect = replace(base, prediction=base.prediction._replace(rows=search.data.measured))
+    assert left_over(search, perfect, base) == 0.0
+    assert left_over(search, perfect, off) == np.inf
+
+
+class _Breaking(ToyPlant):
+    """What twists breaks the model; what ripples has a column that is no number."""
+
+    def predict(
+        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], near: Any
+    ) -> Prediction:
+        found = super().predict(terms, values, names, near)
+        return found._replace(solved=False) if "twist" in terms else found
+
+    def columns(
+        self, terms: tuple[str, ...], values: Mapping[str, float], near: Any, candidates: Sequence[Term]
+    ) -> list[np.ndarray]:
+        found = super().columns(terms, values, near, candidates)
+        return [
+            np.full_like(each, np.nan) if term.name == "ripple" else each
+            for each, term in zip(found, candidates, strict=True)
+        ]
+
+
+def test_a_fit_without_motion_is_lost_and_a_column_that_is_no_number_not_scored() -> None:
+    plant = _Breaking()
+    search = search_of(plant, draw(plant, {"a": 1.0, "t": -0.8}, NOISE, 1))
+    findings = find_terms(search, climb(search, (), {}, None), TERMS, _silent)
+    assert ("twist",) in findings.lost
+    assert all("twist" not in mode.terms and np.isfinite(mode.evidence) for mode in findings.modes)
+    ripple = next(each for each in findings.scores if each.term.name == "ripple")
+    assert (ripple.sigma, ripple.evidence, ripple.smallest) == (0.0, -np.inf, np.inf)

@@ -33,17 +33,19 @@ def _evidence(width: float, seed: int, a: float) -> float:
 @pytest.mark.parametrize(("a", "seed"), [(1.02, 1), (1.5, 2), (2.2, 3)])
 def test_it_is_the_gain_of_a_wider_prior(a: float, seed: int) -> None:
     search = search_of(PLANT, draw(PLANT, {"a": a}, NOISE, seed))
-    gain = strain_of(climb(search, (), {}, None), PLANT.nuisances)
-    assert gain == pytest.approx(_evidence(WIDER, seed, a) - _evidence(1.0, seed, a), abs=2e-2)
+    strain = strain_of(climb(search, (), {}, None), PLANT.nuisances)
+    assert strain.parameter == "a"
+    assert strain.tolerances == pytest.approx((a - 1.0) / 0.2, abs=0.1)
+    assert strain.gain == pytest.approx(_evidence(WIDER, seed, a) - _evidence(1.0, seed, a), abs=2e-2)
 
 
 def test_what_a_tolerance_allows_strains_nothing() -> None:
     search = search_of(PLANT, draw(PLANT, {"a": 1.2}, NOISE, 4))
-    assert strain_of(climb(search, (), {}, None), PLANT.nuisances) < 0.0
+    assert strain_of(climb(search, (), {}, None), PLANT.nuisances).gain < 0.0
 
 
 def test_parameters_of_effects_are_known_to_no_tolerance() -> None:
     search = search_of(PLANT, draw(PLANT, {"a": 1.0, "c": 3.0}, NOISE, 5))
     mode = climb(search, TERMS[:1], {}, None)
-    assert strain_of(mode, PLANT.nuisances) < 0.0
-    assert strain_of(mode, ()) == -np.inf
+    assert strain_of(mode, PLANT.nuisances).gain < 0.0
+    assert strain_of(mode, ()) == (-np.inf, "", 0.0)

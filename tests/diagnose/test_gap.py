@@ -51,3 +51,20 @@ def test_the_interval_is_wider_when_tests_differ() -> None:
     even, _ = shrinks(data, Rows(truth * 1.2, truth, truth * 1.05, channel))
     rough, _ = shrinks(data, Rows(truth * 1.2, truth, truth * uneven, channel))
     assert np.ptp(even.interval) < 1e-6 < 0.01 < np.ptp(rough.interval)
+
+
+def test_where_there_is_nothing_to_close_no_share_is_given() -> None:
+    data, truth, channel = _case(5, 0.01)
+    perfect = data.measured
+    together, _ = shrinks(data, Rows(perfect, perfect, truth, channel))
+    assert np.isnan(together.share_closed)
+    assert np.isnan(together.interval).all()
+
+
+def test_a_channel_that_is_missing_in_a_test_does_not_count_there() -> None:
+    data, truth, channel = _case(6, 1e-6)
+    kept = (channel == 0) | (data.test > 0)
+    part = Data(data.measured[kept], data.variance[kept], data.reach[kept], data.test[kept])
+    off = truth * np.where(channel == 0, 1.03, 1.04)
+    together, _ = shrinks(part, Rows(truth[kept], off[kept], truth[kept], channel[kept]))
+    assert together.recalibrated == pytest.approx(np.sqrt((0.03**2 + 0.04**2) / 2.0), rel=1e-3)

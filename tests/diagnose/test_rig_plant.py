@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.rig import Rig
 from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.prediction import MULTIPLES, Term
 from savgs_ident.diagnose.rig.columns import impose, marched_effect, node_loads
+from savgs_ident.diagnose.rig.coordinates import free_coordinate
 from savgs_ident.diagnose.rig.loops import strut_force
 from savgs_ident.diagnose.rig.places import free_signal, nodes_of, places_of
 from savgs_ident.diagnose.rig.plant import RigPlant
@@ -200,3 +203,17 @@ def _near(
     plant: RigPlant, terms: tuple[str, ...], values: dict[str, float], start: PeriodicSolution
 ) -> PeriodicSolution:
     return plant.predict(terms, values, ["m_s"], start).near
+
+
+@pytest.mark.parametrize("orders", [3, 9])
+def test_a_free_signal_has_as_many_orders_as_it_has_coefficients(orders: int) -> None:
+    phase = np.linspace(0.0, 2.0 * np.pi, 50)
+    coefficients = np.zeros(2 * orders)
+    coefficients[-2:] = 2.0, -1.0
+    expected = 2.0 * np.cos(orders * phase) - np.sin(orders * phase)
+    assert np.allclose(free_signal(coefficients, phase), expected)
+
+
+def test_a_parameter_that_starts_at_nothing_cannot_be_identified(rig: Rig) -> None:
+    with pytest.raises(InputError, match="mu_r is to be identified from 0"):
+        free_coordinate(replace(rig.parameters["mu_r"], value=0.0))

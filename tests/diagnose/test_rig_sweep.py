@@ -87,6 +87,12 @@ def test_motions_are_found_at_the_dwells_in_range_and_between() -> None:
     assert frequencies_of(DWELLS[4:], _sweep()) is None
 
 
+def test_where_all_dwells_lie_in_the_sweep_it_is_compared_as_far_as_they_reach() -> None:
+    found = frequencies_of(DWELLS[:7], _sweep())
+    assert found is not None
+    assert found.tolist() == DWELLS[:7].tolist()
+
+
 def test_the_gap_is_relative_to_the_response_and_leaves_out_what_no_dwell_reaches(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -14,11 +14,16 @@ from savgs_ident.diagnose.verdict import (
     LEFT,
     MATERIAL,
     SURE,
+    Unknown,
     Weighed,
+    heaviest,
     kind_of,
+    odds_of,
     of_material_parts,
     probabilities,
     rivals_of,
+    unknown_of,
+    weigh,
 )
 
 FITTED = cast(Mode, SimpleNamespace())
@@ -104,3 +109,39 @@ def test_an_effect_that_does_too_little_to_matter_is_no_part_of_a_pair(
     )
     assert findings.best.terms == best
     assert alone in findings.modes
+
+
+def _score(name: str, evidence: float) -> Any:
+    return SimpleNamespace(term=SimpleNamespace(name=name), evidence=evidence)
+
+
+SCORES = tuple(_score(name, 400.0) for name in ("rail_stribeck", "rail_viscous", "strut_friction"))
+
+
+def test_a_pair_must_be_better_by_what_it_is_less_probable_beforehand() -> None:
+    """Three pairs share a tenth and three singles four: the same odds of four for each."""
+    alone, pair = _mode(500.0, "rail_stribeck"), _mode(501.0, "rail_stribeck", "rail_viscous")
+    assert heaviest(Findings(_mode(0.0), SCORES, (pair, alone))) is alone
+    better = _mode(502.0, "rail_stribeck", "rail_viscous")
+    assert heaviest(Findings(_mode(0.0), SCORES, (better, alone))) is better
+
+
+@pytest.mark.parametrize(
+    ("alone", "besides", "strained", "reason"),
+    [(600.0, -np.inf, 500.0, "law"), (400.0, 600.0, 500.0, "besides"), (400.0, 500.0, 600.0, "strain")],
+)
+def test_what_speaks_for_something_unknown_is_known(
+    alone: float, besides: float, strained: float, reason: str
+) -> None:
+    findings = Findings(_mode(0.0), SCORES, (_mode(500.0, "rail_stribeck"),))
+    found = unknown_of(findings, alone, besides, strained)
+    assert found.reason == reason
+    assert 590.0 < found.weight < 600.0
+
+
+def test_an_effect_whose_fit_was_lost_is_not_judged_by_its_score() -> None:
+    findings = Findings(_mode(0.0), SCORES, (_mode(300.0, "rail_stribeck"),), (("rail_viscous",),))
+    weighed = weigh(findings, Unknown(-5.0, "law"))
+    assert [each.name for each in weighed] == ["strut_friction", "rail_stribeck", "none", "unknown"]
+    # What was only scored cannot be named, and does not speak for something missing either.
+    assert odds_of(weighed) == pytest.approx(300.0 - np.log(3.0))

@@ -5,7 +5,7 @@ nature is logarithmic, value = centre exp(scale x). A bound that an amplitude be
 """
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, inf, log
 
@@ -101,11 +101,6 @@ def values_at(coordinates: Coordinates, x: NDArray[np.float64]) -> dict[str, flo
 def slopes_at(coordinates: Coordinates, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """d value / dx of every parameter, (n,)."""
     return np.array([each.slope(float(at)) for each, at in zip(coordinates, x, strict=True)])
-
-
-def coordinates_of(coordinates: Coordinates, values: Mapping[str, float]) -> NDArray[np.float64]:
-    """The coordinates (n,) of values by name; the centre where one is not given."""
-    return np.array([each.at(values.get(each.name, each.centre)) for each in coordinates])
 
 
 def reach_of(coordinates: Sequence[AbstractCoordinate]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -26,7 +26,3 @@ class Data:
     def tests(self) -> int:
         """How many tests there are."""
         return int(self.test.max()) + 1
-
-    def of_tests(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """The rows (m,) of the chosen tests (t,)."""
-        return chosen[self.test]

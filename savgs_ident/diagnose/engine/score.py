@@ -28,7 +28,7 @@ class Score:
     Attributes:
         term: the candidate.
         sigma: significance in standard deviations, nuisances projected out.
-        evidence: log evidence of the linearised hypothesis.
+        evidence: log evidence of the linearised hypothesis; minus infinity where what it does is not known.
         start: parameters at its best point, SI, by name.
         smallest: the first amplitude that would stand out of the noise by :data:`STANDS_OUT` sd, nuisances projected
             out [its unit]; infinite if none would.
@@ -68,6 +68,8 @@ def _score(search: Search, mode: Mode, term: Term, columns: NDArray[np.float64])
     scales = np.array([each.scale for each in term.amplitudes])
     best: Score | None = None
     for shapes, column in zip(term.tried, columns, strict=True):
+        if not np.isfinite(column).all():
+            continue
         moved = column * scales
         slopes = np.concatenate([mode.slopes, moved], axis=1)
         x = np.concatenate([mode.x, np.zeros(count)])
@@ -83,8 +85,7 @@ def _score(search: Search, mode: Mode, term: Term, columns: NDArray[np.float64])
                 scales[0] * _smallest(search, mode, moved[:, 0]),
             )
             best = Score(term, sigma, evidence, start, smallest, direction)
-    assert best is not None
-    return best
+    return best or Score(term, 0.0, -np.inf, {}, np.inf, np.zeros(residual.size))
 
 
 def cosine(one: Score, other: Score) -> float:

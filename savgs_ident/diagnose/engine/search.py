@@ -64,11 +64,13 @@ class Findings:
         base: the baseline, recalibrated.
         scores: scores of all candidates at the baseline, best first.
         modes: hypotheses that were fitted in full, the best first; the baseline is not among them.
+        lost: terms of the hypotheses whose fit found no motion.
     """
 
     base: Mode
     scores: tuple[Score, ...]
     modes: tuple[Mode, ...]
+    lost: tuple[tuple[str, ...], ...] = ()
 
     @property
     def best(self) -> Mode:
@@ -84,9 +86,14 @@ def excess(search: Search, mode: Mode) -> float:
 
 
 def left_over(search: Search, base: Mode, mode: Mode) -> float:
-    """Share of the baseline's excess that a hypothesis leaves; 0 where it leaves hardly more than the noise."""
-    left = excess(search, mode)
-    return left / excess(search, base) if left > LITTLE else 0.0
+    """Share of the baseline's excess that a hypothesis leaves; 0 where it leaves hardly more than the noise.
+
+    Infinite where the baseline left nothing.
+    """
+    left, whole = excess(search, mode), excess(search, base)
+    if left <= LITTLE:
+        return 0.0
+    return left / whole if whole > 0.0 else np.inf
 
 
 def find_terms(
@@ -101,12 +108,10 @@ def find_terms(
     ``known`` are sets of terms that are often missing together. They are fitted from their typical sizes, where the
     search would not come from a baseline that lacks all of them and misses by as much as it moves.
     """
-    fits = [_whole(search, base, names, terms, tell) for names in known]
-    wholes = _refined(search, [each for each in fits if np.isfinite(each.evidence)], terms, tell)
-    if any(left_over(search, base, whole) <= EXPLAINED for whole in wholes):
+    wholes = _refined(search, [_whole(search, base, names, terms, tell) for names in known], terms, tell)
+    if any(_explains_all(search, base, whole) for whole in wholes):
         tell(f"{' + '.join(wholes[0].terms)}: nothing is left")
-        scores = score_terms(search, base, list(terms))
-        return Findings(base, tuple(scores), tuple(wholes))
+        return _findings(base, score_terms(search, base, list(terms)), wholes)
     tell(f"scores of {len(terms)} effects")
     columns = search.plant.columns((), base.values, base.prediction.near, list(terms))
     alone = dict(zip((term.name for term in terms), columns, strict=True))
@@ -116,21 +121,30 @@ def find_terms(
     ranked = _refined(search, _fitted(search, base, first, terms, tell), terms, tell)
     begun = {each.term.name for each in first}
     later = [each for each in worth if each.term.name not in begun]
-    if ranked and left_over(search, base, ranked[0]) <= EXPLAINED:
+    if ranked and _explains_all(search, base, ranked[0]):
         later = _alike(later, [each for each in scores if each.term.name == ranked[0].terms[0]])
     else:
         later = later[:MORE]
     ranked = _refined(search, [*ranked, *_fitted(search, base, later, terms, tell)], terms, tell)
     pairs: list[Mode] = []
     if ranked and ranked[0].evidence > base.evidence + SURE:
-        if left_over(search, base, ranked[0]) > EXPLAINED:
-            for parent in ranked[:PARENTS]:
+        if not _explains_all(search, base, ranked[0]):
+            for parent in [each for each in ranked[:PARENTS] if np.isfinite(each.evidence)]:
                 pairs += _with_partners(search, parent, terms, pairs, tell)
         else:
             pairs = _with_small_partners(search, ranked[0], terms, alone, tell)
         pairs = _refined(search, pairs, terms, tell)
-    modes = sorted([*wholes, *ranked, *pairs], key=lambda mode: -mode.evidence)
-    return Findings(base, tuple(scores), tuple(modes))
+    return _findings(base, scores, [*wholes, *ranked, *pairs])
+
+
+def _findings(base: Mode, scores: Sequence[Score], modes: Sequence[Mode]) -> Findings:
+    found = sorted((mode for mode in modes if np.isfinite(mode.evidence)), key=lambda mode: -mode.evidence)
+    lost = tuple(mode.terms for mode in modes if not np.isfinite(mode.evidence))
+    return Findings(base, tuple(scores), tuple(found), lost)
+
+
+def _explains_all(search: Search, base: Mode, mode: Mode) -> bool:
+    return bool(np.isfinite(mode.evidence)) and left_over(search, base, mode) <= EXPLAINED
 
 
 def _alike(scores: Sequence[Score], to: Sequence[Score]) -> list[Score]:
@@ -157,7 +171,8 @@ def _refined(search: Search, modes: Sequence[Mode], terms: Sequence[Term], tell:
         better = refine(search, mode, tuple(by_name[name] for name in mode.terms))
         return better if np.isfinite(better.evidence) else mode
 
-    near = [mode for mode in ranked[:REFINED] if mode.evidence > ranked[0].evidence - CLOSE]
+    solved = [mode for mode in ranked[:REFINED] if np.isfinite(mode.evidence)]
+    near = [mode for mode in solved if mode.evidence > ranked[0].evidence - CLOSE]
     finer = in_parallel(again, [mode for mode in near if not mode.precise])
     settled = [mode for mode in ranked if not any(mode is each and not mode.precise for each in near)]
     return sorted([*finer, *settled], key=lambda mode: -mode.evidence)
@@ -212,4 +227,4 @@ def _fitted(
         tell(f"fitting {' + '.join((*parent.terms, score.term.name))}")
         return climb(search, (*inherited, score.term), parent.values | score.start, parent.prediction.near)
 
-    return [mode for mode in in_parallel(fit, scores) if np.isfinite(mode.evidence)]
+    return in_parallel(fit, scores)

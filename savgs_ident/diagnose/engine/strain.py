@@ -6,7 +6,8 @@ is held against the tolerances as they are is that one of them does not hold: it
 parameter, and how sharply.
 """
 
-from math import log
+from math import exp, inf, log
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,19 +18,33 @@ WIDER = 10.0
 """By how much wider the prior is of a parameter whose tolerance does not hold."""
 
 
-def strain_of(mode: Mode, nuisances: Coordinates) -> float:
-    """Rise of the log evidence of a mode if one of the tolerances of ``nuisances`` may not hold, no matter which."""
+class Strain(NamedTuple):
+    """What speaks for a tolerance that does not hold.
+
+    Attributes:
+        gain: rise of the log evidence of the mode if one of the tolerances may not hold, no matter which.
+        parameter: the one that is strained most; empty where none is known to a tolerance.
+        tolerances: how many of its tolerances it is off its sheet.
+    """
+
+    gain: float
+    parameter: str
+    tolerances: float
+
+
+def strain_of(mode: Mode, nuisances: Coordinates) -> Strain:
+    """The strain of a mode in those of its ``nuisances`` that are known to a tolerance."""
     known = {each.name for each in nuisances if isinstance(each, Linear)}
     variance = np.diag(mode.covariance())
-    gains = [
-        _gain(float(x), float(v))
+    gains = {
+        each.name: (_gain(float(x), float(v)), float(x))
         for each, x, v in zip(mode.coordinates, mode.x, variance, strict=True)
         if each.name in known
-    ]
+    }
     if not gains:
-        return -np.inf
-    best = max(gains)
-    return best + log(sum(np.exp(each - best) for each in gains) / len(gains))
+        return Strain(-inf, "", 0.0)
+    name, (best, off) = max(gains.items(), key=lambda each: each[1][0])
+    return Strain(best + log(sum(exp(each - best) for each, _ in gains.values()) / len(gains)), name, off)
 
 
 def _gain(x: float, variance: float) -> float:

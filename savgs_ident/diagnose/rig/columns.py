@@ -28,8 +28,8 @@ from savgs_ident.simulate.stored import placed, stored
 SAMPLES = 384
 """Instants of a period along which states are marched."""
 
-PERIODS = 8
-"""Periods until they repeat."""
+PERIODS = 16
+"""Periods after which they repeat: what rang at the start has died away even in a slow, slightly damped frame."""
 
 FORWARD = 0.52
 """Weight of the far end of a step for states that do not slip: hardly any damping, and none that rings on."""

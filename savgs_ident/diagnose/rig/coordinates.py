@@ -5,6 +5,7 @@ wide. The amplitude of an effect begins at its null, two typical sizes wide; wha
 about its typical value, to a factor of two.
 """
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.diagnose.engine.coordinates import AbstractCoordinate, Linear, Logarithmic
 from savgs_ident.diagnose.engine.prediction import Term
@@ -21,7 +22,15 @@ SHAPE = 0.7
 
 
 def free_coordinate(parameter: Parameter) -> AbstractCoordinate:
-    """The coordinate of a parameter that is to be identified."""
+    """The coordinate of a parameter that is to be identified.
+
+    Raises :class:`InputError` for one whose start is not positive.
+    """
+    if not parameter.value > 0.0:
+        raise InputError(
+            f"{parameter.name} is to be identified from {parameter.value:g} {parameter.unit}",
+            remedy="give it a positive value in the rig file: its size, roughly",
+        )
     return _logarithmic(parameter, FREE)
 
 

@@ -49,10 +49,11 @@ def _by_test(data: Data, rows: Rows, values: NDArray[np.float64]) -> NDArray[np.
 def _relative(
     square: NDArray[np.float64], power: NDArray[np.float64], channels: list[int]
 ) -> NDArray[np.float64]:
-    """Relative mean squares over the last but one axis, pooled over channels."""
-    return np.asarray(
-        np.mean(square[..., channels].sum(axis=-2) / power[..., channels].sum(axis=-2), axis=-1)
-    )
+    """Relative mean squares over the last but one axis, pooled over the channels that were measured there."""
+    squares, powers = square[..., channels].sum(axis=-2), power[..., channels].sum(axis=-2)
+    measured = powers > 0.0
+    shares = np.divide(squares, powers, out=np.zeros_like(squares), where=measured)
+    return np.asarray(shares.sum(axis=-1) / measured.sum(axis=-1))
 
 
 def _shrink(
@@ -62,7 +63,7 @@ def _shrink(
     tests = np.random.default_rng(SEED).integers(0, len(power), (RESAMPLES, len(power)))
     drawn = {name: _relative(square[tests], power[tests], channels) for name, square in squares.items()}
     closed = _closed(drawn["before"], drawn["after"], drawn["floor"])
-    low, high = np.quantile(closed, [0.025, 0.975])
+    low, high = np.nanquantile(closed, [0.025, 0.975]) if np.isfinite(closed).any() else (np.nan, np.nan)
     return Shrink(
         **{name: float(np.sqrt(value)) for name, value in whole.items()},
         share_closed=float(_closed(*(np.array(whole[name]) for name in ("before", "after", "floor")))),
@@ -73,7 +74,7 @@ def _shrink(
 def _closed(
     before: NDArray[np.float64], after: NDArray[np.float64], floor: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """1 - (after^2 - floor^2) / (before^2 - floor^2), from the squares; 1 where there was nothing to close."""
+    """1 - (after^2 - floor^2) / (before^2 - floor^2), from the squares; NaN where there was nothing to close."""
     whole = before - floor
     share = 1.0 - np.maximum(after - floor, 0.0) / np.where(whole > 0.0, whole, 1.0)
-    return np.where(whole > 0.0, np.minimum(share, 1.0), 1.0)
+    return np.where(whole > 0.0, np.minimum(share, 1.0), np.nan)

@@ -20,6 +20,7 @@ from savgs_ident.diagnose.engine.parallel import in_parallel
 from savgs_ident.diagnose.engine.prediction import Prediction
 from savgs_ident.diagnose.result import NextTest
 from savgs_ident.diagnose.rig.plant import RigPlant
+from savgs_ident.model.effect import AbstractSeries, Port
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.periodic import PeriodicSolution
 
@@ -113,6 +114,8 @@ def predicted(
     )
     moved = eqx.tree_at(lambda each: each.excitation, near, there)
     values = _loaded(mode.values, plant, condition.payload)
+    if condition.lift == 0.0:
+        values |= _of_a_road_at_rest(mode.terms, plant)
     return replace(plant, excitation=there, corrections={}).predict(mode.terms, values, names, moved)
 
 
@@ -123,6 +126,13 @@ def _begin(mode: Mode, condition: Condition) -> PeriodicSolution:
         return near
     rest = Trajectory(*(jnp.zeros_like(part) for part in near.trajectory))
     return eqx.tree_at(lambda each: each.trajectory, near, rest)
+
+
+def _of_a_road_at_rest(terms: Sequence[str], plant: RigPlant) -> dict[str, float]:
+    """Null values of what the terms do to the road: a cam at rest has no shape; a plate still gives way."""
+    effects = [plant.catalogue[name] for name in terms]
+    moving = [each for each in effects if each.port is Port.ROAD and not isinstance(each, AbstractSeries)]
+    return {name: null for each in moving for name, null in each.null.items()}
 
 
 def _expected(search: Search, plant: RigPlant, other: Mode, draft: _Draft) -> float:

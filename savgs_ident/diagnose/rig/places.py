@@ -103,7 +103,7 @@ def places_of(plant: RigPlant, terms: tuple[str, ...], p: Values, solution: Peri
 
 def free_signal(coefficients: Signal, phase: Signal) -> Signal:
     """The free signal of a test at phases [rad], from its coefficients."""
-    order = np.arange(1, FREE_ORDERS + 1)[:, None]
+    order = np.arange(1, coefficients.size // 2 + 1)[:, None]
     return np.asarray(coefficients[0::2] @ np.cos(order * phase) + coefficients[1::2] @ np.sin(order * phase))
 
 

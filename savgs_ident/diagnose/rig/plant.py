@@ -217,7 +217,7 @@ class RigPlant:
         """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""
         model = self.complete(terms)
         found: dict[str, list[NDArray[np.float64]]] = {term.name: [] for term in candidates}
-        for one in range(max(len(term.tried) for term in candidates)):
+        for one in range(max((len(term.tried) for term in candidates), default=0)):
             some = [term for term in candidates if len(term.tried) > one]
             shapes = {name: value for term in some for name, value in term.tried[one].items()}
             p = placed(self.values(dict(values) | shapes))

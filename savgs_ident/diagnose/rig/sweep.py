@@ -57,12 +57,15 @@ def sweep_shrink(
 
 
 def frequencies_of(dwells: Signal, sweep: SweepResponse) -> Signal | None:
-    """As many frequencies [Hz] as there are dwells: those in the sweep's range, its end, and what lies between."""
+    """As many frequencies [Hz] as there are dwells: those in the sweep's range, its end, and what lies between.
+
+    Its end is left out where all dwells lie in its range: then it is compared up to the fastest of them.
+    """
     lowest, highest = float(sweep.frequency.min()), float(sweep.frequency.max())
     inside = np.unique(dwells[(dwells >= lowest) & (dwells < highest)])
-    if inside.size < DWELLS or inside.size == dwells.size:
+    if inside.size < DWELLS:
         return None
-    found = [*inside.tolist(), highest]
+    found = inside.tolist() if inside.size == dwells.size else [*inside.tolist(), highest]
     while len(found) < dwells.size:
         place = int(np.argmax(np.diff(found)))
         found.insert(place + 1, (found[place] + found[place + 1]) / 2.0)

@@ -45,7 +45,8 @@ def cycle_positions(plant: RigPlant, data: Data, rows: NDArray[np.float64]) -> t
     body = np.real((measured[:, 0, 1:] / (1j * order[1:])) @ turns[1:])
     if not np.any(measured[:, 0]):
         return ()
-    speed = np.abs(body) / np.abs(body).max(axis=1, keepdims=True)
+    fastest = np.abs(body).max(axis=1, keepdims=True)
+    speed = np.abs(body) / np.where(fastest > 0.0, fastest, 1.0)
     found = []
     for c, channel in enumerate(RESPONSE_CHANNELS):
         power = np.sum(np.abs(measured[:, c]) ** 2, axis=1)
