@@ -31,6 +31,7 @@ class Job:
         """What draws must have in common to be counted together."""
         return {
             "campaign": str(self.diagnosis.campaign),
+            "channels": str(self.diagnosis.channels),
             "rig": str(self.diagnosis.rig or default_rig_path()),
             "model": self.diagnosis.model.value,
             "max_frequency": self.diagnosis.max_frequency,
@@ -44,7 +45,7 @@ def count_false_alarms(job: Job, voice: Voice, out: Path) -> int:
     prepare_folder(out)
     use_persistent_cache()
     kept = out / "draws.jsonl"
-    done = known_trials(kept, job.marks(), NullDraw) if job.resume else []
+    done = known_trials(kept, job.marks(), lambda fields: NullDraw(**fields)) if job.resume else []
     with voice.working() as progress:
         bench = _bench(job, progress)
         if not done:

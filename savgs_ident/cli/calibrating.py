@@ -55,7 +55,7 @@ def calibrate_by_trials(job: Job, voice: Voice, out: Path) -> int:
     prepare_folder(out)
     use_persistent_cache()
     kept = out / "trials.jsonl"
-    done = known_trials(kept, job.marks(), Trial) if job.resume else []
+    done = known_trials(kept, job.marks(), lambda fields: Trial(**fields)) if job.resume else []
     if not done:
         begin_trials(kept, job.marks())
     with voice.working() as progress:

@@ -3,40 +3,61 @@
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.files import write_bytes
 
 Trial = TypeVar("Trial")
 
 
-def known_trials(kept: Path, marks: Mapping[str, object], trial: Callable[..., Trial]) -> list[Trial]:
-    """The whole trials of an earlier run; a last line that was cut off is left out and the file mended.
+def marks_in(kept: Path) -> dict[str, Any]:
+    """What the trials of a file have in common; empty where there is no file, or not even that line is whole.
 
-    ``marks`` are what trials must have in common to be counted together, ``trial`` makes one of its fields. Raises
-    :class:`InputError` for trials with other marks, and for a file that is no list of trials.
+    Raises :class:`InputError` for a file that is no list of trials.
     """
     if not kept.exists():
-        return []
+        return {}
     try:
-        lines = kept.read_text().split("\n")[:-1]
-        of, *trials = (json.loads(line) for line in lines)
-        found = [trial(**each) for each in trials]
-    except (ValueError, TypeError) as error:
-        raise InputError("is no list of trials", source=kept, remedy="leave out --resume") from error
+        first, ended, _ = kept.read_text().partition("\n")
+        marks = json.loads(first) if ended else {}
+    except ValueError as error:
+        raise _no_list(kept) from error
+    if not isinstance(marks, dict):
+        raise _no_list(kept)
+    return marks
+
+
+def known_trials(
+    kept: Path, marks: Mapping[str, object], trial: Callable[[dict[str, Any]], Trial]
+) -> list[Trial]:
+    """The whole trials of an earlier run; a last line that was cut off is left out and the file mended.
+
+    ``marks`` are what trials must have in common to be counted together; ``trial`` makes one of what its line says.
+    Raises :class:`InputError` for trials with other marks, and for a file that is no list of trials.
+    """
+    of = marks_in(kept)
+    if not of:
+        return []
     if of != marks:
+        unlike = sorted(name for name in {*of, *marks} if of.get(name) != marks.get(name))
         raise InputError(
-            "holds trials of something else (" + ", ".join(_differing(of, marks)) + ")",
+            f"holds trials of another {', '.join(unlike)}",
             source=kept,
-            remedy="leave out --resume, or name another --out DIR",
+            remedy="name another --out DIR, or remove the file",
         )
-    kept.write_text("\n".join(lines) + "\n")
+    lines = kept.read_text().split("\n")[1:-1]
+    try:
+        found = [trial(json.loads(line)) for line in lines]
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise _no_list(kept) from error
+    _write(kept, [json.dumps(marks), *lines])
     return found
 
 
 def begin_trials(kept: Path, marks: Mapping[str, object]) -> None:
     """Begin the file anew."""
-    kept.write_text(json.dumps(marks) + "\n")
+    _write(kept, [json.dumps(marks)])
 
 
 def keep_trial(kept: Path, fields: Mapping[str, object]) -> None:
@@ -45,6 +66,9 @@ def keep_trial(kept: Path, fields: Mapping[str, object]) -> None:
         stream.write(json.dumps(fields) + "\n")
 
 
-def _differing(of: object, marks: Mapping[str, object]) -> list[str]:
-    known = of if isinstance(of, dict) else {}
-    return sorted(str(name) for name in {*known, *marks} if known.get(name) != marks.get(name))
+def _write(kept: Path, lines: list[str]) -> None:
+    write_bytes(kept, "".join(line + "\n" for line in lines).encode())
+
+
+def _no_list(kept: Path) -> InputError:
+    return InputError("is no list of trials", source=kept, remedy="remove it, or name another --out DIR")
