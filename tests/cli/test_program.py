@@ -13,6 +13,9 @@ import pytest
 from savgs_ident import __version__
 
 COMMAND = (sys.executable, "-m", "savgs_ident.cli")
+COMMANDS = (
+    "demo", "inspect", "fit", "bode", "simulate", "posterior", "calibrate", "diagnose", "false-alarms", "blind"
+)  # fmt: skip
 HEAVY = ("jax", "matplotlib", "pandas", "scipy", "numpy")
 
 
@@ -24,11 +27,11 @@ def test_the_version_is_told(program) -> None:
 def test_help_names_every_command_and_the_exit_codes(program) -> None:
     done = program("--help")
     assert done.returncode == 0
-    for word in ("demo", "inspect", "fit", "bode", "simulate", "posterior", "calibrate", "Exit codes"):
+    for word in (*COMMANDS, "Exit codes"):
         assert word in done.stdout
 
 
-@pytest.mark.parametrize("command", ["demo", "inspect", "fit", "bode", "simulate", "posterior", "calibrate"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_the_help_of_a_command_has_an_example_and_its_files(invoke, command: str) -> None:
     done = invoke(command, "--help")
     assert done.exit_code == 0

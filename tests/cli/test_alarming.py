@@ -1,0 +1,26 @@
+"""Draws of campaigns with nothing missing, through the program: kept, continued, refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+DRAWS = ("false-alarms", "--orders", "3", "--quiet", "--out", "o")
+
+
+@pytest.mark.slow
+def test_draws_are_kept_gone_on_with_and_counted(program, short_campaign: Path, tmp_path: Path) -> None:
+    first = program(*DRAWS, short_campaign, "--draws", "2")
+    assert first.returncode == 0, first.stderr
+    lines = (tmp_path / "o" / "draws.jsonl").read_text().splitlines()
+    assert len(lines) == 3
+    again = program(*DRAWS, short_campaign, "--draws", "3", "--resume", "--json")
+    assert again.returncode == 0, again.stderr
+    record = json.loads(again.stdout)
+    assert record == json.loads((tmp_path / "o" / "false_alarms.json").read_text())
+    assert (record["drawn"], record["alarms"]) == (3, 0)
+    assert (tmp_path / "o" / "draws.jsonl").read_text().splitlines()[:3] == lines
+    assert (tmp_path / "o" / "false_alarms.png").stat().st_size > 10_000
+    other = program(*DRAWS, short_campaign, "--resume", "--seed", "2")
+    assert other.returncode == 2
+    assert "holds trials of another seed" in other.stderr
