@@ -15,6 +15,9 @@ from savgs_ident.diagnose.verdict import Weighed
 WITHIN = 1.959964
 """Standard deviations of a 95 % interval."""
 
+NEARLY = 1e-3
+"""Two candidates whose cosine is nearer to 1 are one."""
+
 OFTEN = 10.0
 """An effect that only shows at so many times its typical size cannot be judged."""
 
@@ -30,7 +33,7 @@ def candidates_of(
     scores = {score.term.name: score for score in findings.scores}
     gap, found = excess(search, findings.base), []
     for each, share in zip(weighed, probability, strict=True):
-        sigma = np.sqrt(sum(scores[name].sigma ** 2 for name in each.effects if name in scores))
+        sigma = joint_sigma([scores[name] for name in each.effects if name in scores])
         gain = held[each.name].mean - held["none"].mean if each.name in held else float("nan")
         closed = float("nan")
         if each.mode is not None and gap > LITTLE:
@@ -40,7 +43,7 @@ def candidates_of(
                 name=each.name,
                 effects=each.effects,
                 probability=float(share),
-                score_sigma=float(sigma),
+                score_sigma=sigma,
                 heldout_gain=float(gain),
                 share_closed=closed,
                 parameters=() if each.mode is None else estimates_of(each.mode, scores),
@@ -48,6 +51,15 @@ def candidates_of(
             )
         )
     return tuple(found)
+
+
+def joint_sigma(scores: Sequence[Score]) -> float:
+    """Significance of candidates together: what they share counts once. 0 for none of them."""
+    if not scores:
+        return 0.0
+    sigma = np.array([each.sigma for each in scores])
+    alike = np.array([[1.0 if one is other else cosine(one, other) for other in scores] for one in scores])
+    return max(float(sigma.max()), float(np.sqrt(sigma @ np.linalg.pinv(alike, rcond=NEARLY) @ sigma)))
 
 
 def estimates_of(mode: Mode, scores: Mapping[str, Score]) -> tuple[Estimate, ...]:

@@ -103,7 +103,7 @@ def recalibrate(
     plant, data = rig_plant(
         measured, rig, catalogue, options.baseline, options.free, options.orders, options.periodic
     )
-    near = plant.start(values)
+    near, _ = side_by_side(lambda: plant.start(values), plant.rehearse)
     search = search_of(plant, data)
     given = plant.predict((), values, [each.name for each in plant.nuisances], near)
     tell("recalibrating the baseline")

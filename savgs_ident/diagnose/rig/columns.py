@@ -69,6 +69,15 @@ def columns_with_states(
     return impose(model, likelihood, orders, p, solution, fields)
 
 
+def rehearse(p: Values, effects: Sequence[AbstractEffect], tests: int) -> None:
+    """Have compiled what marches effects with states, on a rig that stands still: nothing else must wait for it."""
+    still = jnp.zeros((tests, SAMPLES))
+    steps = np.full(tests, 1.0 / SAMPLES)
+    for effect in effects:
+        name, blank = _port_of(effect), Load(still, still) if isinstance(effect, AbstractSeries) else None
+        _marched(effect, placed(dict(p)), {name: blank or PortSignals(still, still, still)}, steps)
+
+
 def marched_effect(
     model: QuarterCar, p: Values, solution: PeriodicSolution, effect: AbstractEffect
 ) -> NDArray[np.float64]:
@@ -173,11 +182,14 @@ def _marched(
     steps: NDArray[np.float64],
 ) -> Float[Array, "D n k"]:
     """What the effect does at its port along the last period: a force, or a way and its rate."""
+    return _march(effect, p, signals[_port_of(effect)], jnp.asarray(steps))
+
+
+def _port_of(effect: AbstractEffect) -> str:
+    """Under which name the signals are kept that an effect with states is marched along."""
     if isinstance(effect, AbstractSeries):
-        name = "load.damper" if effect.in_damper else f"load.{effect.port.value}"
-    else:
-        name = effect.port.value
-    return _march(effect, p, signals[name], jnp.asarray(steps))
+        return "load.damper" if effect.in_damper else f"load.{effect.port.value}"
+    return effect.port.value
 
 
 @eqx.filter_jit

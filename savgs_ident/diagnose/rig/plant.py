@@ -20,7 +20,7 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.rig import Rig, merge_parameters
 from savgs_ident.diagnose.engine.coordinates import Coordinates
 from savgs_ident.diagnose.engine.prediction import Prediction, Term
-from savgs_ident.diagnose.rig.columns import columns_with_states
+from savgs_ident.diagnose.rig.columns import columns_with_states, rehearse
 from savgs_ident.diagnose.rig.coordinates import free_coordinate, term_of, tolerance_coordinate
 from savgs_ident.diagnose.rig.rows import rows_of, slopes_of
 from savgs_ident.effects.registry import MODELS
@@ -174,6 +174,13 @@ class RigPlant:
                 remedy="leave these dwells out with --max-frequency, or mend the rig file",
             )
         return solution
+
+    def rehearse(self) -> None:
+        """Have compiled what scores of candidates with states will ask for."""
+        with_states = [
+            self.catalogue[term.name] for term in self.candidates if self.catalogue[term.name].states
+        ]
+        rehearse(self.values({}), with_states, self.shape[0])
 
     def refined(
         self, terms: tuple[str, ...], values: Mapping[str, float], near: PeriodicSolution
