@@ -24,7 +24,7 @@ from savgs_ident.report.diagnosis_words import (
 from savgs_ident.report.numerals import DASH
 from savgs_ident.report.origin import Origin
 
-from .diagnosis_reading import HOSTILE, ORIGIN, SHOWN, Reader, record_of, rendered
+from .diagnosis_reading import ORIGIN, SHOWN, record_of, rendered
 from .diagnosis_synthetic import (
     KINDS,
     NO_SHRINK,
@@ -32,6 +32,7 @@ from .diagnosis_synthetic import (
     hostile,
     unconverged,
 )
+from .page_reader import HOSTILE, Reader
 
 SECTIONS = ["where", "response", "loops", "which", "shrink", "map", "next", "limits", "origin"]
 

@@ -5,7 +5,6 @@ import io
 import json
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -26,35 +25,13 @@ from savgs_ident.report.posterior_record import posterior_record
 from savgs_ident.report.posterior_text import posterior_text
 from savgs_ident.report.posterior_words import checks, predictive_sentence, shift_in_sd
 
+from .page_reader import HOSTILE, Reader
 from .posterior_synthetic import SENTENCES, nominal_response, renamed, synthetic_posterior, unconverged
 
-HOSTILE = "<script>x</script>\"'&[bold red]\x1b[2J\u202etxt"
 ORIGIN = Origin(
     ("savgs-ident", "posterior", "m & m.toml"), "runs/a<b>.csv", "ab" * 32, "m & m.toml", {"savgs-ident": "0.1.0"},
     (DataWarning("odd", "something", test="dwell_2"),),
 )  # fmt: skip
-
-
-class Reader(HTMLParser):
-    """Texts and tags of a page, in order."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.texts: list[str] = []
-        self._styling = False
-        self.feed(page)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-        self._styling = tag in ("style", "title")
-
-    def handle_endtag(self, tag: str) -> None:
-        self._styling = self._styling and tag not in ("style", "title")
-
-    def handle_data(self, data: str) -> None:
-        if data.strip() and not self._styling:
-            self.texts.append(data.strip())
 
 
 @pytest.fixture(scope="module")
