@@ -2,7 +2,7 @@
 
 Every hypothesis that is fitted in full comes out as a :class:`Mode` with its evidence. The linear evidence of
 the scores says which are worth the fit; a pair is tried on top of the best single terms if these leave more than
-the noise.
+the noise, or strain what is known to a tolerance.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,6 +15,7 @@ from savgs_ident.diagnose.engine.climb import Mode, Search, climb, refine
 from savgs_ident.diagnose.engine.parallel import in_parallel
 from savgs_ident.diagnose.engine.prediction import Term
 from savgs_ident.diagnose.engine.score import Score, cosine, score_terms, scores_of
+from savgs_ident.diagnose.engine.strain import strain_of
 
 Tell = Callable[[str], None]
 """Is told what is going on, a line at a time."""
@@ -128,8 +129,10 @@ def find_terms(
     ranked = _refined(search, [*ranked, *_fitted(search, base, later, terms, tell)], terms, tell)
     pairs: list[Mode] = []
     if ranked and ranked[0].evidence > base.evidence + SURE:
-        if not _explains_all(search, base, ranked[0]):
-            for parent in [each for each in ranked[:PARENTS] if np.isfinite(each.evidence)]:
+        wanting = not _explains_all(search, base, ranked[0])
+        if wanting or strain_of(ranked[0], search.plant.nuisances).gain > SURE:
+            solved = [mode for mode in ranked[: PARENTS if wanting else 1] if np.isfinite(mode.evidence)]
+            for parent in solved:
                 pairs += _with_partners(search, parent, terms, pairs, tell)
         else:
             pairs = _with_small_partners(search, ranked[0], terms, alone, tell)

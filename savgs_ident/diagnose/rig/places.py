@@ -1,6 +1,7 @@
 """The rig's ports as places of an unknown signal: laws of what a port sees, and free harmonics.
 
-A force may be any law of displacement, velocity and load of its port; what gives way, of the load there and its
+A force may be any law of displacement, velocity and load of its port, or what a contact there carries that gives a
+little before it slides; what gives way, of the load there and its
 rate; a sensor's error, of its reading; the road's, of the cam's angle. A law is a sum of smooth functions, some
 sharp about zero velocity, where friction turns round.
 """
@@ -27,6 +28,9 @@ FORCES = (Port.STRUT, Port.SUSPENSION, Port.TYRE_RADIAL, Port.TYRE_LATERAL, Port
 
 SHARP = (0.01, 0.1)
 """Velocities over which friction-like functions turn round, as shares of the largest."""
+
+STRETCHES = (1e-4, 1e-3)
+"""How far a contact gives before it slides [m]."""
 
 RESONANCES = (3.0, 4.0, 5.4, 7.3, 9.8, 13.0, 18.0, 24.0, 33.0, 50.0)
 """Natural frequencies [Hz] of what the frame may do."""
@@ -74,7 +78,8 @@ def places_of(plant: RigPlant, terms: tuple[str, ...], p: Values, solution: Peri
     free: dict[str, list[tuple[str, Signal]]] = {}
     for port in FORCES:
         seen = [np.asarray(part) for part in ports[port.value]]
-        laws[port.value] = [(port.value, each) for each in _force_laws(*seen)]
+        held = [_stop(seen[0], width, nodes, solution) for width in STRETCHES]
+        laws[port.value] = [(port.value, each) for each in [*_force_laws(*seen), *held]]
         for load, field in GIVING.get(port, ()):
             beyond = np.asarray(carried[load].beyond_rest)
             ways = _force_laws(beyond, _rate(beyond, nodes, solution), np.zeros_like(beyond))
@@ -123,6 +128,20 @@ def _force_laws(displacement: Signal, velocity: Signal, load: Signal) -> list[Si
         weight = load / np.abs(load).max()
         functions += [weight * sharp[0], weight * v, weight]
     return functions
+
+
+def _stop(displacement: Signal, width: float, nodes: Nodes, solution: PeriodicSolution) -> Signal:
+    """What a contact of unit grip carries that gives by ``width`` [m] before it slides (Prandtl's element)."""
+    carried = np.zeros_like(displacement)
+    for first, count in zip(solution.mesh.layout.starts, solution.mesh.layout.counts, strict=True):
+        along = displacement[first : first + count]
+        moves = (along - np.roll(along, 1)) / width
+        now = 0.0
+        # The first period forgets where it began.
+        for place, move in enumerate((*moves, *moves)):
+            now = min(max(now + move, -1.0), 1.0)
+            carried[first + place % count] = now
+    return carried
 
 
 def _rate(signal: Signal, nodes: Nodes, solution: PeriodicSolution) -> Signal:
