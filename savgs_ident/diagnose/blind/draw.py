@@ -15,7 +15,7 @@ import numpy as np
 from savgs_ident.core.errors import InputError
 from savgs_ident.diagnose.blind.answer import Answer, Drawn
 from savgs_ident.diagnose.blind.bench import Bench
-from savgs_ident.diagnose.blind.drawing import STANDS_OUT, Drawing, Present, drawing_of
+from savgs_ident.diagnose.blind.drawing import STANDS_OUT, TOLD_APART, Drawing, Present, drawing_of
 from savgs_ident.effects.registry import CATALOGUE
 
 OFF = 0.1
@@ -103,7 +103,9 @@ def _draw(kind: Drawn, drawing: Drawing, number: int, random: np.random.Generato
         return None
     twins = {twin for pair in TWINS for twin in pair if kind == "unknown" and chosen[0] in pair}
     without = tuple(sorted({*chosen, *twins})) if kind == "unknown" else ()
-    imitators = {each.name: drawing.imitators(each) for each in present}
+    # What is unknown must stand out of the catalogue as an effect must of what calibration does.
+    limit = STANDS_OUT if kind == "unknown" else TOLD_APART
+    imitators = {each.name: drawing.imitators(each, limit) for each in present}
     if kind != "effect" and any(set(each) - set(without) for each in imitators.values()):
         return None
     return Answer(

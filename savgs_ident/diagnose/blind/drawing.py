@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.parameter import Parameter
 from savgs_ident.diagnose.blind.alike import Ways, similar, ways_of
 from savgs_ident.diagnose.blind.bench import Bench, change_of
 from savgs_ident.diagnose.blind.hiding import (
@@ -18,6 +17,7 @@ from savgs_ident.diagnose.blind.hiding import (
     sigma_of,
 )
 from savgs_ident.diagnose.blind.sizing import draw_form, find_size
+from savgs_ident.diagnose.rig.coordinates import term_of
 from savgs_ident.effects.registry import CATALOGUE
 from savgs_ident.simulate.periodic import PeriodicSolution
 
@@ -44,17 +44,25 @@ class Present:
     change: float
     response: NDArray[np.complex128]
 
-    def scaled(self, factor: float) -> dict[str, float]:
-        """Its parameters with the amplitudes multiplied, within their bounds."""
-        effect = CATALOGUE[self.name]
-        return {each.name: self._scaled(each, effect.null, factor) for each in effect.parameters}
+    @property
+    def sizes(self) -> int:
+        """How many numbers say how large it is and of which shape."""
+        return 1 + len(term_of(CATALOGUE[self.name]).shapes)
 
-    def _scaled(self, each: Parameter, null: Mapping[str, float], factor: float) -> float:
-        value = self.parameters[each.name]
-        if each.name not in null:
-            return value
-        there = null[each.name] + factor * (value - null[each.name])
-        return float(np.clip(there, each.lower, each.upper))
+    def at(self, sizes: NDArray[np.float64]) -> dict[str, float]:
+        """Its parameters with the amplitudes multiplied by the first of the sizes, shapes by exp of the others.
+
+        Within their bounds.
+        """
+        effect = CATALOGUE[self.name]
+        shapes = [each.name for each in term_of(effect).shapes]
+        factors = dict(zip(shapes, np.exp(sizes[1:]).tolist(), strict=True))
+        found = {}
+        for each in effect.parameters:
+            value, null = self.parameters[each.name], effect.null.get(each.name, 0.0)
+            factor = float(sizes[0]) if each.name in effect.null else factors.get(each.name, 1.0)
+            found[each.name] = float(np.clip(null + factor * (value - null), each.lower, each.upper))
+        return found
 
 
 @dataclass(frozen=True)
@@ -105,12 +113,13 @@ class Drawing:
         return Present(name, form.at(size), change_of(found[size], self.response), found[size])
 
     def sigma(self, target: NDArray[np.complex128], beside: Present | None = None) -> float:
-        """How far a response stands out of what the rig can do, with the effect ``beside`` of any size."""
+        """How far a response stands out of what the rig can do, with the effect ``beside`` of any size and shape."""
         names = () if beside is None else (beside.name,)
         noise, known = self.hiding.noise, len(self.hiding.names)
+        further = np.zeros(0) if beside is None else np.eye(beside.sizes)[0]
 
         def given_at(x: NDArray[np.float64]) -> dict[str, float]:
-            return self._moved(x) | ({} if beside is None else beside.scaled(float(x[-1])))
+            return self._moved(x) | ({} if beside is None else beside.at(x[known:]))
 
         def miss_at(x: NDArray[np.float64]) -> NDArray[np.float64] | None:
             response = self.solve(names, given_at(x))
@@ -118,14 +127,13 @@ class Drawing:
 
         def columns_at(x: NDArray[np.float64], miss: NDArray[np.float64]) -> NDArray[np.float64]:
             columns = self._hiding_at(names, given_at(x)).columns
-            if not names:
-                return columns
-            nudged = miss_at(x + NUDGE * np.eye(x.size)[-1])
-            last = np.zeros(noise.size) if nudged is None else (miss - nudged) / NUDGE
-            return np.column_stack([columns, last])
+            for unit in np.eye(x.size)[known:]:
+                nudged = miss_at(x + NUDGE * unit)
+                last = np.zeros(noise.size) if nudged is None else (miss - nudged) / NUDGE
+                columns = np.column_stack([columns, last])
+            return columns
 
-        start = np.concatenate([np.zeros(known), np.ones(len(names))])
-        return sigma_of(miss_at, columns_at, start, known)
+        return sigma_of(miss_at, columns_at, np.concatenate([np.zeros(known), further]), known)
 
     def _hiding_at(self, names: Sequence[str], given: Mapping[str, float]) -> Hiding:
         """What can hide an effect elsewhere."""
@@ -143,8 +151,8 @@ class Drawing:
             for name, value in zip(self.hiding.names, x.tolist(), strict=False)
         }
 
-    def imitators(self, present: Present) -> tuple[str, ...]:
-        """Effects that, of some size, do the same: the effect hardly stands out beside them."""
+    def imitators(self, present: Present, limit: float = TOLD_APART) -> tuple[str, ...]:
+        """Effects that, of some size and shape, do the same: beside them it stands out by less than ``limit``."""
         change = rows_of(present.response) - rows_of(self.response)
         found = []
         for name, parameters in similar(self.hiding, change, self.ways, present.name).items():
@@ -153,7 +161,7 @@ class Drawing:
                 each.name: float(np.clip(parameters[each.name], each.lower, each.upper))
                 for each in effect.parameters
             }
-            if self.sigma(present.response, Present(name, within, 0.0, self.response)) < TOLD_APART:
+            if self.sigma(present.response, Present(name, within, 0.0, self.response)) < limit:
                 found.append(name)
         return tuple(found)
 
