@@ -31,8 +31,9 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def environment(cache: Path) -> dict[str, str]:
-    """The environment of the program: the package importable from anywhere."""
-    return os.environ | {"PYTHONPATH": str(REPOSITORY), "SAVGS_IDENT_CACHE": str(cache), "COLUMNS": "100"}
+    """The environment of the program: the package importable from anywhere, JAX as it is outside of tests."""
+    outside = {name: value for name, value in os.environ.items() if not name.startswith("JAX_")}
+    return outside | {"PYTHONPATH": str(REPOSITORY), "SAVGS_IDENT_CACHE": str(cache), "COLUMNS": "100"}
 
 
 @pytest.fixture
