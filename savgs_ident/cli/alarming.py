@@ -1,13 +1,13 @@
 """Draws one after the other, each kept as soon as it is there."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from savgs_ident.cli.console import Progress, Voice, complain
 from savgs_ident.cli.diagnosing import Job as DiagnosisJob
 from savgs_ident.cli.diagnosing import baseline_of
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
-from savgs_ident.cli.kept_trials import begin_trials, keep_trial, known_trials
+from savgs_ident.cli.kept_trials import begin_trials, completed, known_trials
 from savgs_ident.cli.reading import read_response
 from savgs_ident.core.rig import default_rig_path, read_rig
 from savgs_ident.diagnose.false_alarms import AlarmBench, NullDraw, alarm_bench
@@ -50,7 +50,7 @@ def count_false_alarms(job: Job, voice: Voice, out: Path) -> int:
         bench = _bench(job, progress)
         if not done:
             begin_trials(kept, job.marks())
-        draws = _drawn(job, bench, kept, done, progress)
+        draws = completed(kept, done, job.draws, bench.draw, progress)
         record = alarms_record(draws, bench.odds, job.diagnosis.command)
         files = [write_json(out / "false_alarms.json", record), kept]
         files += write_figure(out, "false_alarms", alarms_figure(draws, bench.odds))
@@ -68,14 +68,3 @@ def _bench(job: Job, progress: Progress) -> AlarmBench:
     rig, settings, values = baseline_of(read_rig(source), asked, source)
     _, measured = read_response(asked.campaign, asked.channels, asked.orders, asked.max_frequency, progress)
     return alarm_bench(measured, rig, settings, values, job.seed, progress)
-
-
-def _drawn(
-    job: Job, bench: AlarmBench, kept: Path, done: list[NullDraw], progress: Progress
-) -> list[NullDraw]:
-    draws = list(done)
-    for number in range(len(done), job.draws):
-        progress(f"draw {number + 1} of {job.draws}")
-        draws.append(bench.draw(number))
-        keep_trial(kept, asdict(draws[-1]))
-    return draws[: job.draws]

@@ -1,12 +1,12 @@
 """Trials one after the other, each kept as soon as it is there."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from savgs_ident.cli.console import Progress, Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
-from savgs_ident.cli.kept_trials import begin_trials, keep_trial, known_trials
+from savgs_ident.cli.kept_trials import begin_trials, completed, known_trials
 from savgs_ident.cli.models import effects_in, identified_in, rig_before
 from savgs_ident.cli.reading import read_response
 from savgs_ident.cli.selection import every_so_many
@@ -56,8 +56,6 @@ def calibrate_by_trials(job: Job, voice: Voice, out: Path) -> int:
     use_persistent_cache()
     kept = out / "trials.jsonl"
     done = known_trials(kept, job.marks(), lambda fields: Trial(**fields)) if job.resume else []
-    if not done:
-        begin_trials(kept, job.marks())
     with voice.working() as progress:
         rig = read_rig(job.model)
         trials = _run(job, rig, kept, done, progress)
@@ -84,9 +82,7 @@ def _run(job: Job, rig: Rig, kept: Path, done: list[Trial], progress: Progress) 
     progress("preparing")
     settings = SamplingSettings(job.sampler, target_ess=DRAWS, seed=job.seed)
     work = calibrator(question, settings)
-    trials = list(done)
-    for number in range(len(done), job.trials):
-        progress(f"trial {number + 1} of {job.trials}")
-        trials.append(work.trial(number))
-        keep_trial(kept, asdict(trials[-1]))
-    return trials[: job.trials]
+    # Not before all else is known to be well: what an earlier run left is gone then.
+    if not done:
+        begin_trials(kept, job.marks())
+    return completed(kept, done, job.trials, work.trial, progress)

@@ -1,14 +1,20 @@
 """Trials kept in a file as soon as they are there: one JSON line that says of what, then one a trial."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from savgs_ident.cli.console import Progress
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import write_bytes
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 Trial = TypeVar("Trial")
+Made = TypeVar("Made", bound="DataclassInstance")
 
 
 def marks_in(kept: Path) -> dict[str, Any]:
@@ -64,6 +70,18 @@ def keep_trial(kept: Path, fields: Mapping[str, object]) -> None:
     """Put a trial at its end."""
     with kept.open("a") as stream:
         stream.write(json.dumps(fields) + "\n")
+
+
+def completed(
+    kept: Path, done: Sequence[Made], count: int, make: Callable[[int], Made], progress: Progress
+) -> list[Made]:
+    """``count`` trials: those ``done``, and the further ones by their numbers, each kept as soon as it is there."""
+    trials = list(done)
+    for number in range(len(done), count):
+        progress(f"trial {number + 1} of {count}")
+        trials.append(make(number))
+        keep_trial(kept, asdict(trials[-1]))
+    return trials[:count]
 
 
 def _write(kept: Path, lines: list[str]) -> None:
