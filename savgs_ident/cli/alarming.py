@@ -33,7 +33,7 @@ class Job:
             "campaign": str(self.diagnosis.campaign),
             "channels": str(self.diagnosis.channels),
             "rig": str(self.diagnosis.rig or default_rig_path()),
-            "model": self.diagnosis.model.value,
+            "model": self.diagnosis.model and self.diagnosis.model.value,
             "max_frequency": self.diagnosis.max_frequency,
             "orders": self.diagnosis.orders,
             "seed": self.seed,

@@ -8,7 +8,7 @@ import typer
 
 from savgs_ident.cli.console import Voice
 from savgs_ident.cli.guard import ends_with_code
-from savgs_ident.cli.models import ModelName, ModelOption
+from savgs_ident.cli.models import BaselineOption
 from savgs_ident.cli.options import CampaignArgument, ChannelsOption, JsonOption, QuietOption
 
 
@@ -20,7 +20,7 @@ def false_alarms(
         Path | None,
         typer.Option("--rig", metavar="FILE", help="Rig file, or model.toml of an earlier fit."),
     ] = None,
-    model: ModelOption = ModelName.simtr,
+    model: BaselineOption = None,
     max_frequency: Annotated[
         float | None, typer.Option("--max-frequency", metavar="HZ", help="Leave out faster dwells.")
     ] = None,

@@ -8,7 +8,7 @@ import typer
 
 from savgs_ident.cli.console import Voice
 from savgs_ident.cli.guard import ends_with_code
-from savgs_ident.cli.models import ModelName, ModelOption
+from savgs_ident.cli.models import BaselineOption
 from savgs_ident.cli.options import CampaignArgument, ChannelsOption, JsonOption, QuietOption
 
 
@@ -19,7 +19,7 @@ def diagnose(
         Path | None,
         typer.Option("--rig", metavar="FILE", help="Rig file, or model.toml of an earlier fit."),
     ] = None,
-    model: ModelOption = ModelName.simtr,
+    model: BaselineOption = None,
     without: Annotated[
         list[str] | None,
         typer.Option("--without", metavar="EFFECT ...", help="Leave effects out of the catalogue."),

@@ -15,6 +15,7 @@ from savgs_ident.cli.models import (
     rig_before,
 )
 from savgs_ident.cli.reading import first_sweep, read_response
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.rig import Rig, default_rig_path, read_rig
 from savgs_ident.diagnose.diagnose import diagnose_response
 from savgs_ident.diagnose.settings import DiagnosisSettings
@@ -37,7 +38,7 @@ class Job:
     campaign: Path
     channels: Path | None
     rig: Path | None
-    model: ModelName
+    model: ModelName | None
     without: tuple[str, ...]
     max_frequency: float | None
     orders: int
@@ -68,13 +69,22 @@ def run_diagnosis(job: Job, voice: Voice, out: Path) -> int:
 
 
 def baseline_of(rig: Rig, job: Job, source: object) -> tuple[Rig, DiagnosisSettings, Mapping[str, float]]:
-    """The rig as known before its own fit, what the baseline is, and the values that it is given with."""
+    """The rig as known before its own fit, what the baseline is, and the values that it is given with.
+
+    Raises :class:`InputError` for an identified rig of another model than the job asks for.
+    """
     if "effects" not in rig.provenance:
-        effects = effects_of(job.model)
-        free = free_parameters((), job.model, rig.parameters)
-        settings = DiagnosisSettings(job.model.value, effects, free, job.orders, job.without)
+        model = job.model or ModelName.simtr
+        free = free_parameters((), model, rig.parameters)
+        settings = DiagnosisSettings(model.value, effects_of(model), free, job.orders, job.without)
         return rig, settings, {}
     effects = effects_in(rig, source)
+    if job.model is not None and set(effects_of(job.model)) != set(effects):
+        raise InputError(
+            f"was identified with {', '.join(effects) or 'no friction'}, which is not {job.model.value}",
+            source=source,
+            remedy="leave --model out, or give the drawing that the rig was identified from",
+        )
     free, values = identified_in(rig, effects, source)
     settings = DiagnosisSettings(rig.name, effects, free, job.orders, job.without)
     return rig_before(rig, effects, source), settings, values

@@ -24,6 +24,15 @@ ModelOption = Annotated[
     ModelName, typer.Option("--model", help="simtr: with rail and tyre friction; simqc: without.")
 ]
 
+BaselineOption = Annotated[
+    ModelName | None,
+    typer.Option(
+        "--model",
+        help="simtr: with rail and tyre friction, the default for a drawing; simqc: without. "
+        "A model.toml brings its own.",
+    ),
+]
+
 FREE_BY_DEFAULT = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
 """The parameters that the paper identifies."""
 

@@ -197,7 +197,7 @@ class Diagnosis:
     Attributes:
         model: name of the baseline, "simqc" or "simtr", or the name of the rig file's own.
         effects: names of the effects in the baseline.
-        rig: the rig as it was given.
+        rig: the rig as known before any fit.
         parameters: parameters of the recalibrated baseline, SI, by name.
         identified: parameters of the rig with the named effects, SI, by name.
         verdict: the verdict.
