@@ -130,13 +130,15 @@ def find_terms(
     pairs: list[Mode] = []
     if ranked and ranked[0].evidence > base.evidence + SURE:
         wanting = not _explains_all(search, base, ranked[0])
-        if wanting or strain_of(ranked[0], search.plant.nuisances).gain > SURE:
+        if wanting or strain_of(ranked[0], search.plant.nuisances).gain > NOTICED:
             solved = [mode for mode in ranked[: PARENTS if wanting else 1] if np.isfinite(mode.evidence)]
             for parent in solved:
                 pairs += _with_partners(search, parent, terms, pairs, tell)
+            pairs = _refined(search, pairs, terms, tell)
+            if pairs and not _spotless(search, base, pairs[0]):
+                pairs = _with_others(search, base, pairs, {mode.terms for mode in solved}, terms, tell)
         else:
-            pairs = _with_small_partners(search, ranked[0], terms, alone, tell)
-        pairs = _refined(search, pairs, terms, tell)
+            pairs = _refined(search, _with_small_partners(search, ranked[0], terms, alone, tell), terms, tell)
     return _findings(base, scores, [*wholes, *ranked, *pairs])
 
 
@@ -148,6 +150,12 @@ def _findings(base: Mode, scores: Sequence[Score], modes: Sequence[Mode]) -> Fin
 
 def _explains_all(search: Search, base: Mode, mode: Mode) -> bool:
     return bool(np.isfinite(mode.evidence)) and left_over(search, base, mode) <= EXPLAINED
+
+
+def _spotless(search: Search, base: Mode, mode: Mode) -> bool:
+    """Whether a hypothesis leaves hardly more than the noise, and every tolerance about where its sheet has it."""
+    strained = strain_of(mode, search.plant.nuisances).gain > NOTICED
+    return left_over(search, base, mode) == 0.0 and not strained
 
 
 def _alike(scores: Sequence[Score], to: Sequence[Score]) -> list[Score]:
@@ -199,6 +207,31 @@ def _with_partners(
     scores = score_terms(search, parent, others)
     worth = [each for each in scores if each.evidence > parent.evidence]
     return _fitted(search, parent, worth[:PARTNERS], terms, tell)
+
+
+def _with_others(
+    search: Search,
+    base: Mode,
+    pairs: list[Mode],
+    parents: set[tuple[str, ...]],
+    terms: Sequence[Term],
+    tell: Tell,
+) -> list[Mode]:
+    """The pairs, and those that keep a member of the best one and exchange the other.
+
+    A member that shows only beside another one is no parent by itself: the other may have been a stand-in.
+    """
+    by_name, best = {term.name: term for term in terms}, pairs[0]
+
+    def alone(name: str) -> Mode:
+        tell(f"fitting {name} as it is beside the other")
+        return climb(search, (by_name[name],), best.values, best.prediction.near)
+
+    found = in_parallel(alone, [name for name in best.terms if (name,) not in parents])
+    for parent in found:
+        if np.isfinite(parent.evidence):
+            pairs = [*pairs, *_with_partners(search, parent, terms, pairs, tell)]
+    return _refined(search, pairs, terms, tell)
 
 
 def _with_small_partners(
