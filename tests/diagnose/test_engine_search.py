@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from savgs_ident.diagnose.engine.attribution import SIZES, Attribution, Place, anywhere, attribute
 from savgs_ident.diagnose.engine.climb import Mode, Search, climb, search_of
+from savgs_ident.diagnose.engine.coordinates import Linear
 from savgs_ident.diagnose.engine.heldout import FOLDS, hold_out
 from savgs_ident.diagnose.engine.misfit import misfit_of
 from savgs_ident.diagnose.engine.prediction import Prediction, Term
@@ -224,3 +226,41 @@ def test_a_fit_without_motion_is_lost_and_a_column_that_is_no_number_not_scored(
     assert all("twist" not in mode.terms and np.isfinite(mode.evidence) for mode in findings.modes)
     ripple = next(each for each in findings.scores if each.term.name == "ripple")
     assert (ripple.sigma, ripple.evidence, ripple.smallest) == (0.0, -np.inf, np.inf)
+
+
+class _Shapes(ToyPlant):
+    """A line and five shapes: two that are missing, two that look like both together, one like the line."""
+
+    def rows(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+        x, v = self.x, dict.fromkeys("bdefg", 0.0) | {"a": 1.0} | dict(values)
+        round_, wavy = x**2, np.sin(6.0 * x)
+        both = round_ + 0.3 * wavy
+        line = (v["a"] + v["g"]) * x
+        shapes = v["b"] * round_ + v["d"] * wavy
+        return (
+            line + shapes + v["e"] * (both + 0.3 * np.sin(13.0 * x)) + v["f"] * (both + 0.3 * np.cos(9.0 * x))
+        )
+
+
+SHAPES = tuple(
+    Term(name, "spring", (Linear(symbol, "N", 0.0, 0.4),))
+    for name, symbol in (("round", "b"), ("wavy", "d"), ("stand-in", "e"), ("other", "f"), ("line", "g"))
+)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_stand_in_for_two_does_not_keep_its_place_beside_one_of_them(seed: int) -> None:
+    """Alone it is nearest, so that the two are never tried together but by exchanging it."""
+    plant = _Shapes()
+    search = search_of(plant, draw(plant, {"a": 1.0, "b": 0.3, "d": 0.15}, NOISE, seed))
+    findings = find_terms(search, climb(search, (), {}, None), SHAPES, _silent)
+    assert {score.term.name for score in findings.scores[:2]} == {"stand-in", "other"}
+    assert set(findings.best.terms) == {"round", "wavy"}
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_strains_a_tolerance_is_tried_with_an_effect_that_spares_it(seed: int) -> None:
+    plant = _Shapes()
+    search = search_of(plant, draw(plant, {"a": 1.8, "b": 0.3}, NOISE, seed))
+    findings = find_terms(search, climb(search, (), {}, None), (SHAPES[0], SHAPES[4]), _silent)
+    assert set(findings.best.terms) == {"round", "line"}

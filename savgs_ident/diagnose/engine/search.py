@@ -217,18 +217,20 @@ def _with_others(
     terms: Sequence[Term],
     tell: Tell,
 ) -> list[Mode]:
-    """The pairs, and those that keep a member of the best one and exchange the other.
+    """The pairs, and those that keep a member of the best ones and exchange the other.
 
     A member that shows only beside another one is no parent by itself: the other may have been a stand-in.
     """
-    by_name, best = {term.name: term for term in terms}, pairs[0]
+    by_name = {term.name: term for term in terms}
+    beside = {
+        name: pair for pair in reversed(pairs[:PARENTS]) for name in pair.terms if (name,) not in parents
+    }
 
     def alone(name: str) -> Mode:
         tell(f"fitting {name} as it is beside the other")
-        return climb(search, (by_name[name],), best.values, best.prediction.near)
+        return climb(search, (by_name[name],), beside[name].values, beside[name].prediction.near)
 
-    found = in_parallel(alone, [name for name in best.terms if (name,) not in parents])
-    for parent in found:
+    for parent in in_parallel(alone, list(beside)):
         if np.isfinite(parent.evidence):
             pairs = [*pairs, *_with_partners(search, parent, terms, pairs, tell)]
     return _refined(search, pairs, terms, tell)
