@@ -229,14 +229,17 @@ def test_a_fit_without_motion_is_lost_and_a_column_that_is_no_number_not_scored(
 
 
 class _Shapes(ToyPlant):
-    """A line and five shapes: two that are missing, two that look like both together, one like the line."""
+    """A line and six shapes.
+
+    Two that are missing, two that look like both together, one like the line, one nearly like the first.
+    """
 
     def rows(self, values: Mapping[str, float]) -> NDArray[np.float64]:
-        x, v = self.x, dict.fromkeys("bdefg", 0.0) | {"a": 1.0} | dict(values)
+        x, v = self.x, dict.fromkeys("bdefgh", 0.0) | {"a": 1.0} | dict(values)
         round_, wavy = x**2, np.sin(6.0 * x)
         both = round_ + 0.3 * wavy
         line = (v["a"] + v["g"]) * x
-        shapes = v["b"] * round_ + v["d"] * wavy
+        shapes = v["b"] * round_ + v["d"] * wavy + v["h"] * (round_ + 0.1 * wavy + 0.03 * np.cos(5.0 * x))
         return (
             line + shapes + v["e"] * (both + 0.3 * np.sin(13.0 * x)) + v["f"] * (both + 0.3 * np.cos(9.0 * x))
         )
@@ -264,3 +267,15 @@ def test_what_strains_a_tolerance_is_tried_with_an_effect_that_spares_it(seed: i
     search = search_of(plant, draw(plant, {"a": 1.8, "b": 0.3}, NOISE, seed))
     findings = find_terms(search, climb(search, (), {}, None), (SHAPES[0], SHAPES[4]), _silent)
     assert set(findings.best.terms) == {"round", "line"}
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_double_of_one_of_two_is_not_named_in_its_place(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is nearest as long as the other is not there, and beside it leaves no more than half the noise."""
+    monkeypatch.setattr("savgs_ident.diagnose.engine.search.PARENTS", 1)
+    plant = _Shapes()
+    search = search_of(plant, draw(plant, {"a": 1.0, "b": 0.5, "d": 0.15}, NOISE, seed))
+    double = Term("double", "spring", (Linear("h", "N", 0.0, 0.4),))
+    findings = find_terms(search, climb(search, (), {}, None), (SHAPES[0], SHAPES[1], double), _silent)
+    assert findings.scores[0].term.name == "double"
+    assert set(findings.best.terms) == {"round", "wavy"}

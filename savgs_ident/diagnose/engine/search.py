@@ -139,6 +139,8 @@ def find_terms(
                 pairs = _with_others(search, base, pairs, {mode.terms for mode in solved}, terms, tell)
         else:
             pairs = _refined(search, _with_small_partners(search, ranked[0], terms, alone, tell), terms, tell)
+        if pairs and pairs[0].evidence > ranked[0].evidence:
+            pairs = _with_doubles(search, pairs, scores, terms, tell)
     return _findings(base, scores, [*wholes, *ranked, *pairs])
 
 
@@ -234,6 +236,28 @@ def _with_others(
         if np.isfinite(parent.evidence):
             pairs = [*pairs, *_with_partners(search, parent, terms, pairs, tell)]
     return _refined(search, pairs, terms, tell)
+
+
+def _with_doubles(
+    search: Search, pairs: list[Mode], scores: Sequence[Score], terms: Sequence[Term], tell: Tell
+) -> list[Mode]:
+    """The pairs, and the best one with either member exchanged for what looks like it."""
+    by_name, by_score = {term.name: term for term in terms}, {score.term.name: score for score in scores}
+    best, tried = pairs[0], {frozenset(mode.terms) for mode in pairs}
+    exchanged = [
+        (kept, double)
+        for kept, gone in (best.terms, best.terms[::-1])
+        for double in _alike(scores, [by_score[gone]])
+        if double.term.name not in best.terms and frozenset({kept, double.term.name}) not in tried
+    ]
+
+    def fit(exchange: tuple[str, Score]) -> Mode:
+        kept, double = exchange
+        tell(f"fitting {kept} + {double.term.name}")
+        chosen = (by_name[kept], double.term)
+        return climb(search, chosen, best.values | double.start, best.prediction.near)
+
+    return _refined(search, [*pairs, *in_parallel(fit, exchanged)], terms, tell)
 
 
 def _with_small_partners(
