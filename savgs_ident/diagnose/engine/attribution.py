@@ -35,12 +35,13 @@ class Place:
 
     Attributes:
         name: its name.
-        law: change of the rows per function of a law, the same in all tests, (m, q).
+        laws: for each law that the place may follow, the change of the rows per function of it, the same in all
+            tests, (m, q). It follows one of them.
         free: change of the rows per component of a free signal, in each test its own, (m, f).
     """
 
     name: str
-    law: Matrix
+    laws: tuple[Matrix, ...]
     free: Matrix
 
 
@@ -50,9 +51,9 @@ class Attribution:
 
     Attributes:
         name: name of the place.
-        share: share of the gap in left-out tests that the law explains; 0 if it makes it worse.
+        share: share of the gap in left-out tests that the most probable law explains; 0 if it makes it worse.
         reach: share that a free signal explains.
-        evidence: log evidence of the baseline with the law, linearised, over all widths of its prior.
+        evidence: log evidence of the baseline with a law, linearised, over all laws and widths of their priors.
         held_out: rows (m,) of each test, predicted by the law and parameters that the others set.
         coefficients: those of the free signal by test, (tests, f).
     """
@@ -84,8 +85,10 @@ def _mean_of(evidences: Sequence[float]) -> float:
 
 def _attribution(search: Search, mode: Mode, place: Place) -> Attribution:
     weight = 1.0 / np.sqrt(mode.misfit.spread)
-    law = _scaled(place.law, weight)
-    size, evidence = _best_size(search, mode, law)
+    laws = [_scaled(each, weight) for each in place.laws]
+    weighed = [_best_size(search, mode, each) for each in laws]
+    law, (size, _) = max(zip(laws, weighed, strict=True), key=lambda each: each[1][1])
+    evidence = _mean_of([each for _, each in weighed])
     reach, coefficients = _reach(search, mode, place.free, weight)
     without, missed = (_left_out(search, mode, each, weight) for each in (law * 0.0, law * size))
     whole = float(np.sum((without * weight) ** 2))

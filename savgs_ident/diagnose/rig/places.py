@@ -1,9 +1,9 @@
 """The rig's ports as places of an unknown signal: laws of what a port sees, and free harmonics.
 
 A force may be any law of displacement, velocity and load of its port, or what a contact there carries that gives a
-little before it slides; what gives way, of the load there and its
-rate; a sensor's error, of its reading; the road's, of the cam's angle. A law is a sum of smooth functions, some
-sharp about zero velocity, where friction turns round.
+little before it slides; what gives way, of the load there and its rate; a sensor's error, of its reading; the road's,
+of the cam's angle. A law is a sum of smooth functions, some sharp about zero velocity, where friction turns round.
+Where a force may be unknown and something may give way, these are two laws: a place follows one.
 """
 
 from typing import NamedTuple
@@ -22,6 +22,9 @@ from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import PeriodicSolution
 
 Signal = NDArray[np.float64]
+
+Fields = list[tuple[str, Signal]]
+"""Where something is imposed, and what, at the nodes."""
 
 FORCES = (Port.STRUT, Port.SUSPENSION, Port.TYRE_RADIAL, Port.TYRE_LATERAL, Port.RAIL)
 """Ports at which a force may be unknown."""
@@ -74,16 +77,16 @@ def places_of(plant: RigPlant, terms: tuple[str, ...], p: Values, solution: Peri
     model = plant.complete(terms)
     ports, carried = node_loads(model, p, solution)
     nodes = nodes_of(solution)
-    laws: dict[str, list[tuple[str, Signal]]] = {}
-    free: dict[str, list[tuple[str, Signal]]] = {}
+    laws: dict[str, list[Fields]] = {}
+    free: dict[str, Fields] = {}
     for port in FORCES:
         seen = [np.asarray(part) for part in ports[port.value]]
         held = [_stop(seen[0], width, nodes, solution) for width in STRETCHES]
-        laws[port.value] = [(port.value, each) for each in [*_force_laws(*seen), *held]]
+        laws[port.value] = [[(port.value, each) for each in [*_force_laws(*seen), *held]]]
         for load, field in GIVING.get(port, ()):
             beyond = np.asarray(carried[load].beyond_rest)
             ways = _force_laws(beyond, _rate(beyond, nodes, solution), np.zeros_like(beyond))
-            laws[port.value] += [(field, _with_rate(each, nodes, solution)) for each in ways]
+            laws[port.value].append([(field, _with_rate(each, nodes, solution)) for each in ways])
         free[port.value] = [(port.value, each) for each in _waves(nodes)]
     for port, (load, field) in WAY_LOADS.items():
         beyond = np.asarray(carried[load].beyond_rest)
@@ -92,17 +95,22 @@ def places_of(plant: RigPlant, terms: tuple[str, ...], p: Values, solution: Peri
             ways = [*ways, *_cam_waves(nodes, solution)]
         if port is Port.FRAME:
             ways = [beyond, *_resonances(beyond, nodes)]
-        laws[port.value] = [(field, _with_rate(each, nodes, solution)) for each in ways]
+        laws[port.value] = [[(field, _with_rate(each, nodes, solution)) for each in ways]]
         free[port.value] = [(field, _with_rate(each, nodes, solution)) for each in _waves(nodes)]
     wheel = np.asarray(ports["rail"].velocity) + np.asarray(ports["suspension"].velocity)
     body = _rate(np.asarray(ports["rail"].velocity), nodes, solution)
-    laws["inertia"] = [("rail", body), ("tyre_radial", _rate(wheel, nodes, solution))]
-    free["inertia"] = laws["inertia"]
-    fields = [each for group in (laws, free) for some in group.values() for each in some]
-    rows = iter(impose(model, plant.likelihood, plant.orders, p, solution, fields))
-    law_rows = {name: np.stack([next(rows) for _ in some]).T for name, some in laws.items()}
-    free_rows = {name: np.stack([next(rows) for _ in some]).T for name, some in free.items()}
-    places = [Place(name, law_rows[name], free_rows[name]) for name in laws]
+    masses: Fields = [("rail", body), ("tyre_radial", _rate(wheel, nodes, solution))]
+    laws["inertia"], free["inertia"] = [masses], masses
+    every = [*(law for some in laws.values() for law in some), *free.values()]
+    rows = iter(
+        impose(model, plant.likelihood, plant.orders, p, solution, [each for some in every for each in some])
+    )
+
+    def taken(fields: Fields) -> Signal:
+        return np.stack([next(rows) for _ in fields]).T
+
+    law_rows = {name: tuple(taken(law) for law in some) for name, some in laws.items()}
+    places = [Place(name, law_rows[name], taken(some)) for name, some in free.items()]
     return places + _sensor_places(plant, p, solution)
 
 
@@ -202,5 +210,5 @@ def _sensor_places(plant: RigPlant, p: Values, solution: PeriodicSolution) -> li
             np.where(order == k, 1.0, 0.0) * turn for k in range(1, plant.orders + 1) for turn in (1.0, -1j)
         ]
         free = np.stack([rows_of(np.broadcast_to(each, mine.shape)) for each in unit], axis=1)
-        places.append(Place(f"sensor.{channel}", law, free))
+        places.append(Place(f"sensor.{channel}", (law,), free))
     return places
