@@ -21,6 +21,7 @@ from savgs_ident.diagnose.rig.places import places_of
 from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.diagnose.settings import DiagnosisSettings
 from savgs_ident.diagnose.verdict import (
+    TRACE,
     Unknown,
     Weighed,
     heaviest,
@@ -129,8 +130,10 @@ def judge(case: Case, tell: Tell) -> Judged:
         tell(f"what {' + '.join(best.terms)} leaves")
         besides = anywhere(_attributed(case, best))
     strain = strain_of(best, plant.nuisances)
-    unknown = unknown_of(findings, anywhere(places), besides, best.evidence + strain.gain)
-    weighed = weigh(findings, unknown)
+    alone = anywhere(places)
+    small = _change_by(case, max(places, key=lambda each: each.evidence)) < TRACE
+    unknown = unknown_of(findings, -np.inf if small else alone, besides, best.evidence + strain.gain)
+    weighed = weigh(findings, unknown, alone if small else -np.inf)
     kind, chosen = kind_of(weighed, _change_without(case, best, best.terms), left)
     return Judged(findings, tuple(places), tuple(weighed), unknown, strain, kind, chosen, left)
 
@@ -176,6 +179,16 @@ def _change_without(case: Case, mode: Mode, gone: Sequence[str]) -> float:
     without = case.plant.predict(left, values, wanted, case.base.prediction.near)
     if not without.solved:
         return np.inf
-    change = np.bincount(case.plant.channel, (mode.prediction.rows - without.rows) ** 2)
+    return _share(case, mode.prediction.rows - without.rows)
+
+
+def _change_by(case: Case, place: Attribution) -> float:
+    """What a law at a place does to the response of tests left out, as a share of it."""
+    return _share(case, place.held_out - case.base.prediction.rows)
+
+
+def _share(case: Case, change: NDArray[np.float64]) -> float:
+    """A change of the rows as a share of the response, in the channel where it is most."""
+    squares = np.bincount(case.plant.channel, change**2)
     whole = np.bincount(case.plant.channel, case.data.measured**2)
-    return float(np.sqrt(np.max(change[whole > 0.0] / whole[whole > 0.0])))
+    return float(np.sqrt(np.max(squares[whole > 0.0] / whole[whole > 0.0])))

@@ -27,6 +27,9 @@ SURE = 10.0
 MATERIAL = 0.003
 """Change of the response by the named effects, as a share of it, below which nothing that matters is missing."""
 
+TRACE = 0.001
+"""Change of the response by a learned law, as a share of it, below which it is a trace and nothing is missing."""
+
 LEFT = 0.05
 """Share of the baseline's excess misfit that named effects may leave; beyond it something else is missing."""
 
@@ -100,11 +103,15 @@ def unknown_of(findings: Findings, alone: float, besides: float, strained: float
     return max(found, key=lambda each: each.weight)
 
 
-def weigh(findings: Findings, unknown: Unknown) -> list[Weighed]:
-    """All hypotheses by falling weight, but for those whose fit was lost."""
+def weigh(findings: Findings, unknown: Unknown, trace: float = -np.inf) -> list[Weighed]:
+    """All hypotheses by falling weight, but for those whose fit was lost.
+
+    ``trace`` is the log evidence of a law that does too little to matter: that nothing is missing holds with it, too.
+    """
     count = len(findings.scores)
+    nothing = np.logaddexp(findings.base.evidence + prior_of((), count), trace + log(PRIOR_UNKNOWN))
     found = [
-        Weighed("none", (), findings.base.evidence + prior_of((), count), findings.base),
+        Weighed("none", (), float(nothing), findings.base),
         Weighed("unknown", (), unknown.weight, None),
     ]
     found += [

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from savgs_ident.diagnose.engine.attribution import SIZES, Attribution, Place, anywhere, attribute
+from savgs_ident.diagnose.engine.attribution import SIZES, Attribution, Law, Place, anywhere, attribute
 from savgs_ident.diagnose.engine.climb import Mode, Search, climb, search_of
 from savgs_ident.diagnose.engine.coordinates import Linear
 from savgs_ident.diagnose.engine.heldout import FOLDS, hold_out
@@ -154,8 +154,10 @@ def test_a_gap_is_attributed_to_the_place_that_can_make_it() -> None:
     search = search_of(PLANT, draw(PLANT, {"c": 0.3}, NOISE, 9))
     base = climb(search, (), {}, None)
     x = PLANT.x
-    spring = Place("spring", (np.stack([x**2, x**4], axis=1),), np.stack([x**2, x**3], axis=1))
-    sensor = Place("sensor", (np.stack([np.sin(6 * x), np.sin(9 * x)], axis=1),), np.stack([x**3], axis=1))
+    spring = Place("spring", (Law(np.stack([x**2, x**4], axis=1)),), np.stack([x**2, x**3], axis=1))
+    sensor = Place(
+        "sensor", (Law(np.stack([np.sin(6 * x), np.sin(9 * x)], axis=1)),), np.stack([x**3], axis=1)
+    )
     first, second = attribute(search, base, [sensor, spring])
     assert (first.name, second.name) == ("spring", "sensor")
     assert first.share > 0.98
@@ -185,7 +187,7 @@ def test_a_law_that_explains_nothing_is_less_probable_than_no_law() -> None:
     """By Occam's factor, which the widest prior over as many rows bounds."""
     search = search_of(PLANT, draw(PLANT, {"a": 1.1}, NOISE, 3))
     base = climb(search, (), {}, None)
-    place = Place("spring", (PLANT.x[:, None] ** 2,), PLANT.x[:, None] ** 2)
+    place = Place("spring", (Law(PLANT.x[:, None] ** 2),), PLANT.x[:, None] ** 2)
     (found,) = attribute(search, base, [place])
     assert base.evidence - np.log(max(SIZES) * PLANT.tests * PLANT.points) < found.evidence < base.evidence
 
@@ -282,12 +284,12 @@ def test_a_double_of_one_of_two_is_not_named_in_its_place(seed: int, monkeypatch
 
 
 def test_a_place_that_may_follow_another_law_is_not_much_less_probable_for_it() -> None:
-    """One of two laws costs log 2, not what all functions of the other would as parts of the same law."""
+    """It costs the logarithm of its share, not what all functions of the other would as parts of one law."""
     search = search_of(PLANT, draw(PLANT, {"c": 0.3}, NOISE, 9))
     base, x = climb(search, (), {}, None), PLANT.x
-    law, other = x[:, None] ** 2, np.stack([np.sin(k * x) for k in range(4, 12)], axis=1)
+    law, other = Law(x[:, None] ** 2), Law(np.stack([np.sin(k * x) for k in range(4, 12)], axis=1), 3.0)
     alone, either = (
-        attribute(search, base, [Place("spring", laws, law)])[0] for laws in ((law,), (law, other))
+        attribute(search, base, [Place("spring", laws, law.columns)])[0] for laws in ((law,), (law, other))
     )
-    assert either.evidence == pytest.approx(alone.evidence - np.log(2.0), abs=1e-3)
+    assert either.evidence == pytest.approx(alone.evidence - np.log(4.0), abs=1e-3)
     np.testing.assert_allclose(either.held_out, alone.held_out, atol=1e-9)

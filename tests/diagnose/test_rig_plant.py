@@ -138,7 +138,7 @@ def test_every_port_is_a_place_and_explains_what_acts_there(
         change = columns[0][:, 0] * weight
 
         def left(name: str, change: np.ndarray = change) -> float:
-            law = np.concatenate(places[name].laws, axis=1) * weight[:, None]
+            law = np.concatenate([each.columns for each in places[name].laws], axis=1) * weight[:, None]
             law = law[:, np.linalg.norm(law, axis=0) > 0.0]
             law = law / np.linalg.norm(law, axis=0)
             fitted, *_ = np.linalg.lstsq(law, change, rcond=1e-10)

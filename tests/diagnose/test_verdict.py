@@ -145,3 +145,11 @@ def test_an_effect_whose_fit_was_lost_is_not_judged_by_its_score() -> None:
     assert [each.name for each in weighed] == ["strut_friction", "rail_stribeck", "none", "unknown"]
     # What was only scored cannot be named, and does not speak for something missing either.
     assert odds_of(weighed) == pytest.approx(300.0 - np.log(3.0))
+
+
+def test_a_law_that_does_next_to_nothing_speaks_for_nothing_missing() -> None:
+    findings = Findings(_mode(0.0), SCORES, ())
+    traced = {each.name: each.weight for each in weigh(findings, Unknown(-np.inf, "besides"), 8.0)}
+    clean = {each.name: each.weight for each in weigh(findings, Unknown(-np.inf, "besides"))}
+    assert traced["none"] == pytest.approx(np.logaddexp(clean["none"], 8.0 + np.log(0.1)))
+    assert traced["unknown"] == -np.inf

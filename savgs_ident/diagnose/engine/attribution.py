@@ -9,6 +9,7 @@ beside it, so that it gets no credit for what recalibration can do.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, log
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,19 +30,28 @@ FREE_SIZE = 100.0
 """The same of a free signal: wide, so that its reach is an upper bound."""
 
 
+class Law(NamedTuple):
+    """Change of the rows per function of a law, the same in all tests, (m, q); how probable the law is beforehand.
+
+    Probabilities count beside those of the other laws of a place.
+    """
+
+    columns: Matrix
+    prior: float = 1.0
+
+
 @dataclass(frozen=True)
 class Place:
     """What a place can do to the rows.
 
     Attributes:
         name: its name.
-        laws: for each law that the place may follow, the change of the rows per function of it, the same in all
-            tests, (m, q). It follows one of them.
+        laws: that the place may follow, one of them.
         free: change of the rows per component of a free signal, in each test its own, (m, f).
     """
 
     name: str
-    laws: tuple[Matrix, ...]
+    laws: tuple[Law, ...]
     free: Matrix
 
 
@@ -85,10 +95,12 @@ def _mean_of(evidences: Sequence[float]) -> float:
 
 def _attribution(search: Search, mode: Mode, place: Place) -> Attribution:
     weight = 1.0 / np.sqrt(mode.misfit.spread)
-    laws = [_scaled(each, weight) for each in place.laws]
-    weighed = [_best_size(search, mode, each) for each in laws]
-    law, (size, _) = max(zip(laws, weighed, strict=True), key=lambda each: each[1][1])
-    evidence = _mean_of([each for _, each in weighed])
+    laws = [_scaled(each.columns, weight) for each in place.laws]
+    sizes, evidences = zip(*(_best_size(search, mode, each) for each in laws), strict=True)
+    priors = np.array([each.prior for each in place.laws])
+    weights = np.array(evidences) + np.log(priors / priors.sum())
+    law, size = laws[int(np.argmax(weights))], sizes[int(np.argmax(weights))]
+    evidence = float(np.logaddexp.reduce(weights))
     reach, coefficients = _reach(search, mode, place.free, weight)
     without, missed = (_left_out(search, mode, each, weight) for each in (law * 0.0, law * size))
     whole = float(np.sum((without * weight) ** 2))

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.diagnose.engine.attribution import Place
+from savgs_ident.diagnose.engine.attribution import Law, Place
 from savgs_ident.diagnose.rig.columns import impose, node_loads
 from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.model.effect import Port
@@ -34,6 +34,9 @@ SHARP = (0.01, 0.1)
 
 STRETCHES = (1e-4, 1e-3)
 """How far a contact gives before it slides [m]."""
+
+SIMPLE = 0.05
+"""Probability of a simple law, to that of any other: most that is so simple is in the catalogue."""
 
 RESONANCES = (3.0, 4.0, 5.4, 7.3, 9.8, 13.0, 18.0, 24.0, 33.0, 50.0)
 """Natural frequencies [Hz] of what the frame may do."""
@@ -77,16 +80,18 @@ def places_of(plant: RigPlant, terms: tuple[str, ...], p: Values, solution: Peri
     model = plant.complete(terms)
     ports, carried = node_loads(model, p, solution)
     nodes = nodes_of(solution)
-    laws: dict[str, list[Fields]] = {}
+    laws: dict[str, list[tuple[float, Fields]]] = {}
     free: dict[str, Fields] = {}
     for port in FORCES:
         seen = [np.asarray(part) for part in ports[port.value]]
         held = [_stop(seen[0], width, nodes, solution) for width in STRETCHES]
-        laws[port.value] = [[(port.value, each) for each in [*_force_laws(*seen), *held]]]
+        every, few = [*_force_laws(*seen), *held], [*_simple_laws(*seen), *held]
+        laws[port.value] = [(1.0, [(port.value, each) for each in every])]
+        laws[port.value].append((SIMPLE, [(port.value, each) for each in few]))
         for load, field in GIVING.get(port, ()):
             beyond = np.asarray(carried[load].beyond_rest)
             ways = _force_laws(beyond, _rate(beyond, nodes, solution), np.zeros_like(beyond))
-            laws[port.value].append([(field, _with_rate(each, nodes, solution)) for each in ways])
+            laws[port.value].append((1.0, [(field, _with_rate(each, nodes, solution)) for each in ways]))
         free[port.value] = [(port.value, each) for each in _waves(nodes)]
     for port, (load, field) in WAY_LOADS.items():
         beyond = np.asarray(carried[load].beyond_rest)
@@ -95,21 +100,20 @@ def places_of(plant: RigPlant, terms: tuple[str, ...], p: Values, solution: Peri
             ways = [*ways, *_cam_waves(nodes, solution)]
         if port is Port.FRAME:
             ways = [beyond, *_resonances(beyond, nodes)]
-        laws[port.value] = [[(field, _with_rate(each, nodes, solution)) for each in ways]]
+        laws[port.value] = [(1.0, [(field, _with_rate(each, nodes, solution)) for each in ways])]
         free[port.value] = [(field, _with_rate(each, nodes, solution)) for each in _waves(nodes)]
     wheel = np.asarray(ports["rail"].velocity) + np.asarray(ports["suspension"].velocity)
     body = _rate(np.asarray(ports["rail"].velocity), nodes, solution)
     masses: Fields = [("rail", body), ("tyre_radial", _rate(wheel, nodes, solution))]
-    laws["inertia"], free["inertia"] = [masses], masses
-    every = [*(law for some in laws.values() for law in some), *free.values()]
-    rows = iter(
-        impose(model, plant.likelihood, plant.orders, p, solution, [each for some in every for each in some])
-    )
+    laws["inertia"], free["inertia"] = [(1.0, masses)], masses
+    groups = [*(law for some in laws.values() for _, law in some), *free.values()]
+    fields = [each for some in groups for each in some]
+    rows = iter(impose(model, plant.likelihood, plant.orders, p, solution, fields))
 
     def taken(fields: Fields) -> Signal:
         return np.stack([next(rows) for _ in fields]).T
 
-    law_rows = {name: tuple(taken(law) for law in some) for name, some in laws.items()}
+    law_rows = {name: tuple(Law(taken(law), prior) for prior, law in some) for name, some in laws.items()}
     places = [Place(name, law_rows[name], taken(some)) for name, some in free.items()]
     return places + _sensor_places(plant, p, solution)
 
@@ -136,6 +140,15 @@ def _force_laws(displacement: Signal, velocity: Signal, load: Signal) -> list[Si
         weight = load / np.abs(load).max()
         functions += [weight * sharp[0], weight * v, weight]
     return functions
+
+
+def _simple_laws(displacement: Signal, velocity: Signal, load: Signal) -> list[Signal]:
+    """The few that come first to mind: a friction, a damper, a spring, a friction in proportion to the load."""
+    x = displacement - displacement.mean()
+    v = velocity / max(float(np.abs(velocity).max()), np.finfo(float).tiny)
+    sharp = np.tanh(v / SHARP[0])
+    carried = [load / np.abs(load).max() * sharp] if np.any(load) else []
+    return [sharp, v, x / max(float(np.abs(x).max()), np.finfo(float).tiny), *carried]
 
 
 def _stop(displacement: Signal, width: float, nodes: Nodes, solution: PeriodicSolution) -> Signal:
@@ -210,5 +223,5 @@ def _sensor_places(plant: RigPlant, p: Values, solution: PeriodicSolution) -> li
             np.where(order == k, 1.0, 0.0) * turn for k in range(1, plant.orders + 1) for turn in (1.0, -1j)
         ]
         free = np.stack([rows_of(np.broadcast_to(each, mine.shape)) for each in unit], axis=1)
-        places.append(Place(f"sensor.{channel}", (law,), free))
+        places.append(Place(f"sensor.{channel}", (Law(law),), free))
     return places
