@@ -149,3 +149,20 @@ def test_whatever_is_changed_in_a_file_it_is_read_or_refused(
         return
     assert np.isfinite(recording.force).all()
     assert np.isfinite(recording.position).all()
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    kind=st.sampled_from(["f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8"]),
+    shape=st.lists(st.integers(1, 5), min_size=2, max_size=3),
+    name=st.sampled_from(["x", "gtau", "a_rather_long_name"]),
+    packed=st.booleans(),
+)
+def test_arrays_come_back_as_they_were_saved(
+    tmp_path: Path, kind: str, shape: list[int], name: str, packed: bool
+) -> None:
+    """As SciPy writes them: column by column, small ones in one word."""
+    array = np.random.default_rng(1).integers(0, 100, shape).astype(kind)
+    path = tmp_path / "any.mat"
+    savemat(path, {"other": {"a": 1.0}, "text": "none", name: array}, do_compression=packed)
+    np.testing.assert_array_equal(mat_file.read_arrays(path, [name])[name], array)

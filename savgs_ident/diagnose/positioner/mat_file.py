@@ -1,41 +1,56 @@
 """Numeric arrays out of a MATLAB file (version 5 to 7), from a stranger.
 
-Nothing in the file is run or built: only named numeric arrays are read, after the file's own list of contents has
-said that they are numeric and how large they are, and after everything that is packed in it has been weighed. What
-would unpack to more than :data:`LARGEST` bytes is refused before it does.
+Nothing in the file is run or built: only the named arrays are read, and only if they are real and numeric; what would
+unpack to more than :data:`LARGEST` bytes is refused before it does. The few parts of such an array are read here
+because SciPy's reader, which knows all of the format, ends the process on some malformed files.
+
+    element   type, size, content; a small one has both in one word. Packed ones hold another element.
+    array     flags (class, complex), shape, name, numbers: in this order, each an element of its own
+
+MathWorks, MAT-File Format, on the Level 5 format.
 """
 
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from math import prod
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.io import loadmat, whosmat
-from scipy.io.matlab import MatReadError
 
 from savgs_ident.core.errors import InputError
 
 LARGEST = 2**28
 """Most bytes of a file, and of what it unpacks to."""
 
-NUMERIC = frozenset(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)) | {
-    "double",
-    "single",
-}
-"""Classes of arrays that are read."""
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+"""How numbers are stored, by the type of their element."""
 
+_CLASSES = {
+    1: "cell", 2: "struct", 3: "object", 4: "char", 5: "sparse", 6: "double", 7: "single", 8: "int8", 9: "uint8",
+    10: "int16", 11: "uint16", 12: "int32", 13: "uint32", 14: "int64", 15: "uint64",
+}  # fmt: skip
+_FIRST_NUMERIC = 6
+_COMPLEX = 0x800
+
+_BYTES, _SHAPE, _FLAGS, _ARRAY, _PACKED = 1, 5, 6, 14, 15
 _HEADER = 128
-_PACKED = 15
 _PIECE = 2**20
 _SAVE = "save it in MATLAB with save(file, '-v7')"
 
-_MALFORMED = (
-    MatReadError, NotImplementedError, ValueError, TypeError, KeyError, IndexError, OverflowError, MemoryError,
-    EOFError, OSError, zlib.error, struct.error,
-)  # fmt: skip
-"""What SciPy's reader raises for contents that are not what they say."""
+
+class _Malformed(Exception):  # noqa: N818
+    """What is there is not what the file says."""
+
+
+class _Element(NamedTuple):
+    """Type of an element, its content, and where the next one begins."""
+
+    kind: int
+    content: memoryview
+    end: int
 
 
 def read_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
@@ -44,25 +59,25 @@ def read_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float6
     Raises :class:`InputError` for a file that is none, that is too large, that lacks one of them or has it twice,
     or where one is not a real numeric array.
     """
-    _weigh(path)
+    raw, order = _content(path)
+    found: dict[str, NDArray[np.float64]] = {}
     try:
-        listed = whosmat(path)
-    except _MALFORMED as error:
-        raise InputError(
-            f"its list of contents cannot be read ({error})", source=path, remedy=_SAVE
-        ) from error
-    for name in names:
-        _check_listed(path, name, [each for each in listed if each[0] == name])
-    try:
-        contents = loadmat(path, variable_names=list(names))
-        found = {name: np.asarray(contents[name]) for name in names}
-    except _MALFORMED as error:
+        for array in _arrays(path, raw, order):
+            name, parts = _header(array, order)
+            if name in found:
+                raise InputError("is there more than once", source=path, channel=name)
+            if name in names:
+                found[name] = _real(path, name, parts, order)
+    except _Malformed as error:
         raise InputError(f"its contents cannot be read ({error})", source=path, remedy=_SAVE) from error
-    return {name: _real(path, name, array) for name, array in found.items()}
+    for name in names:
+        if name not in found:
+            raise InputError("is missing", source=path, channel=name)
+    return found
 
 
-def _weigh(path: Path) -> None:
-    """Walks through the elements of the file and unpacks them piecewise, to nothing."""
+def _content(path: Path) -> tuple[bytes, str]:
+    """The bytes of a file and their order."""
     if not path.is_file():
         raise InputError("is no file", source=path)
     try:
@@ -74,51 +89,98 @@ def _weigh(path: Path) -> None:
     order = {b"IM": "<", b"MI": ">"}.get(raw[126:128])
     if order is None or len(raw) <= _HEADER or raw[:4].count(0):
         raise InputError("not a MATLAB file of version 5 to 7", source=path, remedy=_SAVE)
-    place, total = _HEADER, 0
+    return raw, order
+
+
+def _arrays(path: Path, raw: bytes, order: str) -> Iterator[memoryview]:
+    """The contents of all arrays, unpacked."""
+    place, left = _HEADER, LARGEST
     while place + 8 <= len(raw):
         kind, size = struct.unpack_from(order + "II", raw, place)
         if place + 8 + size > len(raw):
             raise InputError("ends before its last array does", source=path, remedy="copy the file again")
-        total += (
-            _unpacked(path, raw[place + 8 : place + 8 + size], LARGEST - total) if kind == _PACKED else size
-        )
+        content = memoryview(raw)[place + 8 : place + 8 + size]
+        if kind == _PACKED:
+            unpacked = _unpacked(path, content, left)
+            left -= len(unpacked)
+            kind, content, _ = _element(memoryview(unpacked), 0, order)
+        if kind == _ARRAY:
+            yield content
         place += 8 + size
 
 
-def _unpacked(path: Path, packed: bytes, most: int) -> int:
-    """How many bytes ``packed`` unpacks to."""
-    unpacker, total = zlib.decompressobj(), 0
+def _unpacked(path: Path, packed: memoryview, most: int) -> bytes:
+    """What ``packed`` unpacks to, at ``most`` so many bytes."""
+    unpacker, pieces, total = zlib.decompressobj(), [], 0
+    rest = bytes(packed)
     try:
-        while packed and not unpacker.eof:
-            total += len(unpacker.decompress(packed, _PIECE))
-            packed = unpacker.unconsumed_tail
+        while rest and not unpacker.eof:
+            pieces.append(unpacker.decompress(rest, _PIECE))
+            rest, total = unpacker.unconsumed_tail, total + len(pieces[-1])
             if total > most:
                 raise InputError(f"unpacks to more than {LARGEST} bytes", source=path, remedy=_SAVE)
     except zlib.error as error:
         raise InputError(
             f"cannot be unpacked ({error})", source=path, remedy="copy the file again"
         ) from error
-    return total
+    return b"".join(pieces)
 
 
-def _check_listed(path: Path, name: str, found: Sequence[tuple[str, tuple[int, ...], str]]) -> None:
-    if not found:
-        raise InputError("is missing", source=path, channel=name)
-    if len(found) > 1:
-        raise InputError("is there more than once", source=path, channel=name)
-    _, shape, kind = found[0]
-    if kind not in NUMERIC:
-        raise InputError(
-            f"is of class {kind}", source=path, channel=name, remedy="save it as an array of double"
-        )
-    size = 8
-    for extent in shape:
-        size *= extent
-    if not 0 <= size <= LARGEST or any(extent < 0 for extent in shape):
+def _element(content: memoryview, place: int, order: str) -> _Element:
+    """The element at a place of a content."""
+    if place + 8 > len(content):
+        raise _Malformed("it ends within an array")
+    kind, size = struct.unpack_from(order + "II", content, place)
+    if kind >> 16:
+        kind, size, begin, end = kind & 0xFFFF, kind >> 16, place + 4, place + 8
+        if size > 4:
+            raise _Malformed("a small element is not small")
+    else:
+        begin = place + 8
+        end = begin + size + -size % 8
+    if begin + size > len(content):
+        raise _Malformed("it ends within an array")
+    return _Element(kind, content[begin : begin + size], end)
+
+
+class _Parts(NamedTuple):
+    """Flags of an array, its shape, and its numbers as they are stored."""
+
+    flags: int
+    shape: tuple[int, ...]
+    numbers: memoryview
+
+
+def _header(array: memoryview, order: str) -> tuple[str, _Parts]:
+    """Name of an array and what it consists of; what is not a numeric array has no numbers."""
+    flags = _element(array, 0, order)
+    if flags.kind != _FLAGS or len(flags.content) != 8:
+        raise _Malformed("an array does not say of what class it is")
+    shape = _element(array, flags.end, order)
+    if shape.kind != _SHAPE or len(shape.content) % 4 or len(shape.content) < 8:
+        raise _Malformed("an array has no shape")
+    name = _element(array, shape.end, order)
+    if name.kind != _BYTES:
+        raise _Malformed("an array has no name")
+    extents = struct.unpack(f"{order}{len(shape.content) // 4}i", shape.content)
+    (word,) = struct.unpack_from(order + "I", flags.content)
+    return bytes(name.content).decode("latin-1"), _Parts(word, extents, array[name.end :])
+
+
+def _real(path: Path, name: str, parts: _Parts, order: str) -> NDArray[np.float64]:
+    """The numbers of an array, in its shape."""
+    kind, remedy = _CLASSES.get(parts.flags & 0xFF, "unknown"), "save it as an array of double"
+    if parts.flags & 0xFF < _FIRST_NUMERIC or kind == "unknown":
+        raise InputError(f"is of class {kind}", source=path, channel=name, remedy=remedy)
+    if parts.flags & _COMPLEX:
+        raise InputError("is not real", source=path, channel=name, remedy=remedy)
+    shape = parts.shape
+    if any(extent < 0 for extent in shape) or 8 * prod(shape) > LARGEST:
         raise InputError(f"has the shape {shape}", source=path, channel=name, remedy="record a shorter test")
-
-
-def _real(path: Path, name: str, array: NDArray[np.generic]) -> NDArray[np.float64]:
-    if array.dtype.kind not in "fiu":
-        raise InputError("is not real", source=path, channel=name, remedy="save it as an array of double")
-    return array.astype(np.float64)
+    stored = _element(parts.numbers, 0, order)
+    if stored.kind not in _NUMBERS:
+        raise _Malformed(f"the numbers of {name} are of type {stored.kind}")
+    numbers = np.dtype(order + _NUMBERS[stored.kind])
+    if len(stored.content) != numbers.itemsize * prod(shape):
+        raise _Malformed(f"{name} has not as many numbers as its shape says")
+    return np.frombuffer(stored.content, numbers).astype(np.float64).reshape(shape, order="F")
