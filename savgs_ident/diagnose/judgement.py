@@ -22,6 +22,7 @@ from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.diagnose.settings import DiagnosisSettings
 from savgs_ident.diagnose.verdict import (
     TRACE,
+    Change,
     Unknown,
     Weighed,
     heaviest,
@@ -131,7 +132,8 @@ def judge(case: Case, tell: Tell) -> Judged:
         besides = anywhere(_attributed(case, best))
     strain = strain_of(best, plant.nuisances)
     alone = anywhere(places)
-    small = _change_by(case, max(places, key=lambda each: each.evidence)) < TRACE
+    place = max(places, key=lambda each: each.evidence)
+    small = _change(case, place.held_out - base.prediction.rows).whole < TRACE
     unknown = unknown_of(findings, -np.inf if small else alone, besides, best.evidence + strain.gain)
     weighed = weigh(findings, unknown, alone if small else -np.inf)
     kind, chosen = kind_of(weighed, _change_without(case, best, best.terms), left)
@@ -165,30 +167,30 @@ def _attributed(case: Case, mode: Mode) -> list[Attribution]:
     return attribute(case.search, mode, places_of(case.plant, mode.terms, p, mode.prediction.near))
 
 
-def _change_without(case: Case, mode: Mode, gone: Sequence[str]) -> float:
+def _change_without(case: Case, mode: Mode, gone: Sequence[str]) -> Change:
     """What some terms of a hypothesis do to the response, all other parameters as they are.
 
-    As a share of it, in the channel where they do most; infinite where there is no motion without them.
+    In the channel where they do most; infinite where there is no motion without them.
     """
     if not gone:
-        return 0.0
+        return Change(0.0, 0.0)
     left = tuple(name for name in mode.terms if name not in gone)
     wanted = [each.name for each in case.plant.nuisances]
     taken = {each.name for name in gone for each in case.plant.catalogue[name].parameters}
     values = {name: value for name, value in mode.values.items() if name not in taken or name in wanted}
     without = case.plant.predict(left, values, wanted, case.base.prediction.near)
     if not without.solved:
-        return np.inf
-    return _share(case, mode.prediction.rows - without.rows)
+        return Change(np.inf, np.inf)
+    return _change(case, mode.prediction.rows - without.rows)
 
 
-def _change_by(case: Case, place: Attribution) -> float:
-    """What a law at a place does to the response of tests left out, as a share of it."""
-    return _share(case, place.held_out - case.base.prediction.rows)
+def _change(case: Case, rows: NDArray[np.float64]) -> Change:
+    """A change of the rows, in the channel where it is most."""
+    channel, test = case.plant.channel, case.data.test
+    return Change(_share(case, rows, channel), _share(case, rows, channel * case.data.tests + test))
 
 
-def _share(case: Case, change: NDArray[np.float64]) -> float:
-    """A change of the rows as a share of the response, in the channel where it is most."""
-    squares = np.bincount(case.plant.channel, change**2)
-    whole = np.bincount(case.plant.channel, case.data.measured**2)
+def _share(case: Case, rows: NDArray[np.float64], group: NDArray[np.intp]) -> float:
+    """A change of the rows as a share of the response, in the group of rows where it is most."""
+    squares, whole = np.bincount(group, rows**2), np.bincount(group, case.data.measured**2)
     return float(np.sqrt(np.max(squares[whole > 0.0] / whole[whole > 0.0])))

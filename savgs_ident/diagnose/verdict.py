@@ -25,7 +25,10 @@ SURE = 10.0
 """Log odds against the baseline from which on something is said to be missing."""
 
 MATERIAL = 0.003
-"""Change of the response by the named effects, as a share of it, below which nothing that matters is missing."""
+"""Change of the response by an effect, as a share of it, below which it does not matter, unless it does somewhere."""
+
+LOCAL = 0.02
+"""The same in the one test where it does most."""
 
 TRACE = 0.001
 """Change of the response by a learned law, as a share of it, below which it is a trace and nothing is missing."""
@@ -48,6 +51,18 @@ class Weighed:
     effects: tuple[str, ...]
     weight: float
     mode: Mode | None
+
+
+class Change(NamedTuple):
+    """What something does to the response, as a share of it: in all, and in the test where it does most."""
+
+    whole: float
+    somewhere: float
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is large enough to be called an effect."""
+        return self.whole >= MATERIAL or self.somewhere >= LOCAL
 
 
 Reason = Literal["law", "besides", "strain"]
@@ -75,14 +90,14 @@ def heaviest(findings: Findings) -> Mode:
     return max((findings.base, *findings.modes), key=lambda mode: mode.evidence + prior_of(mode.terms, count))
 
 
-def of_material_parts(findings: Findings, change: Callable[[Mode, Sequence[str]], float]) -> Findings:
+def of_material_parts(findings: Findings, change: Callable[[Mode, Sequence[str]], Change]) -> Findings:
     """The findings less the heaviest ones that need an effect which does too little to matter.
 
     What a wrong effect leaves, a trace of a second one often takes away: that does not make both of them right.
-    ``change`` is what some terms of a hypothesis do to the response, as a share of it.
+    ``change`` is what some terms of a hypothesis do to the response.
     """
     best = heaviest(findings)
-    while len(best.terms) > 1 and any(change(best, (name,)) < MATERIAL for name in best.terms):
+    while len(best.terms) > 1 and any(not change(best, (name,)).matters for name in best.terms):
         findings = replace(findings, modes=tuple(each for each in findings.modes if each is not best))
         best = heaviest(findings)
     return findings
@@ -144,11 +159,11 @@ def odds_of(weighed: Sequence[Weighed]) -> float:
     return max(something) - next(each.weight for each in weighed if each.name == "none")
 
 
-def kind_of(weighed: list[Weighed], change: float, left: float) -> tuple[Kind, Weighed]:
+def kind_of(weighed: list[Weighed], change: Change, left: float) -> tuple[Kind, Weighed]:
     """What may be said, and the hypothesis that it rests on.
 
-    ``change`` is what the best fitted hypothesis does to the response, as a share of it; ``left`` the
-    share of the excess misfit that it leaves.
+    ``change`` is what the best fitted hypothesis does to the response; ``left`` the share of the excess misfit that
+    it leaves.
     """
     by_name = {each.name: each for each in weighed}
     none, unknown = by_name["none"], by_name["unknown"]
@@ -158,7 +173,7 @@ def kind_of(weighed: list[Weighed], change: float, left: float) -> tuple[Kind, W
         return "none", none
     if unknown.weight > best.weight or left > LEFT:
         return "unknown", unknown
-    if change < MATERIAL:
+    if not change.matters:
         return "none", none
     return ("effect" if len(best.effects) == 1 else "several"), best
 

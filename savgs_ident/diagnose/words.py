@@ -3,7 +3,7 @@
 from savgs_ident.diagnose.engine.climb import Mode
 from savgs_ident.diagnose.judgement import Case, Judged
 from savgs_ident.diagnose.result import Shrink, Verdict
-from savgs_ident.diagnose.verdict import MATERIAL, SURE, heaviest, odds_of
+from savgs_ident.diagnose.verdict import LOCAL, MATERIAL, SURE, heaviest, odds_of
 from savgs_ident.effects.registry import CATALOGUE
 
 IMPERFECT = 0.005
@@ -50,7 +50,10 @@ def _doubted(odds: float) -> str:
         return (
             f" Evidence of {odds:.1f} nat speaks for something missing: less than the {SURE:.0f} asked for."
         )
-    return f" What would explain more changes the response by less than {_percent(MATERIAL)}: too little to matter."
+    return (
+        f" What would explain more changes the response by less than {_percent(MATERIAL)}, and by less than "
+        f"{_percent(LOCAL)} in any test: too little to matter."
+    )
 
 
 def _nearest(judged: Judged) -> str:

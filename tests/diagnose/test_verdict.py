@@ -12,8 +12,10 @@ from savgs_ident.diagnose.engine.search import Findings
 from savgs_ident.diagnose.verdict import (
     CONFUSED,
     LEFT,
+    LOCAL,
     MATERIAL,
     SURE,
+    Change,
     Unknown,
     Weighed,
     heaviest,
@@ -58,13 +60,15 @@ def _weighed(weights: Mapping[str, float], scored: tuple[str, ...] = ()) -> list
     ],
 )
 def test_kinds(weights: dict[str, float], change: float, left: float, kind: str, name: str) -> None:
-    found, chosen = kind_of(_weighed(weights), change, left)
+    found, chosen = kind_of(_weighed(weights), Change(change, change), left)
     assert (found, chosen.name) == (kind, name)
 
 
 def test_only_what_was_fitted_can_be_named() -> None:
     weights = {"none": 0.0, "unknown": -1.0, "rail_viscous": 900.0, "spring_rate": 50.0}
-    assert kind_of(_weighed(weights, scored=("rail_viscous",)), 0.05, 0.0)[1].name == "spring_rate"
+    assert (
+        kind_of(_weighed(weights, scored=("rail_viscous",)), Change(0.05, 0.05), 0.0)[1].name == "spring_rate"
+    )
 
 
 def test_probabilities_are_those_of_the_weights() -> None:
@@ -96,17 +100,19 @@ def _mode(evidence: float, *terms: str) -> Mode:
 
 @pytest.mark.parametrize(
     ("trace", "best"),
-    [(2.0 * MATERIAL, ("strut_friction", "rail_stribeck")), (0.5 * MATERIAL, ("strut_friction",))],
+    [
+        (Change(2.0 * MATERIAL, 0.0), ("strut_friction", "rail_stribeck")),
+        (Change(0.0, 2.0 * LOCAL), ("strut_friction", "rail_stribeck")),
+        (Change(0.5 * MATERIAL, 0.5 * LOCAL), ("strut_friction",)),
+    ],
 )
 def test_an_effect_that_does_too_little_to_matter_is_no_part_of_a_pair(
-    trace: float, best: tuple[str, ...]
+    trace: Change, best: tuple[str, ...]
 ) -> None:
     alone = _mode(500.0, "strut_friction")
     pair = _mode(800.0, "strut_friction", "rail_stribeck")
-    changes = {"strut_friction": 0.1, "rail_stribeck": trace}
-    findings = of_material_parts(
-        Findings(_mode(0.0), (), (pair, alone)), lambda _, gone: sum(changes[name] for name in gone)
-    )
+    changes = {"strut_friction": Change(0.1, 0.2), "rail_stribeck": trace}
+    findings = of_material_parts(Findings(_mode(0.0), (), (pair, alone)), lambda _, gone: changes[gone[0]])
     assert findings.best.terms == best
     assert alone in findings.modes
 
