@@ -41,7 +41,7 @@ _PIECE = 2**20
 _SAVE = "save it in MATLAB with save(file, '-v7')"
 
 
-class _Malformed(Exception):  # noqa: N818
+class _MalformedError(Exception):
     """What is there is not what the file says."""
 
 
@@ -68,7 +68,7 @@ def read_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float6
                 raise InputError("is there more than once", source=path, channel=name)
             if name in names:
                 found[name] = _real(path, name, parts, order)
-    except _Malformed as error:
+    except _MalformedError as error:
         raise InputError(f"its contents cannot be read ({error})", source=path, remedy=_SAVE) from error
     for name in names:
         if name not in found:
@@ -129,17 +129,17 @@ def _unpacked(path: Path, packed: memoryview, most: int) -> bytes:
 def _element(content: memoryview, place: int, order: str) -> _Element:
     """The element at a place of a content."""
     if place + 8 > len(content):
-        raise _Malformed("it ends within an array")
+        raise _MalformedError("it ends within an array")
     kind, size = struct.unpack_from(order + "II", content, place)
     if kind >> 16:
         kind, size, begin, end = kind & 0xFFFF, kind >> 16, place + 4, place + 8
         if size > 4:
-            raise _Malformed("a small element is not small")
+            raise _MalformedError("a small element is not small")
     else:
         begin = place + 8
         end = begin + size + -size % 8
     if begin + size > len(content):
-        raise _Malformed("it ends within an array")
+        raise _MalformedError("it ends within an array")
     return _Element(kind, content[begin : begin + size], end)
 
 
@@ -155,13 +155,13 @@ def _header(array: memoryview, order: str) -> tuple[str, _Parts]:
     """Name of an array and what it consists of; what is not a numeric array has no numbers."""
     flags = _element(array, 0, order)
     if flags.kind != _FLAGS or len(flags.content) != 8:
-        raise _Malformed("an array does not say of what class it is")
+        raise _MalformedError("an array does not say of what class it is")
     shape = _element(array, flags.end, order)
     if shape.kind != _SHAPE or len(shape.content) % 4 or len(shape.content) < 8:
-        raise _Malformed("an array has no shape")
+        raise _MalformedError("an array has no shape")
     name = _element(array, shape.end, order)
     if name.kind != _BYTES:
-        raise _Malformed("an array has no name")
+        raise _MalformedError("an array has no name")
     extents = struct.unpack(f"{order}{len(shape.content) // 4}i", shape.content)
     (word,) = struct.unpack_from(order + "I", flags.content)
     return bytes(name.content).decode("latin-1"), _Parts(word, extents, array[name.end :])
@@ -179,8 +179,8 @@ def _real(path: Path, name: str, parts: _Parts, order: str) -> NDArray[np.float6
         raise InputError(f"has the shape {shape}", source=path, channel=name, remedy="record a shorter test")
     stored = _element(parts.numbers, 0, order)
     if stored.kind not in _NUMBERS:
-        raise _Malformed(f"the numbers of {name} are of type {stored.kind}")
+        raise _MalformedError(f"the numbers of {name} are of type {stored.kind}")
     numbers = np.dtype(order + _NUMBERS[stored.kind])
     if len(stored.content) != numbers.itemsize * prod(shape):
-        raise _Malformed(f"{name} has not as many numbers as its shape says")
+        raise _MalformedError(f"{name} has not as many numbers as its shape says")
     return np.frombuffer(stored.content, numbers).astype(np.float64).reshape(shape, order="F")
