@@ -31,7 +31,7 @@ LOCAL = 0.02
 """The same in the one test where it does most."""
 
 TRACE = 0.001
-"""Change of the response by a learned law, as a share of it, below which it is a trace and nothing is missing."""
+"""Change of the response by a learned law, as a share of it, below which it is a trace, unless it reaches LOCAL."""
 
 LEFT = 0.05
 """Share of the baseline's excess misfit that named effects may leave; beyond it something else is missing."""
