@@ -21,8 +21,6 @@ from savgs_ident.diagnose.rig.places import places_of
 from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.diagnose.settings import DiagnosisSettings
 from savgs_ident.diagnose.verdict import (
-    LOCAL,
-    TRACE,
     Change,
     Unknown,
     Weighed,
@@ -134,10 +132,10 @@ def judge(case: Case, tell: Tell) -> Judged:
     strain = strain_of(best, plant.nuisances)
     alone = anywhere(places)
     place = max(places, key=lambda each: each.evidence)
-    done = _change(case, place.held_out - base.prediction.rows)
-    small = done.whole < TRACE and done.somewhere < LOCAL
-    unknown = unknown_of(findings, -np.inf if small else alone, besides, best.evidence + strain.gain)
-    weighed = weigh(findings, unknown, alone if small else -np.inf)
+    if _change(case, place.held_out - base.prediction.rows).is_trace:
+        alone = -np.inf
+    unknown = unknown_of(findings, alone, besides, best.evidence + strain.gain)
+    weighed = weigh(findings, unknown)
     kind, chosen = kind_of(weighed, _change_without(case, best, best.terms), left)
     return Judged(findings, tuple(places), tuple(weighed), unknown, strain, kind, chosen, left)
 

@@ -64,6 +64,11 @@ class Change(NamedTuple):
         """Whether it is large enough to be called an effect."""
         return self.whole >= MATERIAL or self.somewhere >= LOCAL
 
+    @property
+    def is_trace(self) -> bool:
+        """Whether it is too small for a law that does no more to speak for something unknown."""
+        return self.whole < TRACE and self.somewhere < LOCAL
+
 
 Reason = Literal["law", "besides", "strain"]
 """What speaks for something unknown: a law at a port, one besides the best effects, a tolerance that is broken."""
@@ -118,15 +123,11 @@ def unknown_of(findings: Findings, alone: float, besides: float, strained: float
     return max(found, key=lambda each: each.weight)
 
 
-def weigh(findings: Findings, unknown: Unknown, trace: float = -np.inf) -> list[Weighed]:
-    """All hypotheses by falling weight, but for those whose fit was lost.
-
-    ``trace`` is the log evidence of a law that does too little to matter: that nothing is missing holds with it, too.
-    """
+def weigh(findings: Findings, unknown: Unknown) -> list[Weighed]:
+    """All hypotheses by falling weight, but for those whose fit was lost."""
     count = len(findings.scores)
-    nothing = np.logaddexp(findings.base.evidence + prior_of((), count), trace + log(PRIOR_UNKNOWN))
     found = [
-        Weighed("none", (), float(nothing), findings.base),
+        Weighed("none", (), findings.base.evidence + prior_of((), count), findings.base),
         Weighed("unknown", (), unknown.weight, None),
     ]
     found += [

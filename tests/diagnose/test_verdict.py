@@ -153,9 +153,7 @@ def test_an_effect_whose_fit_was_lost_is_not_judged_by_its_score() -> None:
     assert odds_of(weighed) == pytest.approx(300.0 - np.log(3.0))
 
 
-def test_a_law_that_does_next_to_nothing_speaks_for_nothing_missing() -> None:
-    findings = Findings(_mode(0.0), SCORES, ())
-    traced = {each.name: each.weight for each in weigh(findings, Unknown(-np.inf, "besides"), 8.0)}
-    clean = {each.name: each.weight for each in weigh(findings, Unknown(-np.inf, "besides"))}
-    assert traced["none"] == pytest.approx(np.logaddexp(clean["none"], 8.0 + np.log(0.1)))
-    assert traced["unknown"] == -np.inf
+def test_a_law_is_a_trace_only_if_it_does_next_to_nothing_in_every_test() -> None:
+    assert Change(0.0009, 0.019).is_trace
+    assert not Change(0.0011, 0.0).is_trace
+    assert not Change(0.0, 0.021).is_trace
