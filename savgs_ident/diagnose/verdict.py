@@ -30,8 +30,11 @@ MATERIAL = 0.003
 LOCAL = 0.02
 """The same in the one test where it does most."""
 
-TRACE = 0.001
-"""Change of the response by a learned law, as a share of it, below which it is a trace, unless it reaches LOCAL."""
+TRACE = 0.0004
+"""Change of the response by a learned law, as a share of it, below which it is a trace, unless it reaches LOCAL.
+
+Two formulations of the same rig differ by up to 0.03 %.
+"""
 
 LEFT = 0.05
 """Share of the baseline's excess misfit that named effects may leave; beyond it something else is missing."""

@@ -154,6 +154,6 @@ def test_an_effect_whose_fit_was_lost_is_not_judged_by_its_score() -> None:
 
 
 def test_a_law_is_a_trace_only_if_it_does_next_to_nothing_in_every_test() -> None:
-    assert Change(0.0009, 0.019).is_trace
-    assert not Change(0.0011, 0.0).is_trace
+    assert Change(0.00035, 0.019).is_trace
+    assert not Change(0.00045, 0.0).is_trace
     assert not Change(0.0, 0.021).is_trace
