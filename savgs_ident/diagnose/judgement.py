@@ -123,7 +123,11 @@ def judge(case: Case, tell: Tell) -> Judged:
         lambda: find_terms(search, base, plant.candidates, tell, plant.known),
         lambda: _attributed(case, base),
     )
-    findings = of_material_parts(findings, partial(_change_without, case))
+    findings = of_material_parts(
+        findings,
+        partial(_change_without, case),
+        lambda mode: _change(case, mode.prediction.rows - base.prediction.rows),
+    )
     best, besides = heaviest(findings), -np.inf
     left = left_over(search, base, best)
     if best.terms and left > EXPLAINED:

@@ -64,6 +64,24 @@ class Present:
             found[each.name] = float(np.clip(null + factor * (value - null), each.lower, each.upper))
         return found
 
+    @cached_property
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The sizes (k,) between which no parameter leaves its bounds."""
+        effect = CATALOGUE[self.name]
+        shapes = [each.name for each in term_of(effect).shapes]
+        lower, upper = np.full(self.sizes, -np.inf), np.full(self.sizes, np.inf)
+        for each in effect.parameters:
+            value, ends = self.parameters[each.name], np.array([each.lower, each.upper])
+            if each.name in effect.null:
+                null = effect.null[each.name]
+                k, (low, high) = 0, np.sort((ends - null) / (value - null))
+            elif each.name in shapes:
+                k, (low, high) = 1 + shapes.index(each.name), np.log(np.maximum(ends, 0.0) / value)
+            else:
+                continue
+            lower[k], upper[k] = max(lower[k], low), min(upper[k], high)
+        return lower, upper
+
 
 @dataclass(frozen=True)
 class Drawing:
@@ -113,7 +131,10 @@ class Drawing:
         return Present(name, form.at(size), change_of(found[size], self.response), found[size])
 
     def sigma(self, target: NDArray[np.complex128], beside: Present | None = None) -> float:
-        """How far a response stands out of what the rig can do, with the effect ``beside`` of any size and shape."""
+        """How far a response stands out of what the rig can do, with the effect ``beside`` of any size and shape.
+
+        No tolerance is broken by more than :data:`STANDS_OUT`: what does not hide within it stands out anyway.
+        """
         names = () if beside is None else (beside.name,)
         noise, known = self.hiding.noise, len(self.hiding.names)
         further = np.zeros(0) if beside is None else np.eye(beside.sizes)[0]
@@ -128,12 +149,16 @@ class Drawing:
         def columns_at(x: NDArray[np.float64], miss: NDArray[np.float64]) -> NDArray[np.float64]:
             columns = self._hiding_at(names, given_at(x)).columns
             for unit in np.eye(x.size)[known:]:
-                nudged = miss_at(x + NUDGE * unit)
-                last = np.zeros(noise.size) if nudged is None else (miss - nudged) / NUDGE
+                nudge = NUDGE if np.all(x + NUDGE * unit <= upper) else -NUDGE
+                nudged = miss_at(x + nudge * unit)
+                last = np.zeros(noise.size) if nudged is None else (miss - nudged) / nudge
                 columns = np.column_stack([columns, last])
             return columns
 
-        return sigma_of(miss_at, columns_at, np.concatenate([np.zeros(known), further]), known)
+        start = np.concatenate([np.zeros(known), further])
+        reach = np.array([np.inf if name in self.bench.free else STANDS_OUT for name in self.hiding.names])
+        lower, upper = (-reach, reach) if beside is None else map(np.append, (-reach, reach), beside.bounds)
+        return sigma_of(miss_at, columns_at, start, known, (lower, upper))
 
     def _hiding_at(self, names: Sequence[str], given: Mapping[str, float]) -> Hiding:
         """What can hide an effect elsewhere."""

@@ -7,7 +7,7 @@ model without it can do:
     sigma^2 = min_x  |(change - moved(x)) / noise|^2 + |x|^2
 
 with x the parameters that are identified or known to a tolerance, in units of what is known of them beforehand.
-The search takes damped Gauss-Newton steps.
+The search takes damped Gauss-Newton steps within bounds.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from savgs_ident.core.free_vector import known_to_tolerance
 from savgs_ident.core.parameter import Parameter
@@ -23,14 +24,14 @@ from savgs_ident.fit.problem import used_parameters
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 
-STEPS = 12
+STEPS = 20
 """Steps of the search at most."""
 
-SHARES = (1.0, 0.3, 0.1)
+SHARES = (1.0, 0.3, 0.1, 0.03)
 """Shares of a step that are tried."""
 
-SETTLED = 0.8
-"""The search ends where a step leaves more than this of the square."""
+SETTLED = 0.9
+"""The search ends where a whole step leaves more than this of the square."""
 
 ENOUGH = 2.0
 """It ends as well below so many standard deviations: nobody could see that."""
@@ -87,10 +88,12 @@ def hiding_at(
     return Hiding(noise, names, np.stack(columns, axis=1))
 
 
-def _step(columns: Real, miss: Real, x: Real, known: int) -> Real:
-    """The step of the search from ``x``; its first ``known`` entries have priors."""
+def _step(columns: Real, miss: Real, x: Real, known: int, bounds: tuple[Real, Real] | None = None) -> Real:
+    """The step of the search from ``x``; its first ``known`` entries have priors, it does not leave the bounds."""
     stacked = np.concatenate([columns, np.eye(known, x.size)])
-    step: Real = np.linalg.lstsq(stacked, np.concatenate([miss, -x[:known]]), rcond=None)[0]
+    wanted = np.concatenate([miss, -x[:known]])
+    lower, upper = (-np.inf, np.inf) if bounds is None else (bounds[0] - x, bounds[1] - x)
+    step: Real = lsq_linear(stacked, wanted, (lower, upper), method="bvls").x
     return step
 
 
@@ -115,11 +118,12 @@ def sigma_of(
     columns_at: Callable[[Real, Real], Real],
     start: Real,
     known: int,
+    bounds: tuple[Real, Real],
 ) -> float:
     """How far a response stands out: the least sigma found from ``start`` (n,), with (m,) misses in noise.
 
     ``columns_at(x, miss)`` are minus the slopes of ``miss_at(x)``, (m, n); the first ``known`` entries of x have
-    priors. Steps that make it worse, or lead where there is no motion, are shortened.
+    priors, and x stays between ``bounds``. Steps that make it worse, or lead where there is no motion, are shortened.
     """
 
     def square(x: Real, miss: Real | None) -> float:
@@ -130,12 +134,13 @@ def sigma_of(
     for _ in range(STEPS):
         if miss is None or best < ENOUGH**2:
             break
-        step, before = _step(columns_at(x, miss), miss, x, known), best
+        step, before = _step(columns_at(x, miss), miss, x, known, bounds), best
         for share in SHARES:
-            found = miss_at(x + share * step)
-            if square(x + share * step, found) < best:
-                x, miss, best = x + share * step, found, square(x + share * step, found)
+            there = x + share * step
+            found = miss_at(there)
+            if square(there, found) < best:
+                x, miss, best = there, found, square(there, found)
                 break
-        if best > SETTLED * before:
+        if best == before or (share == 1.0 and best > SETTLED * before):
             break
     return float(np.sqrt(best))
