@@ -90,6 +90,15 @@ def test_what_calibration_can_do_does_not_stand_out_beside_another_effect_either
     assert drawing.sigma(response, mass) < 2.5
 
 
+def test_the_sizes_of_an_effect_end_where_its_parameters_do(drawing: Drawing) -> None:
+    mass = Present("unsprung_mass", {"unsprung_mass_change": 10.0}, 0.1, drawing.response)
+    lower, upper = mass.bounds
+    assert (lower.item(), upper.item()) == (-2.0, 4.0)
+    assert mass.at(upper)["unsprung_mass_change"] == 40.0
+    nothing = Present("unsprung_mass", {"unsprung_mass_change": 0.0}, 0.0, drawing.response)
+    assert (nothing.bounds[0].item(), nothing.bounds[1].item()) == (-np.inf, np.inf)
+
+
 def test_a_gain_stands_out_by_its_ratio_to_its_tolerance(drawing: Drawing) -> None:
     """The accelerometer's gain is known to half a per cent, and far better from the data than that."""
     response = drawing.solve(("accel_gain",), {**drawing.rig, "accel_gain_error": 0.035})

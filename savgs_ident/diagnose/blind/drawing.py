@@ -35,6 +35,10 @@ NUDGE = 0.02
 """Share of an effect's size by which it is changed for a slope."""
 
 
+TINY = 1e-300
+"""A shape's parameter is at least so much: its logarithm is a number."""
+
+
 @dataclass(frozen=True)
 class Present:
     """An effect of a size: its parameters [SI], its change of the response, the response with it alone."""
@@ -72,11 +76,12 @@ class Present:
         lower, upper = np.full(self.sizes, -np.inf), np.full(self.sizes, np.inf)
         for each in effect.parameters:
             value, ends = self.parameters[each.name], np.array([each.lower, each.upper])
-            if each.name in effect.null:
-                null = effect.null[each.name]
+            null = effect.null.get(each.name)
+            # A size of nothing remains nothing, whatever it is multiplied by.
+            if null is not None and value != null:
                 k, (low, high) = 0, np.sort((ends - null) / (value - null))
             elif each.name in shapes:
-                k, (low, high) = 1 + shapes.index(each.name), np.log(np.maximum(ends, 0.0) / value)
+                k, (low, high) = 1 + shapes.index(each.name), np.log(np.maximum(ends, TINY) / value)
             else:
                 continue
             lower[k], upper[k] = max(lower[k], low), min(upper[k], high)

@@ -24,13 +24,13 @@ from savgs_ident.fit.problem import used_parameters
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 
-STEPS = 20
+STEPS = 12
 """Steps of the search at most."""
 
 SHARES = (1.0, 0.3, 0.1, 0.03)
 """Shares of a step that are tried."""
 
-SETTLED = 0.9
+SETTLED = 0.8
 """The search ends where a whole step leaves more than this of the square."""
 
 ENOUGH = 2.0
