@@ -123,11 +123,7 @@ def judge(case: Case, tell: Tell) -> Judged:
         lambda: find_terms(search, base, plant.candidates, tell, plant.known),
         lambda: _attributed(case, base),
     )
-    findings = of_material_parts(
-        findings,
-        partial(_change_without, case),
-        lambda mode: _change(case, mode.prediction.rows - base.prediction.rows),
-    )
+    findings = of_material_parts(findings, partial(_change_without, case))
     best, besides = heaviest(findings), -np.inf
     left = left_over(search, base, best)
     if best.terms and left > EXPLAINED:

@@ -98,21 +98,14 @@ def heaviest(findings: Findings) -> Mode:
     return max((findings.base, *findings.modes), key=lambda mode: mode.evidence + prior_of(mode.terms, count))
 
 
-def of_material_parts(
-    findings: Findings, change: Callable[[Mode, Sequence[str]], Change], beyond: Callable[[Mode], Change]
-) -> Findings:
-    """The findings less the heaviest ones that need an effect which does too little to matter, or two for a trace.
+def of_material_parts(findings: Findings, change: Callable[[Mode, Sequence[str]], Change]) -> Findings:
+    """The findings less the heaviest ones that need an effect which does too little to matter.
 
-    What a wrong effect leaves, a trace of a second one often takes away: that does not make both of them right. And
-    two large ones that undo each other but for a trace are no explanation of it. ``change`` is what some terms of a
-    hypothesis do to the response, ``beyond`` what the whole of it does beyond the recalibrated baseline.
+    What a wrong effect leaves, a trace of a second one often takes away: that does not make both of them right.
+    ``change`` is what some terms of a hypothesis do to the response.
     """
     best = heaviest(findings)
-
-    def idle(mode: Mode) -> bool:
-        return beyond(mode).is_trace or any(not change(mode, (name,)).matters for name in mode.terms)
-
-    while len(best.terms) > 1 and idle(best):
+    while len(best.terms) > 1 and any(not change(best, (name,)).matters for name in best.terms):
         findings = replace(findings, modes=tuple(each for each in findings.modes if each is not best))
         best = heaviest(findings)
     return findings

@@ -15,7 +15,6 @@ from savgs_ident.diagnose.verdict import (
     LOCAL,
     MATERIAL,
     SURE,
-    TRACE,
     Change,
     Unknown,
     Weighed,
@@ -113,25 +112,9 @@ def test_an_effect_that_does_too_little_to_matter_is_no_part_of_a_pair(
     alone = _mode(500.0, "strut_friction")
     pair = _mode(800.0, "strut_friction", "rail_stribeck")
     changes = {"strut_friction": Change(0.1, 0.2), "rail_stribeck": trace}
-    findings = of_material_parts(
-        Findings(_mode(0.0), (), (pair, alone)), lambda _, gone: changes[gone[0]], lambda _: Change(0.1, 0.2)
-    )
+    findings = of_material_parts(Findings(_mode(0.0), (), (pair, alone)), lambda _, gone: changes[gone[0]])
     assert findings.best.terms == best
     assert alone in findings.modes
-
-
-@pytest.mark.parametrize(
-    ("beyond", "best"),
-    [(0.5 * TRACE, ("strut_friction",)), (2.0 * TRACE, ("strut_friction", "rail_stribeck"))],
-)
-def test_two_effects_that_undo_each_other_but_for_a_trace_explain_nothing(
-    beyond: float, best: tuple[str, ...]
-) -> None:
-    alone, pair = _mode(500.0, "strut_friction"), _mode(800.0, "strut_friction", "rail_stribeck")
-    findings = of_material_parts(
-        Findings(_mode(0.0), (), (pair, alone)), lambda *_: Change(0.1, 0.2), lambda _: Change(beyond, 0.0)
-    )
-    assert findings.best.terms == best
 
 
 def _score(name: str, evidence: float) -> Any:
