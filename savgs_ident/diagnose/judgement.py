@@ -14,18 +14,21 @@ from savgs_ident.diagnose.engine.climb import Mode, Search, climb, refine, searc
 from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.parallel import side_by_side
 from savgs_ident.diagnose.engine.search import EXPLAINED, Findings, Tell, find_terms, left_over
-from savgs_ident.diagnose.engine.strain import Strain, strain_of
+from savgs_ident.diagnose.engine.strain import strain_of
 from savgs_ident.diagnose.result import Kind
 from savgs_ident.diagnose.rig.comparison import rig_plant
 from savgs_ident.diagnose.rig.places import places_of
 from savgs_ident.diagnose.rig.plant import RigPlant
+from savgs_ident.diagnose.rig.seats import SEATS
 from savgs_ident.diagnose.settings import DiagnosisSettings
 from savgs_ident.diagnose.verdict import (
     Change,
+    Strained,
     Unknown,
     Weighed,
     heaviest,
     kind_of,
+    most_strained,
     of_material_parts,
     unknown_of,
     weigh,
@@ -57,7 +60,7 @@ class Judged:
         places: what a law at each port would explain.
         weighed: hypotheses by falling weight.
         unknown: what speaks most for something that the catalogue lacks.
-        strain: what the heaviest hypothesis asks of the sheet's tolerances.
+        strained: the tolerance that is most probably broken.
         kind: what may be said.
         chosen: the hypothesis that it rests on.
         left: share of the baseline's excess misfit that the heaviest hypothesis leaves.
@@ -68,7 +71,7 @@ class Judged:
     places: tuple[Attribution, ...]
     weighed: tuple[Weighed, ...]
     unknown: Unknown
-    strain: Strain
+    strained: Strained
     kind: Kind
     chosen: Weighed
     left: float
@@ -76,8 +79,14 @@ class Judged:
 
     @property
     def place(self) -> Attribution:
-        """Where something unknown would most probably sit."""
+        """Where a law of something unknown would most probably sit."""
         return max(self.places, key=lambda each: each.evidence)
+
+    @property
+    def seat(self) -> str:
+        """The port at which something unknown shows: that of a broken tolerance, if that is it, or of the law."""
+        broken = SEATS.get(self.strained.strain.parameter) if self.unknown.reason == "strain" else None
+        return self.place.name if broken is None else broken.value
 
 
 def recalibrate(
@@ -126,18 +135,19 @@ def judge(case: Case, tell: Tell) -> Judged:
     findings = of_material_parts(findings, partial(_change_without, case))
     best, besides = heaviest(findings), -np.inf
     left = left_over(search, base, best)
-    if best.terms and left > EXPLAINED:
+    # Two effects together imitate a third one well, but for a small rest.
+    if best.terms and left > (EXPLAINED if len(best.terms) == 1 else 0.0):
         tell(f"what {' + '.join(best.terms)} leaves")
         besides = anywhere(_attributed(case, best))
-    strain = strain_of(best, plant.nuisances)
+    strained = most_strained(findings, lambda mode: strain_of(mode, plant.nuisances))
     alone = anywhere(places)
     place = max(places, key=lambda each: each.evidence)
     if _change(case, place.held_out - base.prediction.rows).is_trace:
         alone = -np.inf
-    unknown = unknown_of(findings, alone, besides, best.evidence + strain.gain)
+    unknown = unknown_of(findings, alone, besides, strained.weight)
     weighed = weigh(findings, unknown)
     kind, chosen = kind_of(weighed, _change_without(case, best, best.terms), left)
-    return Judged(findings, tuple(places), tuple(weighed), unknown, strain, kind, chosen, left)
+    return Judged(findings, tuple(places), tuple(weighed), unknown, strained, kind, chosen, left)
 
 
 def settle(case: Case, judged: Judged, tell: Tell) -> tuple[Case, Judged]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.diagnose.engine.climb import Mode
 from savgs_ident.diagnose.engine.search import Findings
+from savgs_ident.diagnose.engine.strain import Strain
 from savgs_ident.diagnose.result import Kind
 
 PRIOR_NONE = 0.4
@@ -111,17 +112,41 @@ def of_material_parts(findings: Findings, change: Callable[[Mode, Sequence[str]]
     return findings
 
 
+class Strained(NamedTuple):
+    """A tolerance that does not hold: log weight, prior included, the strain, and the effects ``beside`` it."""
+
+    weight: float
+    strain: Strain
+    beside: tuple[str, ...]
+
+
+def most_strained(findings: Findings, strain: Callable[[Mode], Strain]) -> Strained:
+    """The broken tolerance that is most probable.
+
+    Beside the heaviest hypothesis; where this is a pair also beside nothing, for one broken tolerance is simpler than
+    two effects.
+    """
+
+    def broken(mode: Mode) -> Strained:
+        found, prior = strain(mode), prior_of(mode.terms, len(findings.scores)) + log(PRIOR_STRAINED)
+        return Strained(mode.evidence + found.gain + prior, found, mode.terms)
+
+    best = heaviest(findings)
+    modes = (best, findings.base) if len(best.terms) > 1 else (best,)
+    return max(map(broken, modes), key=lambda each: each.weight)
+
+
 def unknown_of(findings: Findings, alone: float, besides: float, strained: float) -> Unknown:
     """What speaks most for something unknown.
 
-    ``alone`` is the log evidence of a law learned at some port; ``besides`` that of one beside the heaviest
-    hypothesis, and ``strained`` that of this one if a tolerance does not hold: both less probable beforehand than it.
+    ``alone`` is the log evidence of a law learned at some port, ``besides`` that of one beside the heaviest
+    hypothesis, which is less probable beforehand than it; ``strained`` is the log weight of a broken tolerance.
     """
     prior = prior_of(heaviest(findings).terms, len(findings.scores))
     found = (
         Unknown(alone + log(PRIOR_UNKNOWN), "law"),
         Unknown(besides + log(PRIOR_UNKNOWN) + prior, "besides"),
-        Unknown(strained + log(PRIOR_STRAINED) + prior, "strain"),
+        Unknown(strained, "strain"),
     )
     return max(found, key=lambda each: each.weight)
 

@@ -27,7 +27,7 @@ def verdict_of(judged: Judged, rivals: tuple[str, ...], gap: Shrink) -> Verdict:
             f"shrinks from {_percent(gap.recalibrated)} recalibrated to {_percent(gap.after)} of the response; "
             f"the noise is {_percent(gap.floor)}."
         )
-        return Verdict(kind, (), (place.name,), (), sentence + _nearest(judged))
+        return Verdict(kind, (), (judged.seat,), (), sentence + _nearest(judged))
     one = len(chosen.effects) == 1
     ports = tuple(dict.fromkeys(CATALOGUE[name].port.value for name in chosen.effects))
     names = " and ".join(chosen.effects)
@@ -58,14 +58,14 @@ def _doubted(odds: float) -> str:
 
 def _nearest(judged: Judged) -> str:
     """How far the catalogue comes to something unknown."""
-    effects = " and ".join(heaviest(judged.findings).terms)
-    strain = judged.strain
     if judged.unknown.reason == "strain" and judged.weighed[0].name == "unknown":
+        strain, effects = judged.strained.strain, " and ".join(judged.strained.beside)
         short = f"With {effects} the" if effects else "The"
         return (
             f" {short} model would need {strain.parameter} {abs(strain.tolerances):.1f} tolerances "
-            f"{'above' if strain.tolerances > 0.0 else 'below'} its sheet."
+            f"{'above' if strain.tolerances > 0.0 else 'below'} its sheet, which shows at the port '{judged.seat}'."
         )
+    effects = " and ".join(heaviest(judged.findings).terms)
     if not effects:
         return ""
     left = 100.0 * judged.left

@@ -9,6 +9,7 @@ import pytest
 
 from savgs_ident.diagnose.engine.climb import Mode
 from savgs_ident.diagnose.engine.search import Findings
+from savgs_ident.diagnose.engine.strain import Strain
 from savgs_ident.diagnose.verdict import (
     CONFUSED,
     LEFT,
@@ -20,6 +21,7 @@ from savgs_ident.diagnose.verdict import (
     Weighed,
     heaviest,
     kind_of,
+    most_strained,
     odds_of,
     of_material_parts,
     probabilities,
@@ -134,7 +136,7 @@ def test_a_pair_must_be_better_by_what_it_is_less_probable_beforehand() -> None:
 
 @pytest.mark.parametrize(
     ("alone", "besides", "strained", "reason"),
-    [(600.0, -np.inf, 500.0, "law"), (400.0, 600.0, 500.0, "besides"), (400.0, 500.0, 600.0, "strain")],
+    [(600.0, -np.inf, 500.0, "law"), (400.0, 600.0, 500.0, "besides"), (400.0, 500.0, 595.0, "strain")],
 )
 def test_what_speaks_for_something_unknown_is_known(
     alone: float, besides: float, strained: float, reason: str
@@ -143,6 +145,20 @@ def test_what_speaks_for_something_unknown_is_known(
     found = unknown_of(findings, alone, besides, strained)
     assert found.reason == reason
     assert 590.0 < found.weight < 600.0
+
+
+@pytest.mark.parametrize(("pair", "beside"), [(510.0, ()), (560.0, ("rail_stribeck", "strut_friction"))])
+def test_a_broken_tolerance_is_held_against_a_pair(pair: float, beside: tuple[str, ...]) -> None:
+    """The baseline gains 540 from it and the pair nothing: one is simpler than two, unless two explain more."""
+    modes = (_mode(pair, "rail_stribeck", "strut_friction"), _mode(300.0, "rail_stribeck"))
+    gains = {(): 540.0, modes[0].terms: 0.0, modes[1].terms: 1000.0}
+    found = most_strained(
+        Findings(_mode(0.0), SCORES, modes), lambda mode: Strain(gains[mode.terms], "k_sd", 8.7)
+    )
+    assert found.beside == beside
+    assert found.weight == pytest.approx(
+        np.log(0.01) + (540.0 + np.log(0.4) if not beside else 560.0 + np.log(0.1 / 3.0))
+    )
 
 
 def test_an_effect_whose_fit_was_lost_is_not_judged_by_its_score() -> None:

@@ -10,7 +10,7 @@ from savgs_ident.diagnose.engine.search import Findings
 from savgs_ident.diagnose.engine.strain import Strain
 from savgs_ident.diagnose.judgement import Judged
 from savgs_ident.diagnose.result import Shrink
-from savgs_ident.diagnose.verdict import SURE, Reason, Unknown, Weighed
+from savgs_ident.diagnose.verdict import SURE, Reason, Strained, Unknown, Weighed
 from savgs_ident.diagnose.words import verdict_of, warnings_of
 
 GAP = Shrink(0.3, 0.04, 0.002, 0.0015, 0.99, (0.98, 1.0))
@@ -36,7 +36,7 @@ def _judged(kind: Any, reason: Reason, weights: dict[str, float], **more: Any) -
         places=(PLACE,),
         weighed=ranked,
         unknown=Unknown(weights["unknown"], reason),
-        strain=Strain(20.0, "k_t", -4.2),
+        strained=Strained(weights["unknown"], Strain(20.0, "k_t", -4.2), tuple(effects)),
         kind=kind,
         chosen=next(each for each in ranked if each.name == kind),
         left=0.08,
@@ -63,7 +63,10 @@ def test_something_unknown_is_told_with_how_near_the_catalogue_comes() -> None:
 )
 def test_a_tolerance_that_does_not_hold_is_named(weights: dict[str, float], start: str) -> None:
     verdict = verdict_of(_judged("unknown", "strain", weights), (), GAP)
-    assert verdict.sentence.endswith(f"{start} k_t 4.2 tolerances below its sheet.")
+    assert verdict.sentence.endswith(
+        f"{start} k_t 4.2 tolerances below its sheet, which shows at the port 'tyre_radial'."
+    )
+    assert verdict.ports == ("tyre_radial",)
 
 
 @pytest.mark.parametrize(
