@@ -13,7 +13,14 @@ from savgs_ident.diagnose.engine.attribution import Attribution, anywhere, attri
 from savgs_ident.diagnose.engine.climb import Mode, Search, climb, refine, search_of
 from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.parallel import side_by_side
-from savgs_ident.diagnose.engine.search import EXPLAINED, Findings, Tell, find_terms, left_over
+from savgs_ident.diagnose.engine.search import (
+    EXPLAINED,
+    Findings,
+    Tell,
+    find_terms,
+    left_over,
+    with_partners_among,
+)
 from savgs_ident.diagnose.engine.strain import strain_of
 from savgs_ident.diagnose.result import Kind
 from savgs_ident.diagnose.rig.comparison import rig_plant
@@ -22,6 +29,7 @@ from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.diagnose.rig.seats import SEATS
 from savgs_ident.diagnose.settings import DiagnosisSettings
 from savgs_ident.diagnose.verdict import (
+    LEFT,
     Change,
     Strained,
     Unknown,
@@ -35,6 +43,9 @@ from savgs_ident.diagnose.verdict import (
 )
 from savgs_ident.effects.registry import CATALOGUE
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+
+NEAREST = 2
+"""Ports of what a hypothesis leaves whose effects are tried: at the first may sit a stand-in of the hypothesis."""
 
 
 @dataclass(frozen=True)
@@ -132,13 +143,9 @@ def judge(case: Case, tell: Tell) -> Judged:
         lambda: find_terms(search, base, plant.candidates, tell, plant.known),
         lambda: _attributed(case, base),
     )
-    findings = of_material_parts(findings, partial(_change_without, case))
-    best, besides = heaviest(findings), -np.inf
+    findings, besides = _rest(case, of_material_parts(findings, partial(_change_without, case)), tell)
+    best = heaviest(findings)
     left = left_over(search, base, best)
-    # Two effects together imitate a third one well, but for a small rest.
-    if best.terms and left > (EXPLAINED if len(best.terms) == 1 else 0.0):
-        tell(f"what {' + '.join(best.terms)} leaves")
-        besides = anywhere(_attributed(case, best))
     strained = most_strained(findings, lambda mode: strain_of(mode, plant.nuisances))
     alone = anywhere(places)
     place = max(places, key=lambda each: each.evidence)
@@ -148,6 +155,28 @@ def judge(case: Case, tell: Tell) -> Judged:
     weighed = weigh(findings, unknown)
     kind, chosen = kind_of(weighed, _change_without(case, best, best.terms), left)
     return Judged(findings, tuple(places), tuple(weighed), unknown, strained, kind, chosen, left)
+
+
+def _rest(case: Case, findings: Findings, tell: Tell) -> tuple[Findings, float]:
+    """The findings, and the log evidence of a law beside the heaviest of them, if this leaves something.
+
+    Where it leaves much, the effects at the ports where such a law explains most are tried beside its members.
+    """
+    best, search, candidates = heaviest(findings), case.search, case.plant.candidates
+    left = left_over(search, case.base, best)
+    # Two effects together imitate a third one well, but for a small rest.
+    if not best.terms or left <= (EXPLAINED if len(best.terms) == 1 else 0.0):
+        return findings, -np.inf
+    tell(f"what {' + '.join(best.terms)} leaves")
+    places = _attributed(case, best)
+    if left > LEFT:
+        ports = {each.name for each in sorted(places, key=lambda each: -each.evidence)[:NEAREST]}
+        near = [term for term in candidates if CATALOGUE[term.name].port.value in ports]
+        more = with_partners_among(search, findings, near, best, candidates, tell)
+        findings = of_material_parts(more, partial(_change_without, case))
+        if heaviest(findings).terms != best.terms:
+            return _rest(case, findings, tell)
+    return findings, anywhere(places)
 
 
 def settle(case: Case, judged: Judged, tell: Tell) -> tuple[Case, Judged]:

@@ -16,7 +16,13 @@ from savgs_ident.diagnose.engine.heldout import FOLDS, hold_out
 from savgs_ident.diagnose.engine.misfit import misfit_of
 from savgs_ident.diagnose.engine.prediction import Prediction, Term
 from savgs_ident.diagnose.engine.score import cosine, score_terms
-from savgs_ident.diagnose.engine.search import Findings, excess, find_terms, left_over
+from savgs_ident.diagnose.engine.search import (
+    Findings,
+    excess,
+    find_terms,
+    left_over,
+    with_partners_among,
+)
 
 from .toy import TERMS, ToyPlant, draw
 
@@ -281,6 +287,22 @@ def test_a_double_of_one_of_two_is_not_named_in_its_place(seed: int, monkeypatch
     findings = find_terms(search, climb(search, (), {}, None), (SHAPES[0], SHAPES[1], double), _silent)
     assert findings.scores[0].term.name == "double"
     assert set(findings.best.terms) == {"round", "wavy"}
+
+
+def test_a_partner_at_the_place_of_what_is_left_is_found_beside_the_right_member() -> None:
+    plant = _Shapes()
+    search = search_of(plant, draw(plant, {"a": 1.0, "b": 0.3, "d": 0.15}, NOISE, 1))
+    base = climb(search, (), {}, None)
+    by_name = {term.name: term for term in SHAPES}
+    alone = climb(search, (by_name["round"],), {}, None)
+    wrong = climb(search, (by_name["round"], by_name["other"]), {}, None)
+    assert left_over(search, base, wrong) > 0.0
+    found = with_partners_among(
+        search, Findings(base, (), (wrong, alone)), [by_name["wavy"]], wrong, SHAPES, _silent
+    )
+    assert found.best.terms == ("round", "wavy")
+    assert left_over(search, base, found.best) < 0.01
+    assert {mode.terms for mode in found.modes} >= {wrong.terms, alone.terms}
 
 
 def test_a_place_that_may_follow_another_law_is_not_much_less_probable_for_it() -> None:

@@ -6,7 +6,7 @@ the noise, or strain what is known to a tolerance.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,6 +142,24 @@ def find_terms(
         if pairs and pairs[0].evidence > ranked[0].evidence:
             pairs = _with_doubles(search, pairs, scores, terms, tell)
     return _findings(base, scores, [*wholes, *ranked, *pairs])
+
+
+def with_partners_among(
+    search: Search, findings: Findings, near: Sequence[Term], best: Mode, terms: Sequence[Term], tell: Tell
+) -> Findings:
+    """The findings, and pairs of each member of the hypothesis ``best`` with each of the terms ``near``.
+
+    Beside a stand-in the right partner shows little: it has to be tried beside the right member alone.
+    """
+    pairs: list[Mode] = []
+    tried = {frozenset(mode.terms) for mode in findings.modes}
+    parents = [mode for mode in findings.modes if len(mode.terms) == 1 and mode.terms[0] in best.terms]
+    for parent in parents:
+        others = [term for term in near if frozenset({*parent.terms, term.name}) not in tried]
+        others = [term for term in others if term.name not in parent.terms]
+        pairs += _fitted(search, parent, score_terms(search, parent, others), terms, tell)
+    refined = _refined(search, [*findings.modes, *pairs], terms, tell)
+    return replace(_findings(findings.base, findings.scores, refined), lost=findings.lost)
 
 
 def _findings(base: Mode, scores: Sequence[Score], modes: Sequence[Mode]) -> Findings:
