@@ -158,8 +158,8 @@ def with_partners_among(
         others = [term for term in near if frozenset({*parent.terms, term.name}) not in tried]
         others = [term for term in others if term.name not in parent.terms]
         pairs += _fitted(search, parent, score_terms(search, parent, others), terms, tell)
-    refined = _refined(search, [*findings.modes, *pairs], terms, tell)
-    return replace(_findings(findings.base, findings.scores, refined), lost=findings.lost)
+    more = _findings(findings.base, findings.scores, _refined(search, [*findings.modes, *pairs], terms, tell))
+    return replace(more, lost=(*findings.lost, *more.lost))
 
 
 def _findings(base: Mode, scores: Sequence[Score], modes: Sequence[Mode]) -> Findings:
