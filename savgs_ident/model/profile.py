@@ -73,6 +73,19 @@ def _smooth_rise(share: Scalar) -> Scalar:
     return share**3 * (10.0 + share * (6.0 * share - 15.0))
 
 
+class Faded(AbstractProfile):
+    """A profile that grows from nothing during the first ``fade`` [s] and is gone ``fade`` after ``end`` [s]."""
+
+    inner: AbstractProfile
+    end: Number = eqx.field(converter=jnp.asarray)
+    fade: Number = eqx.field(converter=jnp.asarray)
+
+    def value(self, t: Scalar) -> Scalar:
+        """The quantity at time ``t`` [s]."""
+        going = 1.0 - _smooth_rise((t - self.end) / self.fade)
+        return self.inner.value(t) * _smooth_rise(t / self.fade) * going
+
+
 class LinearSweep(AbstractProfile):
     """amplitude sin(phi(t)) with a frequency dphi/dt that runs linearly and then stays.
 

@@ -30,7 +30,6 @@ Vector = Float[Array, " n"]
 
 class _Progress(NamedTuple):
     root: Vector
-    residual: Vector
     step_left: Float[Array, ""]
     iterations: Array
 
@@ -75,18 +74,17 @@ def find_root(
 
     def newton(function: Callable[[Vector], Vector], start: Vector) -> Vector:
         def advance(now: _Progress) -> _Progress:
-            _, slope = jax.linearize(function, now.root)
+            residual, slope = jax.linearize(function, now.root)
             jacobian = _columns(slope, now.root)
-            root = now.root - solve(jacobian, now.residual)
-            residual = function(root)
+            root = now.root - solve(jacobian, residual)
             # Where the same piece holds at the new point, the step that is left is what the old Jacobian says.
-            step_left = jnp.max(jnp.abs(solve(jacobian, residual)) / scale)
-            return _Progress(root, residual, step_left, now.iterations + 1)
+            step_left = jnp.max(jnp.abs(solve(jacobian, function(root))) / scale)
+            return _Progress(root, step_left, now.iterations + 1)
 
         def unfinished(now: _Progress) -> Array:
             return (now.step_left > precision) & (now.iterations < LIMIT)
 
-        begin = _Progress(start, function(start), jnp.asarray(jnp.inf, start.dtype), jnp.asarray(0))
+        begin = _Progress(start, jnp.asarray(jnp.inf, start.dtype), jnp.asarray(0))
         end = jax.lax.while_loop(unfinished, advance, begin)
         return jnp.where(end.step_left <= precision, end.root, jnp.nan)
 

@@ -26,7 +26,8 @@ def _readings(model: QuarterCar, p: Values, trajectory: Trajectory) -> Float[Arr
     return jnp.stack(at_nodes(trajectory.x[1], trajectory.y[0]), axis=-1)
 
 
-def _analyse(signals: Float[Array, "P C"], mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
+def analyse(signals: Float[Array, "P C"], mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
+    """Complex harmonics 0..orders of C signals at the nodes of a mesh, in their own units."""
     twice = jnp.full(orders + 1, 2.0).at[0].set(1.0)
     kernel = twice * jnp.conj(turns(mesh.phase, orders))
     terms = signals[:, :, None] * (kernel * jnp.asarray(mesh.weight)[:, None])[:, None, :]
@@ -49,7 +50,7 @@ def harmonics_of(
     model: QuarterCar, p: Values, motions: Trajectory, known: PeriodicSolution, orders: int
 ) -> Complex[Array, "D C K"]:
     """The same of motions on the nodes of a ``known`` solution, as a part of a larger program that is compiled."""
-    seen = _analyse(_readings(model, p, motions), known.mesh, orders)
+    seen = analyse(_readings(model, p, motions), known.mesh, orders)
     return seen * _sensors(model, p, known.excitation.frequency, orders)
 
 

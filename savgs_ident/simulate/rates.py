@@ -38,11 +38,13 @@ def solve_rates(
     s: Float[Array, " s"],
     inputs: Inputs,
     curves: SectionCurves | None = None,
+    near: Float[Array, " y"] | None = None,
 ) -> Rates:
     """Accelerations and rates that make the residual vanish; NaN where there are none.
 
-    ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`. Differentiable in everything,
-    exactly, by the implicit function theorem.
+    ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`; ``near`` (2 + s,) are accelerations
+    and rates of a moment ago, from where they are found sooner. Differentiable in everything, exactly, by the
+    implicit function theorem.
     """
 
     def residual(y: Array) -> Array:
@@ -50,5 +52,6 @@ def solve_rates(
         return model.residual(p, motion, s, y[2:], inputs, curves)
 
     rates = [state.scale / STATE_TIME for state in model.states]
-    y = find_root(residual, jnp.zeros(2 + len(rates)), jnp.asarray([*ACCELERATION_SCALE, *rates]))
+    start = jnp.zeros(2 + len(rates)) if near is None else near
+    y = find_root(residual, start, jnp.asarray([*ACCELERATION_SCALE, *rates]))
     return Rates(Coordinates(y[0], y[1]), y[2:])

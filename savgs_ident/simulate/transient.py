@@ -130,9 +130,10 @@ def _inputs_and_rates(
     t: Array,
     now: RigState,
     curves: SectionCurves | None = None,
+    near: Array | None = None,
 ) -> tuple[Inputs, Rates]:
     inputs = Inputs(road.at(t), link.link(t, now.actuation), road.cam_at(t))
-    return inputs, solve_rates(model, p, now.q, now.qd, now.s, inputs, curves)
+    return inputs, solve_rates(model, p, now.q, now.qd, now.s, inputs, curves, near)
 
 
 def state_rates(
@@ -143,12 +144,14 @@ def state_rates(
     t: Float[Array, ""],
     now: RigState,
     curves: SectionCurves | None = None,
+    near: Float[Array, " y"] | None = None,
 ) -> RigState:
     """Time derivative of the state: the right side of the differential equations.
 
-    ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`.
+    ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`, ``near`` as in
+    :func:`savgs_ident.simulate.rates.solve_rates`.
     """
-    inputs, rates = _inputs_and_rates(model, p, road, link, t, now, curves)
+    inputs, rates = _inputs_and_rates(model, p, road, link, t, now, curves, near)
     strut = model.loads(p, Motion(now.q, now.qd, rates.qdd), now.s, rates.sd, inputs, curves).strut
     load = link_torque(p, strut, now.q.theta_LW, inputs.link.angle)
     return RigState(now.qd, rates.qdd, rates.sd, link.rate(p, t, now.actuation, load))
@@ -158,11 +161,13 @@ def _scales(model: QuarterCar, link: AbstractActuation) -> Float[Array, " x"]:
     return jnp.asarray([*STATE_SCALE, *(state.scale for state in model.states), *link.scales])
 
 
-def _pack(state: RigState) -> Float[Array, " x"]:
+def pack_state(state: RigState) -> Float[Array, " x"]:
+    """The state as one vector: coordinates, velocities, internal states, states of what moves the link."""
     return jnp.concatenate([jnp.stack([*state.q, *state.qd]), state.s, state.actuation])
 
 
-def _unpack(model: QuarterCar, x: Float[Array, " x"]) -> RigState:
+def unpack_state(model: QuarterCar, x: Float[Array, " x"]) -> RigState:
+    """The state that :func:`pack_state` made a vector of."""
     end = 4 + len(model.states)
     return RigState(Coordinates(x[0], x[1]), Coordinates(x[2], x[3]), x[4:end], x[end:])
 
@@ -179,7 +184,7 @@ def _integrate(
     curves: SectionCurves,
 ) -> dfx.Solution:
     def rates(t: object, x: Array, args: None) -> Array:
-        return _pack(state_rates(model, p, road, link, jnp.asarray(t), _unpack(model, x), curves))
+        return pack_state(state_rates(model, p, road, link, jnp.asarray(t), unpack_state(model, x), curves))
 
     def out_of_range(t: Array, x: Array, args: None, **kwargs: object) -> Array:
         return jnp.abs(x[1]) > TRAVEL
@@ -198,7 +203,7 @@ def _integrate(
         times[0],
         times[-1],
         FIRST_STEP,
-        _pack(start),
+        pack_state(start),
         saveat=dfx.SaveAt(ts=times),
         stepsize_controller=controller,
         event=dfx.Event(out_of_range),
@@ -222,7 +227,7 @@ def _observe(
     curves: SectionCurves,
 ) -> TransientSolution:
     def one(at: tuple[Array, Array]) -> tuple[RigState, Inputs, Motion, Array, Readings]:
-        t, now = at[0], _unpack(model, at[1])
+        t, now = at[0], unpack_state(model, at[1])
         inputs, rates = _inputs_and_rates(model, p, road, link, t, now, curves)
         seen = model.read(p, now.q.theta_LW, rates.qdd.z_s)
         shown = seen._replace(

@@ -1,0 +1,1 @@
+"""Control on the identified model: linear equivalents, H-infinity design, the loop closed on the nonlinear rig."""

@@ -1,0 +1,131 @@
+"""What a run is worth: comfort, road holding, and what the drive had to do for it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.control.closed_loop.programme import REST, LoopTest
+from savgs_ident.control.closed_loop.run import ClosedLoopRun, Signals
+from savgs_ident.model.values import Values
+
+LEFT = 0.05
+"""Share of the largest deflection of a run that may still move when the road has stood still for a while."""
+
+AT_LIMIT = 0.999
+"""From this share of a limit on, the limit counts as reached."""
+
+RPM = 30.0 / np.pi
+"""Turns per minute of one rad/s."""
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Ride:
+    """How the rig rode during the test: rms about the mean of acceleration [m/s^2], deflection [m], tyre load [N].
+
+    ``lifts`` is the share of time without contact [1]; ``stable`` whether the motion ended with the road.
+    """
+
+    sprung_accel: float
+    susp_deflection: float
+    tyre_load: float
+    lifts: float
+    stable: bool
+
+
+@dataclass(frozen=True)
+class DriveUse:
+    """What the drive did during the test.
+
+    Attributes:
+        speed_peak_rpm: of the motor [1/min].
+        saturated: share of time in which more speed was asked for than the drive gives [1].
+        saturated_from: when that was so first [s]; None if never.
+        angle_deg: least and greatest link angle [deg].
+        power_peak: largest power at the motor's shaft [W].
+        energy: electric energy taken less what was given back [J].
+        returned: electric energy given back [J].
+    """
+
+    speed_peak_rpm: float
+    saturated: float
+    saturated_from: float | None
+    angle_deg: tuple[float, float]
+    power_peak: float
+    energy: float
+    returned: float
+
+
+def _judged(signals: Signals, test: LoopTest) -> NDArray[np.bool_]:
+    time = np.asarray(signals.time)
+    return (time >= test.start) & (time < test.end)
+
+
+def _rms(values: Array) -> float:
+    return float(np.std(values))
+
+
+def _settles(signals: Signals) -> bool:
+    """Whether the deflection stands still at the end, compared with what it was."""
+    time, deflection = np.asarray(signals.time), np.asarray(signals.susp_deflection)
+    last = deflection[time >= time[-1] - 0.25 * REST]
+    return bool(np.ptp(last) <= LEFT * np.ptp(deflection))
+
+
+def ride_of(run: ClosedLoopRun, test: LoopTest) -> Ride:
+    """How a run rode."""
+    if not run.status.ok:
+        return Ride(np.nan, np.nan, np.nan, np.nan, stable=False)
+    signals, judged = run.signals, _judged(run.signals, test)
+    return Ride(
+        _rms(np.asarray(signals.sprung_accel)[judged]),
+        _rms(np.asarray(signals.susp_deflection)[judged]),
+        _rms(np.asarray(signals.tyre_load)[judged]),
+        float(np.mean(np.asarray(signals.tyre_load)[judged] <= 0.0)),
+        _settles(signals),
+    )
+
+
+def drive_use(run: ClosedLoopRun, test: LoopTest, p: Values) -> DriveUse:
+    """What the drive did in a run that ended well."""
+    signals, judged = run.signals, _judged(run.signals, test)
+    ratio, limit = float(p["motor_gear_ratio"]), float(p["motor_speed_limit"])
+    time = np.asarray(signals.time)[judged]
+    speed = ratio * np.asarray(signals.link_velocity)[judged]
+    beyond = ratio * np.abs(np.asarray(signals.asked)[judged]) >= AT_LIMIT * limit
+    angle = np.degrees(np.asarray(signals.link_angle)[judged])
+    electric = np.asarray(signals.electric_power)[judged]
+    step = float(time[1] - time[0])
+    return DriveUse(
+        float(np.max(np.abs(speed))) * RPM,
+        float(np.mean(beyond)),
+        float(time[beyond][0]) if beyond.any() else None,
+        (float(np.min(angle)), float(np.max(angle))),
+        float(np.max(np.asarray(signals.shaft_power)[judged])),
+        float(np.sum(electric)) * step,
+        float(-np.sum(np.minimum(electric, 0.0))) * step,
+    )
+
+
+@dataclass(frozen=True)
+class Gain:
+    """The active rig against the passive one, in per cent: positive is less motion."""
+
+    sprung_accel: float
+    susp_deflection: float
+    tyre_load: float
+
+
+def gain_of(passive: Ride, active: Ride) -> Gain:
+    """By how much the rms values fell [%]; a rig that did not move gains nothing."""
+
+    def fell(before: float, after: float) -> float:
+        return 100.0 * (1.0 - after / before) if before > 0.0 else 0.0
+
+    return Gain(
+        fell(passive.sprung_accel, active.sprung_accel),
+        fell(passive.susp_deflection, active.susp_deflection),
+        fell(passive.tyre_load, active.tyre_load),
+    )

@@ -1,0 +1,247 @@
+"""One closed-loop run: rig, drive, instruments and law in one diffrax solve.
+
+The law samples the instruments at its rate; what it asks for is held from the next sample on, since the computer
+needs the time between two. Between samples the rig and the drive move continuously, by steps of
+:mod:`savgs_ident.control.closed_loop.stabilised`. A step of the solve is a frame of :data:`FRAME` samples; what
+happened at each of them is kept.
+"""
+
+from functools import partial
+from typing import Any, ClassVar, NamedTuple
+
+import diffrax as dfx
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from savgs_ident.control.closed_loop.failure import Failure
+from savgs_ident.control.closed_loop.instruments import NUMBER, Instruments
+from savgs_ident.control.closed_loop.laws import AbstractLaw
+from savgs_ident.control.closed_loop.stabilised import stabilised_step
+from savgs_ident.core.status import Status
+from savgs_ident.model.actuation import link_torque
+from savgs_ident.model.drive import Drive, VelocityReference, drive_state
+from savgs_ident.model.dynamics import Coordinates, Motion
+from savgs_ident.model.equilibrium import deflection_zero
+from savgs_ident.model.inputs import Inputs
+from savgs_ident.model.kinematics import suspension_travel
+from savgs_ident.model.profile import Constant
+from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.road import RoadMotion
+from savgs_ident.model.section import SectionCurves
+from savgs_ident.model.values import Values
+from savgs_ident.simulate.transient import pack_state, rest_state, state_rates, unpack_state
+
+FRAME = 20
+"""Samples of the law in one step of the solve."""
+
+SEED = 1
+"""Of the instruments' noise."""
+
+
+class Loop(NamedTuple):
+    """All that closes the loop around a rig: ``rate`` [1/s] is the law's."""
+
+    law: AbstractLaw
+    instruments: Instruments
+    failure: Failure
+    rate: float
+
+
+class Signals(NamedTuple):
+    """What happened at every sample, each (n,); SI.
+
+    Attributes:
+        time: [s].
+        road: height of the plate [m].
+        sprung_accel: true acceleration of the sprung mass [m/s^2].
+        susp_deflection: true deflection from standstill at the nominal link angle [m].
+        tyre_load: F_tz [N].
+        link_angle: [rad].
+        link_velocity: [rad/s].
+        asked: link velocity that the law asks for [rad/s].
+        motor_torque: of the motor [N m].
+        shaft_power: that the motor gives to its shaft [W].
+        electric_power: that the motor takes [W]; negative while it gives back.
+    """
+
+    time: Array
+    road: Array
+    sprung_accel: Array
+    susp_deflection: Array
+    tyre_load: Array
+    link_angle: Array
+    link_velocity: Array
+    asked: Array
+    motor_torque: Array
+    shaft_power: Array
+    electric_power: Array
+
+
+class ClosedLoopRun(NamedTuple):
+    """A run: its signals as arrays, and how it ended."""
+
+    signals: Signals
+    status: Status
+
+
+class _LoopState(NamedTuple):
+    """State of rig and drive, their last rates, the law's state, what it asked for and what is held; the frame."""
+
+    rig: Float[Array, " x"]
+    rates: Float[Array, " x"]
+    law: Float[Array, " c"]
+    asked: Float[Array, ""]
+    kept: Float[Array, "frame signals"]
+
+
+class _Case(NamedTuple):
+    model: QuarterCar
+    p: Values
+    curves: SectionCurves
+    road: RoadMotion
+    loop: Loop
+    zero: Float[Array, ""]
+    noise: Float[Array, "frames frame 3"]
+
+
+def _drive_of(case: _Case, asked: Array) -> Drive:
+    return Drive(VelocityReference(Constant(asked)), case.p["psi_nominal"])
+
+
+def _values_at(case: _Case, t: Array) -> Values:
+    share = case.loop.failure.drive_at(t)
+    limits = {name: share * case.p[name] for name in ("motor_peak_torque", "motor_peak_power")}
+    return {**case.p, **limits}
+
+
+def _field(case: _Case, asked: Array, t: Array, x: Array, near: Array) -> Array:
+    """Rates of rig and drive while the law's command is held."""
+    start = near[2 : 4 + len(case.model.states)]
+    now = unpack_state(case.model, x)
+    drive = _drive_of(case, asked)
+    return pack_state(
+        state_rates(case.model, _values_at(case, t), case.road, drive, t, now, case.curves, start)
+    )
+
+
+def _sample(case: _Case, t: Array, x: Array, rates: Array, held: Array) -> tuple[Array, Array]:
+    """True values for the instruments (3,), and the row that is kept."""
+    now, change = unpack_state(case.model, x), unpack_state(case.model, rates)
+    drive = _drive_of(case, held)
+    inputs = Inputs(case.road.at(t), drive.link(t, now.actuation), case.road.cam_at(t))
+    motion = Motion(now.q, now.qd, Coordinates(*change.qd))
+    loads = case.model.loads(case.p, motion, now.s, change.s, inputs, case.curves)
+    deflection = suspension_travel(case.model.effective(case.p), now.q.theta_LW) - case.zero
+    acceleration, motor = change.qd.z_s, drive_state(now.actuation)
+    p = _values_at(case, t)
+    load = link_torque(p, loads.strut, now.q.theta_LW, motor.angle)
+    inside = drive.signals(p, t, now.actuation, load)
+    speed = p["motor_gear_ratio"] * motor.velocity
+    voltage, current = jnp.stack(inside.voltage), jnp.stack(motor.current)
+    row = Signals(
+        t,
+        inputs.road.height,
+        acceleration,
+        deflection,
+        loads.vertical,
+        motor.angle,
+        motor.velocity,
+        held,
+        inside.torque,
+        inside.torque * speed,
+        1.5 * voltage @ current,
+    )
+    return jnp.stack([acceleration, deflection, motor.angle]), jnp.stack(row)
+
+
+class _Sampled(dfx.AbstractSolver[None]):
+    """Steps of one frame: sample, ask, and move on by the stabilised method, :data:`FRAME` times."""
+
+    case: _Case
+    term_structure: ClassVar = dfx.ODETerm
+    interpolation_cls: ClassVar = dfx.LocalLinearInterpolation
+
+    def order(self, terms: object) -> int:
+        """Two, between samples."""
+        return 2
+
+    def init(self, terms: object, t0: object, t1: object, y0: object, args: object) -> None:
+        """Nothing is carried along but the state."""
+        return None
+
+    def func(self, terms: Any, t0: Any, y0: Any, args: Any) -> Any:
+        """The vector field."""
+        return terms.vf(t0, y0, args)
+
+    def step(
+        self, terms: Any, t0: Any, t1: Any, y0: Any, args: Any, solver_state: None, made_jump: Any
+    ) -> tuple[Any, None, dict[str, Any], None, Any]:
+        """One frame."""
+        loop, p = self.case.loop, self.case.p
+        step = (t1 - t0) / FRAME
+        number = jnp.round(t0 * loop.rate / FRAME).astype(jnp.int32)
+        fastest = p["motor_speed_limit"] / p["motor_gear_ratio"] * step
+
+        def one(now: _LoopState, at: tuple[Array, Array]) -> tuple[_LoopState, Array]:
+            share, normal = at
+            t = t0 + share * step
+            field = partial(_field, self.case, now.asked)
+            rates = field(t, now.rig, now.rates)
+            truth, row = _sample(self.case, t, now.rig, rates, now.asked)
+            readings = loop.failure.shown(t, loop.instruments.read(truth, normal))
+            law, asked = loop.law.command(now.law, readings, fastest)
+            rig, last = stabilised_step(field, t, now.rig, rates, step)
+            return _LoopState(rig, last, law, asked, now.kept), row
+
+        places = jnp.arange(FRAME, dtype=jnp.float64)
+        end, rows = jax.lax.scan(one, y0, (places, self.case.noise[number]))
+        end = end._replace(kept=rows)
+        return end, None, {"y0": y0, "y1": end}, None, dfx.RESULTS.successful
+
+
+@eqx.filter_jit
+def _solve(case: _Case, ends: Float[Array, " frames"]) -> tuple[Array, dfx.RESULTS]:
+    road, p = case.road, case.p
+    still = jnp.zeros(())
+    begin = pack_state(rest_state(case.model, p, road, _drive_of(case, still), ends[0], case.curves))
+    width = len(Signals._fields)
+    start = _LoopState(begin, jnp.zeros_like(begin), case.loop.law.start(), still, jnp.zeros((FRAME, width)))
+
+    def rates(t: object, y: _LoopState, args: None) -> _LoopState:
+        rig = _field(case, y.asked, jnp.asarray(t), y.rig, y.rates)
+        return jax.tree.map(jnp.zeros_like, y)._replace(rig=rig)
+
+    found = dfx.diffeqsolve(
+        dfx.ODETerm(rates),
+        _Sampled(case),
+        ends[0],
+        ends[-1],
+        None,
+        start,
+        saveat=dfx.SaveAt(steps=True, fn=lambda t, y, args: y.kept),
+        stepsize_controller=dfx.StepTo(ends),
+        adjoint=dfx.ForwardMode(),
+        max_steps=ends.shape[0],
+        throw=False,
+    )
+    kept = found.ys[: ends.shape[0] - 1]
+    return kept.reshape(-1, width), found.result
+
+
+def run_loop(model: QuarterCar, p: Values, road: RoadMotion, loop: Loop, duration: float) -> ClosedLoopRun:
+    """A run of ``duration`` [s], a whole number of frames, from rest at the nominal link angle."""
+    frames = round(duration * loop.rate / FRAME)
+    curves = model.curves(p)
+    noise = np.random.default_rng(SEED).standard_normal((frames, FRAME, NUMBER))
+    case = _Case(model, p, curves, road, loop, _zero(model, p, curves), jnp.asarray(noise))
+    rows, result = _solve(case, jnp.arange(frames + 1) * (FRAME / loop.rate))
+    signals = Signals(*np.asarray(rows).T)
+    finite = all(np.isfinite(each).all() for each in signals)
+    ended = bool(result == dfx.RESULTS.successful) and finite
+    return ClosedLoopRun(signals, Status.CONVERGED if ended else Status.NOT_FINITE)
+
+
+_zero = eqx.filter_jit(deflection_zero)

@@ -1,0 +1,135 @@
+"""A test of the closed loop as a whole: passive and active, failures, other rigs, causes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from savgs_ident.control.closed_loop.causes import Cause, measure_causes
+from savgs_ident.control.closed_loop.failure import KINDS, NOTHING, failing
+from savgs_ident.control.closed_loop.instruments import sheet_instruments
+from savgs_ident.control.closed_loop.laws import HoldLaw, hinf_law
+from savgs_ident.control.closed_loop.metrics import DriveUse, Gain, Ride, drive_use, gain_of, ride_of
+from savgs_ident.control.closed_loop.programme import LoopTest
+from savgs_ident.control.closed_loop.run import ClosedLoopRun, Loop, run_loop
+from savgs_ident.control.controller_file import DigitalController
+from savgs_ident.control.rigs import Rigs
+from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.values import Values, as_values
+
+FAILS_AT = 0.4
+"""When something fails, as a share of the time in which the test is judged."""
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A run in which something failed at ``time`` [s]."""
+
+    kind: str
+    time: float
+    run: ClosedLoopRun
+    ride: Ride
+
+
+@dataclass(frozen=True)
+class OnRig:
+    """What the loop gains on one rig of a set, and whether it is stable there, passive and active."""
+
+    gain: Gain
+    stable: bool
+
+
+@dataclass(frozen=True)
+class LoopStudy:
+    """A test with all that was found.
+
+    Attributes:
+        test: the test.
+        passive, active: the runs.
+        passive_ride, active_ride: how the rig rode in them.
+        gain: the active rig against the passive one.
+        drive: what the drive did.
+        failures: one run for each kind of failure.
+        rigs: the set of rigs that the loop was tried on; None if on no other.
+        on_rigs: how it did there.
+        causes: what stands between prediction and rig; empty if that was not asked for.
+    """
+
+    test: LoopTest
+    passive: ClosedLoopRun
+    active: ClosedLoopRun
+    passive_ride: Ride
+    active_ride: Ride
+    gain: Gain
+    drive: DriveUse
+    failures: tuple[Failed, ...]
+    rigs: Rigs | None
+    on_rigs: tuple[OnRig, ...]
+    causes: tuple[Cause, ...]
+
+    @property
+    def stable(self) -> bool:
+        """Whether the loop is stable on the rig and on all others that it was tried on."""
+        return self.active_ride.stable and all(each.stable for each in self.on_rigs)
+
+
+def loop_around(p: Values, controller: DigitalController) -> Loop:
+    """A controller with the instruments of the sheet, nothing failing."""
+    instruments = sheet_instruments(float(p["motor_gear_ratio"]))
+    return Loop(hinf_law(controller), instruments, failing(NOTHING, 0.0), controller.rate)
+
+
+def study_loop(
+    model: QuarterCar,
+    p: Values,
+    controller: DigitalController,
+    test: LoopTest,
+    progress: Callable[[str], None],
+    rigs: Rigs | None = None,
+    causes: bool = False,
+) -> LoopStudy:
+    """Run a test of a controller on a rig, with each failure, and on ``rigs``."""
+    loop = loop_around(p, controller)
+    hold = loop._replace(law=HoldLaw(p["psi_nominal"]))
+
+    def ran(values: Values, around: Loop) -> ClosedLoopRun:
+        return run_loop(model, values, test.road, around, test.duration)
+
+    progress(f"passive: {test.title}")
+    passive = ran(p, hold)
+    progress(f"active: {test.title}")
+    active = ran(p, loop)
+    before, after = ride_of(passive, test), ride_of(active, test)
+    when = test.start + FAILS_AT * (test.end - test.start)
+    failures = []
+    for kind in (kind for kind in KINDS if kind != NOTHING):
+        progress(f"failure: {KINDS[kind].about}")
+        run = ran(p, loop._replace(failure=failing(kind, when)))
+        failures.append(Failed(kind, when, run, ride_of(run, test)))
+    others = []
+    for number, values in enumerate(rigs.values if rigs else ()):
+        progress(f"rig {number + 1} of {len(rigs.values) if rigs else 0}")
+        others.append(_on_rig(as_values(values), ran, hold, loop, test))
+    found: list[Cause] = []
+    if causes:
+        for cause in measure_causes(model, p, hinf_law(controller), loop, test):
+            progress(f"cause: {cause.variant}")
+            found.append(cause)
+    return LoopStudy(
+        test,
+        passive,
+        active,
+        before,
+        after,
+        gain_of(before, after),
+        drive_use(active, test, p),
+        tuple(failures),
+        rigs,
+        tuple(others),
+        tuple(found),
+    )
+
+
+def _on_rig(
+    values: Values, ran: Callable[[Values, Loop], ClosedLoopRun], hold: Loop, loop: Loop, test: LoopTest
+) -> OnRig:
+    passive, active = (ride_of(ran(values, around), test) for around in (hold, loop))
+    return OnRig(gain_of(passive, active), passive.stable and active.stable)

@@ -1,0 +1,162 @@
+"""Describing functions: the friction and the damper of a motion as the linear elements that they are at its size.
+
+In a steady motion on the cam, the first harmonic of an element's force over that of its velocity is a complex gain
+
+    N(f, A) = F_1 / V_1 = -(c + k / (i w)),
+
+a damping c [N s/m] and a stiffness k [N/m] that hold at this frequency and amplitude. The rig with these in place of
+its rail, its damper and its tyre's friction is linear; a control design that is to work at the amplitude of the test,
+and not only at vanishing ones, starts from it.
+
+    solution = simulate_periodic(model, p, cam_excitation(frequency, 0.0275, np.pi / 2))
+    described = describe(model, p, solution)
+    described.damping, described.stiffness                  # (D, 3): rail, strut, tyre_lateral
+    quasi_linear_response(model, p, described)              # complex (D, 2), per metre of road
+"""
+
+from typing import NamedTuple
+
+import control
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from numpy.typing import NDArray
+
+from savgs_ident.control.linearisation import OperatingPoint, resting
+from savgs_ident.model.dynamics import Coordinates, Motion
+from savgs_ident.model.inputs import Inputs, nothing_imposed
+from savgs_ident.model.kinematics import suspension_travel
+from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.strut import Link
+from savgs_ident.model.tyre import Road
+from savgs_ident.model.values import Values
+from savgs_ident.simulate.harmonics import analyse
+from savgs_ident.simulate.imposed import loads_at_nodes
+from savgs_ident.simulate.periodic import PeriodicSolution
+
+ELEMENTS = ("rail", "strut", "tyre_lateral")
+"""Ports of the elements that are described: the rail's friction, the damper, the tyre's lateral friction."""
+
+OUTPUTS = ("sprung_accel", "susp_deflection")
+"""[m/s^2], [m]."""
+
+
+class Described(NamedTuple):
+    """Gains of the elements in D motions.
+
+    Attributes:
+        frequency: [Hz], (D,).
+        gain: complex, (D, 3), force over velocity [N s/m], elements as in :data:`ELEMENTS`.
+    """
+
+    frequency: NDArray[np.float64]
+    gain: NDArray[np.complex128]
+
+    @property
+    def damping(self) -> NDArray[np.float64]:
+        """c [N s/m], (D, 3)."""
+        return -self.gain.real
+
+    @property
+    def stiffness(self) -> NDArray[np.float64]:
+        """k [N/m], (D, 3)."""
+        return 2.0 * np.pi * self.frequency[:, None] * self.gain.imag
+
+
+@eqx.filter_jit
+def _first_harmonics(model: QuarterCar, p: Values, solution: PeriodicSolution) -> tuple[Array, Array]:
+    loads = loads_at_nodes(model, p, solution)
+    forces = jnp.stack([loads.rail, loads.ports["strut"].load, loads.lateral], axis=-1)
+    velocities = jnp.stack([loads.ports[port].velocity for port in ELEMENTS], axis=-1)
+    return analyse(forces, solution.mesh, 1)[:, :, 1], analyse(velocities, solution.mesh, 1)[:, :, 1]
+
+
+def describe(model: QuarterCar, p: Values, solution: PeriodicSolution) -> Described:
+    """The gains in periodic motions that were found; zero where an element does not move."""
+    force, velocity = (np.asarray(each) for each in _first_harmonics(model, p, solution))
+    gain = np.divide(force, velocity, out=np.zeros_like(force), where=velocity != 0.0)
+    return Described(np.asarray(solution.excitation.frequency), gain)
+
+
+class _Bare(NamedTuple):
+    """The rig without the elements, near rest: residual (2,), outputs (2,) and velocities of the elements (3,).
+
+    Each along the coordinates, their rates, their accelerations, the road's height and velocity, and forces of the
+    elements.
+    """
+
+    residual: tuple[Array, ...]
+    output: tuple[Array, ...]
+    velocity: Array
+
+
+@eqx.filter_jit
+def _bare_slopes(model: QuarterCar, p: Values, at: OperatingPoint) -> _Bare:
+    bare = QuarterCar(model.damper)
+    rig = model.effective(p)
+    undamped = {**rig, "c_sd": jnp.zeros_like(rig["c_sd"])}
+    zero = jnp.zeros(())
+
+    def everything(q: Array, qd: Array, qdd: Array, road: Array, forces: Array) -> tuple[Array, Array, Array]:
+        given = nothing_imposed(zero)._replace(rail=forces[0], strut=forces[1], tyre_lateral=forces[2])
+        inputs = Inputs(Road(road[0], road[1]), Link(at.link.angle, zero), None, given)
+        motion = Motion(Coordinates(q[0], q[1]), Coordinates(qd[0], qd[1]), Coordinates(qdd[0], qdd[1]))
+        none = jnp.zeros(0)
+        loads = bare.loads(undamped, motion, none, none, inputs)
+        seen = jnp.stack([rig["accel_gain"] * qdd[0], rig["deflection_gain"] * suspension_travel(rig, q[1])])
+        return (
+            bare.residual(undamped, motion, none, none, inputs),
+            seen,
+            jnp.stack([loads.ports[port].velocity for port in ELEMENTS]),
+        )
+
+    still = jnp.zeros(2)
+    found = jax.jacfwd(everything, argnums=(0, 1, 2, 3, 4))(
+        jnp.stack([*at.q]), still, still, still, jnp.zeros(3)
+    )
+    return _Bare(found[0], found[1], found[2][1])
+
+
+def _bare(model: QuarterCar, p: Values) -> _Bare:
+    at = resting(QuarterCar(model.damper), model.effective(p), p["psi_nominal"])
+    return jax.tree.map(np.asarray, _bare_slopes(model, p, at))
+
+
+def quasi_linear_response(model: QuarterCar, p: Values, described: Described) -> NDArray[np.complex128]:
+    """Response (D, 2) of the rig with the described elements, :data:`OUTPUTS` per metre of road."""
+    rig = _bare(model, p)
+    position, velocity, acceleration, road, force = rig.residual
+    rows = []
+    for frequency, gain in zip(described.frequency, described.gain, strict=True):
+        iw = 2j * np.pi * frequency
+        # The residual is a sum of forces: an element's force enters with its gain times its velocity.
+        elements = force @ (gain[:, None] * rig.velocity)
+        dynamic = position + iw * (velocity + elements) + iw**2 * acceleration
+        q = np.linalg.solve(dynamic, -(road[:, 0] + iw * road[:, 1]))
+        rows.append((rig.output[0] + iw**2 * rig.output[2]) @ q)
+    return np.array(rows)
+
+
+def quasi_linear_space(
+    model: QuarterCar, p: Values, damping: Float[np.ndarray, " 3"], stiffness: Float[np.ndarray, " 3"]
+) -> control.StateSpace:
+    """The rig near rest with dampings [N s/m] and stiffnesses [N/m] in place of its elements, as a state space.
+
+    States are coordinates, their rates and the road's height [m]; the input is the road's velocity [m/s].
+    """
+    rig = _bare(model, p)
+    position, velocity, acceleration, road, force = rig.residual
+    stiff = position - force @ (stiffness[:, None] * rig.velocity)
+    damped = velocity - force @ (damping[:, None] * rig.velocity)
+    a, b = np.zeros((5, 5)), np.zeros((5, 1))
+    a[0, 2] = a[1, 3] = b[4, 0] = 1.0
+    a[2:4] = np.linalg.solve(-acceleration, np.hstack([stiff, damped, road[:, :1]]))
+    b[2:4] = np.linalg.solve(-acceleration, road[:, 1:])
+    shown = np.hstack([rig.output[0], rig.output[1], np.zeros((2, 1))])
+    c, d = shown + rig.output[2] @ a[2:4], rig.output[2] @ b[2:4]
+    states = ("sprung_position", "wishbone_angle", "sprung_velocity", "wishbone_velocity", "road_height")
+    return control.ss(
+        a, b, c, d, states=states, inputs=("road_velocity",), outputs=OUTPUTS, name="quasi_linear"
+    )

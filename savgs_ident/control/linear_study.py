@@ -1,0 +1,232 @@
+"""The linear models of a rig side by side, and against the nonlinear one.
+
+Three questions, one record each: how k_eq, c_eq and alpha change with the link angle and how well constants and
+parabolas stand for them (Fig. 7); how far equation (8) and the exact linearisation are from the nonlinear rig at
+small motions, and why; how far the rig with describing functions is from it at the size of the test.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.control.approximation import Approximation, approximate
+from savgs_ident.control.describing_function import Described, describe, quasi_linear_response
+from savgs_ident.control.linear_equivalent import Equivalent, equivalents, resting_angles
+from savgs_ident.control.linearisation import linearise, resting
+from savgs_ident.control.quarter_car_space import TwoMasses, quarter_car_space
+from savgs_ident.control.two_masses import (
+    nominal_equivalent,
+    paper_masses,
+    with_damper_at_rest,
+    with_distributed_masses,
+)
+from savgs_ident.core.errors import InputError
+from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.values import Values
+from savgs_ident.simulate.excitation import cam_excitation
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import simulate_periodic
+
+CHANNELS = ("sprung_accel", "susp_deflection")
+"""[m/s^2] and [m], per metre of road."""
+
+LINK_DEG = np.linspace(0.0, 180.0, 181)
+"""Link angles of the curves [deg]."""
+
+WISHBONE_DEG = np.linspace(-10.0, 10.0, 21)
+"""Wishbone angles of the surfaces [deg]."""
+
+WORKING_DEG = (40.0, 140.0)
+"""Where the link works in a closed loop [deg]: the parabola is fitted there, too."""
+
+SMALL = 2e-6
+"""Peak to peak of a small cam [m]: at 0.1 mm the curvature of the damper alone is worth 1.6 %."""
+
+FREQUENCY = np.geomspace(0.5, 10.0, 25)
+"""Frequencies of the small motions [Hz]."""
+
+TEST_FREQUENCY = np.array([0.5, 1.0, 1.5, 1.75, 2.0, 2.2, 2.35, 2.5, 2.75, 3.0, 3.5, 4.0, 5.0, 6.0])
+"""Frequencies of the motions at the size of the test [Hz]."""
+
+EXACT = 0.01
+"""How far the exact linearisation may be from the nonlinear rig at small motions, relatively [1]."""
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class EquivalentStudy:
+    """k_eq [N/m], c_eq [N s/m], alpha [m/rad] over the link angle, the rig at rest, and over both angles.
+
+    Attributes:
+        link_deg: link angles [deg], (n,).
+        wishbone_deg: where the wishbone rests there [deg], (n,).
+        resting: the equivalent along them, each (n,).
+        surface: the equivalent over link angles and :data:`WISHBONE_DEG`, each (n, m).
+        nominal: the equivalent in the nominal state.
+        approximations: by name of what is approximated and by what.
+    """
+
+    link_deg: NDArray[np.float64]
+    wishbone_deg: NDArray[np.float64]
+    resting: Equivalent
+    surface: Equivalent
+    nominal: Equivalent
+    approximations: Mapping[str, Approximation]
+
+
+@dataclass(frozen=True)
+class SmallMotions:
+    """Responses to a small cam, complex (F, 2), :data:`CHANNELS` per metre of road.
+
+    Attributes:
+        frequency: [Hz], (F,).
+        nonlinear: the nonlinear rig without friction.
+        models: the linear ones by name, in the order in which simplifications are undone.
+        masses: the numbers behind those with two masses.
+        slow_link: suspension deflection per z_lin of a link that turns slowly [1], by the exact linearisation; 1 in
+            equation (8).
+    """
+
+    frequency: NDArray[np.float64]
+    nonlinear: Complex
+    models: Mapping[str, Complex]
+    masses: Mapping[str, TwoMasses]
+    slow_link: float
+
+    def error(self, name: str) -> float:
+        """Largest relative difference of a model to the nonlinear rig over frequencies and channels [1]."""
+        return float(np.max(np.abs(self.models[name] / self.nonlinear - 1.0)))
+
+
+@dataclass(frozen=True)
+class TestMotions:
+    """Responses to the cam of the test, friction included.
+
+    Attributes:
+        nonlinear: complex (D, 2), first harmonics of the nonlinear rig per metre of road.
+        quasi_linear: the same of the rig with describing functions.
+        described: the gains.
+    """
+
+    nonlinear: Complex
+    quasi_linear: Complex
+    described: Described
+
+    @property
+    def error(self) -> float:
+        """Largest relative difference over frequencies and channels [1]."""
+        return float(np.max(np.abs(self.quasi_linear / self.nonlinear - 1.0)))
+
+
+@dataclass(frozen=True)
+class LinearStudy:
+    """All three; ``at_test`` is None for a rig without friction."""
+
+    equivalents: EquivalentStudy
+    small: SmallMotions
+    at_test: TestMotions | None
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the exact linearisation is the nonlinear rig at small motions, as it must be."""
+        return self.small.error("exact linearisation") <= EXACT
+
+
+def study_equivalents(model: QuarterCar, p: Values) -> EquivalentStudy:
+    """The linear equivalent over the angles."""
+    bare, rig = QuarterCar(model.damper), model.effective(p)
+    link, wishbone = np.radians(LINK_DEG), np.radians(WISHBONE_DEG)
+    rest = resting_angles(bare, rig, jnp.asarray(link))
+    if not np.isfinite(rest).all():
+        raise InputError(
+            "the rig finds no rest at some link angle", remedy="mend the spring or the hardpoints of the rig"
+        )
+    along = _plain(equivalents(bare, rig, rest, jnp.asarray(link)))
+    pairs = np.meshgrid(wishbone, link)
+    surface = equivalents(bare, rig, *(jnp.asarray(each.ravel()) for each in pairs))
+    shape = (link.size, wishbone.size)
+    lowest, highest = WORKING_DEG
+    works = (lowest <= LINK_DEG) & (highest >= LINK_DEG)
+    approximations = {
+        f"{name} by a constant": approximate(link, getattr(along, name), 0)
+        for name in ("k_eq", "c_eq", "alpha")
+    }
+    approximations["alpha by a parabola"] = approximate(link, np.asarray(along.alpha), 2)
+    approximations["alpha by a parabola, working range"] = approximate(
+        link[works], np.asarray(along.alpha)[works], 2
+    )
+    return EquivalentStudy(
+        LINK_DEG,
+        np.degrees(np.asarray(rest)),
+        along,
+        _plain(Equivalent(*(part.reshape(shape) for part in surface))),
+        _plain(nominal_equivalent(model, p)),
+        approximations,
+    )
+
+
+def _plain(found: Equivalent) -> Equivalent:
+    numbers: Equivalent = jax.tree.map(np.asarray, found)
+    return numbers
+
+
+def study_small_motions(model: QuarterCar, p: Values) -> SmallMotions:
+    """The linear models and the nonlinear rig on a small cam, without friction."""
+    bare, rig = QuarterCar(model.damper), model.effective(p)
+    printed = paper_masses(model, p)
+    at_rest = with_damper_at_rest(model, p, printed)
+    masses = {
+        "equation (8)": printed,
+        "(8), damper's slope at rest": at_rest,
+        "(8), masses distributed, too": with_distributed_masses(model, p, at_rest),
+    }
+    iw = 2j * np.pi * FREQUENCY
+    models = {}
+    for name, numbers in masses.items():
+        response = quarter_car_space(numbers)(iw)
+        models[name] = np.stack([response[0, 0], response[1, 0]], axis=-1) * iw[:, None]
+    exact = linearise(bare, rig, resting(bare, rig, p["psi_nominal"]))
+    found = exact(iw)
+    seen = np.array([float(rig["accel_gain"]), float(rig["deflection_gain"])])
+    models["exact linearisation"] = np.stack([found[0, 0], found[1, 0]], axis=-1) * iw[:, None]
+    nonlinear = _first_harmonic(bare, rig, FREQUENCY, SMALL)[0] / seen
+    slow = 2j * np.pi * 1e-3
+    turned = exact(slow)[1, 1] * slow / float(nominal_equivalent(model, p).alpha)
+    return SmallMotions(FREQUENCY, nonlinear, models, masses, float(np.real(turned)))
+
+
+def study_test_motions(model: QuarterCar, p: Values) -> TestMotions:
+    """The rig with describing functions and the nonlinear one on the cam of the test."""
+    nonlinear, described = _first_harmonic(model, p, TEST_FREQUENCY, float(p["cam_peak_to_peak"]))
+    return TestMotions(nonlinear, quasi_linear_response(model, p, described), described)
+
+
+def _first_harmonic(
+    model: QuarterCar, p: Values, frequency: NDArray[np.float64], peak_to_peak: float
+) -> tuple[Complex, Described]:
+    """First harmonics of the readings per metre of road (D, 2), and the elements of the motions."""
+    solution = simulate_periodic(model, p, cam_excitation(frequency, peak_to_peak, float(p["psi_nominal"])))
+    lost = [f"{at:g}" for at, status in zip(frequency, solution.status(), strict=True) if not status.ok]
+    if lost:
+        raise InputError(
+            f"the periodic motion was not found at {', '.join(lost)} Hz", remedy="check the rig's numbers"
+        )
+    found = np.asarray(harmonics(model, p, solution, 1)[:, :, 1] / (peak_to_peak / 2.0), np.complex128)
+    return found, describe(model, p, solution)
+
+
+def study_linear(model: QuarterCar, p: Values, progress: Callable[[str], None]) -> LinearStudy:
+    """All of it. Raises :class:`InputError` where the rig finds no rest or no periodic motion."""
+    progress("linear equivalent over the link angle")
+    over_angles = study_equivalents(model, p)
+    progress("small motions: equation (8), exact linearisation, nonlinear rig")
+    small = study_small_motions(model, p)
+    if not model.effects:
+        return LinearStudy(over_angles, small, None)
+    progress("motions of the test: describing functions, nonlinear rig")
+    return LinearStudy(over_angles, small, study_test_motions(model, p))

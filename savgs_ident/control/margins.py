@@ -1,0 +1,78 @@
+"""How far the loop is from instability, where the controller's command leaves for the drive."""
+
+from dataclasses import dataclass
+
+import control
+import numpy as np
+from numpy.typing import NDArray
+
+LOWEST, HIGHEST = 1e-3, 1e3
+"""Frequencies between which loops are examined [Hz]."""
+
+POINTS = 1500
+"""How many of them."""
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Margins of a loop that is broken at its command.
+
+    Attributes:
+        stable: whether the closed loop is stable.
+        gain_up: least factor above one of the loop's gain that makes it unstable [1]; infinite if none does.
+        gain_down: greatest factor below one that does [1]; 0 if none does.
+        phase_deg: least phase that does [deg].
+        delay: least additional delay that does [s].
+        sensitivity: peak of the sensitivity 1/(1 + L) [1]: one over the least distance of L to -1.
+    """
+
+    stable: bool
+    gain_up: float
+    gain_down: float
+    phase_deg: float
+    delay: float
+    sensitivity: float
+
+
+def loop_of(plant: control.StateSpace, controller: control.StateSpace) -> control.StateSpace:
+    """The open loop L, with the sign for which 1 + L is the return difference."""
+    return -controller * plant
+
+
+def sensitivity_of(loop: control.StateSpace, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """1/(1 + L) at frequencies [Hz]."""
+    return np.asarray(1.0 / (1.0 + np.ravel(loop(2j * np.pi * frequency))))
+
+
+def margins_of(plant: control.StateSpace, controller: control.StateSpace) -> Margins:
+    """The margins of a controller on what it works on, from its command to its measurements."""
+    loop = loop_of(plant, controller)
+    poles = control.feedback(loop, 1.0).poles()
+    stable = bool(np.all(np.abs(poles) < 1.0 if loop.isdtime(strict=True) else poles.real < 0.0))
+    # On a fine grid, for sampled loops up to half the rate: polynomials of order twenty would lose their digits.
+    highest = np.pi / loop.dt if loop.isdtime(strict=True) else 2.0 * np.pi * HIGHEST
+    swept = control.frd(loop, np.geomspace(2.0 * np.pi * LOWEST, highest, POINTS), smooth=True)
+    gains, phases, distances, w_gain, w_phase, _ = control.stability_margins(swept, returnall=True)
+    ends = _ends(loop)
+    gains = np.concatenate([np.asarray(gains)[np.asarray(w_gain) > 0.0], -1.0 / ends[ends < 0.0]])
+    away = np.abs((np.asarray(phases) + 180.0) % 360.0 - 180.0)
+    # A phase lead of the return difference, seen from below, is a lag of 360 deg less it.
+    lags = np.where(np.asarray(phases) > 0.0, phases, np.asarray(phases) + 360.0)
+    delays = np.radians(lags) / np.asarray(w_phase)
+    nearest = np.concatenate([np.ravel(distances), np.abs(1.0 + np.ravel(swept.complex)), np.abs(1.0 + ends)])
+    return Margins(
+        stable,
+        float(np.min(gains[gains > 1.0], initial=np.inf)),
+        float(np.max(gains[gains < 1.0], initial=0.0)),
+        float(np.min(away, initial=180.0)),
+        float(np.min(delays, initial=np.inf)),
+        float(1.0 / np.min(nearest)),
+    )
+
+
+def _ends(loop: control.StateSpace) -> NDArray[np.float64]:
+    """The loop where it is real, as far as it is finite: at zero frequency, and at infinite or half the rate."""
+    sampled = loop.isdtime(strict=True)
+    lowest = loop(1.0 if sampled else 0.0, warn_infinite=False)
+    values = np.array([lowest, loop(-1.0, warn_infinite=False) if sampled else loop.D[0, 0]])
+    return values.real[np.isfinite(values)]

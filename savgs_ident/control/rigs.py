@@ -1,0 +1,104 @@
+"""Rigs that the recordings allow: parameter sets for a controller to be tried on, not only the best one.
+
+They come from the samples of a posterior, or else from the covariance that an identified rig carries, or else, for a
+drawing, from its tolerances.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.parameter import ParameterTable
+
+SEED = 20170701
+"""Of the draws: the same rigs every time."""
+
+ROUNDING = 1e-6
+"""By how much the correlations of a covariance may be lopsided or indefinite [1]."""
+
+
+@dataclass(frozen=True)
+class Rigs:
+    """``source`` says in words where they come from; ``values`` are whole parameter sets by name, SI."""
+
+    source: str
+    values: tuple[Mapping[str, float], ...]
+
+
+def rigs_from_posterior(table: ParameterTable, path: Path, count: int) -> Rigs:
+    """``count`` rigs evenly spread over the draws of a ``posterior.nc``.
+
+    Raises :class:`InputError` if the file cannot be read or holds no draws of the rig's parameters.
+    """
+    remedy = "give the posterior.nc that `savgs-ident posterior` wrote for this model"
+    try:
+        with h5py.File(path, "r") as file:
+            group = file["posterior"]
+            held = set(group.keys())
+            draws = {name: np.ravel(group[name][()]) for name in table if name in held}
+    except OSError as error:
+        raise InputError(f"cannot be read: {error}", source=path, remedy=remedy) from error
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError("is no posterior", source=path, remedy=remedy) from error
+    lengths = {values.size for values in draws.values()}
+    finite = all(values.dtype.kind == "f" and np.isfinite(values).all() for values in draws.values())
+    if len(lengths) != 1 or 0 in lengths or not finite:
+        raise InputError("holds no finite draws of the rig's parameters", source=path, remedy=remedy)
+    chosen = np.unique(np.linspace(0, lengths.pop() - 1, count).astype(int))
+    matrix = np.stack([values[chosen] for values in draws.values()], axis=1)
+    return _rigs(table, f"{chosen.size} samples of {path}", tuple(draws), matrix)
+
+
+def rigs_from_covariance(table: ParameterTable, provenance: Mapping[str, object], count: int) -> Rigs:
+    """``count`` rigs from the normal distribution that an identified rig carries; from tolerances for a drawing.
+
+    Raises :class:`InputError` if what it carries is no covariance of its parameters.
+    """
+    carried = provenance.get("covariance")
+    if carried is None:
+        known = [entry for entry in table.entries if entry.tolerance > 0.0]
+        names = tuple(entry.name for entry in known)
+        covariance = np.diag([entry.tolerance**2 for entry in known])
+        source = f"{count} rigs within the tolerances of the drawing"
+    else:
+        names, covariance = _covariance(carried, table)
+        source = f"{count} rigs from the covariance of the fit"
+    centre = np.array(table.values_of(names))
+    lower = np.array([table[name].lower for name in names])
+    upper = np.array([table[name].upper for name in names])
+    drawn = np.random.default_rng(SEED).multivariate_normal(centre, covariance, count, method="eigh")
+    return _rigs(table, source, names, np.clip(drawn, lower, upper))
+
+
+def _covariance(carried: object, table: ParameterTable) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+    wrong = InputError(
+        "provenance.covariance is no covariance of the rig's parameters", remedy="identify the rig again"
+    )
+    if not isinstance(carried, Mapping):
+        raise wrong
+    names, matrix = carried.get("names"), carried.get("matrix")
+    try:
+        covariance = np.array(matrix, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise wrong from None
+    if not isinstance(names, list | tuple) or any(name not in table for name in names):
+        raise wrong
+    if covariance.shape != (len(names), len(names)) or not np.isfinite(covariance).all():
+        raise wrong
+    size = np.sqrt(np.abs(np.diag(covariance)))
+    size[size == 0.0] = 1.0
+    correlation = covariance / np.outer(size, size)
+    lopsided = np.max(np.abs(correlation - correlation.T))
+    if lopsided > ROUNDING or np.min(np.linalg.eigvalsh(correlation)) < -ROUNDING:
+        raise wrong
+    return tuple(names), covariance
+
+
+def _rigs(table: ParameterTable, source: str, names: tuple[str, ...], matrix: NDArray[np.float64]) -> Rigs:
+    base = table.as_dict()
+    return Rigs(source, tuple(base | dict(zip(names, map(float, row), strict=True)) for row in matrix))
