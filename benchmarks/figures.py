@@ -99,6 +99,15 @@ FIGURES: dict[str, Figure] = {
     "false_alarms_percent_ours": Figure("%", ".0f", "Where nothing is missing: something said to be."),
     "false_alarms_percent_stlsq": Figure("%", ".0f", "The same by STLSQ."),
     "false_alarms_percent_frols": Figure("%", ".0f", "The same by FROLS."),
+    "closed_loop_sweep_s": Figure(
+        "s", ".2f", "60 s of closed loop (sweep, 1000 samples per second of the law), program compiled."
+    ),
+    "speedup_closed_loop_scipy": Figure(
+        "x", ".0f", "How many times longer scipy's LSODA takes for 4 s of closed loop, on the same equations."
+    ),
+    "closed_loop_difference_percent": Figure(
+        "%", ".3f", "By how much the deflections of the two differ, rms over rms."
+    ),
     "mcap_samples_per_s": Figure(
         "1/s", ",.0f", "Samples (of six channels) read per second from a long MCAP file."
     ),

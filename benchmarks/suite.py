@@ -9,7 +9,7 @@ from benchmarks.task import DWELLS_HZ
 
 NAMES = (
     "response", "harmonicbalance", "scipy", "diffrax", "fit", "posterior", "posterior-scipy", "collocation", "mcap",
-    "diagnosis", "sindy",
+    "diagnosis", "sindy", "closed-loop",
 )  # fmt: skip
 """What can be asked for."""
 
@@ -54,6 +54,10 @@ def run_suite(names: Sequence[str], size: Size, tell: Tell) -> Outcome:
         from benchmarks import diagnosis_by_sindy
 
         outcome += diagnosis_by_sindy.measure(size.trials, tell)
+    if "closed-loop" in names:
+        from benchmarks import closed_loop
+
+        outcome += closed_loop.measure(tell)
     return outcome + Outcome(speedups(outcome.figures) | posterior_speedup(outcome.figures, size.dwells_hz))
 
 

@@ -56,10 +56,14 @@ class OperatingPoint(NamedTuple):
     link: Link
 
 
-@eqx.filter_jit
 def resting(model: QuarterCar, p: Values, link_angle: Float[Array, ""] | float) -> OperatingPoint:
     """The rig at rest with the link at an angle [rad]."""
-    angle = jnp.asarray(link_angle, jnp.float64)
+    # As an array: a number would be another program to compile for every angle.
+    return _resting(model, p, jnp.asarray(link_angle, jnp.float64))
+
+
+@eqx.filter_jit
+def _resting(model: QuarterCar, p: Values, angle: Float[Array, ""]) -> OperatingPoint:
     zero = jnp.zeros_like(angle)
     rest = static_equilibrium(model, p, angle, zero)
     return OperatingPoint(rest.q, Coordinates(zero, zero), rest.s, Road(zero, zero), Link(angle, zero))

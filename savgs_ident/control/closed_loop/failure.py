@@ -44,7 +44,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "actuator-off": Kind(
             "the drive loses its torque and the strut turns the link", 1e-4, (1.0, 1.0, 1.0)
         ),
-        "actuator-weak": Kind("the drive keeps 70 % of its torque and power", 0.7, (1.0, 1.0, 1.0)),
+        "actuator-weak": Kind("the drive keeps half of its torque and power", 0.5, (1.0, 1.0, 1.0)),
         "accelerometer": Kind("the accelerometer shows zero", 1.0, (0.0, 1.0, 1.0)),
         "potentiometer": Kind("the potentiometer shows zero", 1.0, (1.0, 0.0, 1.0)),
         "encoder": Kind("the link angle shows zero", 1.0, (1.0, 1.0, 0.0)),

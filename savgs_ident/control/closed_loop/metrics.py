@@ -58,9 +58,9 @@ class DriveUse:
     returned: float
 
 
-def _judged(signals: Signals, test: LoopTest) -> NDArray[np.bool_]:
+def _between(signals: Signals, start: float, end: float) -> NDArray[np.bool_]:
     time = np.asarray(signals.time)
-    return (time >= test.start) & (time < test.end)
+    return (time >= start) & (time < end)
 
 
 def _rms(values: Array) -> float:
@@ -75,10 +75,19 @@ def _settles(signals: Signals) -> bool:
 
 
 def ride_of(run: ClosedLoopRun, test: LoopTest) -> Ride:
-    """How a run rode."""
+    """How the rig rode in a run, all of the time in which the test is judged."""
+    return _ride(run, test.start, test.end)
+
+
+def ride_after(run: ClosedLoopRun, test: LoopTest) -> Ride:
+    """How the rig rode from the time on at which something fails, in the runs in which something does."""
+    return _ride(run, test.fails_at, test.end)
+
+
+def _ride(run: ClosedLoopRun, start: float, end: float) -> Ride:
     if not run.status.ok:
         return Ride(np.nan, np.nan, np.nan, np.nan, stable=False)
-    signals, judged = run.signals, _judged(run.signals, test)
+    signals, judged = run.signals, _between(run.signals, start, end)
     return Ride(
         _rms(np.asarray(signals.sprung_accel)[judged]),
         _rms(np.asarray(signals.susp_deflection)[judged]),
@@ -90,7 +99,7 @@ def ride_of(run: ClosedLoopRun, test: LoopTest) -> Ride:
 
 def drive_use(run: ClosedLoopRun, test: LoopTest, p: Values) -> DriveUse:
     """What the drive did in a run that ended well."""
-    signals, judged = run.signals, _judged(run.signals, test)
+    signals, judged = run.signals, _between(run.signals, test.start, test.end)
     ratio, limit = float(p["motor_gear_ratio"]), float(p["motor_speed_limit"])
     time = np.asarray(signals.time)[judged]
     speed = ratio * np.asarray(signals.link_velocity)[judged]

@@ -50,6 +50,7 @@ class LoopTest:
         title: what it is in words.
         road: what the plate does.
         start, end: when it is judged [s].
+        fails_at: when something fails, in the runs in which something does [s].
         sweeps: frequencies at time 0 and at ``end`` of a sweep [Hz]; None of another test.
     """
 
@@ -58,6 +59,7 @@ class LoopTest:
     road: RoadMotion
     start: float
     end: float
+    fails_at: float
     sweeps: tuple[float, float] | None = None
 
     @property
@@ -73,7 +75,7 @@ def harmonic_test(peak_to_peak: float, frequency: float, duration: float = 12.0)
     end = round(end / 0.02) * 0.02
     road = RoadMotion(Faded(Sine(peak_to_peak / 2.0, frequency, 0.0, 0.0, 2.0), end, FADE))
     title = f"cam of {1e3 * peak_to_peak:g} mm peak to peak at {frequency:g} Hz"
-    return LoopTest(TestName.harmonic, title, road, SETTLE, end)
+    return LoopTest(TestName.harmonic, title, road, SETTLE, end, 0.5 * (SETTLE + end))
 
 
 def sweep_test(peak_to_peak: float) -> LoopTest:
@@ -81,19 +83,20 @@ def sweep_test(peak_to_peak: float) -> LoopTest:
     low, high, duration = SWEEP
     road = RoadMotion(Faded(LinearSweep(peak_to_peak / 2.0, low, high, duration), duration, FADE))
     title = f"sweep of {1e3 * peak_to_peak:g} mm peak to peak, {low:g} to {high:g} Hz in {duration:g} s"
-    return LoopTest(TestName.sweep, title, road, 0.0, duration, (low, high))
+    return LoopTest(TestName.sweep, title, road, 0.0, duration, 0.6 * duration, (low, high))
 
 
 def iso_test(grade: str, speed: float, duration: float = 20.0) -> LoopTest:
     """A random road of an ISO class A to D at ``speed`` [m/s]."""
     road = iso_road(grade, speed, duration, FADE)
     title = f"random road of ISO 8608 class {grade} at {3.6 * speed:g} km/h"
-    return LoopTest(TestName.iso, title, road, 1.0, duration)
+    return LoopTest(TestName.iso, title, road, 1.0, duration, 0.4 * duration)
 
 
 def bump_test(speed: float) -> LoopTest:
     """A speed bump at ``speed`` [m/s]."""
     height, length, duration = BUMP
-    road = bump_road(height, length, speed, start=0.5)
+    begins = 0.5
+    road = bump_road(height, length, speed, begins)
     title = f"speed bump, {1e3 * height:g} mm high and {length:g} m long, at {3.6 * speed:g} km/h"
-    return LoopTest(TestName.bump, title, road, 0.0, duration)
+    return LoopTest(TestName.bump, title, road, 0.0, duration, begins + 0.5 * length / speed)

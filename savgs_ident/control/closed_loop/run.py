@@ -97,7 +97,9 @@ class _LoopState(NamedTuple):
     kept: Float[Array, "frame signals"]
 
 
-class _Case(NamedTuple):
+class LoopCase(NamedTuple):
+    """What a run is of: rig, road, loop, the deflection's zero [m], and the noise of its frames, standard normal."""
+
     model: QuarterCar
     p: Values
     curves: SectionCurves
@@ -107,18 +109,21 @@ class _Case(NamedTuple):
     noise: Float[Array, "frames frame 3"]
 
 
-def _drive_of(case: _Case, asked: Array) -> Drive:
+def _drive_of(case: LoopCase, asked: Array) -> Drive:
     return Drive(VelocityReference(Constant(asked)), case.p["psi_nominal"])
 
 
-def _values_at(case: _Case, t: Array) -> Values:
+def _values_at(case: LoopCase, t: Array) -> Values:
     share = case.loop.failure.drive_at(t)
     limits = {name: share * case.p[name] for name in ("motor_peak_torque", "motor_peak_power")}
     return {**case.p, **limits}
 
 
-def _field(case: _Case, asked: Array, t: Array, x: Array, near: Array) -> Array:
-    """Rates of rig and drive while the law's command is held."""
+def loop_field(case: LoopCase, asked: Array, t: Array, x: Array, near: Array) -> Array:
+    """Rates (x,) of rig and drive at ``t`` [s] in the state ``x`` while the law's command [rad/s] is held.
+
+    ``near`` are the rates of a moment ago, zeros if they are not known.
+    """
     start = near[2 : 4 + len(case.model.states)]
     now = unpack_state(case.model, x)
     drive = _drive_of(case, asked)
@@ -127,8 +132,8 @@ def _field(case: _Case, asked: Array, t: Array, x: Array, near: Array) -> Array:
     )
 
 
-def _sample(case: _Case, t: Array, x: Array, rates: Array, held: Array) -> tuple[Array, Array]:
-    """True values for the instruments (3,), and the row that is kept."""
+def loop_sample(case: LoopCase, t: Array, x: Array, rates: Array, held: Array) -> tuple[Array, Array]:
+    """True values for the instruments (3,), and the :class:`Signals` of a sample, in a state with its rates."""
     now, change = unpack_state(case.model, x), unpack_state(case.model, rates)
     drive = _drive_of(case, held)
     inputs = Inputs(case.road.at(t), drive.link(t, now.actuation), case.road.cam_at(t))
@@ -160,7 +165,7 @@ def _sample(case: _Case, t: Array, x: Array, rates: Array, held: Array) -> tuple
 class _Sampled(dfx.AbstractSolver[None]):
     """Steps of one frame: sample, ask, and move on by the stabilised method, :data:`FRAME` times."""
 
-    case: _Case
+    case: LoopCase
     term_structure: ClassVar = dfx.ODETerm
     interpolation_cls: ClassVar = dfx.LocalLinearInterpolation
 
@@ -188,9 +193,9 @@ class _Sampled(dfx.AbstractSolver[None]):
         def one(now: _LoopState, at: tuple[Array, Array]) -> tuple[_LoopState, Array]:
             share, normal = at
             t = t0 + share * step
-            field = partial(_field, self.case, now.asked)
+            field = partial(loop_field, self.case, now.asked)
             rates = field(t, now.rig, now.rates)
-            truth, row = _sample(self.case, t, now.rig, rates, now.asked)
+            truth, row = loop_sample(self.case, t, now.rig, rates, now.asked)
             readings = loop.failure.shown(t, loop.instruments.read(truth, normal))
             law, asked = loop.law.command(now.law, readings, fastest)
             rig, last = stabilised_step(field, t, now.rig, rates, step)
@@ -202,16 +207,22 @@ class _Sampled(dfx.AbstractSolver[None]):
         return end, None, {"y0": y0, "y1": end}, None, dfx.RESULTS.successful
 
 
-@eqx.filter_jit
-def _solve(case: _Case, ends: Float[Array, " frames"]) -> tuple[Array, dfx.RESULTS]:
-    road, p = case.road, case.p
+def loop_rest(case: LoopCase) -> Float[Array, " x"]:
+    """State of rig and drive at rest at the nominal link angle, at time 0."""
     still = jnp.zeros(())
-    begin = pack_state(rest_state(case.model, p, road, _drive_of(case, still), ends[0], case.curves))
+    drive = _drive_of(case, still)
+    return pack_state(rest_state(case.model, case.p, case.road, drive, still, case.curves))
+
+
+@eqx.filter_jit
+def _solve(case: LoopCase, ends: Float[Array, " frames"]) -> tuple[Array, dfx.RESULTS]:
+    still = jnp.zeros(())
+    begin = loop_rest(case)
     width = len(Signals._fields)
     start = _LoopState(begin, jnp.zeros_like(begin), case.loop.law.start(), still, jnp.zeros((FRAME, width)))
 
     def rates(t: object, y: _LoopState, args: None) -> _LoopState:
-        rig = _field(case, y.asked, jnp.asarray(t), y.rig, y.rates)
+        rig = loop_field(case, y.asked, jnp.asarray(t), y.rig, y.rates)
         return jax.tree.map(jnp.zeros_like, y)._replace(rig=rig)
 
     found = dfx.diffeqsolve(
@@ -231,12 +242,18 @@ def _solve(case: _Case, ends: Float[Array, " frames"]) -> tuple[Array, dfx.RESUL
     return kept.reshape(-1, width), found.result
 
 
-def run_loop(model: QuarterCar, p: Values, road: RoadMotion, loop: Loop, duration: float) -> ClosedLoopRun:
-    """A run of ``duration`` [s], a whole number of frames, from rest at the nominal link angle."""
+def loop_case(model: QuarterCar, p: Values, road: RoadMotion, loop: Loop, duration: float) -> LoopCase:
+    """The case of a run of ``duration`` [s], a whole number of frames."""
     frames = round(duration * loop.rate / FRAME)
     curves = model.curves(p)
     noise = np.random.default_rng(SEED).standard_normal((frames, FRAME, NUMBER))
-    case = _Case(model, p, curves, road, loop, _zero(model, p, curves), jnp.asarray(noise))
+    return LoopCase(model, p, curves, road, loop, _zero(model, p, curves), jnp.asarray(noise))
+
+
+def run_loop(model: QuarterCar, p: Values, road: RoadMotion, loop: Loop, duration: float) -> ClosedLoopRun:
+    """A run of ``duration`` [s], a whole number of frames, from rest at the nominal link angle."""
+    case = loop_case(model, p, road, loop, duration)
+    frames = case.noise.shape[0]
     rows, result = _solve(case, jnp.arange(frames + 1) * (FRAME / loop.rate))
     signals = Signals(*np.asarray(rows).T)
     finite = all(np.isfinite(each).all() for each in signals)

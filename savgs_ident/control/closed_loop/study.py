@@ -7,7 +7,15 @@ from savgs_ident.control.closed_loop.causes import Cause, measure_causes
 from savgs_ident.control.closed_loop.failure import KINDS, NOTHING, failing
 from savgs_ident.control.closed_loop.instruments import sheet_instruments
 from savgs_ident.control.closed_loop.laws import HoldLaw, hinf_law
-from savgs_ident.control.closed_loop.metrics import DriveUse, Gain, Ride, drive_use, gain_of, ride_of
+from savgs_ident.control.closed_loop.metrics import (
+    DriveUse,
+    Gain,
+    Ride,
+    drive_use,
+    gain_of,
+    ride_after,
+    ride_of,
+)
 from savgs_ident.control.closed_loop.programme import LoopTest
 from savgs_ident.control.closed_loop.run import ClosedLoopRun, Loop, run_loop
 from savgs_ident.control.controller_file import DigitalController
@@ -15,16 +23,12 @@ from savgs_ident.control.rigs import Rigs
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values, as_values
 
-FAILS_AT = 0.4
-"""When something fails, as a share of the time in which the test is judged."""
-
 
 @dataclass(frozen=True)
 class Failed:
-    """A run in which something failed at ``time`` [s]."""
+    """A run in which something failed, and how the rig rode from then on."""
 
     kind: str
-    time: float
     run: ClosedLoopRun
     ride: Ride
 
@@ -45,6 +49,7 @@ class LoopStudy:
         test: the test.
         passive, active: the runs.
         passive_ride, active_ride: how the rig rode in them.
+        passive_after, active_after: how it rode from the time on at which something fails in other runs.
         gain: the active rig against the passive one.
         drive: what the drive did.
         failures: one run for each kind of failure.
@@ -58,6 +63,8 @@ class LoopStudy:
     active: ClosedLoopRun
     passive_ride: Ride
     active_ride: Ride
+    passive_after: Ride
+    active_after: Ride
     gain: Gain
     drive: DriveUse
     failures: tuple[Failed, ...]
@@ -98,12 +105,11 @@ def study_loop(
     progress(f"active: {test.title}")
     active = ran(p, loop)
     before, after = ride_of(passive, test), ride_of(active, test)
-    when = test.start + FAILS_AT * (test.end - test.start)
     failures = []
     for kind in (kind for kind in KINDS if kind != NOTHING):
         progress(f"failure: {KINDS[kind].about}")
-        run = ran(p, loop._replace(failure=failing(kind, when)))
-        failures.append(Failed(kind, when, run, ride_of(run, test)))
+        run = ran(p, loop._replace(failure=failing(kind, test.fails_at)))
+        failures.append(Failed(kind, run, ride_after(run, test)))
     others = []
     for number, values in enumerate(rigs.values if rigs else ()):
         progress(f"rig {number + 1} of {len(rigs.values) if rigs else 0}")
@@ -119,6 +125,8 @@ def study_loop(
         active,
         before,
         after,
+        ride_after(passive, test),
+        ride_after(active, test),
         gain_of(before, after),
         drive_use(active, test, p),
         tuple(failures),

@@ -1,0 +1,83 @@
+"""What a study of the closed loop says in words."""
+
+import numpy as np
+
+from savgs_ident.control.closed_loop.failure import KINDS
+from savgs_ident.control.closed_loop.metrics import DriveUse
+from savgs_ident.control.closed_loop.study import Failed, LoopStudy
+from savgs_ident.report.numerals import decimal, percentage
+
+
+def fell_words(percent: float) -> str:
+    """A reduction in per cent in words: by how much something fell, or rose."""
+    return f"{'less' if percent >= 0.0 else 'more'} by {decimal(abs(percent), 1)} %"
+
+
+def headline(study: LoopStudy) -> str:
+    """What the loop does, in one sentence."""
+    if not study.active_ride.stable:
+        return f"The loop is not stable: {study.test.title}."
+    gain = study.gain
+    return (
+        f"The body accelerates {fell_words(gain.sprung_accel)} and the suspension deflects"
+        f" {fell_words(gain.susp_deflection)}: {study.test.title}."
+    )
+
+
+def alarm(study: LoopStudy) -> str:
+    """Why the loop is not to be used; empty if nothing was found."""
+    if not study.active_ride.stable:
+        return "The loop is not stable on this rig: its motion does not end with the road's."
+    bad = sum(not each.stable for each in study.on_rigs)
+    return f"The loop is not stable on {bad} of {len(study.on_rigs)} rigs that the data allow." if bad else ""
+
+
+def saturation_words(study: LoopStudy) -> str:
+    """Whether and when more speed was asked for than the drive gives."""
+    drive, test = study.drive, study.test
+    if drive.saturated_from is None:
+        return "The drive was never asked for more speed than it gives."
+    when = f"{decimal(drive.saturated_from, 1)} s"
+    if test.sweeps is not None:
+        low, high = test.sweeps
+        reached = low + (high - low) * drive.saturated_from / test.end
+        when = f"{decimal(reached, 2)} Hz"
+    return (
+        f"The drive was asked for more speed than it gives in {percentage(drive.saturated)} of the time, first at"
+        f" {when}."
+    )
+
+
+def energy_words(drive: DriveUse) -> str:
+    """What the drive took and gave back."""
+    return (
+        f"Electric energy: {decimal(drive.energy, 0)} J net; {decimal(drive.returned, 0)} J were given back on the"
+        " way."
+    )
+
+
+def failure_words(study: LoopStudy, failed: Failed) -> str:
+    """What a failure led to."""
+    about = KINDS[failed.kind].about
+    if not failed.run.status.ok or not failed.ride.stable:
+        return f"When {about}, the motion does not end with the road's."
+    final = np.degrees(float(np.asarray(failed.run.signals.link_angle)[-1]))
+    rose = failed.ride.sprung_accel / study.passive_after.sprung_accel - 1.0
+    return (
+        f"When {about}, the body accelerates {fell_words(-100.0 * rose)} than passively from then on; the link"
+        f" ends at {decimal(final, 0)} deg."
+    )
+
+
+def rigs_words(study: LoopStudy) -> str:
+    """How the loop does on other rigs that the data allow; that it was not tried, if so."""
+    if study.rigs is None or not study.on_rigs:
+        return "The loop was tried on no other rig."
+    stable = sum(each.stable for each in study.on_rigs)
+    accel = [each.gain.sprung_accel for each in study.on_rigs]
+    deflection = [each.gain.susp_deflection for each in study.on_rigs]
+    return (
+        f"Stable on {stable} of {len(study.on_rigs)} ({study.rigs.source}); the acceleration falls by"
+        f" {decimal(min(accel), 1)} to {decimal(max(accel), 1)} %, the deflection by {decimal(min(deflection), 1)} to"
+        f" {decimal(max(deflection), 1)} %."
+    )
