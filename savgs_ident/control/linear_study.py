@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.control.approximation import Approximation, approximate
 from savgs_ident.control.describing_function import Described, describe, quasi_linear_response
+from savgs_ident.control.first_harmonic import first_harmonic, motions_on_cam
 from savgs_ident.control.linear_equivalent import Equivalent, equivalents, resting_angles
 from savgs_ident.control.linearisation import linearise, resting
 from savgs_ident.control.quarter_car_space import TwoMasses, quarter_car_space
@@ -27,9 +28,6 @@ from savgs_ident.control.two_masses import (
 from savgs_ident.core.errors import InputError
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values
-from savgs_ident.simulate.excitation import cam_excitation
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import simulate_periodic
 
 CHANNELS = ("sprung_accel", "susp_deflection")
 """[m/s^2] and [m], per metre of road."""
@@ -194,7 +192,8 @@ def study_small_motions(model: QuarterCar, p: Values) -> SmallMotions:
     found = exact(iw)
     seen = np.array([float(rig["accel_gain"]), float(rig["deflection_gain"])])
     models["exact linearisation"] = np.stack([found[0, 0], found[1, 0]], axis=-1) * iw[:, None]
-    nonlinear = _first_harmonic(bare, rig, FREQUENCY, SMALL)[0] / seen
+    motions = motions_on_cam(bare, rig, FREQUENCY, SMALL)
+    nonlinear = first_harmonic(bare, rig, motions, SMALL) / seen
     slow = 2j * np.pi * 1e-3
     turned = exact(slow)[1, 1] * slow / float(nominal_equivalent(model, p).alpha)
     return SmallMotions(FREQUENCY, nonlinear, models, masses, float(np.real(turned)))
@@ -202,22 +201,10 @@ def study_small_motions(model: QuarterCar, p: Values) -> SmallMotions:
 
 def study_test_motions(model: QuarterCar, p: Values) -> TestMotions:
     """The rig with describing functions and the nonlinear one on the cam of the test."""
-    nonlinear, described = _first_harmonic(model, p, TEST_FREQUENCY, float(p["cam_peak_to_peak"]))
+    cam = float(p["cam_peak_to_peak"])
+    motions = motions_on_cam(model, p, TEST_FREQUENCY, cam)
+    described, nonlinear = describe(model, p, motions), first_harmonic(model, p, motions, cam)
     return TestMotions(nonlinear, quasi_linear_response(model, p, described), described)
-
-
-def _first_harmonic(
-    model: QuarterCar, p: Values, frequency: NDArray[np.float64], peak_to_peak: float
-) -> tuple[Complex, Described]:
-    """First harmonics of the readings per metre of road (D, 2), and the elements of the motions."""
-    solution = simulate_periodic(model, p, cam_excitation(frequency, peak_to_peak, float(p["psi_nominal"])))
-    lost = [f"{at:g}" for at, status in zip(frequency, solution.status(), strict=True) if not status.ok]
-    if lost:
-        raise InputError(
-            f"the periodic motion was not found at {', '.join(lost)} Hz", remedy="check the rig's numbers"
-        )
-    found = np.asarray(harmonics(model, p, solution, 1)[:, :, 1] / (peak_to_peak / 2.0), np.complex128)
-    return found, describe(model, p, solution)
 
 
 def study_linear(model: QuarterCar, p: Values, progress: Callable[[str], None]) -> LinearStudy:

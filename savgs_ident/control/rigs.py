@@ -71,7 +71,12 @@ def rigs_from_covariance(table: ParameterTable, provenance: Mapping[str, object]
     centre = np.array(table.values_of(names))
     lower = np.array([table[name].lower for name in names])
     upper = np.array([table[name].upper for name in names])
-    drawn = np.random.default_rng(SEED).multivariate_normal(centre, covariance, count, method="eigh")
+    # In units of their own deviations: parameters of 1e7 N/m beside such of 1e-4 m leave no digits for a check.
+    spread = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(spread, spread)
+    zero = np.zeros(len(names))
+    random = np.random.default_rng(SEED)
+    drawn = centre + spread * random.multivariate_normal(zero, correlation, count, method="eigh")
     return _rigs(table, source, names, np.clip(drawn, lower, upper))
 
 
@@ -89,6 +94,8 @@ def _covariance(carried: object, table: ParameterTable) -> tuple[tuple[str, ...]
     if not isinstance(names, list | tuple) or any(name not in table for name in names):
         raise wrong
     if covariance.shape != (len(names), len(names)) or not np.isfinite(covariance).all():
+        raise wrong
+    if not (np.diag(covariance) > 0.0).all():
         raise wrong
     size = np.sqrt(np.abs(np.diag(covariance)))
     size[size == 0.0] = 1.0

@@ -141,7 +141,9 @@ def largest_gain(system: control.StateSpace) -> tuple[float, float]:
     best, at = float(swept.max()), float(GRID[swept.argmax()])
     for place in np.argsort(swept)[-3:]:
         low, high = logs[max(place - 1, 0)], logs[min(place + 1, logs.size - 1)]
-        found = minimize_scalar(lambda log: -gain(log), bounds=(low, high), method="bounded")
+        found = minimize_scalar(
+            lambda log: -gain(log), bounds=(low, high), method="bounded", options={"xatol": 1e-9}
+        )
         if -found.fun > best:
             best, at = -float(found.fun), 10.0 ** float(found.x)
     return best, at

@@ -14,7 +14,8 @@ from savgs_ident import __version__
 
 COMMAND = (sys.executable, "-m", "savgs_ident.cli")
 COMMANDS = (
-    "demo", "inspect", "fit", "bode", "simulate", "posterior", "calibrate", "diagnose", "false-alarms", "blind"
+    "demo", "inspect", "fit", "bode", "simulate", "posterior", "calibrate", "diagnose", "false-alarms", "blind",
+    "linearise", "design",
 )  # fmt: skip
 HEAVY = ("jax", "matplotlib", "pandas", "scipy", "numpy")
 

@@ -1,0 +1,160 @@
+"""The reports on linear models and on a design in a real browser: on a phone, on a desk, and under attack."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from savgs_ident.control.design import Design, design_controller
+from savgs_ident.control.linear_study import LinearStudy, study_linear
+from savgs_ident.control.rigs import rigs_from_covariance
+from savgs_ident.control.weights import DEFAULT_WEIGHTS
+from savgs_ident.core.rig import Rig
+from savgs_ident.effects.registry import MODELS, build_model, model_parameters
+from savgs_ident.model.values import as_values
+from savgs_ident.report.design_html import design_html
+from savgs_ident.report.linear_html import linear_html
+from savgs_ident.report.model_origin import ModelOrigin, model_origin
+
+from ..relaxed import with_kept_programs
+from .conftest import HOSTILE, SHOWN, Browser
+from .test_posterior_page import OPEN_ALL, OVERFLOWING, SIZES, SMALLEST_PICTURE_TEXT, SMALLEST_TEXT
+
+PICTURES = {"linear": 3, "design": 5, "attacked": 5}
+EFFECTS = MODELS["simtr"]
+
+
+@pytest.fixture(scope="module")
+def results(rig: Rig) -> Iterator[tuple[LinearStudy, Design]]:
+    """The linear models of the shipped rig, and a controller for it."""
+    table = model_parameters(rig, EFFECTS)
+    with with_kept_programs():
+        model, p = build_model(rig, EFFECTS), as_values(table.as_dict())
+        rigs = rigs_from_covariance(table, rig.provenance, 5)
+        yield (
+            study_linear(model, p, lambda _: None),
+            design_controller(model, p, rigs, DEFAULT_WEIGHTS, lambda _: None),
+        )
+
+
+@pytest.fixture(scope="module")
+def pages(results: tuple[LinearStudy, Design], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Both reports, and one of a controller that fails, with an attack in every name."""
+    study, design = results
+    origin = model_origin("gt_rear", "gt_rear.toml", EFFECTS, ("savgs-ident", "design", "gt_rear.toml"))
+    bad = ModelOrigin(HOSTILE, HOSTILE, (HOSTILE,), ("savgs-ident", HOSTILE), {HOSTILE: HOSTILE})
+    failed = replace(
+        design,
+        digital_margins=replace(design.digital_margins, stable=False),
+        rigs=replace(design.rigs, source=HOSTILE),
+    )
+    texts = {
+        "linear": linear_html(study, origin),
+        "design": design_html(design, origin),
+        "attacked": design_html(failed, bad),
+    }
+    folder = tmp_path_factory.mktemp("sections")
+    for name, text in texts.items():
+        (folder / f"{name}.html").write_text(text, encoding="utf-8")
+    return {name: folder / f"{name}.html" for name in texts}
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_a_page_asks_for_nothing_and_has_nothing_to_complain_about(
+    browser: Browser, pages: dict[str, Path], name: str
+) -> None:
+    browser.open(pages[name])
+    console, asked = browser.heard()
+    assert console == []
+    assert asked == [pages[name].as_uri()]
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_every_picture_is_there_and_described(browser: Browser, pages: dict[str, Path], name: str) -> None:
+    browser.open(pages[name])
+    pictures = browser.ask("return [...document.images].map(i => [i.complete, i.naturalWidth, i.alt.length])")
+    assert len(pictures) == PICTURES[name]
+    for complete, width, described in pictures:
+        assert complete
+        assert width > 300
+        assert described > 30
+
+
+@pytest.mark.parametrize("width", [390, 768, 1280])
+@pytest.mark.parametrize("name", PICTURES)
+def test_nothing_is_wider_than_the_window(
+    browser: Browser, pages: dict[str, Path], name: str, width: int
+) -> None:
+    browser.open(pages[name], width)
+    assert browser.ask("return innerWidth") == width
+    page = "document.documentElement"
+    assert browser.ask(f"return {page}.scrollWidth - {page}.clientWidth") == 0
+    assert browser.ask(OVERFLOWING) == []
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize("name", ["linear", "design"])
+def test_all_text_is_large_enough_to_read(
+    browser: Browser, pages: dict[str, Path], name: str, width: int
+) -> None:
+    browser.open(pages[name], width)
+    sizes = browser.ask(SIZES)
+    assert len(sizes) > 100
+    assert [entry for entry in sizes if entry[0] < SMALLEST_TEXT] == []
+    scales = browser.ask(
+        "return [...document.images].map(i => i.getBoundingClientRect().width / i.naturalWidth)"
+    )
+    # The smallest words in these pictures have 8.5 points.
+    assert min(scales) * 8.5 * 96.0 / 72.0 >= SMALLEST_PICTURE_TEXT
+    assert max(scales) < 1.25
+
+
+@pytest.mark.parametrize("name", ["linear", "design"])
+def test_tables_fit_beside_their_headings_on_a_desk(
+    browser: Browser, pages: dict[str, Path], name: str
+) -> None:
+    browser.open(pages[name], 1280)
+    scrolling = (
+        "return [...document.querySelectorAll('.box')].filter(b => b.scrollWidth > b.clientWidth).length"
+    )
+    assert browser.ask(scrolling) == 0
+
+
+def test_hostile_text_is_text(browser: Browser, pages: dict[str, Path]) -> None:
+    browser.open(pages["attacked"])
+    browser.ask(OPEN_ALL)
+    foreign = (
+        "return document.querySelectorAll('script, b, iframe, object, embed, link:not([rel=icon])').length"
+    )
+    assert browser.ask(foreign) == 0
+    armed = "return [...document.querySelectorAll('*')].filter(e => [...e.attributes].some(a => /^on/i.test(a.name)))"
+    assert browser.ask(armed) == []
+    # Kind, note on the rigs, rig file, effects, rigs it was tried on, command, a package and its version.
+    assert browser.ask("return document.body.innerText").count(SHOWN) >= 8
+    assert SHOWN in browser.ask("return document.title")
+
+
+def test_the_first_thing_to_read_is_that_it_is_not_to_be_trusted(
+    browser: Browser, pages: dict[str, Path]
+) -> None:
+    browser.open(pages["attacked"], 390)
+    assert browser.ask("return document.body.innerText").startswith("Not to be trusted")
+    assert browser.ask("return document.querySelector('.alarm').getBoundingClientRect().top") < 100.0
+
+
+@pytest.mark.parametrize("name", ["linear", "design"])
+def test_the_page_has_a_language_headings_in_order_and_links_that_lead_somewhere(
+    browser: Browser, pages: dict[str, Path], name: str
+) -> None:
+    browser.open(pages[name])
+    assert browser.ask("return document.documentElement.lang") == "en"
+    levels = browser.ask("return [...document.querySelectorAll('h1, h2, h3, h4')].map(h => +h.tagName[1])")
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+    targets = (
+        "return [...document.querySelectorAll('nav a')].map(a => document.querySelector(a.hash) !== null)"
+    )
+    assert set(browser.ask(targets)) == {True}

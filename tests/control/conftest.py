@@ -1,0 +1,115 @@
+"""The rig's models, their linear studies and the shipped design, each made once; programs kept between runs."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import control
+import pytest
+
+from savgs_ident.control.design import Design, design_controller
+from savgs_ident.control.generalised_plant import generalised_plant
+from savgs_ident.control.linear_study import (
+    SmallMotions,
+    TestMotions,
+    study_small_motions,
+    study_test_motions,
+)
+from savgs_ident.control.quarter_car_space import TwoMasses, quarter_car_space
+from savgs_ident.control.rigs import rigs_from_covariance
+from savgs_ident.control.synthesis import Synthesis, synthesise_hinf
+from savgs_ident.control.two_masses import paper_masses
+from savgs_ident.control.weights import DEFAULT_WEIGHTS
+from savgs_ident.core.parameter import ParameterTable
+from savgs_ident.core.rig import Rig
+from savgs_ident.effects.registry import MODELS, build_model, model_parameters
+from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.values import Values, as_values
+
+from ..relaxed import with_kept_programs
+
+FEW_RIGS = 3
+
+
+@pytest.fixture(scope="package", autouse=True)
+def _as_users_have_it() -> Iterator[None]:
+    with with_kept_programs():
+        yield
+
+
+@pytest.fixture(scope="package")
+def table(rig: Rig) -> ParameterTable:
+    """All parameters of the rig with friction."""
+    return model_parameters(rig, MODELS["simtr"])
+
+
+@pytest.fixture(scope="package")
+def numbers(table: ParameterTable) -> Values:
+    """Their values, SI."""
+    return as_values(table.as_dict())
+
+
+@pytest.fixture(scope="package")
+def friction(rig: Rig) -> QuarterCar:
+    """SimTR."""
+    return build_model(rig, MODELS["simtr"])
+
+
+@pytest.fixture(scope="package")
+def frictionless(rig: Rig) -> QuarterCar:
+    """SimQC."""
+    return build_model(rig, MODELS["simqc"])
+
+
+@pytest.fixture(scope="package")
+def masses(friction: QuarterCar, numbers: Values) -> TwoMasses:
+    """The numbers of equation (8)."""
+    return paper_masses(friction, numbers)
+
+
+@pytest.fixture(scope="package")
+def space(masses: TwoMasses) -> control.StateSpace:
+    """Equation (8)."""
+    return quarter_car_space(masses)
+
+
+@pytest.fixture(scope="package")
+def bandwidth(numbers: Values) -> float:
+    """Of the actuator [Hz]."""
+    return float(numbers["motor_reference_bandwidth"])
+
+
+@pytest.fixture(scope="package")
+def plant_with(space: control.StateSpace, bandwidth: float) -> Callable[..., control.StateSpace]:
+    """The generalised plant with some weights changed, whatever their bounds say."""
+
+    def plant(**changed: float) -> control.StateSpace:
+        entries = DEFAULT_WEIGHTS.entries
+        weights = tuple(replace(e, value=changed.get(e.name, e.value), lower=0.0) for e in entries)
+        return generalised_plant(space, bandwidth, ParameterTable(weights))
+
+    return plant
+
+
+@pytest.fixture(scope="package")
+def synthesis(plant_with: Callable[..., control.StateSpace]) -> Synthesis:
+    """The H-infinity controller for the shipped rig and weights."""
+    return synthesise_hinf(plant_with())
+
+
+@pytest.fixture(scope="package")
+def design(friction: QuarterCar, numbers: Values, table: ParameterTable, rig: Rig) -> Design:
+    """The whole design on the shipped rig."""
+    rigs = rigs_from_covariance(table, rig.provenance, FEW_RIGS)
+    return design_controller(friction, numbers, rigs, DEFAULT_WEIGHTS, lambda said: None)
+
+
+@pytest.fixture(scope="package")
+def small(friction: QuarterCar, numbers: Values) -> SmallMotions:
+    """The linear models and the nonlinear rig at small motions."""
+    return study_small_motions(friction, numbers)
+
+
+@pytest.fixture(scope="package")
+def at_test(friction: QuarterCar, numbers: Values) -> TestMotions:
+    """The rig with describing functions and the nonlinear one at the size of the test."""
+    return study_test_motions(friction, numbers)
