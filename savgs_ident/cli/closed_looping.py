@@ -9,8 +9,8 @@ from savgs_ident.cli.guard import NOT_TRUSTED, OK
 from savgs_ident.cli.models import ModelName, effects_in, effects_of
 from savgs_ident.control.closed_loop.programme import (
     DEFAULT_SPEED,
+    LoopKind,
     LoopTest,
-    TestName,
     bump_test,
     harmonic_test,
     iso_test,
@@ -101,13 +101,13 @@ def _controller(job: Job, model: QuarterCar, p: Values, progress: Progress) -> t
 
 
 def _test(job: Job, p: Values) -> LoopTest:
-    cam, name = float(p["cam_peak_to_peak"]), TestName(job.test)
-    if name is TestName.harmonic:
+    cam, name = float(p["cam_peak_to_peak"]), LoopKind(job.test)
+    if name is LoopKind.harmonic:
         return harmonic_test(cam, job.frequency)
-    if name is TestName.sweep:
+    if name is LoopKind.sweep:
         return sweep_test(cam)
     speed = DEFAULT_SPEED[name] if job.speed is None else job.speed
-    return iso_test(job.road, speed) if name is TestName.iso else bump_test(speed)
+    return iso_test(job.road, speed) if name is LoopKind.iso else bump_test(speed)
 
 
 def _draw(study: LoopStudy, p: Values, origin: ModelOrigin, told: str, out: Path) -> list[Path]:

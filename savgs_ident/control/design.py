@@ -100,8 +100,9 @@ class Design:
 
     @property
     def trusted(self) -> bool:
-        """Whether gamma was confirmed, and the loop is stable sampled and on every rig."""
-        return self.synthesis.holds and self.digital_margins.stable and self.robustness.stable
+        """Whether gamma was confirmed, and the loop is stable, sampled too, and on every rig."""
+        both = self.margins.stable and self.digital_margins.stable
+        return self.synthesis.holds and both and self.robustness.stable
 
 
 def design_controller(

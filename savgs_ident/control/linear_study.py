@@ -44,7 +44,7 @@ WORKING_DEG = (40.0, 140.0)
 SMALL = 2e-6
 """Peak to peak of a small cam [m]: at 0.1 mm the curvature of the damper alone is worth 1.6 %."""
 
-FREQUENCY = np.geomspace(0.5, 10.0, 25)
+FREQUENCY = np.geomspace(0.5, 10.0, 41)
 """Frequencies of the small motions [Hz]."""
 
 TEST_FREQUENCY = np.array([0.5, 1.0, 1.5, 1.75, 2.0, 2.2, 2.35, 2.5, 2.75, 3.0, 3.5, 4.0, 5.0, 6.0])
@@ -102,7 +102,7 @@ class SmallMotions:
 
 
 @dataclass(frozen=True)
-class TestMotions:
+class CamMotions:
     """Responses to the cam of the test, friction included.
 
     Attributes:
@@ -127,7 +127,7 @@ class LinearStudy:
 
     equivalents: EquivalentStudy
     small: SmallMotions
-    at_test: TestMotions | None
+    at_test: CamMotions | None
 
     @property
     def trusted(self) -> bool:
@@ -199,12 +199,12 @@ def study_small_motions(model: QuarterCar, p: Values) -> SmallMotions:
     return SmallMotions(FREQUENCY, nonlinear, models, masses, float(np.real(turned)))
 
 
-def study_test_motions(model: QuarterCar, p: Values) -> TestMotions:
+def study_test_motions(model: QuarterCar, p: Values) -> CamMotions:
     """The rig with describing functions and the nonlinear one on the cam of the test."""
     cam = float(p["cam_peak_to_peak"])
     motions = motions_on_cam(model, p, TEST_FREQUENCY, cam)
     described, nonlinear = describe(model, p, motions), first_harmonic(model, p, motions, cam)
-    return TestMotions(nonlinear, quasi_linear_response(model, p, described), described)
+    return CamMotions(nonlinear, quasi_linear_response(model, p, described), described)
 
 
 def study_linear(model: QuarterCar, p: Values, progress: Callable[[str], None]) -> LinearStudy:

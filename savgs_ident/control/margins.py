@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 LOWEST, HIGHEST = 1e-3, 1e3
 """Frequencies between which loops are examined [Hz]."""
 
+NO_GAIN = 1e-6
+"""Below this a factor is rounding: a loop that is zero at zero frequency has no lower gain margin."""
+
 POINTS = 1500
 """How many of them."""
 
@@ -54,7 +57,12 @@ def margins_of(plant: control.StateSpace, controller: control.StateSpace) -> Mar
     swept = control.frd(loop, np.geomspace(2.0 * np.pi * LOWEST, highest, POINTS), smooth=True)
     gains, phases, distances, w_gain, w_phase, _ = control.stability_margins(swept, returnall=True)
     ends = _ends(loop)
-    gains = np.concatenate([np.asarray(gains)[np.asarray(w_gain) > 0.0], -1.0 / ends[ends < 0.0]])
+    gains = np.concatenate(
+        [
+            np.asarray(gains)[(np.asarray(w_gain) > 0.0) & (np.asarray(gains) > NO_GAIN)],
+            -1.0 / ends[ends < 0.0],
+        ]
+    )
     away = np.abs((np.asarray(phases) + 180.0) % 360.0 - 180.0)
     # A phase lead of the return difference, seen from below, is a lag of 360 deg less it.
     lags = np.where(np.asarray(phases) > 0.0, phases, np.asarray(phases) + 360.0)

@@ -130,7 +130,7 @@ def _loop(design: Design) -> Section:
         note="The loop is broken where the controller's command leaves for the drive.",
         picture=embed(
             loop_figure(design),
-            f"Magnitude of the sensitivity over frequency; its peak is {decimal(design.margins.sensitivity, 2)}, continuous.",
+            f"Magnitude of the sensitivity over frequency, with a peak of {decimal(design.margins.sensitivity, 2)}.",
         ),
         caption="The sensitivity: one over the distance of the open loop from the point where it becomes unstable.",
         wide=True,

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from savgs_ident.control.describing_function import ELEMENTS
 from savgs_ident.control.linear_study import (
     WISHBONE_DEG,
+    CamMotions,
     EquivalentStudy,
     LinearStudy,
     SmallMotions,
-    TestMotions,
 )
 from savgs_ident.report.linear_words import ELEMENT_WORDS
 from savgs_ident.report.readings import READINGS
@@ -121,7 +121,7 @@ def responses_figure(small: SmallMotions) -> Figure:
         return figure
 
 
-def described_figure(test: TestMotions) -> Figure:
+def described_figure(test: CamMotions) -> Figure:
     """First harmonics on the cam of the test, nonlinear and with describing functions, and what the elements are."""
     described = test.described
     ends = float(described.frequency[0]), float(described.frequency[-1])

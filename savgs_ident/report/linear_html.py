@@ -1,6 +1,6 @@
 """The report on the linear models of a rig: one page."""
 
-from savgs_ident.control.linear_study import SMALL, EquivalentStudy, LinearStudy, SmallMotions, TestMotions
+from savgs_ident.control.linear_study import SMALL, CamMotions, EquivalentStudy, LinearStudy, SmallMotions
 from savgs_ident.report.html import embed
 from savgs_ident.report.linear_figures import alpha_figure, described_figure, responses_figure
 from savgs_ident.report.linear_words import (
@@ -125,7 +125,7 @@ def _small(small: SmallMotions) -> Section:
     )
 
 
-def _described(study: LinearStudy, test: TestMotions) -> Section:
+def _described(study: LinearStudy, test: CamMotions) -> Section:
     described = test.described
     rows = tuple(
         (

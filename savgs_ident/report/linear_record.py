@@ -11,10 +11,10 @@ from savgs_ident.control.describing_function import ELEMENTS
 from savgs_ident.control.linear_study import (
     CHANNELS,
     SMALL,
+    CamMotions,
     EquivalentStudy,
     LinearStudy,
     SmallMotions,
-    TestMotions,
 )
 from savgs_ident.control.quarter_car_space import INPUTS, OUTPUTS, STATES, quarter_car_space
 from savgs_ident.recordings.recording import CANONICAL_UNITS
@@ -95,7 +95,7 @@ def _small_motions(small: SmallMotions) -> dict[str, Any]:
     }
 
 
-def _test_motions(test: TestMotions, words: str) -> dict[str, Any]:
+def _test_motions(test: CamMotions, words: str) -> dict[str, Any]:
     described = test.described
     return {
         "frequency_hz": described.frequency,

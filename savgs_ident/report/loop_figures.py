@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from savgs_ident.control.closed_loop.failure import KINDS
 from savgs_ident.control.closed_loop.metrics import RPM
-from savgs_ident.control.closed_loop.programme import TestName
+from savgs_ident.control.closed_loop.programme import LoopKind
 from savgs_ident.control.closed_loop.run import Signals
 from savgs_ident.control.closed_loop.study import LoopStudy
 from savgs_ident.model.values import Values
@@ -60,7 +60,7 @@ def loop_figure(study: LoopStudy, p: Values) -> Figure:
 def _shown(study: LoopStudy) -> np.ndarray:
     """What is drawn: of a harmonic test the last seconds that are judged, of any other all."""
     time, test = np.asarray(study.active.signals.time), study.test
-    if test.name is TestName.harmonic:
+    if test.name is LoopKind.harmonic:
         return (time >= test.end - PERIODS) & (time < test.end)
     return time < test.end + 1.0
 
@@ -147,7 +147,7 @@ def rigs_figure(study: LoopStudy) -> Figure:
             label="the rig itself",
             zorder=5,
         )
-        if study.test.name is TestName.harmonic:
+        if study.test.name is LoopKind.harmonic:
             axes.scatter(*PAPER, s=60, marker="D", facecolors="white", edgecolors=INK, label="paper, at 2 Hz")
         axes.set_xlabel("fall of the rms acceleration [%]")
         axes.set_ylabel("fall of the rms deflection [%]")

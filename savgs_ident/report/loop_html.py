@@ -1,7 +1,7 @@
 """The report on the closed loop: one page."""
 
 from savgs_ident.control.closed_loop.failure import KINDS
-from savgs_ident.control.closed_loop.programme import TestName
+from savgs_ident.control.closed_loop.programme import LoopKind
 from savgs_ident.control.closed_loop.study import LoopStudy
 from savgs_ident.model.values import Values
 from savgs_ident.report.html import embed
@@ -54,7 +54,7 @@ def loop_html(study: LoopStudy, p: Values, origin: ModelOrigin, controller: str)
 
 def _facts(study: LoopStudy) -> tuple[Fact, ...]:
     gain, drive = study.gain, study.drive
-    at_paper = study.test.name is TestName.harmonic
+    at_paper = study.test.name is LoopKind.harmonic
     low, high = drive.angle_deg
     return (
         Fact(

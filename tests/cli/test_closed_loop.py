@@ -12,7 +12,7 @@ from click.testing import Result
 
 from savgs_ident.cli import closed_looping
 from savgs_ident.control.closed_loop.failure import KINDS, NOTHING
-from savgs_ident.control.closed_loop.programme import LoopTest, TestName
+from savgs_ident.control.closed_loop.programme import LoopKind, LoopTest
 from savgs_ident.control.closed_loop.study import LoopStudy
 from savgs_ident.core.rig import default_rig_path
 
@@ -136,10 +136,10 @@ def test_a_loop_that_is_not_stable_is_code_1(
 @pytest.mark.parametrize(
     ("words", "name", "says"),
     [
-        (("--test", "sweep"), TestName.sweep, "0 to 3 Hz in 60 s"),
-        (("--test", "iso", "--road", "D", "--speed", "36"), TestName.iso, "class D at 36 km/h"),
-        (("--test", "bump"), TestName.bump, "50 mm high and 2 m long, at 20 km/h"),
-        (("--frequency", "1.5"), TestName.harmonic, "at 1.5 Hz"),
+        (("--test", "sweep"), LoopKind.sweep, "0 to 3 Hz in 60 s"),
+        (("--test", "iso", "--road", "D", "--speed", "36"), LoopKind.iso, "class D at 36 km/h"),
+        (("--test", "bump"), LoopKind.bump, "50 mm high and 2 m long, at 20 km/h"),
+        (("--frequency", "1.5"), LoopKind.harmonic, "at 1.5 Hz"),
     ],
 )
 def test_the_test_asked_for_is_the_test_that_runs(
@@ -147,7 +147,7 @@ def test_the_test_asked_for_is_the_test_that_runs(
     run: Any,
     monkeypatch: pytest.MonkeyPatch,
     words: tuple[str, ...],
-    name: TestName,
+    name: LoopKind,
     says: str,
 ) -> None:
     asked: list[LoopTest] = []

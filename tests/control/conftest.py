@@ -9,8 +9,8 @@ import pytest
 from savgs_ident.control.design import Design, design_controller
 from savgs_ident.control.generalised_plant import generalised_plant
 from savgs_ident.control.linear_study import (
+    CamMotions,
     SmallMotions,
-    TestMotions,
     study_small_motions,
     study_test_motions,
 )
@@ -110,6 +110,6 @@ def small(friction: QuarterCar, numbers: Values) -> SmallMotions:
 
 
 @pytest.fixture(scope="package")
-def at_test(friction: QuarterCar, numbers: Values) -> TestMotions:
+def at_test(friction: QuarterCar, numbers: Values) -> CamMotions:
     """The rig with describing functions and the nonlinear one at the size of the test."""
     return study_test_motions(friction, numbers)

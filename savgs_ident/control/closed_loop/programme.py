@@ -28,7 +28,7 @@ BUMP = (0.05, 2.0, 5.0)
 """Height and length [m] of the bump, and how long its test lasts [s]."""
 
 
-class TestName(StrEnum):
+class LoopKind(StrEnum):
     """The tests there are."""
 
     harmonic = "harmonic"
@@ -37,7 +37,7 @@ class TestName(StrEnum):
     bump = "bump"
 
 
-DEFAULT_SPEED: Mapping[TestName, float] = MappingProxyType({TestName.iso: 20.0, TestName.bump: 20.0 / 3.6})
+DEFAULT_SPEED: Mapping[LoopKind, float] = MappingProxyType({LoopKind.iso: 20.0, LoopKind.bump: 20.0 / 3.6})
 """Speeds of driving [m/s] of the tests that have one."""
 
 
@@ -54,7 +54,7 @@ class LoopTest:
         sweeps: frequencies at time 0 and at ``end`` of a sweep [Hz]; None of another test.
     """
 
-    name: TestName
+    name: LoopKind
     title: str
     road: RoadMotion
     start: float
@@ -75,7 +75,7 @@ def harmonic_test(peak_to_peak: float, frequency: float, duration: float = 12.0)
     end = round(end / 0.02) * 0.02
     road = RoadMotion(Faded(Sine(peak_to_peak / 2.0, frequency, 0.0, 0.0, 2.0), end, FADE))
     title = f"cam of {1e3 * peak_to_peak:g} mm peak to peak at {frequency:g} Hz"
-    return LoopTest(TestName.harmonic, title, road, SETTLE, end, 0.5 * (SETTLE + end))
+    return LoopTest(LoopKind.harmonic, title, road, SETTLE, end, 0.5 * (SETTLE + end))
 
 
 def sweep_test(peak_to_peak: float) -> LoopTest:
@@ -83,14 +83,14 @@ def sweep_test(peak_to_peak: float) -> LoopTest:
     low, high, duration = SWEEP
     road = RoadMotion(Faded(LinearSweep(peak_to_peak / 2.0, low, high, duration), duration, FADE))
     title = f"sweep of {1e3 * peak_to_peak:g} mm peak to peak, {low:g} to {high:g} Hz in {duration:g} s"
-    return LoopTest(TestName.sweep, title, road, 0.0, duration, 0.6 * duration, (low, high))
+    return LoopTest(LoopKind.sweep, title, road, 0.0, duration, 0.6 * duration, (low, high))
 
 
 def iso_test(grade: str, speed: float, duration: float = 20.0) -> LoopTest:
     """A random road of an ISO class A to D at ``speed`` [m/s]."""
     road = iso_road(grade, speed, duration, FADE)
     title = f"random road of ISO 8608 class {grade} at {3.6 * speed:g} km/h"
-    return LoopTest(TestName.iso, title, road, 1.0, duration, 0.4 * duration)
+    return LoopTest(LoopKind.iso, title, road, 1.0, duration, 0.4 * duration)
 
 
 def bump_test(speed: float) -> LoopTest:
@@ -99,4 +99,4 @@ def bump_test(speed: float) -> LoopTest:
     begins = 0.5
     road = bump_road(height, length, speed, begins)
     title = f"speed bump, {1e3 * height:g} mm high and {length:g} m long, at {3.6 * speed:g} km/h"
-    return LoopTest(TestName.bump, title, road, 0.0, duration, begins + 0.5 * length / speed)
+    return LoopTest(LoopKind.bump, title, road, 0.0, duration, begins + 0.5 * length / speed)
