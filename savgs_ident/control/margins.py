@@ -57,12 +57,8 @@ def margins_of(plant: control.StateSpace, controller: control.StateSpace) -> Mar
     swept = control.frd(loop, np.geomspace(2.0 * np.pi * LOWEST, highest, POINTS), smooth=True)
     gains, phases, distances, w_gain, w_phase, _ = control.stability_margins(swept, returnall=True)
     ends = _ends(loop)
-    gains = np.concatenate(
-        [
-            np.asarray(gains)[(np.asarray(w_gain) > 0.0) & (np.asarray(gains) > NO_GAIN)],
-            -1.0 / ends[ends < 0.0],
-        ]
-    )
+    crossed = np.asarray(gains)[np.asarray(w_gain) > 0.0]
+    gains = np.concatenate([crossed[crossed > NO_GAIN], -1.0 / ends[ends < 0.0]])
     away = np.abs((np.asarray(phases) + 180.0) % 360.0 - 180.0)
     # A phase lead of the return difference, seen from below, is a lag of 360 deg less it.
     lags = np.where(np.asarray(phases) > 0.0, phases, np.asarray(phases) + 360.0)

@@ -48,7 +48,9 @@ def loop_record(study: LoopStudy, origin: ModelOrigin, controller: str) -> dict[
         "motor_speed_peak_rpm": drive.speed_peak_rpm,
         "saturated_fraction": drive.saturated,
         "saturated_from_s": drive.saturated_from,
-        "saturated_from_hz": _reached(study),
+        "saturated_from_hz": _reached(study, drive.saturated_from),
+        "speed_limit_from_s": drive.limited_from,
+        "speed_limit_from_hz": _reached(study, drive.limited_from),
         "link_angle_range_deg": list(drive.angle_deg),
         "peak_power_w": drive.power_peak,
         "energy_j": drive.energy,
@@ -81,12 +83,12 @@ def loop_record(study: LoopStudy, origin: ModelOrigin, controller: str) -> dict[
     }
 
 
-def _reached(study: LoopStudy) -> float | None:
-    """Frequency of a sweep [Hz] at which the drive first saturates; None where there is none."""
-    if study.test.sweeps is None or study.drive.saturated_from is None:
+def _reached(study: LoopStudy, time: float | None) -> float | None:
+    """Frequency of a sweep [Hz] at a time [s]; None where there is none."""
+    if study.test.sweeps is None or time is None:
         return None
     low, high = study.test.sweeps
-    return low + (high - low) * study.drive.saturated_from / study.test.end
+    return low + (high - low) * time / study.test.end
 
 
 def _ride(ride: Ride) -> dict[str, Any]:

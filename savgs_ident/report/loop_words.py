@@ -34,18 +34,24 @@ def alarm(study: LoopStudy) -> str:
 
 def saturation_words(study: LoopStudy) -> str:
     """Whether and when more speed was asked for than the drive gives."""
-    drive, test = study.drive, study.test
+    drive = study.drive
     if drive.saturated_from is None:
         return "The drive was never asked for more speed than it gives."
-    when = f"{decimal(drive.saturated_from, 1)} s"
-    if test.sweeps is not None:
-        low, high = test.sweeps
-        reached = low + (high - low) * drive.saturated_from / test.end
-        when = f"{decimal(reached, 2)} Hz"
-    return (
+    told = (
         f"The drive was asked for more speed than it gives in {percentage(drive.saturated)} of the time, first at"
-        f" {when}."
+        f" {_moment(study, drive.saturated_from)}"
     )
+    if drive.limited_from is None:
+        return f"{told}; it never ran at its limit."
+    return f"{told}; it ran at its limit from {_moment(study, drive.limited_from)} on."
+
+
+def _moment(study: LoopStudy, time: float) -> str:
+    """A time of a test in words: of a sweep, the frequency that it reached."""
+    if study.test.sweeps is None:
+        return f"{decimal(time, 1)} s"
+    low, high = study.test.sweeps
+    return f"{decimal(low + (high - low) * time / study.test.end, 2)} Hz"
 
 
 def energy_words(drive: DriveUse) -> str:

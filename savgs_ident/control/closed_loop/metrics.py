@@ -15,6 +15,9 @@ LEFT = 0.05
 AT_LIMIT = 0.999
 """From this share of a limit on, the limit counts as reached."""
 
+RUNS_AT = 0.99
+"""From this share of its limit on, the motor counts as running at it."""
+
 RPM = 30.0 / np.pi
 """Turns per minute of one rad/s."""
 
@@ -43,6 +46,7 @@ class DriveUse:
         speed_peak_rpm: of the motor [1/min].
         saturated: share of time in which more speed was asked for than the drive gives [1].
         saturated_from: when that was so first [s]; None if never.
+        limited_from: when the motor first ran at its speed limit [s]; None if never.
         angle_deg: least and greatest link angle [deg].
         power_peak: largest power at the motor's shaft [W].
         energy: electric energy taken less what was given back [J].
@@ -52,6 +56,7 @@ class DriveUse:
     speed_peak_rpm: float
     saturated: float
     saturated_from: float | None
+    limited_from: float | None
     angle_deg: tuple[float, float]
     power_peak: float
     energy: float
@@ -97,6 +102,10 @@ def _ride(run: ClosedLoopRun, start: float, end: float) -> Ride:
     )
 
 
+def _first(time: Array, when: NDArray[np.bool_]) -> float | None:
+    return float(time[when][0]) if when.any() else None
+
+
 def drive_use(run: ClosedLoopRun, test: LoopTest, p: Values) -> DriveUse:
     """What the drive did in a run that ended well."""
     signals, judged = run.signals, _between(run.signals, test.start, test.end)
@@ -110,7 +119,8 @@ def drive_use(run: ClosedLoopRun, test: LoopTest, p: Values) -> DriveUse:
     return DriveUse(
         float(np.max(np.abs(speed))) * RPM,
         float(np.mean(beyond)),
-        float(time[beyond][0]) if beyond.any() else None,
+        _first(time, beyond),
+        _first(time, np.abs(speed) >= RUNS_AT * limit),
         (float(np.min(angle)), float(np.max(angle))),
         float(np.max(np.asarray(signals.shaft_power)[judged])),
         float(np.sum(electric)) * step,
