@@ -6,7 +6,12 @@ from dataclasses import replace
 import control
 import pytest
 
+from savgs_ident.control.alpha_map import alpha_map
+from savgs_ident.control.closed_loop.run import Loop
+from savgs_ident.control.closed_loop.study import loop_around
+from savgs_ident.control.controller_file import DigitalController
 from savgs_ident.control.design import Design, design_controller
+from savgs_ident.control.digital import discretise
 from savgs_ident.control.generalised_plant import generalised_plant
 from savgs_ident.control.linear_study import (
     CamMotions,
@@ -113,3 +118,15 @@ def small(friction: QuarterCar, numbers: Values) -> SmallMotions:
 def at_test(friction: QuarterCar, numbers: Values) -> CamMotions:
     """The rig with describing functions and the nonlinear one at the size of the test."""
     return study_test_motions(friction, numbers)
+
+
+@pytest.fixture(scope="package")
+def controller(synthesis: Synthesis, friction: QuarterCar, numbers: Values) -> DigitalController:
+    """The same controller sampled, with the rig's alpha."""
+    return DigitalController(discretise(synthesis.controller), alpha_map(friction, numbers))
+
+
+@pytest.fixture(scope="package")
+def loop(numbers: Values, controller: DigitalController) -> Loop:
+    """That controller in a loop with the instruments of the sheet, nothing failing."""
+    return loop_around(numbers, controller)
