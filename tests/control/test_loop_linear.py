@@ -17,11 +17,10 @@ from scipy.linalg import expm
 from savgs_ident.control.closed_loop.run import Loop, Signals
 from savgs_ident.control.controller_file import DigitalController
 from savgs_ident.control.linearisation import INPUTS, linearise, resting
-from savgs_ident.model.actuation import link_torque
 from savgs_ident.model.drive import Drive, VelocityReference
-from savgs_ident.model.equilibrium import static_equilibrium
 from savgs_ident.model.profile import Constant
 from savgs_ident.model.quarter_car import QuarterCar
+from savgs_ident.model.strut import strut_at_rest
 from savgs_ident.model.values import Values
 
 from .loops import NO_FRICTION, cam, harmonics_of, ideal, judged, ran, with_changed
@@ -65,8 +64,7 @@ def plant(frictionless: QuarterCar, smooth: Values) -> Plant:
         smooth["psi_nominal"],
     )
     t = jnp.zeros(())
-    rest = static_equilibrium(frictionless, smooth, nominal, t)
-    load = link_torque(smooth, rest.strut, rest.q.theta_LW, nominal)
+    load = strut_at_rest(smooth).torque
 
     def drive(asked: jax.Array) -> Drive:
         return Drive(VelocityReference(Constant(asked)), nominal)
@@ -75,7 +73,7 @@ def plant(frictionless: QuarterCar, smooth: Values) -> Plant:
         return drive(asked).rate(smooth, t, x, load)
 
     by_state, by_asked, by_load = map(
-        np.asarray, jax.jacfwd(rate, argnums=(0, 1, 2))(drive(t).start(smooth, t, load), t, load)
+        np.asarray, jax.jit(jax.jacfwd(rate, argnums=(0, 1, 2)))(drive(t).start(smooth, t, load), t, load)
     )
     n, k = rig.nstates, by_state.shape[0]
     torque, measured = (

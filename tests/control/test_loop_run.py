@@ -126,7 +126,7 @@ def test_what_the_motor_takes_is_copper_loss_and_work_on_its_shaft(
 def test_the_motor_passes_its_speed_limit_by_no_more_than_its_loop_lets_it(
     friction: QuarterCar, numbers: Values, loop: Loop, limit: float
 ) -> None:
-    """At 3 Hz, where more is asked for. The limit is on the demand: the torque of the run-up has yet to be taken back.
+    """At 3 Hz, where more is asked for. The limit is on the demand; the torque of the run-up has to be taken back.
 
     The proportional gain of the velocity loop turns that torque into an excess of speed: 5 % of 3000 rpm.
     """
