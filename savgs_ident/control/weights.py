@@ -56,7 +56,7 @@ def read_weights(path: str | Path) -> ParameterTable:
     try:
         return DEFAULT_WEIGHTS.with_values(values)
     except InputError as error:
-        raise InputError(error.what, source=path, remedy="give a positive number") from None
+        raise InputError(error.what, source=path, remedy="give a finite, positive number") from None
 
 
 def _number(path: object, name: str, entry: object) -> float:

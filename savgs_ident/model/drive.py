@@ -4,7 +4,7 @@
               -> current PI -> voltage limit -> motor -> gear -> link
 
 A reference is a link angle to be kept or a link velocity to be followed. Limits: motor speed (3000 rpm, on
-the demand; the loop passes it by 2 % for a moment), torque of the drive, 500 W at the shaft when motoring,
+the demand; the loop passes it by up to 5 % for a moment), torque of the drive, 500 W at the shaft when motoring,
 length of the voltage vector. The velocity loop does not integrate against a limit, or it would pass the speed
 limit by three times as much; the current loop gives back what its limit takes away.
 

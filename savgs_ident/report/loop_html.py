@@ -139,6 +139,7 @@ def _rigs(study: LoopStudy) -> Section:
         note=rigs_words(study),
         picture=embed(rigs_figure(study), rigs_words(study)),
         caption="Each point is one rig, with the same controller.",
+        wide=True,
     )
 
 
@@ -160,6 +161,7 @@ def _causes(study: LoopStudy) -> Section:
             causes_figure(study), "Bars: by how much acceleration and deflection fall in each variant."
         ),
         caption="What a bar gains over the first row is what that imperfection costs.",
+        wide=True,
         table=Table(
             "Fall of the rms [%]", ("Variant", "Acceleration", "Deflection", "Tyre load"), rows, (1, 2, 3)
         ),

@@ -7,22 +7,25 @@ from pathlib import Path
 
 import pytest
 
-from savgs_ident.control.design import Design, design_controller
+from savgs_ident.control.closed_loop.programme import DEFAULT_SPEED, LoopKind, bump_test
+from savgs_ident.control.closed_loop.study import LoopStudy, study_loop
+from savgs_ident.control.design import Design, controller_for, design_controller
 from savgs_ident.control.linear_study import LinearStudy, study_linear
 from savgs_ident.control.rigs import rigs_from_covariance
 from savgs_ident.control.weights import DEFAULT_WEIGHTS
 from savgs_ident.core.rig import Rig
 from savgs_ident.effects.registry import MODELS, build_model, model_parameters
-from savgs_ident.model.values import as_values
+from savgs_ident.model.values import Values, as_values
 from savgs_ident.report.design_html import design_html
 from savgs_ident.report.linear_html import linear_html
+from savgs_ident.report.loop_html import loop_html
 from savgs_ident.report.model_origin import ModelOrigin, model_origin
 
 from ..relaxed import with_kept_programs
 from .conftest import HOSTILE, SHOWN, Browser
 from .test_posterior_page import OPEN_ALL, OVERFLOWING, SIZES, SMALLEST_PICTURE_TEXT, SMALLEST_TEXT
 
-PICTURES = {"linear": 3, "design": 5, "attacked": 5}
+PICTURES = {"linear": 3, "design": 5, "loop": 4, "attacked": 5}
 EFFECTS = MODELS["simtr"]
 
 
@@ -40,8 +43,24 @@ def results(rig: Rig) -> Iterator[tuple[LinearStudy, Design]]:
 
 
 @pytest.fixture(scope="module")
-def pages(results: tuple[LinearStudy, Design], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Both reports, and one of a controller that fails, with an attack in every name."""
+def loop(rig: Rig) -> Iterator[tuple[LoopStudy, Values]]:
+    """A controller over a bump, on the shipped rig and on two others, with causes."""
+    table = model_parameters(rig, EFFECTS)
+    with with_kept_programs():
+        model, p = build_model(rig, EFFECTS), as_values(table.as_dict())
+        controller = controller_for(model, p, DEFAULT_WEIGHTS)
+        rigs = rigs_from_covariance(table, rig.provenance, 2)
+        test = bump_test(DEFAULT_SPEED[LoopKind.bump])
+        yield study_loop(model, p, controller, test, lambda _: None, rigs, causes=True), p
+
+
+@pytest.fixture(scope="module")
+def pages(
+    results: tuple[LinearStudy, Design],
+    loop: tuple[LoopStudy, Values],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> dict[str, Path]:
+    """The three reports, and one of a controller that fails, with an attack in every name."""
     study, design = results
     origin = model_origin("gt_rear", "gt_rear.toml", EFFECTS, ("savgs-ident", "design", "gt_rear.toml"))
     bad = ModelOrigin(HOSTILE, HOSTILE, (HOSTILE,), ("savgs-ident", HOSTILE), {HOSTILE: HOSTILE})
@@ -53,6 +72,7 @@ def pages(results: tuple[LinearStudy, Design], tmp_path_factory: pytest.TempPath
     texts = {
         "linear": linear_html(study, origin),
         "design": design_html(design, origin),
+        "loop": loop_html(*loop, origin, "designed here"),
         "attacked": design_html(failed, bad),
     }
     folder = tmp_path_factory.mktemp("sections")
@@ -95,7 +115,7 @@ def test_nothing_is_wider_than_the_window(
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-@pytest.mark.parametrize("name", ["linear", "design"])
+@pytest.mark.parametrize("name", ["linear", "design", "loop"])
 def test_all_text_is_large_enough_to_read(
     browser: Browser, pages: dict[str, Path], name: str, width: int
 ) -> None:

@@ -59,15 +59,11 @@ def smooth(numbers: Values) -> Values:
 @pytest.fixture(scope="module")
 def plant(frictionless: QuarterCar, smooth: Values) -> Plant:
     """The rig's linearisation with the drive's between link velocity and torque on the link."""
-    rig, nominal = (
-        linearise(frictionless, smooth, resting(frictionless, smooth, np.pi / 2.0)),
-        smooth["psi_nominal"],
-    )
-    t = jnp.zeros(())
-    load = strut_at_rest(smooth).torque
+    rig = linearise(frictionless, smooth, resting(frictionless, smooth, np.pi / 2.0))
+    t, load = jnp.zeros(()), strut_at_rest(smooth).torque
 
     def drive(asked: jax.Array) -> Drive:
-        return Drive(VelocityReference(Constant(asked)), nominal)
+        return Drive(VelocityReference(Constant(asked)), smooth["psi_nominal"])
 
     def rate(x: jax.Array, asked: jax.Array, load: jax.Array) -> jax.Array:
         return drive(asked).rate(smooth, t, x, load)
@@ -76,10 +72,8 @@ def plant(frictionless: QuarterCar, smooth: Values) -> Plant:
         np.asarray, jax.jit(jax.jacfwd(rate, argnums=(0, 1, 2)))(drive(t).start(smooth, t, load), t, load)
     )
     n, k = rig.nstates, by_state.shape[0]
-    torque, measured = (
-        rig.output_labels.index("link_torque"),
-        [rig.output_labels.index(name) for name in MEASURED],
-    )
+    torque = rig.output_labels.index("link_torque")
+    measured = [rig.output_labels.index(name) for name in MEASURED]
     velocity = np.zeros((1, n + k))
     velocity[0, n + 1] = 1.0
     a = np.zeros((n + k, n + k))

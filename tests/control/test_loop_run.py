@@ -17,7 +17,7 @@ from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.transient import simulate_transient
 
-from .loops import CAM, NO_FRICTION, cam, harmonics_of, ideal, judged, passive, ran, with_changed
+from .loops import CAM, NO_FRICTION, along, cam, harmonics_of, ideal, judged, passive, ran, with_changed
 
 AT_TWO = cam(2.0)
 SAMPLES = 2501
@@ -54,6 +54,18 @@ def quiet(friction: QuarterCar, numbers: Values, loop: Loop) -> ClosedLoopRun:
     return ran(friction, numbers, AT_TWO, ideal(loop))
 
 
+@pytest.fixture(scope="module")
+def smooth(numbers: Values) -> Values:
+    """The rig and its drive without friction."""
+    return with_changed(numbers, **NO_FRICTION)
+
+
+@pytest.fixture(scope="module")
+def sliding(friction: QuarterCar, smooth: Values, loop: Loop) -> ClosedLoopRun:
+    """The active rig at 2 Hz without friction."""
+    return ran(friction, smooth, AT_TWO, loop)
+
+
 @pytest.mark.parametrize(("rigid", "within"), [(False, 1e-3), (True, 0.01)])
 def test_the_passive_run_ends_in_the_periodic_motion(
     friction: QuarterCar, numbers: Values, held: ClosedLoopRun, rigid: bool, within: float
@@ -77,19 +89,23 @@ def test_the_passive_run_ends_in_the_periodic_motion(
     assert np.max(np.abs(found / wanted - 1.0)) < within
 
 
-@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize("with_friction", [True, False])
 def test_the_active_run_is_that_of_an_error_controlled_integration(
-    friction: QuarterCar, numbers: Values, loop: Loop, active: ClosedLoopRun, smooth: bool
+    friction: QuarterCar,
+    numbers: Values,
+    smooth: Values,
+    active: ClosedLoopRun,
+    sliding: ClosedLoopRun,
+    with_friction: bool,
 ) -> None:
     """Of the same rig, drive and road, by Tsitouras' method, while the drive is asked for what the law asked for."""
-    p = with_changed(numbers, **NO_FRICTION) if smooth else numbers
-    signals = ran(friction, p, AT_TWO, loop).signals if smooth else active.signals
+    p, signals = (numbers, active.signals) if with_friction else (smooth, sliding.signals)
     drive = Drive(VelocityReference(Held(jnp.asarray(signals.asked))), p["psi_nominal"])
     times = np.asarray(signals.time)[:SAMPLES]
     exact = simulate_transient(friction, p, AT_TWO.road, drive, times, tolerance=1e-6)
     assert exact.status().ok
     allowed = {"susp_deflection": 3e-4, "link_angle": 3e-4, "link_velocity": 5e-4, "sprung_accel": 3e-3}
-    if smooth:
+    if not with_friction:
         # Without sticking and sliding, which begin within a step and shake the sprung mass.
         allowed = dict.fromkeys(allowed, 3e-4)
     truths = (
@@ -101,6 +117,21 @@ def test_the_active_run_is_that_of_an_error_controlled_integration(
     for (name, within), truth in zip(allowed.items(), map(np.asarray, truths), strict=True):
         left = np.std(getattr(signals, name)[:SAMPLES] - truth) / np.std(truth)
         assert left < within, name
+
+
+def test_the_plate_carries_the_weight_at_rest_and_on_average(sliding: ClosedLoopRun, smooth: Values) -> None:
+    """Over whole periods, where no friction holds the rig: nothing else holds it up."""
+    weight = float((smooth["m_s"] + smooth["m_u"]) * smooth["g"])
+    load = judged(sliding.signals, AT_TWO).tyre_load
+    assert sliding.signals.tyre_load[0] == pytest.approx(weight, rel=1e-6)
+    assert np.mean(load) == pytest.approx(weight, abs=2e-3 * np.std(load))
+    assert np.std(load) > 0.05 * weight
+
+
+def test_the_road_of_a_run_is_that_of_the_test(active: ClosedLoopRun) -> None:
+    height, _ = along(AT_TWO.road, np.arange(active.signals.time.size) / 1000.0)
+    assert active.signals.road == pytest.approx(height, abs=1e-15)
+    assert np.ptp(height) == pytest.approx(CAM, rel=1e-6)
 
 
 def test_what_the_motor_takes_is_copper_loss_and_work_on_its_shaft(

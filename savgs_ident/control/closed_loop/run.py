@@ -62,7 +62,9 @@ class Signals(NamedTuple):
         link_angle: [rad].
         link_velocity: [rad/s].
         asked: link velocity that the law asks for [rad/s].
-        motor_torque: of the motor [N m].
+        motor_torque: of the motor [N m]; against integration with error control 3 % off in rms, since a step follows
+            the current's decay (0.3 ms) only roughly. So is what is derived from it: at 2 Hz the net electric energy
+            comes out 2 % low, at 3 Hz the peak power 3 % high. Positions and velocities are right to 0.01 %.
         shaft_power: that the motor gives to its shaft [W].
         electric_power: that the motor takes [W]; negative while it gives back.
     """
