@@ -15,7 +15,7 @@ from savgs_ident import __version__
 COMMAND = (sys.executable, "-m", "savgs_ident.cli")
 COMMANDS = (
     "demo", "inspect", "fit", "bode", "simulate", "posterior", "calibrate", "diagnose", "false-alarms", "blind",
-    "linearise", "design",
+    "linearise", "design", "closed-loop",
 )  # fmt: skip
 HEAVY = ("jax", "matplotlib", "pandas", "scipy", "numpy")
 
@@ -99,7 +99,7 @@ def test_ctrl_c_is_one_line_and_code_130(
     environment: dict[str, str], nominal_campaign: Path, tmp_path: Path
 ) -> None:
     running = subprocess.Popen(
-        [*COMMAND, "inspect", str(nominal_campaign), "--out", str(tmp_path)],
+        [*COMMAND, "fit", str(nominal_campaign), "--out", str(tmp_path)],
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
