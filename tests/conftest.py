@@ -6,6 +6,7 @@ ranks, no silent promotion of dtypes. Warnings are errors (pyproject.toml).
 
 import json
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,15 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(
             f"{left_out} browser tests were LEFT OUT: chromium or chromedriver was not found"
         )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def room_for_programs() -> Iterator[None]:
+    """Thousands of tests in a process compile more than it can hold."""
+    yield
+    from savgs_ident.simulate.compilation import make_room_for_programs
+
+    make_room_for_programs()
 
 
 @pytest.fixture(scope="session")

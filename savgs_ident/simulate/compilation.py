@@ -1,11 +1,15 @@
 """Programs, traced and compiled, kept from one run to the next in the user's cache folder."""
 
+import gc
 import os
 import sys
 from importlib.metadata import version
 from pathlib import Path
 
 import jax
+
+MANY_REGIONS = 20_000
+"""Mapped regions of memory above which compiled programs are let go; Linux ends a process at 65 530."""
 
 _QUICK = "--xla_cpu_use_fusion_emitters=false"
 _QUICK_IS_KNOWN_TO = "0.10."
@@ -51,3 +55,20 @@ def use_persistent_cache() -> bool:
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     return True
+
+
+def make_room_for_programs() -> None:
+    """Let compiled programs go where they are many: each takes some twenty regions of the process's memory.
+
+    For processes that do one task after another. Beyond the bound of the system the next program, compiled or read
+    from the cache, would end the process.
+    """
+    if mapped_regions() > MANY_REGIONS:
+        jax.clear_caches()
+        gc.collect()
+
+
+def mapped_regions() -> int:
+    """Regions of memory [1] that this process has mapped; 0 where the system does not tell."""
+    maps = Path("/proc/self/maps")
+    return maps.read_bytes().count(b"\n") if maps.exists() else 0
