@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
+from savgs_ident.posterior.draws import read_draws
 
 SEED = 20170701
 """Of the draws: the same rigs every time."""
@@ -35,23 +35,9 @@ def rigs_from_posterior(table: ParameterTable, path: Path, count: int) -> Rigs:
 
     Raises :class:`InputError` if the file cannot be read or holds no draws of the rig's parameters.
     """
-    remedy = "give the posterior.nc that `savgs-ident posterior` wrote for this model"
-    try:
-        with h5py.File(path, "r") as file:
-            group = file["posterior"]
-            held = set(group.keys())
-            draws = {name: np.ravel(group[name][()]) for name in table if name in held}
-    except OSError as error:
-        raise InputError(f"cannot be read: {error}", source=path, remedy=remedy) from error
-    except (KeyError, TypeError, AttributeError) as error:
-        raise InputError("is no posterior", source=path, remedy=remedy) from error
-    lengths = {values.size for values in draws.values()}
-    finite = all(values.dtype.kind == "f" and np.isfinite(values).all() for values in draws.values())
-    if len(lengths) != 1 or 0 in lengths or not finite:
-        raise InputError("holds no finite draws of the rig's parameters", source=path, remedy=remedy)
-    chosen = np.unique(np.linspace(0, lengths.pop() - 1, count).astype(int))
-    matrix = np.stack([values[chosen] for values in draws.values()], axis=1)
-    return _rigs(table, f"{chosen.size} samples of {path}", tuple(draws), matrix)
+    draws = read_draws(path, tuple(table), count)
+    matrix = np.stack(list(draws.values()), axis=1)
+    return _rigs(table, f"{len(matrix)} samples of {path}", tuple(draws), matrix)
 
 
 def rigs_from_covariance(table: ParameterTable, provenance: Mapping[str, object], count: int) -> Rigs:

@@ -1,0 +1,70 @@
+"""``savgs-ident export``: an identified model in the forms that other tools read."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from savgs_ident.cli.console import Voice
+from savgs_ident.cli.guard import ends_with_code
+from savgs_ident.cli.models import ModelName
+from savgs_ident.cli.options import JsonOption, ModelArgument, QuietOption
+
+
+@ends_with_code
+def export(
+    model_file: ModelArgument,
+    to: Annotated[
+        list[str],
+        typer.Option(
+            "--to",
+            metavar="FORMAT",
+            help="json, mat, python-control, casadi, c or fmu; several may be given.",
+            show_default=False,
+        ),
+    ],
+    posterior: Annotated[
+        Path | None,
+        typer.Option("--posterior", metavar="FILE", help="posterior.nc, whose draws travel along."),
+    ] = None,
+    samples: Annotated[
+        int, typer.Option("--samples", metavar="N", min=1, help="How many draws, evenly spread over all.")
+    ] = 500,
+    diagnosis: Annotated[
+        Path | None,
+        typer.Option(
+            "--diagnosis",
+            metavar="FILE",
+            help="diagnosis.json: the effects that it names join the model, with the numbers of its fit.",
+        ),
+    ] = None,
+    model: Annotated[
+        ModelName | None,
+        typer.Option("--model", help="simtr or simqc; by default what the file was identified with."),
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")] = Path(
+        "out/export"
+    ),
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> int:
+    """Export an identified model: parameters with covariance, draws, linear models, equations.
+
+    The effects that a diagnosis names join the model; what it found and the catalogue does not have is no equation
+    and travels along as data.
+
+    Writes export.json (what was written, and where the numbers come from), and for json model.json, for mat
+    model.mat, for python-control model-control.json, for casadi and c the functions and signals.json, for fmu
+    savgs_rig.fmu.
+
+    Exit code 1 if the model was written but is not to be trusted: its fit or diagnosis did not converge, or the
+    posterior is not one of this model.
+
+    Example: savgs-ident export out/fit/model.toml --to json mat --posterior out/posterior/posterior.nc
+    """
+    from savgs_ident.cli.exporting import Job, run_export
+
+    command = ("savgs-ident", *sys.argv[1:])
+    job = Job(model_file, tuple(dict.fromkeys(to)), posterior, samples, diagnosis, model, command)
+    return run_export(job, Voice(json, quiet), out)

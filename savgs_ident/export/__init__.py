@@ -1,0 +1,1 @@
+"""The identified model in the forms that control design and simulation expect."""

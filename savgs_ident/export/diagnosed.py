@@ -1,0 +1,128 @@
+"""The model with what a diagnosis found missing in it.
+
+Effects that the verdict names join the model. With them come all numbers of the fit in which they were found: what
+was fitted without them makes up for their absence, a soft mount by a soft tyre, and does not belong to the model with
+them. So ``identified`` of the diagnosis replaces what the rig file has, and the covariance of the earlier fit is left
+behind.
+
+Something unknown is a signal learned at a port, no equation: the diagnosis travels along as data, the model stays.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.rig import Rig
+from savgs_ident.effects.registry import CATALOGUE, model_parameters
+
+_OF_THE_FIT = ("covariance",)
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """A model after a diagnosis.
+
+    Attributes:
+        rig: with the numbers of the diagnosis, where effects were added.
+        effects: all in the model.
+        added: those that the diagnosis added.
+        said: what was done, a sentence each, for reports and files.
+    """
+
+    rig: Rig
+    effects: tuple[str, ...]
+    added: tuple[str, ...]
+    said: tuple[str, ...]
+
+
+def with_diagnosis(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> Diagnosed:
+    """The model of ``effects`` with what the diagnosis names; see the module.
+
+    ``diagnosis`` is what :func:`savgs_ident.export.diagnosis_document.read_diagnosis` returns. Raises
+    :class:`InputError` if it is one of another model, or lacks a number that its effects need.
+    """
+    verdict = diagnosis["verdict"]
+    if verdict["kind"] == "none":
+        said = "The diagnosis finds nothing missing: the numbers are those of the rig file."
+        return Diagnosed(rig, effects, (), (said,))
+    if verdict["kind"] == "unknown":
+        ports = ", ".join(verdict["ports"]) or "no port in particular"
+        said = (
+            f"The diagnosis finds something that the catalogue does not have (at {ports}). A correction learned"
+            " there is no equation: it travels along as data, the equations are without it and the numbers those of"
+            " the rig file."
+        )
+        return Diagnosed(rig, effects, (), (said,))
+    named = tuple(verdict["effects"])
+    added = tuple(name for name in named if name not in effects)
+    if not added:
+        said = f"{_listed(named)}, named by the diagnosis, is in the model already: the numbers are the rig file's."
+        return Diagnosed(rig, effects, (), (said,))
+    _check_baseline(effects, diagnosis)
+    return _with_effects(rig, effects, added, diagnosis)
+
+
+def _with_effects(
+    rig: Rig, effects: tuple[str, ...], added: tuple[str, ...], diagnosis: Mapping[str, Any]
+) -> Diagnosed:
+    whole = (*effects, *added)
+    fitted = _fitted(frozenset(diagnosis["verdict"]["effects"]), diagnosis["which"])
+    values = {**diagnosis.get("identified", {}), **fitted}
+    for name in (each.name for effect in added for each in CATALOGUE[effect].parameters):
+        if name not in values and name not in rig.parameters:
+            raise InputError(f"gives no value for '{name}', a parameter of what it names")
+    table = model_parameters(rig, whole).with_values(values)
+    own = [name for name in values if name not in fitted]
+    said = [
+        f"{_listed(added)} joins the model as the diagnosis found it: "
+        + ", ".join(f"{name} = {value:.6g} {table[name].unit}" for name, value in fitted.items())
+        + "."
+    ]
+    if own:
+        said.append(
+            f"{len(own)} more numbers ({', '.join(own[:4])}, ...) are those that the diagnosis fitted along with it; "
+            "all others are those of the rig file."
+        )
+    else:
+        said.append(
+            "The diagnosis does not say what else it fitted: all other numbers are those of the rig file."
+        )
+    if "covariance" in rig.provenance:
+        said.append("The covariance of the rig file is of the fit without it and is left out.")
+    identified = Rig(
+        rig.name, table, rig.damper_velocity, rig.damper_force, _provenance(rig, whole, diagnosis)
+    )
+    return Diagnosed(identified, whole, added, tuple(said))
+
+
+def _fitted(effects: frozenset[str], candidates: list[Mapping[str, Any]]) -> dict[str, float]:
+    """The parameters of the hypothesis that the verdict names."""
+    for each in candidates:
+        names = each.get("effects") or each["effect"].split(" + ")
+        if frozenset(names) == effects and each["parameters"]:
+            return {name: float(entry["value"]) for name, entry in each["parameters"].items()}
+    raise InputError(f"holds no fitted parameters of {_listed(sorted(effects))}")
+
+
+def _check_baseline(effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> None:
+    baseline = diagnosis["baseline"].get("effects")
+    if baseline is not None and set(baseline) != set(effects):
+        raise InputError(
+            f"is of a model with {_listed(baseline) or 'no friction'}, not of one with"
+            f" {_listed(effects) or 'no friction'}",
+            remedy="export the rig file that was diagnosed, or choose its model with --model",
+        )
+
+
+def _provenance(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> dict[str, object]:
+    """Where the numbers come from now: the diagnosis, and what the rig file said of the fit before."""
+    origin = diagnosis.get("provenance", {})
+    found: dict[str, object] = {"effects": list(effects), "from": "diagnosis"}
+    found |= {name: origin[name] for name in ("data", "data_sha256", "model", "versions") if name in origin}
+    before = {name: value for name, value in rig.provenance.items() if name not in _OF_THE_FIT}
+    return found | ({"fit_before": before} if before else {})
+
+
+def _listed(names: tuple[str, ...] | list[str]) -> str:
+    return " and ".join(names)

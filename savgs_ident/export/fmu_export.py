@@ -1,0 +1,133 @@
+"""FMU: model exchange after FMI 3.0, compiled here, for any simulator that knows the standard.
+
+CasADi's DaeBuilder writes the C code from the same functions as the other exports. Every parameter is tunable, every
+variable has its unit and description; a simulation begins at rest. The headers of the standard come with FMPy, which
+is installed by the extra ``fmu``.
+"""
+
+import contextlib
+import tempfile
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from importlib.util import find_spec
+from pathlib import Path
+
+import casadi as ca
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.files import write_bytes
+from savgs_ident.export.casadi_functions import casadi_functions
+from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.fmi_units import base_units
+from savgs_ident.export.json_export import write_json
+from savgs_ident.export.signals import resting_inputs, resting_state
+
+NAME = "savgs_rig"
+"""The model identifier."""
+
+EXTRA = "extra/savgs_ident"
+"""Where in the archive model.json stands, with the covariance, the draws and the diagnosis."""
+
+_DESCRIPTION = "modelDescription.xml"
+
+
+def write_fmu(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
+    """Write savgs_rig.fmu, for the platform on which this runs.
+
+    Raises :class:`InputError` without FMPy or without a C compiler.
+    """
+    headers = _headers()
+    builder = _builder(model)
+    with tempfile.TemporaryDirectory(prefix="savgs-ident-") as scratch, contextlib.chdir(scratch):
+        files = builder.export_fmu({"no_warning": True})
+        _conform(Path(_DESCRIPTION), _starts(model))
+        (knowledge,) = write_json(model, Path())
+        try:
+            compiled = builder.compile_fmu(files, {"include_dirs": [str(headers)]})
+        except RuntimeError as error:
+            raise InputError(
+                "the FMU could not be compiled", source="--to fmu", remedy="install a C compiler (gcc)"
+            ) from error
+        packed = Path(
+            builder.pack_fmu({**compiled, knowledge.name: f"{EXTRA}/{knowledge.name}"}, {})
+        ).read_bytes()
+    return (write_bytes(folder / f"{NAME}.fmu", packed),)
+
+
+def _headers() -> Path:
+    """The folder with FMI's headers."""
+    found = find_spec("fmpy")
+    if found is None or found.origin is None:
+        raise InputError(
+            "the headers of FMI are missing", source="--to fmu", remedy="pip install 'savgs-ident[fmu]'"
+        )
+    return Path(found.origin).parent / "c-code"
+
+
+def _builder(model: ExportedModel) -> ca.DaeBuilder:
+    equations, table = model.equations, model.table
+    builder = ca.DaeBuilder(NAME)
+
+    def described(symbol: ca.MX, unit: str, about: str) -> ca.MX:
+        builder.set_description(symbol.name(), about)
+        if unit != "1":
+            builder.set_unit(symbol.name(), unit)
+        return symbol
+
+    entries = [table[name] for name in equations.parameters]
+    p = [
+        described(builder.add(each.name, "parameter", "tunable", {}), each.unit, each.about)
+        for each in entries
+    ]
+    u = [described(builder.add(each.name, "input", {}), each.unit, each.about) for each in equations.inputs]
+    x = [described(builder.add(each.name, {}), each.unit, each.about) for each in equations.states]
+    y = [described(builder.add(each.name, "output", {}), each.unit, each.about) for each in equations.outputs]
+    for each in equations.states:
+        builder.set_initial(each.name, "exact")
+    functions = casadi_functions(model)
+    arguments = [ca.vertcat(*part) for part in (x, u, p)]
+    rates, outputs = functions["rates"](*arguments), functions["outputs"](*arguments)
+    for place, symbol in enumerate(x):
+        builder.eq(builder.der(symbol), rates[place])
+    for place, symbol in enumerate(y):
+        builder.eq(symbol, outputs[place])
+    for name, value in _starts(model).items():
+        builder.set_start(name, value)
+    return builder
+
+
+def _starts(model: ExportedModel) -> dict[str, float]:
+    """Values at the start by name: the parameters, and the rig at rest."""
+    equations, starts = model.equations, model.table.as_dict()
+    for signals, values in (
+        (equations.inputs, resting_inputs(model)),
+        (equations.states, resting_state(model)),
+    ):
+        starts |= dict(zip((signal.name for signal in signals), values, strict=True))
+    return starts
+
+
+def _conform(description: Path, starts: Mapping[str, float]) -> None:
+    """What the standard wants beyond what DaeBuilder writes.
+
+    Units are defined before the variables; names are free text, for DaeBuilder makes some that are no structured
+    names. And values at the start keep all their digits, where it writes six.
+    """
+    tree = ET.parse(description)
+    root = tree.getroot()
+    root.set("variableNamingConvention", "flat")
+    for variable in root.iter("Float64"):
+        if variable.get("start") is not None:
+            variable.set("start", repr(starts[variable.attrib["name"]]))
+    used = sorted({unit for each in root.iter() if (unit := each.get("unit")) is not None})
+    definitions = ET.Element("UnitDefinitions")
+    for unit in used:
+        entry = ET.SubElement(definitions, "Unit", name=unit)
+        exponents = {base: str(power) for base, power in base_units(unit).items()}
+        ET.SubElement(entry, "BaseUnit", exponents)
+    places = [place for place, child in enumerate(root) if child.tag == "ModelVariables"]
+    after_interfaces = [
+        place + 1 for place, child in enumerate(root) if child.tag in ("ModelExchange", "CoSimulation")
+    ]
+    root.insert((after_interfaces or places)[-1], definitions)
+    tree.write(description, encoding="utf-8", xml_declaration=True)

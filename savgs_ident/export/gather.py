@@ -1,0 +1,109 @@
+"""What is known about a model, brought together before it is exported.
+
+Rig file, posterior and diagnosis may come from different runs. What they say of each other is checked here, and told:
+``said`` are sentences on where the numbers come from, ``doubts`` on why they are not to be trusted.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.rig import Rig
+from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.export.diagnosed import Diagnosed, with_diagnosis
+from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.model.effect import AbstractSensorFault
+from savgs_ident.posterior.draws import read_draws
+
+FAR = 6.0
+"""Standard deviations by which a parameter may be off the mean of the draws: its own posterior has it within 3."""
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """A model on its way out, with what a reader must know about it.
+
+    Attributes:
+        model: the model.
+        said: where its numbers come from, a sentence each.
+        doubts: why it is not to be trusted, a sentence each; none if it is.
+    """
+
+    model: ExportedModel
+    said: tuple[str, ...]
+    doubts: tuple[str, ...]
+
+
+def gather(
+    rig: Rig,
+    effects: tuple[str, ...],
+    diagnosis: Mapping[str, object] = MappingProxyType({}),
+    posterior: Path | None = None,
+    count: int | None = None,
+) -> Gathered:
+    """The model of a rig with ``effects``, what a ``diagnosis`` adds to it, and ``count`` draws of its posterior.
+
+    Sentences and doubts stand in the provenance of the model's rig, too, as ``notes``, so that they travel along.
+    Raises :class:`InputError` for a diagnosis of another model or draws that cannot be used.
+    """
+    found = with_diagnosis(rig, effects, diagnosis) if diagnosis else Diagnosed(rig, effects, (), ())
+    model = ExportedModel(found.rig, found.effects, diagnosis=diagnosis)
+    doubts = [*_doubts_of_fit(rig, found), *_doubts_of_diagnosis(diagnosis)]
+    if posterior is not None:
+        model = replace(model, samples=read_draws(posterior, tuple(model.table), count))
+        doubts += _doubts_of_draws(model, found.added, posterior)
+    said = (*found.said, *_sensors(model))
+    notes = [*said, *doubts]
+    if notes:
+        noted = replace(model.rig, provenance={**model.rig.provenance, "notes": notes})
+        model = replace(model, rig=noted)
+    return Gathered(model, said, tuple(doubts))
+
+
+def _sensors(model: ExportedModel) -> tuple[str, ...]:
+    """What the equations leave out of the readings."""
+    return tuple(
+        f"{name} is an error of a sensor, not of the rig: the outputs of the equations are without it."
+        for name in model.effects
+        if isinstance(CATALOGUE[name], AbstractSensorFault)
+    )
+
+
+def _doubts_of_fit(rig: Rig, found: Diagnosed) -> tuple[str, ...]:
+    # With added effects, the numbers are of another fit.
+    if found.added or rig.provenance.get("trusted", True):
+        return ()
+    return (f"The rig file's own fit is not to be trusted ({rig.provenance.get('status', 'no status')}).",)
+
+
+def _doubts_of_diagnosis(document: Mapping[str, object]) -> tuple[str, ...]:
+    return () if document.get("converged", True) else ("The diagnosis did not converge.",)
+
+
+def _doubts_of_draws(model: ExportedModel, added: tuple[str, ...], path: Path) -> list[str]:
+    """Whether the draws are those of this model."""
+    own = [entry.name for name in added for entry in CATALOGUE[name].parameters]
+    lacking = [name for name in own if name not in model.samples]
+    doubts = []
+    if lacking:
+        doubts.append(
+            f"{path} is the posterior of a model without {' and '.join(added)}: it has no draws of "
+            f"{', '.join(lacking)}, and its other draws are not those of the exported model."
+        )
+    far = [name for name, values in model.samples.items() if _distance(model.table[name].value, values) > FAR]
+    if far:
+        doubts.append(
+            f"{path} lies elsewhere than the model: {', '.join(far[:4])} {'is' if len(far) == 1 else 'are'} more "
+            f"than {FAR:g} standard deviations off its draws."
+        )
+    return doubts
+
+
+def _distance(value: float, draws: NDArray[np.float64]) -> float:
+    """How far a value is from the mean of draws, in their standard deviations [1]; 0 where that is not known."""
+    spread = float(np.std(draws))
+    return abs(value - float(np.mean(draws))) / spread if spread > 0.0 else 0.0

@@ -1,0 +1,144 @@
+"""MATLAB: model.mat, version 5, for MATLAB, Octave and scipy.io.loadmat.
+
+    model = load('model.mat');
+    sys = ss(model.state_spaces.exact.A, ...);
+    model.parameters.k_t.value                          % SI, the unit beside it
+    model.frequency_responses.exact(1, 1, :)            % outputs x inputs x frequencies
+
+Nested texts (a diagnosis, the provenance) are JSON: jsondecode(model.diagnosis).
+"""
+
+import io
+from collections.abc import Iterable
+from pathlib import Path
+
+import control
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import savemat
+
+from savgs_ident.control.first_harmonic import first_harmonic, motions_on_cam
+from savgs_ident.control.linear_study import CHANNELS, FREQUENCY, TEST_FREQUENCY
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.files import write_bytes
+from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.json_text import as_plain, json_text
+from savgs_ident.export.linear_models import LinearModel, linear_models
+from savgs_ident.export.rig_document import covariance_record, provenance_record
+from savgs_ident.model.values import as_values
+
+NAME = "model.mat"
+"""The file."""
+
+LONGEST_NAME = 63
+"""Characters of a name in MATLAB."""
+
+KEYWORDS = frozenset(
+    {
+        "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global", "if",
+        "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
+    }
+)  # fmt: skip
+"""Names that MATLAB keeps for itself."""
+
+_HEAD = b"MATLAB 5.0 MAT-file, written by savgs_ident"
+_HEAD_BYTES = 116
+
+
+def write_mat(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
+    """Write model.mat.
+
+    Raises :class:`InputError` if it cannot be written, a parameter's name is none to MATLAB, or the rig finds no rest
+    or no motion on the cam.
+    """
+    stream = io.BytesIO()
+    savemat(stream, mat_record(model), long_field_names=True, do_compression=True, oned_as="column")
+    # Its own head says when it was written: the same model is to give the same bytes.
+    content = _HEAD.ljust(_HEAD_BYTES) + stream.getvalue()[_HEAD_BYTES:]
+    return (write_bytes(folder / NAME, content),)
+
+
+def mat_record(model: ExportedModel) -> dict[str, object]:
+    """The variables of the file: numbers as arrays, lists of names as cells."""
+    rig, equations = model.rig, model.equations
+    covariance_record(model)  # Refuses what is none.
+    names, covariance = model.covariance
+    parameters = {
+        _field(entry.name): {"value": entry.value, "unit": entry.unit, "about": entry.about}
+        for entry in model.table.entries
+    }
+    linear = linear_models(model)
+    return {
+        "schema": 1.0,
+        "name": rig.name,
+        "effects": _cell(model.effects),
+        "parameters": parameters,
+        "damper": {"velocity": np.array(rig.damper_velocity), "force": np.array(rig.damper_force)},
+        "signals": {
+            "states": _cell(signal.name for signal in equations.states),
+            "inputs": _cell(signal.name for signal in equations.inputs),
+            "outputs": _cell(signal.name for signal in equations.outputs),
+        },
+        "covariance": {"names": _cell(names), "matrix": covariance},
+        "samples": {_field(name): values for name, values in model.samples.items()},
+        "state_spaces": {name: _space(each) for name, each in linear.items()},
+        "frequency_responses": {
+            "frequency_hz": FREQUENCY,
+            **{name: each.response(FREQUENCY) for name, each in linear.items()},
+            "on_cam": _on_cam(model),
+        },
+        "diagnosis": _json(as_plain(dict(model.diagnosis), "diagnosis")),
+        "provenance": _json(provenance_record(rig)),
+    }
+
+
+def _on_cam(model: ExportedModel) -> dict[str, object]:
+    """First harmonics of the nonlinear rig on the cam of the test, per metre of road, all effects included."""
+    nonlinear, p = model.equations.model, as_values(model.table.as_dict())
+    cam = model.table["cam_peak_to_peak"].value
+    motions = motions_on_cam(nonlinear, p, TEST_FREQUENCY, cam)
+    return {
+        "about": "first harmonics of the nonlinear model, friction included, per metre of road",
+        "frequency_hz": TEST_FREQUENCY,
+        "channels": _cell(CHANNELS),
+        "cam_peak_to_peak": cam,
+        "response": first_harmonic(nonlinear, p, motions, cam).T,
+    }
+
+
+def _space(linear: LinearModel) -> dict[str, object]:
+    space: control.StateSpace = linear.space
+    named = {
+        "states": space.state_labels,
+        "inputs": space.input_labels,
+        "outputs": space.output_labels,
+    }
+    units = {
+        f"{kind[:-1]}_units": _cell(linear.units[name] for name in names) for kind, names in named.items()
+    }
+    cells = {kind: _cell(names) for kind, names in named.items()}
+    matrices = {"A": space.A, "B": space.B, "C": space.C, "D": space.D}
+    return {"about": linear.about, **matrices, **cells, **units}
+
+
+def _field(name: str) -> str:
+    """The name itself, if MATLAB can have it."""
+    usual = name.isascii() and name.isidentifier() and not name.startswith("_")
+    if usual and len(name) <= LONGEST_NAME and name not in KEYWORDS:
+        return name
+    raise InputError(
+        f"the parameter '{name}' cannot be a field in MATLAB",
+        source="--to mat",
+        remedy=f"rename it: a letter, then letters, digits and underscores, {LONGEST_NAME} at most, no keyword",
+    )
+
+
+def _cell(names: Iterable[str]) -> NDArray[np.object_]:
+    found = list(names)
+    cell = np.empty((len(found), 1), dtype=object)
+    cell[:, 0] = found
+    return cell
+
+
+def _json(record: object) -> str:
+    return json_text(record) if record else ""

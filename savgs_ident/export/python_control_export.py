@@ -1,0 +1,137 @@
+"""python-control: the linear models as state spaces, the nonlinear one as a system of differential equations.
+
+    systems = load_python_control("model-control.json")
+    systems["equation_8"], systems["exact"]          # control.StateSpace
+    rig = systems["nonlinear"]                       # control.NonlinearIOSystem, friction included
+    x0, u0 = resting_point("model-control.json")
+    control.input_output_response(rig, t, u, x0, params={"k_t": 2.6e5})
+
+The file holds numbers and names, no code: the equations are those of this package, compiled by JAX, with the rig and
+the effects that the file names. Every parameter of the rig can be changed through ``params``.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TypeAlias
+
+import control
+import jax
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.json_export import model_record, parse_model
+from savgs_ident.export.json_text import write_json_text
+from savgs_ident.export.linear_models import LINEAR, linear_models
+from savgs_ident.export.place import Place, read_document
+from savgs_ident.export.signals import resting_inputs, resting_state
+from savgs_ident.export.state_space_document import parse_space, space_record
+
+SCHEMA = 1
+"""The number of the form; a file with another one is refused."""
+
+KIND = "savgs_ident python-control"
+"""What says that a file is one of these."""
+
+NAME = "model-control.json"
+"""The file."""
+
+NONLINEAR = "nonlinear"
+"""The name of the system with all effects."""
+
+REMEDY = "give the model-control.json that `savgs-ident export --to python-control` wrote"
+
+_KEYS = ("schema", "kind", "model", "state_spaces", "at_rest")
+
+System: TypeAlias = "control.StateSpace | control.NonlinearIOSystem"
+Vector = NDArray[np.float64]
+
+
+def write_python_control(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
+    """Write model-control.json.
+
+    Raises :class:`InputError` if it cannot be written, or the rig finds no rest.
+    """
+    record = {
+        "schema": SCHEMA,
+        "kind": KIND,
+        "model": model_record(model),
+        "state_spaces": {name: space_record(each) for name, each in linear_models(model).items()},
+        "at_rest": {"x": _finite(resting_state(model)), "u": resting_inputs(model)},
+    }
+    return (write_json_text(folder / NAME, record),)
+
+
+def load_python_control(path: str | Path) -> dict[str, System]:
+    """The systems by name, signals named: those in the file's ``state_spaces``, and ``nonlinear``.
+
+    Raises :class:`InputError`, with file, place and remedy, for what is no such file.
+    """
+    return read_document(Path(path), REMEDY, _systems)
+
+
+def resting_point(path: str | Path) -> tuple[Vector, Vector]:
+    """States and inputs of ``nonlinear`` at rest, the link at its nominal angle: where a simulation begins.
+
+    Raises as :func:`load_python_control` does.
+    """
+    return read_document(Path(path), REMEDY, lambda place: _at_rest(_fields(place)))
+
+
+def nonlinear_system(model: ExportedModel) -> control.NonlinearIOSystem:
+    """dx/dt = rates(x, u, p), y = read(x, u, p) of the model's equations, compiled when first used."""
+    equations, values = model.equations, model.table.as_dict()
+    rates, outputs = jax.jit(equations.rates), jax.jit(equations.read)
+
+    def p(params: Mapping[str, float]) -> Vector:
+        if len(params) != len(values):
+            unknown = next(name for name in params if name not in values)
+            raise InputError(f"there is no parameter '{unknown}'", remedy="choose among the system's params")
+        return np.array([params[name] for name in equations.parameters], dtype=np.float64)
+
+    def update(t: float, x: Vector, u: Vector, params: Mapping[str, float]) -> Vector:
+        return np.asarray(rates(np.asarray(x, np.float64), np.asarray(u, np.float64), p(params)))
+
+    def output(t: float, x: Vector, u: Vector, params: Mapping[str, float]) -> Vector:
+        return np.asarray(outputs(np.asarray(x, np.float64), np.asarray(u, np.float64), p(params)))
+
+    return control.NonlinearIOSystem(
+        update,
+        output,
+        states=[signal.name for signal in equations.states],
+        inputs=[signal.name for signal in equations.inputs],
+        outputs=[signal.name for signal in equations.outputs],
+        params=values,
+        name=NONLINEAR,
+    )
+
+
+def _systems(document: Place) -> dict[str, System]:
+    fields = _fields(document)
+    systems: dict[str, System] = {
+        name: parse_space(place, name) for name, place in fields["state_spaces"].table(LINEAR).items()
+    }
+    return systems | {NONLINEAR: nonlinear_system(parse_model(fields["model"]))}
+
+
+def _fields(document: Place) -> dict[str, Place]:
+    fields = document.table(_KEYS)
+    if fields["kind"].value != KIND:
+        raise fields["kind"].wrong(f"'{KIND}'")
+    if fields["schema"].value != SCHEMA or isinstance(fields["schema"].value, bool):
+        raise fields["schema"].wrong(f"the schema {SCHEMA}, which this version reads")
+    return fields
+
+
+def _at_rest(fields: Mapping[str, Place]) -> tuple[Vector, Vector]:
+    equations, rest = parse_model(fields["model"]).equations, fields["at_rest"].table(("x", "u"))
+    (x,) = Place([rest["x"].value], rest["x"].where).matrix(1, len(equations.states))
+    (u,) = Place([rest["u"].value], rest["u"].where).matrix(1, len(equations.inputs))
+    return x, u
+
+
+def _finite(values: list[float]) -> list[float]:
+    if not np.isfinite(values).all():
+        raise InputError("the rig finds no rest", remedy="mend the spring or the hardpoints of the rig")
+    return values

@@ -1,0 +1,38 @@
+"""The draws of a posterior, read back from its file."""
+
+from collections.abc import Collection
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+
+REMEDY = "give the posterior.nc that `savgs-ident posterior` wrote for this model"
+
+
+def read_draws(
+    path: Path, names: Collection[str], count: int | None = None
+) -> dict[str, NDArray[np.float64]]:
+    """Draws by name, each (n,), SI, chains one after the other; of ``names``, those that the file holds.
+
+    With a ``count``, at most so many, evenly spread over all. Raises :class:`InputError` if the file cannot be read
+    or holds no finite draws of any.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            group = file["posterior"]
+            held = set(group.keys())
+            draws = {name: np.ravel(group[name][()]) for name in names if name in held}
+    except OSError as error:
+        raise InputError(f"cannot be read: {error}", source=path, remedy=REMEDY) from error
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError("is no posterior", source=path, remedy=REMEDY) from error
+    lengths = {values.size for values in draws.values()}
+    finite = all(values.dtype.kind == "f" and np.isfinite(values).all() for values in draws.values())
+    if len(lengths) != 1 or 0 in lengths or not finite:
+        raise InputError("holds no finite draws of the rig's parameters", source=path, remedy=REMEDY)
+    total = lengths.pop()
+    chosen = np.unique(np.linspace(0, total - 1, min(count or total, total)).astype(int))
+    return {name: values[chosen].astype(np.float64) for name, values in draws.items()}

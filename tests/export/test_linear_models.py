@@ -1,0 +1,76 @@
+"""The linear models that travel along are those of the control stage; an effect that is no friction stays in."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from savgs_ident.control.linearisation import linearise, resting
+from savgs_ident.control.quarter_car_space import quarter_car_space
+from savgs_ident.control.two_masses import paper_masses
+from savgs_ident.core.rig import Rig
+from savgs_ident.effects.registry import CATALOGUE, MODELS, build_model
+from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.linear_models import equation_8, exact, is_friction, without_friction
+from savgs_ident.model.values import as_values
+
+DRY = {
+    "rail_coulomb", "rail_preload", "rail_stribeck", "rail_asymmetry", "joint_friction", "strut_friction",
+    "tyre_friction",
+}  # fmt: skip
+
+
+def test_friction_is_what_holds_at_rest() -> None:
+    assert {name for name, effect in CATALOGUE.items() if is_friction(effect)} == DRY
+
+
+def test_both_are_those_of_the_control_stage(rig: Rig) -> None:
+    model = ExportedModel(rig, MODELS["simtr"])
+    p, bare = as_values(rig.parameters.as_dict()), build_model(rig, ())
+    printed = quarter_car_space(paper_masses(bare, p))
+    linear = linearise(bare, p, resting(bare, p, p["psi_nominal"]))
+    for found, wanted in ((equation_8(model).space, printed), (exact(model).space, linear)):
+        for name in "ABCD":
+            assert np.array_equal(getattr(found, name), getattr(wanted, name))
+        assert found.state_labels == wanted.state_labels
+
+
+def test_every_signal_has_its_unit(model: ExportedModel) -> None:
+    for each in (equation_8(model), exact(model)):
+        space = each.space
+        assert set(each.units) == {*space.state_labels, *space.input_labels, *space.output_labels}
+    assert exact(model).units["0_mount_deflection"] == "m"
+
+
+def _sag(rig: Rig, compliance: float) -> float:
+    """Suspension deflection per acceleration of the body [s^2] in a slow motion, on a mount of a compliance [m/N]."""
+    effects = (*MODELS["simtr"], "mount_compliance")
+    table = ExportedModel(rig, effects).table.with_values({"mount_compliance": compliance})
+    found = exact(ExportedModel(replace(rig, parameters=table), effects)).response(np.array([1e-3]))
+    return float(np.real(found[1, 0, 0] / found[0, 0, 0]))
+
+
+def test_a_mount_that_gives_way_is_in_the_exact_one(rig: Rig) -> None:
+    """The strut's spring k and the mount C are in series: the stiffness falls in proportion to k C / (1 + k C)."""
+    spring, some, more = rig.parameters["k_sd"].value, 5e-7, 1.5e-6
+    softer = [1.0 - _sag(rig, 0.0) / _sag(rig, compliance) for compliance in (some, more)]
+    series = [spring * compliance / (1.0 + spring * compliance) for compliance in (some, more)]
+    assert softer[1] / softer[0] == pytest.approx(series[1] / series[0], rel=1e-4)
+    # Nearly all stiffness is the spring's.
+    assert softer[0] == pytest.approx(series[0], rel=0.1)
+    stiff = exact(ExportedModel(rig, MODELS["simtr"])).response(np.array([1e-3]))
+    assert float(np.real(stiff[1, 0, 0] / stiff[0, 0, 0])) == pytest.approx(_sag(rig, 0.0), rel=1e-4)
+
+
+def test_the_cam_behind_its_encoder_is_not_linearised(rig: Rig) -> None:
+    model = ExportedModel(rig, ("cam_harmonic", "cam_scale", "rail_viscous"))
+    kept = without_friction(model.equations.model).effects
+    assert [effect.name for effect in kept] == ["rail_viscous"]
+
+
+def test_a_response_is_outputs_by_inputs_by_frequencies(model: ExportedModel) -> None:
+    linear = equation_8(model)
+    frequency = np.array([1.0, 2.0, 3.0])
+    found = linear.response(frequency)
+    assert found.shape == (4, 2, 3)
+    assert found[0, 0, 1] == pytest.approx(complex(linear.space(2j * np.pi * 2.0)[0, 0]))

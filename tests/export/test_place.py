@@ -1,0 +1,71 @@
+"""Reading JSON strictly: every fault is named by its place, nothing is guessed."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.export.place import Place, read_document
+
+FAULTS: dict[str, tuple[object, Callable[[Place], object], str]] = {
+    "no table": ([], lambda p: p.entries(), "at is [], not a table"),
+    "lacking": ({}, lambda p: p.table(("a",)), "at.a is missing"),
+    "too much": ({"a": 1, "b": 2}, lambda p: p.table(("a",)), "at.b is not known"),
+    "no list": ({}, lambda p: p.items(), "at is {}, not a list"),
+    "no text": (1, lambda p: p.text(), "at is 1, not a text"),
+    "another text": ("x", lambda p: p.text(("y", "z")), "at is 'x', not one of: y, z"),
+    "a name twice": (["x", "x"], lambda p: p.names(), "not a list of different names"),
+    "a truth": (True, lambda p: p.number(), "at is True, not a finite number"),
+    "infinite": (math.inf, lambda p: p.number(), "not a finite number"),
+    "too large": (10**400, lambda p: p.number(), "not a finite number"),
+    "text in a vector": ([1.0, "2"], lambda p: p.vector(), "at[1] is '2', not a finite number"),
+    "ragged": ([[1.0], [1.0, 2.0]], lambda p: p.matrix(2, 1), "not a matrix of 2 rows and 1 columns"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_named_by_its_place(fault: str) -> None:
+    value, read, said = FAULTS[fault]
+    with pytest.raises(InputError) as caught:
+        read(Place(value, "at"))
+    assert said in caught.value.what
+
+
+def test_places_are_written_as_one_would_look_for_them() -> None:
+    document = Place({"a": [{"b": 1}]})
+    (first,) = document.table(("a",))["a"].items()
+    assert first.table(("b",))["b"].where == "a[0].b"
+
+
+def test_long_values_are_shown_by_their_beginning() -> None:
+    assert len(Place("x" * 5000, "at").wrong("a number").what) < 120
+
+
+def test_matrices_come_back_in_their_shape() -> None:
+    assert np.array_equal(Place([[1, 2.5, 3], [4, 5, 6]]).matrix(2, 3), [[1.0, 2.5, 3.0], [4.0, 5.0, 6.0]])
+    assert Place([]).matrix(0, 0).shape == (0, 0)
+    assert Place([[], []]).matrix(2, 0).shape == (2, 0)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b'{"a": 1, "a": 2}', "'a' is given twice"),
+        (b'{"a": NaN}', "NaN is no finite number"),
+        (b'{"a": -Infinity}', "-Infinity is no finite number"),
+        (b'{"a": 1e999}', "1e999 is no finite number"),
+        (b'{"a": "\xff"}', "is not such JSON"),
+        (b"", "is not such JSON"),
+        (b"[" * 100_000, "is not such JSON"),
+    ],
+)
+def test_what_is_no_strict_json_is_refused(tmp_path: Path, content: bytes, said: str) -> None:
+    path = tmp_path / "x.json"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        read_document(path, "do this", lambda place: place.value)
+    assert said in caught.value.what
+    assert (caught.value.source, caught.value.remedy) == (str(path), "do this")

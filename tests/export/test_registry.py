@@ -1,0 +1,68 @@
+"""The contract of all formats: what is said to be written is written, whole, and nothing else."""
+
+import importlib
+from pathlib import Path
+
+import pytest
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.export import registry
+from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.registry import EXPORTS
+
+pytestmark = pytest.mark.slow
+
+
+HERE = Path(__file__).parent
+
+
+def _write(name: str, model: ExportedModel, folder: Path) -> tuple[Path, ...]:
+    """Write a format; without what it needs on this machine, the test is skipped."""
+    try:
+        return EXPORTS[name].write(model, folder)
+    except InputError as error:
+        if error.source != f"--to {name}":
+            raise
+        pytest.skip(str(error))
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_every_format_writes_the_files_that_it_says_and_nothing_else(
+    name: str, model: ExportedModel, tmp_path: Path
+) -> None:
+    files = _write(name, model, tmp_path)
+    assert files
+    assert sorted(files) == sorted(tmp_path.iterdir())
+    assert all(file.stat().st_size > 0 for file in files)
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_a_folder_that_is_not_there_is_an_input_error(
+    name: str, model: ExportedModel, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError):
+        EXPORTS[name].write(model, tmp_path / "none")
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_every_format_has_a_test_of_its_own_numbers(name: str) -> None:
+    assert (HERE / f"test_{name.replace('-', '_')}_export.py").is_file()
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_every_format_says_what_it_is(name: str) -> None:
+    assert EXPORTS[name].about
+
+
+def test_a_package_that_is_not_there_stands_in_the_way_of_no_other_format(
+    monkeypatch: pytest.MonkeyPatch, model: ExportedModel, tmp_path: Path
+) -> None:
+    def lacking(name: str) -> object:
+        if name.endswith("mat_export"):
+            raise ImportError("no such package")
+        return importlib.import_module(name)
+
+    monkeypatch.setattr(registry, "import_module", lacking)
+    assert EXPORTS["json"].write(model, tmp_path)
+    with pytest.raises(ImportError):
+        EXPORTS["mat"].write(model, tmp_path)

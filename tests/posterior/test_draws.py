@@ -1,0 +1,70 @@
+"""Draws are read back as they were written, evenly thinned; what holds none is refused."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.posterior.draws import read_draws
+
+CHAINS = np.arange(12.0).reshape(3, 4)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """Three chains of four draws."""
+    path = tmp_path / "posterior.nc"
+    with h5py.File(path, "w") as file:
+        file["posterior/a"] = CHAINS
+        file["posterior/b"] = 10.0 * CHAINS
+        file["posterior/noise_scale"] = CHAINS
+    return path
+
+
+def test_chains_follow_each_other(path: Path) -> None:
+    found = read_draws(path, ("b", "a", "c"))
+    assert list(found) == ["b", "a"]
+    assert np.array_equal(found["a"], np.arange(12.0))
+
+
+def test_draws_are_spread_evenly_and_stay_together(path: Path) -> None:
+    found = read_draws(path, ("a", "b"), 4)
+    assert np.array_equal(found["a"], [0.0, 3.0, 7.0, 11.0])
+    assert np.array_equal(found["b"], 10.0 * found["a"])
+
+
+def test_no_more_than_there_are(path: Path) -> None:
+    assert read_draws(path, ("a",), 500)["a"].size == 12
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ({"other/a": CHAINS}, "is no posterior"),
+        ({"posterior/x": CHAINS}, "no finite draws"),
+        ({"posterior/a": CHAINS, "posterior/b": CHAINS[:2]}, "no finite draws"),
+        ({"posterior/a": np.full((2, 2), np.nan)}, "no finite draws"),
+        ({"posterior/a": np.zeros((0, 2))}, "no finite draws"),
+        ({"posterior/a": np.arange(4)}, "no finite draws"),
+        ({"posterior/a/b": CHAINS}, "is no posterior"),
+    ],
+)
+def test_what_holds_no_draws_is_refused(tmp_path: Path, content: dict[str, np.ndarray], said: str) -> None:
+    path = tmp_path / "x.nc"
+    with h5py.File(path, "w") as file:
+        for name, values in content.items():
+            file[name] = values
+    with pytest.raises(InputError) as caught:
+        read_draws(path, ("a", "b"))
+    assert said in caught.value.what
+    assert caught.value.source == str(path)
+    assert "savgs-ident posterior" in caught.value.remedy
+
+
+def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "x.nc").write_text("text")
+    for name in ("x.nc", "none.nc"):
+        with pytest.raises(InputError, match="cannot be read"):
+            read_draws(tmp_path / name, ("a",))
