@@ -21,8 +21,8 @@ from benchmarks.suite import NAMES, Size, run_suite
 from benchmarks.table import make_table, print_table
 from benchmarks.task import DWELLS_HZ, QUICK_HZ
 
-FULL = Size(DWELLS_HZ, 60.0, 1000.0, 308, 150_000, Path("out/blind"))
-QUICK = Size(QUICK_HZ, 2.0, 100.0, 24, 5000, Path("out/blind"))
+FULL = Size(DWELLS_HZ, 60.0, 1000.0, 308, 150_000, Path("out/blind"), 32)
+QUICK = Size(QUICK_HZ, 2.0, 100.0, 24, 5000, Path("out/blind"), 4)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

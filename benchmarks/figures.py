@@ -108,6 +108,11 @@ FIGURES: dict[str, Figure] = {
     "closed_loop_difference_percent": Figure(
         "%", ".3f", "By how much the deflections of the two differ, rms over rms."
     ),
+    "campaigns_one_worker_s": Figure(
+        "s", ".0f", "`savgs-ident campaign` on many campaigns, one at a time, programs compiled."
+    ),
+    "campaigns_two_workers_s": Figure("s", ".0f", "The same, two at a time."),
+    "campaigns_speedup_two_workers": Figure("x", ".2f", "How many times longer one at a time takes."),
     "mcap_samples_per_s": Figure(
         "1/s", ",.0f", "Samples (of six channels) read per second from a long MCAP file."
     ),

@@ -9,7 +9,7 @@ from benchmarks.task import DWELLS_HZ
 
 NAMES = (
     "response", "harmonicbalance", "scipy", "diffrax", "fit", "posterior", "posterior-scipy", "collocation", "mcap",
-    "diagnosis", "sindy", "closed-loop",
+    "diagnosis", "sindy", "closed-loop", "campaigns",
 )  # fmt: skip
 """What can be asked for."""
 
@@ -26,6 +26,7 @@ class Size(NamedTuple):
         integrations: of single dwells by scipy, for the time of a likelihood.
         stretch_steps: of emcee's own move, at most.
         trials: folder of blind trials on which the diagnosis is compared.
+        campaigns: how many are identified side by side.
     """
 
     dwells_hz: tuple[float, ...]
@@ -34,6 +35,7 @@ class Size(NamedTuple):
     integrations: int
     stretch_steps: int
     trials: Path
+    campaigns: int = 32
 
 
 def run_suite(names: Sequence[str], size: Size, tell: Tell) -> Outcome:
@@ -79,6 +81,10 @@ def _processes(names: Sequence[str], size: Size, tell: Tell) -> Outcome:
         from benchmarks.processes import measure_mcap
 
         outcome += measure_mcap(size.mcap_minutes, tell)
+    if "campaigns" in names:
+        from benchmarks import campaigns
+
+        outcome += campaigns.measure(tell, size.campaigns)
     return outcome
 
 

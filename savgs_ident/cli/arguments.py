@@ -16,10 +16,15 @@ def _is_number(word: str) -> bool:
     return True
 
 
+def _is_format(word: str) -> bool:
+    return word[:1] != "-" and word.replace("-", "_").isidentifier() and not Path(word).exists()
+
+
 SEVERAL: dict[str, Callable[[str], bool]] = {
     "--free": _is_name,
     "--without": _is_name,
     "--frequency": _is_number,
+    "--to": _is_format,
 }
 """The options, and what a further value of each looks like; a word that does not is an argument."""
 

@@ -1,13 +1,11 @@
 """Work in processes side by side that end with the program, however it ends."""
 
 import multiprocessing
-import os
-import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing.connection import wait
 from typing import TypeVar
+
+from savgs_ident.cli.worker_process import end_with_parent
 
 Result = TypeVar("Result")
 
@@ -21,7 +19,11 @@ def side_by_side(work: Callable[[int], Result], numbers: Sequence[int], jobs: in
     One at a time is done in this process. Where the work ends early, so do the processes.
     """
     if jobs == 1 or len(numbers) < 2:
-        yield from map(work, numbers)
+        from savgs_ident.simulate.compilation import make_room_for_programs
+
+        for number in numbers:
+            make_room_for_programs()
+            yield work(number)
         return
     for first in range(0, len(numbers), TASKS * jobs):
         yield from _batch(work, numbers[first : first + TASKS * jobs], jobs)
@@ -48,17 +50,8 @@ def _batch(work: Callable[[int], Result], numbers: Sequence[int], jobs: int) -> 
 
 
 def _prepare() -> None:
-    """Make a new process keep its programs, and end with the one that started it: by that one at Ctrl-C, by
-    itself if that one is killed."""
+    """Make a new process keep its programs, and end with the one that started it."""
     from savgs_ident.simulate.compilation import use_persistent_cache
 
     use_persistent_cache()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
+    end_with_parent()

@@ -20,6 +20,7 @@ from savgs_ident.effects.registry import model_parameters
 from savgs_ident.fit.least_squares import fit_least_squares
 from savgs_ident.fit.result import Fit
 from savgs_ident.fit.settings import FitSettings
+from savgs_ident.recordings.recording import Campaign
 from savgs_ident.report.bode_record import Compared
 from savgs_ident.report.files import prepare_folder, write_json
 from savgs_ident.report.fit_record import fit_record
@@ -49,25 +50,40 @@ def identify(job: Job, voice: Voice, out: Path) -> int:
     """Fit, write fit.json, model.toml, bode.png and bode.pdf to ``out``, and tell; the exit code."""
     prepare_folder(out)
     use_persistent_cache()
-    effects = effects_of(job.model)
-    # A rig that was identified before brings what was known then; its values would count the data twice.
-    drawing = rig_before(read_rig(job.rig), effects, job.rig)
-    free = free_parameters(job.free, job.model, model_parameters(drawing, effects))
+    rig = read_rig(job.rig)
     with voice.working() as progress:
-        campaign, measured = read_response(
-            job.campaign, job.channels, job.settings.orders, job.max_frequency, progress
-        )
-        fit = fit_least_squares(
-            measured, drawing, effects=effects, free=free, settings=job.settings, progress=progress
-        )
-        record = fit_record(fit, (*campaign.warnings, *measured.warnings))
+        campaign, fit = fit_campaign(job, rig, progress)
+        record = fit_record(fit, (*campaign.warnings, *fit.measured.warnings))
         files = [write_json(out / "fit.json", record), out / "model.toml"]
-        identified = replace(fit.rig, provenance=provenance(fit, campaign, job.command))
+        identified = identified_rig(fit, campaign, job)
         write_rig(identified, out / "model.toml")
         files += _draw(fit, identified, campaign.source, out, progress)
     voice.show(fit_text(fit), plain(""), plain("Written: " + ", ".join(str(file) for file in files)))
     voice.hand_over(record)
     return conclude(fit)
+
+
+def fit_campaign(job: Job, rig: Rig, progress: Progress) -> tuple[Campaign, Fit]:
+    """Read the campaign of a job and fit ``rig``, what is in its file, to it.
+
+    Raises :class:`InputError` for a campaign that cannot be used and for unknown parameters.
+    """
+    effects = effects_of(job.model)
+    # A rig that was identified before brings what was known then; its values would count the data twice.
+    drawing = rig_before(rig, effects, job.rig)
+    free = free_parameters(job.free, job.model, model_parameters(drawing, effects))
+    campaign, measured = read_response(
+        job.campaign, job.channels, job.settings.orders, job.max_frequency, progress
+    )
+    fit = fit_least_squares(
+        measured, drawing, effects=effects, free=free, settings=job.settings, progress=progress
+    )
+    return campaign, fit
+
+
+def identified_rig(fit: Fit, campaign: Campaign, job: Job) -> Rig:
+    """What a fit identified, with its provenance: the content of ``model.toml``."""
+    return replace(fit.rig, provenance=provenance(fit, campaign, job.command))
 
 
 def _draw(fit: Fit, rig: Rig, source: str, out: Path, progress: Progress) -> tuple[Path, ...]:

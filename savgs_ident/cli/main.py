@@ -16,9 +16,11 @@ from savgs_ident.cli.arguments import spread_values
 from savgs_ident.cli.blind_command import blind
 from savgs_ident.cli.bode_command import bode
 from savgs_ident.cli.calibrate_command import calibrate
+from savgs_ident.cli.campaign_command import campaign
 from savgs_ident.cli.closed_loop_command import closed_loop
 from savgs_ident.cli.design_command import design
 from savgs_ident.cli.diagnose_command import diagnose
+from savgs_ident.cli.export_command import export
 from savgs_ident.cli.fit_command import demo, fit
 from savgs_ident.cli.inspect_command import inspect
 from savgs_ident.cli.linearise_command import linearise
@@ -55,7 +57,7 @@ def _root(
 
 for _command in (
     demo, inspect, fit, bode, simulate, posterior, calibrate, diagnose, false_alarms, blind, linearise, design,
-    closed_loop,
+    closed_loop, export, campaign,
 ):  # fmt: skip
     app.command()(_command)
 

@@ -88,7 +88,18 @@ def read_rig(path: str | Path) -> Rig:
     Raises :class:`InputError`, with file, key, what is wrong and the remedy, for anything that is not a
     complete rig file of the known form.
     """
-    document = _load(path)
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"cannot be read: {error.strerror}", source=path, remedy="name an existing rig file"
+        ) from error
+    return parse_rig(content, path)
+
+
+def parse_rig(content: bytes, source: object) -> Rig:
+    """The rig in the ``content`` of a rig file that errors call ``source``; raises as :func:`read_rig` does."""
+    document = _load(content, source)
     try:
         return Rig(
             parse_name(document),
@@ -97,7 +108,7 @@ def read_rig(path: str | Path) -> Rig:
             parse_provenance(document),
         )
     except InputError as error:
-        raise InputError(error.what, source=path, remedy=error.remedy) from None
+        raise InputError(error.what, source=source, remedy=error.remedy) from None
 
 
 def write_rig(rig: Rig, path: str | Path) -> None:
@@ -107,8 +118,12 @@ def write_rig(rig: Rig, path: str | Path) -> None:
     :class:`InputError` if the file cannot be written, a unit is not known, or the provenance holds what TOML
     cannot say.
     """
-    text = compose_rig(rig.name, rig.parameters, rig.damper_velocity, rig.damper_force, rig.provenance)
-    write_bytes(Path(path), text.encode())
+    write_bytes(Path(path), rig_text(rig).encode())
+
+
+def rig_text(rig: Rig) -> str:
+    """What :func:`write_rig` writes; raises as it does."""
+    return compose_rig(rig.name, rig.parameters, rig.damper_velocity, rig.damper_force, rig.provenance)
 
 
 def _shipped(relative: str) -> Path:
@@ -119,17 +134,13 @@ def _shipped(relative: str) -> Path:
     raise InputError(f"the shipped file data/{relative} is missing", remedy="install the package again")
 
 
-def _load(path: str | Path) -> dict[str, object]:
+def _load(content: bytes, source: object) -> dict[str, object]:
     try:
-        return tomllib.loads(Path(path).read_bytes().decode("utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"cannot be read: {error.strerror}", source=path, remedy="name an existing rig file"
-        ) from error
+        return tomllib.loads(content.decode("utf-8"))
     except UnicodeDecodeError as error:
-        raise InputError("is not text in UTF-8", source=path, remedy="save the file as UTF-8") from error
+        raise InputError("is not text in UTF-8", source=source, remedy="save the file as UTF-8") from error
     except (ValueError, RecursionError) as error:
-        raise InputError(f"is not valid TOML: {error}", source=path, remedy="mend it there") from error
+        raise InputError(f"is not valid TOML: {error}", source=source, remedy="mend it there") from error
 
 
 def _check_damper_table(velocity: tuple[float, ...], force: tuple[float, ...]) -> None:

@@ -18,6 +18,7 @@ from savgs_ident.recordings.binding import Binding, Candidate, bind, factor_or_s
 from savgs_ident.recordings.channel_map import ChannelMap, ChannelRule
 from savgs_ident.recordings.csv_header import CsvHead, read_head
 from savgs_ident.recordings.csv_table import CsvTable
+from savgs_ident.recordings.epoch import unix_time
 from savgs_ident.recordings.kinds import kind_of
 from savgs_ident.recordings.names import TEST_COLUMNS, canonical_name, normalise, split_header
 from savgs_ident.recordings.reading import Progress, Reader, Reading
@@ -196,6 +197,7 @@ def _cut_into_tests(
                     )
                     for channel, values in channels.items()
                 },
+                start=unix_time(float(time[start])),
             )
         )
     return tuple(recordings)

@@ -18,6 +18,7 @@ from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.binding import Binding, ambiguous
 from savgs_ident.recordings.channel_map import ChannelMap
 from savgs_ident.recordings.clock import choose_clock
+from savgs_ident.recordings.epoch import unix_time
 from savgs_ident.recordings.events import Event, Span, looks_like_events, parse_event, spans_of
 from savgs_ident.recordings.kinds import kind_of
 from savgs_ident.recordings.mcap_records import MAGIC, McapRecords, Segment
@@ -194,7 +195,8 @@ def _cut_into_tests(
         kind, named = kind_of(span.name)
         frequency = span.frequency_hz if span.frequency_hz is not None else named
         kind = "dwell" if kind == "other" and frequency is not None else kind
-        recordings.append(Recording(span.name, kind, frequency if kind == "dwell" else None, channels))
+        frequency = frequency if kind == "dwell" else None
+        recordings.append(Recording(span.name, kind, frequency, channels, unix_time(1e-9 * span.start)))
     return tuple(recordings), tuple(warnings)
 
 

@@ -37,10 +37,10 @@ def read_campaign(
     """
     path = Path(path)
     try:
-        files = _files(path)
+        files = campaign_files(path)
         the_map = _map_for(path, channel_map)
         readings = _read_files(files, the_map, progress or _silent)
-        digest = _digest(files)
+        digest = digest_of(files)
     except OSError as error:
         raise InputError(
             f"cannot be read: {error.strerror or error}",
@@ -57,7 +57,8 @@ def _silent(fraction: float) -> None:
     """Nobody wants to know."""
 
 
-def _files(path: Path) -> list[Path]:
+def campaign_files(path: Path) -> list[Path]:
+    """The files that make up the campaign at ``path``, a file or a folder; :class:`InputError` if there are none."""
     if not path.exists():
         raise InputError("does not exist", source=path, remedy="check the path")
     if path.is_file():
@@ -75,8 +76,14 @@ def _map_for(path: Path, channel_map: ChannelMap | Path | str | None) -> Channel
         return channel_map
     if channel_map is not None:
         return read_channel_map(channel_map)
+    beside = map_beside(path)
+    return ChannelMap() if beside is None else read_channel_map(beside)
+
+
+def map_beside(path: Path) -> Path | None:
+    """The ``channels.toml`` that is used for the campaign at ``path`` where none is named; None if there is none."""
     beside = (path if path.is_dir() else path.parent) / FILE_NAME
-    return read_channel_map(beside) if beside.is_file() else ChannelMap()
+    return beside if beside.is_file() else None
 
 
 def _read_files(files: Sequence[Path], channel_map: ChannelMap, progress: Progress) -> list[Reading]:
@@ -91,7 +98,8 @@ def _read_files(files: Sequence[Path], channel_map: ChannelMap, progress: Progre
     return readings
 
 
-def _digest(files: Sequence[Path]) -> str:
+def digest_of(files: Sequence[Path]) -> str:
+    """The digest (SHA-256, hexadecimal) of what is in ``files``, as :attr:`Campaign.sha256` has it."""
     digests = []
     for file in files:
         with file.open("rb") as stream:

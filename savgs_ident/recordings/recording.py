@@ -56,12 +56,16 @@ class Channel:
 
 @dataclass(frozen=True)
 class Recording:
-    """One test: its name, what kind it is, the frequency asked for [Hz] (None if not told), its channels."""
+    """One test: its name, what kind it is, the frequency asked for [Hz] (None if not told), its channels.
+
+    ``start`` is when it began [s since 1970, UTC]; None if the clock does not tell the date.
+    """
 
     name: str
     kind: TestKind
     frequency_hz: float | None
     channels: Mapping[str, Channel]
+    start: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
@@ -86,6 +90,11 @@ class Campaign:
     recordings: tuple[Recording, ...]
     warnings: tuple[DataWarning, ...]
     sha256: str
+
+    @property
+    def start(self) -> float | None:
+        """When the first test began [s since 1970, UTC]; None if no clock tells the date."""
+        return min((each.start for each in self.recordings if each.start is not None), default=None)
 
     def only(self, channels: Collection[str]) -> "Campaign":
         """The same tests with no other channels than these."""

@@ -21,6 +21,8 @@ WORDS = st.lists(
         ("fit --free mu_r --free c_sd x.csv", "fit --free mu_r --free c_sd x.csv"),
         ("x --frequency 1 2e0 3 --json", "x --frequency 1 --frequency 2e0 --frequency 3 --json"),
         ("diagnose --without a b run.csv", "diagnose --without a --without b run.csv"),
+        ("export --to json python-control m.toml", "export --to json --to python-control m.toml"),
+        ("export m.toml --to c mat -h", "export m.toml --to c --to mat -h"),
         ("fit --free", "fit --free"),
         ("fit --free --quiet mu_r", "fit --free --quiet mu_r"),
         ("simulate --frequency 1 model", "simulate --frequency 1 model"),

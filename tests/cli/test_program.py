@@ -15,7 +15,7 @@ from savgs_ident import __version__
 COMMAND = (sys.executable, "-m", "savgs_ident.cli")
 COMMANDS = (
     "demo", "inspect", "fit", "bode", "simulate", "posterior", "calibrate", "diagnose", "false-alarms", "blind",
-    "linearise", "design", "closed-loop",
+    "linearise", "design", "closed-loop", "export", "campaign",
 )  # fmt: skip
 HEAVY = ("jax", "matplotlib", "pandas", "scipy", "numpy")
 

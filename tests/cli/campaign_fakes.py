@@ -1,0 +1,108 @@
+"""Campaigns that take no time: files of one number, identified by someone who reads it.
+
+Run as a program, it identifies them in processes or on a cluster, slowly, for tests that kill:
+
+    python -m tests.cli.campaign_fakes OUT SECONDS WORKERS|ADDRESS FOLDER ...
+"""
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from savgs_ident.cli.campaign_store import Kept
+from savgs_ident.cli.campaign_work import Failure, Outcome, Task
+from savgs_ident.cli.campaigns import ManyJob, run_campaigns, spread_of
+from savgs_ident.cli.console import Voice
+from savgs_ident.cli.identify import Job
+from savgs_ident.cli.models import ModelName
+from savgs_ident.core.rig import default_rig_path
+from savgs_ident.fit.settings import FitSettings
+
+STDERR = 0.1
+DAY = 86400.0
+
+
+def campaign_file(path: Path, value: float, start: float | None = None, **more: Any) -> Path:
+    """A campaign whose mu_r is found to be ``value``; ``more`` is what else there is to say."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps({"value": value, "start": start, **more}))
+    return path
+
+
+def job(*arguments: Path, **changes: Any) -> ManyJob:
+    """Identify mu_r and c_sd of the campaigns in ``arguments``; changes are of the single fit."""
+    given: dict[str, Any] = {
+        "campaign": Path(),
+        "rig": default_rig_path(),
+        "channels": None,
+        "model": ModelName.simtr,
+        "free": ("mu_r", "c_sd"),
+        "settings": FitSettings(),
+        "max_frequency": None,
+        "command": ("savgs-ident", "campaign"),
+    }
+    return ManyJob(arguments, Job(**(given | changes)), None, 2)
+
+
+def read_number(task: Task) -> Outcome:
+    """What is in the file, as the result of a fit."""
+    path = task.job.campaign
+    files = sorted(path.iterdir()) if path.is_dir() else [path]
+    told = json.loads(files[0].read_text())
+    if "failure" in told:
+        return Failure(told["failure"], told.get("unreadable", False))
+    numbers = {
+        "mu_r": (told["value"], STDERR, "1"),
+        "c_sd": (5792.0, 12.0, "N s/m"),
+        "m_s": (320.0, 1.0, "kg"),
+    }
+    record = {
+        "schema": 1,
+        "parameters": {
+            name: {
+                "value": value,
+                "stderr": stderr,
+                "unit": unit,
+                "free": name != "m_s",
+                "prior_sd": 1.25 if name == "m_s" else 0.0,
+            }
+            for name, (value, stderr, unit) in numbers.items()
+        },
+        "correlation": {"mu_r": {"m_s": 0.0}, "c_sd": {"m_s": 0.6}},
+        "chi2_per_dof": 1.05,
+        "trusted": told.get("trusted", True),
+        "converged": True,
+        "status": "converged",
+        "advice": "converged",
+    }
+    return Kept(json.dumps(record), f"name = {json.dumps(task.source)}\n", told["start"])
+
+
+def one_by_one(work: Callable[[Task], Outcome], tasks: Sequence[Task]) -> Iterator[tuple[int, Outcome]]:
+    """The work in this process."""
+    yield from ((number, work(task)) for number, task in enumerate(tasks))
+
+
+def slowly(seconds: float, task: Task) -> Outcome:
+    """The same after some time; leaves a file of the process that does it, named after the campaign."""
+    path = task.job.campaign
+    (path.parent / f"{path.name}.{os.getpid()}").touch()
+    time.sleep(seconds)
+    return read_number(task)
+
+
+def _main(out: str, seconds: str, where: str, *arguments: str) -> int:
+    asked = job(*map(Path, arguments))
+    local = where.isdecimal()
+    asked = ManyJob(asked.arguments, asked.one, None if local else where, int(where) if local else 1)
+    slow = partial(slowly, float(seconds))
+    return run_campaigns(asked, slow, spread_of(asked), Voice(False, False), Path(out))
+
+
+if __name__ == "__main__":
+    sys.exit(_main(*sys.argv[1:]))
