@@ -49,14 +49,14 @@ def effects_in(rig: "Rig", source: object) -> tuple[str, ...]:
 
     Raises :class:`InputError` if what it says is no list of known effects.
     """
-    from savgs_ident.effects.registry import CATALOGUE
+    from savgs_ident.effects.registry import EFFECTS
 
     named = rig.provenance.get("effects", effects_of(ModelName.simtr))
-    if not isinstance(named, list | tuple) or any(name not in CATALOGUE for name in named):
+    if not isinstance(named, list | tuple) or any(name not in EFFECTS for name in named):
         raise InputError(
             f"provenance.effects is {named!r}",
             source=source,
-            remedy="list known effects: " + ", ".join(sorted(CATALOGUE)),
+            remedy="list known effects: " + ", ".join(sorted(EFFECTS)),
         )
     return tuple(named)
 

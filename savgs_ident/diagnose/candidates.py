@@ -1,6 +1,6 @@
 """Hypotheses as a report shows them: with probabilities, parameters and what they gain on tests left out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,11 +64,15 @@ def joint_sigma(scores: Sequence[Score]) -> float:
 
 def estimates_of(mode: Mode, scores: Mapping[str, Score]) -> tuple[Estimate, ...]:
     """The parameters of a hypothesis's terms with their 95 % intervals."""
-    own = {c.name for name in mode.terms for c in scores[name].term.coordinates}
+    return estimates_among(mode, {c.name for name in mode.terms for c in scores[name].term.coordinates})
+
+
+def estimates_among(mode: Mode, names: Collection[str]) -> tuple[Estimate, ...]:
+    """The named parameters of a hypothesis with their 95 % intervals."""
     sd = np.sqrt(np.diag(mode.covariance()))
     found = []
     for each, x, s in zip(mode.coordinates, mode.x.tolist(), sd.tolist(), strict=True):
-        if each.name in own:
+        if each.name in names:
             low, high = each.value(x - WITHIN * s), each.value(x + WITHIN * s)
             found.append(Estimate(each.name, each.value(x), low, high, each.unit))
     return tuple(found)

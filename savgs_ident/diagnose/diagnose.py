@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from savgs_ident.core.rig import Rig
-from savgs_ident.diagnose.candidates import candidates_of, confusable_of, not_judgeable_of
+from savgs_ident.diagnose.candidates import (
+    candidates_of,
+    confusable_of,
+    estimates_among,
+    not_judgeable_of,
+)
 from savgs_ident.diagnose.engine.climb import Mode
 from savgs_ident.diagnose.engine.heldout import HeldOut, held_out_by_law, hold_out
 from savgs_ident.diagnose.engine.parallel import in_parallel, side_by_side
@@ -18,13 +23,14 @@ from savgs_ident.diagnose.judgement import Case, Judged, judge, recalibrate, set
 from savgs_ident.diagnose.result import (
     Diagnosis,
     ForceLoop,
-    Kind,
+    Learned,
     NextTest,
     PortShare,
     Responses,
     SweepShrink,
 )
 from savgs_ident.diagnose.rig.gap import Rows, shrinks
+from savgs_ident.diagnose.rig.learning import LearnedLaw, can_be_learned, learn
 from savgs_ident.diagnose.rig.loops import loops_of
 from savgs_ident.diagnose.rig.next_test import next_tests
 from savgs_ident.diagnose.rig.plant import RigPlant
@@ -33,9 +39,14 @@ from savgs_ident.diagnose.rig.where import cycle_positions, gap_map
 from savgs_ident.diagnose.settings import DiagnosisSettings
 from savgs_ident.diagnose.verdict import probabilities, rivals_of
 from savgs_ident.diagnose.words import verdict_of, warnings_of
+from savgs_ident.effects.learned.forces import coefficients_at
 from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.model.effect import Port
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.sweep_response import SweepResponse
+
+Corrected = tuple[RigPlant, tuple[str, ...], Mapping[str, float]]
+"""A plant, the terms in it, and values by name [SI]."""
 
 
 def diagnose_response(
@@ -79,13 +90,35 @@ def _diagnose(
     )
     named = judged.chosen.mode if judged.kind in ("effect", "several") else None
     chosen = [] if judged.chosen.mode is None else [judged.chosen.mode]
+    law = _learned(case, judged, held["none"], tell) if judged.kind == "unknown" else None
+    after = _after(case, judged, named, law)
     last, swept = side_by_side(
         lambda: _held_out(case, chosen, tell),
-        lambda: _predict_sweep(case, judged.kind, named, values, sweep, tell),
+        lambda: _predict_sweep(case, values, after, sweep, tell),
     )
-    held = {**held, **last, "unknown": held_out_by_law(case.search, judged.place.held_out)}
-    found = _assemble(case, judged, named, held, measured, options, tell)
+    linear = held_out_by_law(case.search, judged.place.held_out)
+    held = {**held, **last, "unknown": linear if law is None else law.held}
+    found = _assemble(case, judged, named, law, held, measured, options, tell)
     return replace(found, sweep=swept, next_tests=tests, wall_s=time.perf_counter() - began)
+
+
+def _learned(case: Case, judged: Judged, without: HeldOut, tell: Tell) -> LearnedLaw | None:
+    """The law at the port of something unknown, on the nonlinear rig; None where that does not help."""
+    if not can_be_learned(judged.seat):
+        return None
+    tell(f"learning a force at the port {judged.seat}")
+    law = learn(case.plant, case.data, case.base, judged.seat)
+    return law if law.mode.status.ok and law.held.mean > without.mean else None
+
+
+def _after(case: Case, judged: Judged, named: Mode | None, law: LearnedLaw | None) -> Corrected | None:
+    """The plant with what the verdict puts into it; None for a law to first order: no model can be solved with it."""
+    if law is not None:
+        return law.plant, (law.name,), law.values
+    if judged.kind == "unknown":
+        return None
+    mode = named or case.base
+    return case.plant, mode.terms, mode.values
 
 
 def _compared(case: Case, judged: Judged) -> list[Mode]:
@@ -109,6 +142,7 @@ def _assemble(
     case: Case,
     judged: Judged,
     named: Mode | None,
+    law: LearnedLaw | None,
     held: dict[str, HeldOut],
     measured: HarmonicResponse,
     options: DiagnosisSettings,
@@ -127,7 +161,9 @@ def _assemble(
     rivals = rivals_of(list(judged.weighed), judged.chosen)
     verdict = verdict_of(judged, rivals, together)
     shares = probabilities(list(judged.weighed))
-    fitted = judged.place.held_out if judged.kind == "unknown" else after.prediction.rows
+    fitted = after.prediction.rows
+    if judged.kind == "unknown":
+        fitted = judged.place.held_out if law is None else law.mode.prediction.rows
     tell("inferring the signal at the port")
     loops = _loops(case, judged, named, verdict.ports)
     return Diagnosis(
@@ -153,14 +189,19 @@ def _assemble(
         converged=base.status.ok and after.status.ok,
         warnings=warnings_of(case, after, judged),
         wall_s=0.0,
+        learned=None if law is None else _offered(law),
     )
+
+
+def _offered(law: LearnedLaw) -> Learned:
+    own = coefficients_at(Port(law.port))
+    return Learned(law.name, law.port, estimates_among(law.mode, own), law.values)
 
 
 def _predict_sweep(
     case: Case,
-    kind: Kind,
-    named: Mode | None,
     values: Mapping[str, float],
+    after: Corrected | None,
     sweep: SweepResponse | None,
     tell: Tell,
 ) -> SweepShrink | None:
@@ -168,12 +209,9 @@ def _predict_sweep(
     if sweep is None:
         return None
     tell("predicting the sweep")
-    after = case.base if named is None else named
+    plant = case.plant if after is None else after[0]
     hypotheses: list[Hypothesis] = [((), values), ((), case.base.values)]
-    if kind != "unknown":
-        # A learned law stands for no model that could be solved.
-        hypotheses.append((after.terms, after.values))
-    return sweep_shrink(case.plant, sweep, hypotheses)
+    return sweep_shrink(plant, sweep, hypotheses if after is None else [*hypotheses, after[1:]])
 
 
 def _responses(plant: RigPlant, *rows: NDArray[np.float64]) -> Responses:

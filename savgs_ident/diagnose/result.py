@@ -80,6 +80,23 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class Learned:
+    """A correction for something unknown: a force at a port, fitted on the nonlinear rig.
+
+    Attributes:
+        effect: its name as an effect of a model.
+        port: name of the port.
+        parameters: its coefficients with their 95 % intervals.
+        identified: all its numbers, and those of the rig that were fitted beside it, SI, by name.
+    """
+
+    effect: str
+    port: str
+    parameters: tuple[Estimate, ...]
+    identified: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class Candidate:
     """A hypothesis about what is missing.
 
@@ -217,6 +234,7 @@ class Diagnosis:
         converged: whether every search that the verdict stands on ended well.
         warnings: what a reader must know, a sentence each.
         wall_s: how long it took [s].
+        learned: the correction for something unknown, where it is a force and could be fitted.
     """
 
     model: str
@@ -241,3 +259,4 @@ class Diagnosis:
     converged: bool
     warnings: tuple[str, ...]
     wall_s: float
+    learned: Learned | None = None

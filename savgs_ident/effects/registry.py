@@ -25,6 +25,13 @@ from savgs_ident.effects.frame_mode import FrameMode
 from savgs_ident.effects.gear_backlash import GearBacklash
 from savgs_ident.effects.gear_compliance import GearCompliance
 from savgs_ident.effects.joint_friction import JointFriction
+from savgs_ident.effects.learned.forces import (
+    LearnedRail,
+    LearnedStrut,
+    LearnedSuspension,
+    LearnedTyreLateral,
+    LearnedTyreRadial,
+)
 from savgs_ident.effects.link_offset import LinkOffset
 from savgs_ident.effects.mount_compliance import MountCompliance
 from savgs_ident.effects.plate_compliance import PlateCompliance
@@ -86,7 +93,20 @@ CATALOGUE: Mapping[str, AbstractEffect] = MappingProxyType(
         )
     }
 )
-"""All effects by name."""
+"""All effects by name that a diagnosis looks for."""
+
+LEARNED: Mapping[str, AbstractEffect] = MappingProxyType(
+    {
+        effect.name: effect
+        for effect in (
+            LearnedRail(), LearnedStrut(), LearnedSuspension(), LearnedTyreRadial(), LearnedTyreLateral()
+        )
+    }
+)  # fmt: skip
+"""Corrections by name that a diagnosis learns where it finds none of them."""
+
+EFFECTS: Mapping[str, AbstractEffect] = MappingProxyType({**CATALOGUE, **LEARNED})
+"""All that a model may have."""
 
 MODELS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"simqc": (), "simtr": (RailCoulomb.name, TyreFriction.name)}
@@ -97,18 +117,18 @@ MODELS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 def build_model(rig: Rig, effects: Iterable[str]) -> QuarterCar:
     """The rig with the named effects added, in that order.
 
-    Raises :class:`InputError` for a name that is not in the catalogue.
+    Raises :class:`InputError` for a name that is neither in the catalogue nor a learned correction.
     """
     model = QuarterCar(damper_curve(rig))
     for name in effects:
-        if name not in CATALOGUE:
+        if name not in EFFECTS:
             raise InputError(
-                f"there is no effect '{name}'", remedy="choose among: " + ", ".join(sorted(CATALOGUE))
+                f"there is no effect '{name}'", remedy="choose among: " + ", ".join(sorted(EFFECTS))
             )
-        model = model + CATALOGUE[name]
+        model = model + EFFECTS[name]
     return model
 
 
 def model_parameters(rig: Rig, effects: Iterable[str]) -> ParameterTable:
     """The rig's parameters and those that the named effects bring along."""
-    return merge_parameters(rig.parameters, *(ParameterTable(CATALOGUE[name].parameters) for name in effects))
+    return merge_parameters(rig.parameters, *(ParameterTable(EFFECTS[name].parameters) for name in effects))

@@ -5,16 +5,20 @@ was fitted without them makes up for their absence, a soft mount by a soft tyre,
 them. So ``identified`` of the diagnosis replaces what the rig file has, and the covariance of the earlier fit is left
 behind.
 
-Something unknown is a signal learned at a port, no equation: the diagnosis travels along as data, the model stays.
+Something unknown joins as the force that was learned at its port. Where nothing could be learned that is a force, the
+diagnosis travels along as data and the model stays.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import CATALOGUE, model_parameters
+from savgs_ident.effects.registry import EFFECTS, model_parameters
+
+TOLD = 6
+"""Most numbers of an effect that a sentence tells."""
 
 _OF_THE_FIT = ("covariance",)
 
@@ -47,37 +51,57 @@ def with_diagnosis(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, A
         said = "The diagnosis finds nothing missing: the numbers are those of the rig file."
         return Diagnosed(rig, effects, (), (said,))
     if verdict["kind"] == "unknown":
-        ports = ", ".join(verdict["ports"]) or "no port in particular"
-        said = (
-            f"The diagnosis finds something that the catalogue does not have (at {ports}). A correction learned"
-            " there is no equation: it travels along as data, the equations are without it and the numbers those of"
-            " the rig file."
-        )
-        return Diagnosed(rig, effects, (), (said,))
+        return _with_unknown(rig, effects, diagnosis)
     named = tuple(verdict["effects"])
     added = tuple(name for name in named if name not in effects)
     if not added:
         said = f"{_listed(named)}, named by the diagnosis, is in the model already: the numbers are the rig file's."
         return Diagnosed(rig, effects, (), (said,))
-    _check_baseline(effects, diagnosis)
-    return _with_effects(rig, effects, added, diagnosis)
+    fitted = _fitted(frozenset(named), diagnosis["which"])
+    return _with_effects(rig, effects, added, diagnosis, fitted, diagnosis.get("identified", {}))
+
+
+def _with_unknown(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> Diagnosed:
+    """The model with the force that was learned for something unknown, if one was."""
+    ports, learned = diagnosis["verdict"]["ports"], diagnosis.get("learned")
+    if learned is None:
+        said = (
+            f"The diagnosis finds something that the catalogue does not have (at {', '.join(ports) or 'no port'}) and"
+            " that no force there explains: it travels along as data, the equations are without it and the numbers"
+            " those of the rig file."
+        )
+        return Diagnosed(rig, effects, (), (said,))
+    if learned["effect"] in effects:
+        return Diagnosed(
+            rig, effects, (), (f"{learned['effect']}, learned before, is in the model already.",)
+        )
+    fitted = {name: float(entry["value"]) for name, entry in learned["parameters"].items()}
+    found = _with_effects(rig, effects, (learned["effect"],), diagnosis, fitted, learned["identified"])
+    held = "It is held at the edge of the motion in the campaign: beyond, it is a guess."
+    return replace(found, said=(*found.said, held))
 
 
 def _with_effects(
-    rig: Rig, effects: tuple[str, ...], added: tuple[str, ...], diagnosis: Mapping[str, Any]
+    rig: Rig,
+    effects: tuple[str, ...],
+    added: tuple[str, ...],
+    diagnosis: Mapping[str, Any],
+    fitted: Mapping[str, float],
+    identified: Mapping[str, float],
 ) -> Diagnosed:
+    """The model with ``added`` effects: their own numbers ``fitted``, and all ``identified`` along with them [SI]."""
+    _check_baseline(effects, diagnosis)
     whole = (*effects, *added)
-    fitted = _fitted(frozenset(diagnosis["verdict"]["effects"]), diagnosis["which"])
-    values = {**diagnosis.get("identified", {}), **fitted}
-    for name in (each.name for effect in added for each in CATALOGUE[effect].parameters):
+    values = {**identified, **fitted}
+    for name in (each.name for effect in added for each in EFFECTS[effect].parameters):
         if name not in values and name not in rig.parameters:
             raise InputError(f"gives no value for '{name}', a parameter of what it names")
     table = model_parameters(rig, whole).with_values(values)
     own = [name for name in values if name not in fitted]
     said = [
         f"{_listed(added)} joins the model as the diagnosis found it: "
-        + ", ".join(f"{name} = {value:.6g} {table[name].unit}" for name, value in fitted.items())
-        + "."
+        + ", ".join(f"{name} = {value:.6g} {table[name].unit}" for name, value in list(fitted.items())[:TOLD])
+        + (f", and {len(fitted) - TOLD} more." if len(fitted) > TOLD else ".")
     ]
     if own:
         said.append(
@@ -90,10 +114,10 @@ def _with_effects(
         )
     if "covariance" in rig.provenance:
         said.append("The covariance of the rig file is of the fit without it and is left out.")
-    identified = Rig(
+    identified_rig = Rig(
         rig.name, table, rig.damper_velocity, rig.damper_force, _provenance(rig, whole, diagnosis)
     )
-    return Diagnosed(identified, whole, added, tuple(said))
+    return Diagnosed(identified_rig, whole, added, tuple(said))
 
 
 def _fitted(effects: frozenset[str], candidates: list[Mapping[str, Any]]) -> dict[str, float]:

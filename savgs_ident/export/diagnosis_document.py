@@ -6,7 +6,7 @@ Of the whole document, this looks at what an export needs; everything else trave
 from collections.abc import Mapping
 from pathlib import Path
 
-from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.effects.registry import CATALOGUE, EFFECTS, LEARNED
 from savgs_ident.export.place import Place, read_document
 
 SCHEMA = 1
@@ -36,12 +36,14 @@ def parse_diagnosis(place: Place) -> dict[str, object]:
     baseline["model"].text()
     _numbers(baseline["parameters"])
     if "effects" in baseline:
-        baseline["effects"].names(tuple(CATALOGUE))
+        baseline["effects"].names(tuple(EFFECTS))
     _check_verdict(fields["verdict"])
     for candidate in fields["which"].items():
         _check_candidate(candidate)
     if "identified" in fields:
         _numbers(fields["identified"])
+    if "learned" in fields and fields["learned"].value is not None:
+        _check_learned(fields["learned"])
     if "converged" in fields and not isinstance(fields["converged"].value, bool):
         raise fields["converged"].wrong("true or false")
     if "provenance" in fields:
@@ -65,6 +67,14 @@ def _check_candidate(place: Place) -> None:
     fields["effect"].text()
     for entry in fields["parameters"].entries().values():
         entry.table(("value", "unit"), free=True)["value"].number()
+
+
+def _check_learned(place: Place) -> None:
+    fields = place.table(("effect", "parameters", "identified"), free=True)
+    fields["effect"].text(tuple(LEARNED))
+    for entry in fields["parameters"].entries().values():
+        entry.table(("value", "unit"), free=True)["value"].number()
+    _numbers(fields["identified"])
 
 
 def _numbers(place: Place) -> dict[str, float]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.effects.registry import EFFECTS
 from savgs_ident.export.diagnosed import Diagnosed, with_diagnosis
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.model.effect import AbstractSensorFault
@@ -69,7 +69,7 @@ def _sensors(model: ExportedModel) -> tuple[str, ...]:
     return tuple(
         f"{name} is an error of a sensor, not of the rig: the outputs of the equations are without it."
         for name in model.effects
-        if isinstance(CATALOGUE[name], AbstractSensorFault)
+        if isinstance(EFFECTS[name], AbstractSensorFault)
     )
 
 
@@ -86,7 +86,7 @@ def _doubts_of_diagnosis(document: Mapping[str, object]) -> tuple[str, ...]:
 
 def _doubts_of_draws(model: ExportedModel, added: tuple[str, ...], path: Path) -> list[str]:
     """Whether the draws are those of this model."""
-    own = [entry.name for name in added for entry in CATALOGUE[name].parameters]
+    own = [entry.name for name in added for entry in EFFECTS[name].parameters]
     lacking = [name for name in own if name not in model.samples]
     doubts = []
     if lacking:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.effects.registry import EFFECTS
 from savgs_ident.export.diagnosis_document import parse_diagnosis
 from savgs_ident.export.equations import Equations, Signal, equations_of
 from savgs_ident.export.exported_model import ExportedModel
@@ -105,7 +105,7 @@ def parse_model(document: Place) -> ExportedModel:
     if fields["schema"].value != SCHEMA or isinstance(fields["schema"].value, bool):
         raise fields["schema"].wrong(f"the schema {SCHEMA}, which this version reads")
     fields = document.table(_KEYS)
-    effects = fields["effects"].names(tuple(CATALOGUE))
+    effects = fields["effects"].names(tuple(EFFECTS))
     rig = parse_rig(fields, effects)
     if fields["signals"].value != _signals(equations_of(rig, effects)):
         raise InputError(

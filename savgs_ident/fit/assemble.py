@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.effects.registry import EFFECTS
 from savgs_ident.fit.covariance import UNTOLD, spread_of
 from savgs_ident.fit.minimise import Minimum
 from savgs_ident.fit.result import Estimate, Fit, Verdict
@@ -79,7 +79,7 @@ def _estimates(task: Task, best: Minimum) -> tuple[tuple[Estimate, ...], np.ndar
 def _frictionless(task: Task, best: Minimum) -> np.ndarray:
     """The same estimates with every effect at its null: the compiled model serves for SimQC too."""
     problem = task.problem
-    nulls = {name: value for effect in task.effects for name, value in CATALOGUE[effect].null.items()}
+    nulls = {name: value for effect in task.effects for name, value in EFFECTS[effect].null.items()}
     p = dict(problem.parameters(best.u)) | as_values(nulls)
     solution = simulate_periodic(problem.model, p, task.excitation, task.settings.periodic)
     ok = np.array([status.ok for status in solution.status()])

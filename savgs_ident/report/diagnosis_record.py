@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from savgs_ident.diagnose.result import Candidate, Diagnosis, Estimate, Shrink
+from savgs_ident.diagnose.result import Candidate, Diagnosis, Estimate, Learned, Shrink
 from savgs_ident.report.campaign_summary import warning_record
 from savgs_ident.report.origin import Origin
 
@@ -53,6 +53,7 @@ def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
             "floor": diagnosis.sweep.floor,
         },
         "identified": dict(diagnosis.identified),
+        "learned": diagnosis.learned and _learned(diagnosis.learned),
         "converged": diagnosis.converged,
         "warnings": diagnosis.warnings,
         "wall_s": diagnosis.wall_s,
@@ -109,6 +110,15 @@ def _parameters(estimates: Iterable[Estimate]) -> dict[str, dict[str, object]]:
     return {
         each.name: {"value": each.value, "lo": each.lo, "hi": each.hi, "unit": each.unit}
         for each in estimates
+    }
+
+
+def _learned(each: Learned) -> dict[str, object]:
+    return {
+        "effect": each.effect,
+        "port": each.port,
+        "parameters": _parameters(each.parameters),
+        "identified": dict(each.identified),
     }
 
 

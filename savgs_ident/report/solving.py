@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.rig import Rig
 from savgs_ident.core.status import Status
-from savgs_ident.effects.registry import CATALOGUE, build_model, model_parameters
+from savgs_ident.effects.registry import EFFECTS, build_model, model_parameters
 from savgs_ident.model.values import as_values
 from savgs_ident.report.curves import ModelCurve, model_curve
 from savgs_ident.simulate.excitation import Excitation
@@ -82,7 +82,7 @@ def solve_between(rig: Rig, effects: Sequence[str], known: Solved) -> Solved:
 
 def without_effects(rig: Rig, effects: Sequence[str]) -> Rig:
     """The rig with the named effects at their null: the same compiled model then shows it without them."""
-    nulls = {name: value for effect in effects for name, value in CATALOGUE[effect].null.items()}
+    nulls = {name: value for effect in effects for name, value in EFFECTS[effect].null.items()}
     return replace(rig, parameters=model_parameters(rig, effects).with_values(nulls))
 
 

@@ -97,3 +97,6 @@ def test_what_the_catalogue_lacks_is_called_unknown(
     assert diagnosis.verdict.kind == "unknown"
     assert diagnosis.verdict.ports == (port,)
     assert diagnosis.shrink.share_closed > 0.9
+    assert diagnosis.learned is not None
+    assert diagnosis.learned.effect == f"learned_{port}"
+    assert diagnosis.shrink.after < 2.0 * diagnosis.shrink.floor

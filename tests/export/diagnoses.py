@@ -45,3 +45,22 @@ IDENTIFIED = {"mu_r": 0.0301, "k_t": 264423.0, "mount_compliance": 1.65e-06, "mo
 MOUNT = diagnosis("effect", ["mount_compliance"], ["strut"], identified=IDENTIFIED)
 NOTHING = diagnosis("none", [], [], identified={"mu_r": 0.0301})
 UNKNOWN = diagnosis("unknown", [], ["frame"], identified={"mu_r": 0.0309})
+SPANS = {
+    "learned_strut_middle": 0.44,
+    "learned_strut_stroke": 0.02,
+    "learned_strut_speed": 0.3,
+    "learned_strut_carried": 4e3,
+}
+COEFFICIENTS = {f"learned_strut_{number}": 10.0 * number for number in range(1, 17)}
+LEARNED = diagnosis(
+    "unknown", [], ["strut"],
+    learned={
+        "effect": "learned_strut",
+        "port": "strut",
+        "parameters": {
+            name: {"value": value, "lo": 0.0, "hi": 2.0 * value, "unit": "N"} for name, value in COEFFICIENTS.items()
+        },
+        "identified": {"mu_r": 0.0301} | SPANS | COEFFICIENTS,
+    },
+)  # fmt: skip
+"""Something unknown with the force that was learned for it."""

@@ -1,7 +1,8 @@
-"""A diagnosed effect joins the model with the numbers of its own fit; what is unknown stays data."""
+"""A diagnosed effect joins the model with the numbers of its fit, something unknown as the force learned for it."""
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from savgs_ident.core.errors import InputError
@@ -9,8 +10,9 @@ from savgs_ident.core.rig import Rig
 from savgs_ident.effects.registry import MODELS
 from savgs_ident.export.diagnosed import with_diagnosis
 from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.signals import resting_state
 
-from .diagnoses import IDENTIFIED, MOUNT, NOTHING, UNKNOWN, diagnosis
+from .diagnoses import COEFFICIENTS, IDENTIFIED, LEARNED, MOUNT, NOTHING, SPANS, UNKNOWN, diagnosis
 
 SIMTR = MODELS["simtr"]
 
@@ -58,7 +60,7 @@ def test_a_diagnosis_of_the_contract_alone_gives_the_effect_its_numbers(identifi
 
 @pytest.mark.parametrize(
     ("document", "said"),
-    [(NOTHING, "nothing missing"), (UNKNOWN, "at frame). A correction learned there is no equation")],
+    [(NOTHING, "nothing missing"), (UNKNOWN, "at frame) and that no force there explains")],
 )
 def test_without_a_named_effect_the_model_stays_as_it_is(
     identified: Rig, document: dict[str, Any], said: str
@@ -67,6 +69,22 @@ def test_without_a_named_effect_the_model_stays_as_it_is(
     assert (found.rig, found.effects, found.added) == (identified, SIMTR, ())
     (sentence,) = found.said
     assert said in sentence
+
+
+def test_what_was_learned_for_something_unknown_joins_the_model(identified: Rig) -> None:
+    found = with_diagnosis(identified, SIMTR, LEARNED)
+    assert found.added == ("learned_strut",)
+    assert found.effects == (*SIMTR, "learned_strut")
+    for name, value in (SPANS | COEFFICIENTS | {"mu_r": 0.0301}).items():
+        assert found.rig.parameters[name].value == value
+    assert "edge of the motion" in found.said[-1]
+    model, without = (ExportedModel(found.rig, effects).equations for effects in (found.effects, SIMTR))
+    assert len(model.parameters) == len(without.parameters)
+    x, u = np.array(resting_state(ExportedModel(identified, SIMTR))), np.array([0.0, 0.0, 1.57, 0.0])
+    p = np.array(found.rig.parameters.values_of(model.parameters))
+    assert float(np.abs(model.rates(x, u, p) - without.rates(x, u, p)).max()) > 0.01
+    again = with_diagnosis(found.rig, found.effects, LEARNED)
+    assert (again.rig, again.effects) == (found.rig, found.effects)
 
 
 def test_an_effect_that_is_in_the_model_is_not_added_again(identified: Rig) -> None:

@@ -16,7 +16,7 @@ from savgs_ident.control.closed_loop.laws import HinfLaw, HoldLaw
 from savgs_ident.control.closed_loop.metrics import Gain, gain_of, ride_of
 from savgs_ident.control.closed_loop.programme import LoopTest
 from savgs_ident.control.closed_loop.run import Loop, run_loop
-from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.effects.registry import EFFECTS
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values
 
@@ -46,7 +46,7 @@ def measure_causes(model: QuarterCar, p: Values, law: HinfLaw, loop: Loop, test:
 
 def _variants(model: QuarterCar, p: Values, law: HinfLaw, loop: Loop) -> Iterator[tuple[str, Values, Loop]]:
     # Parameters at their null and limits out of reach, not other models: the same compiled program serves all.
-    nulls = {effect.name: CATALOGUE[effect.name].null for effect in model.effects}
+    nulls = {effect.name: EFFECTS[effect.name].null for effect in model.effects}
     every = {name: jnp.asarray(value, jnp.float64) for null in nulls.values() for name, value in null.items()}
     unlimited = {name: UNLIMITED * p[name] for name in _LIMITS}
     nominal = law.alpha.alpha(law.alpha.nominal)

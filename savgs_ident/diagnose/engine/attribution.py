@@ -87,6 +87,17 @@ def anywhere(places: Sequence[Attribution]) -> float:
     return _mean_of([each.evidence for each in places])
 
 
+def widths_of(search: Search, mode: Mode, columns: Matrix) -> NDArray[np.float64]:
+    """Standard deviations (q,) of a law's coefficients before the data, at the size that suits them best.
+
+    ``columns`` (m, q) are the change of the rows per unit of each.
+    """
+    weight = 1.0 / np.sqrt(mode.misfit.spread)
+    size, _ = _best_size(search, mode, _scaled(columns, weight))
+    reach = np.sqrt(np.mean((columns * weight[:, None]) ** 2, axis=0))
+    return np.asarray(size / np.where(reach > 0.0, reach, 1.0))
+
+
 def _mean_of(evidences: Sequence[float]) -> float:
     """Log of the mean of what has these logs: any may hold, none is preferred."""
     best = max(evidences)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from savgs_ident.diagnose.engine.attribution import Law, Place
 from savgs_ident.diagnose.rig.columns import impose, node_loads
 from savgs_ident.diagnose.rig.plant import RigPlant
+from savgs_ident.effects.learned.forces import OF_THE_LOAD, SHARP, functions
 from savgs_ident.model.effect import Port
 from savgs_ident.model.sensors import RESPONSE_CHANNELS
 from savgs_ident.model.values import Values
@@ -28,9 +29,6 @@ Fields = list[tuple[str, Signal]]
 
 FORCES = (Port.STRUT, Port.SUSPENSION, Port.TYRE_RADIAL, Port.TYRE_LATERAL, Port.RAIL)
 """Ports at which a force may be unknown."""
-
-SHARP = (0.01, 0.1)
-"""Velocities over which friction-like functions turn round, as shares of the largest."""
 
 STRETCHES = (1e-4, 1e-3)
 """How far a contact gives before it slides [m]."""
@@ -133,13 +131,10 @@ def _force_laws(displacement: Signal, velocity: Signal, load: Signal) -> list[Si
     x = displacement - displacement.mean()
     x = x / max(float(np.abs(x).max()), np.finfo(float).tiny)
     v = velocity / max(float(np.abs(velocity).max()), np.finfo(float).tiny)
-    sharp = [np.tanh(v / width) for width in SHARP]
-    functions = [*sharp, v, v * np.abs(v), v**2, x, x**2, x**3, x * sharp[0], x * v, x**2 * v]
-    functions += [sharp[0] * np.exp(-((v / width) ** 2)) for width in (0.05, 0.2)]
-    if np.any(load):
-        weight = load / np.abs(load).max()
-        functions += [weight * sharp[0], weight * v, weight]
-    return functions
+    loaded = bool(np.any(load))
+    n = load / np.abs(load).max() if loaded else load
+    found = [np.asarray(each) for each in functions(jnp.asarray(x), jnp.asarray(v), jnp.asarray(n))]
+    return found if loaded else found[: -len(OF_THE_LOAD)]
 
 
 def _simple_laws(displacement: Signal, velocity: Signal, load: Signal) -> list[Signal]:

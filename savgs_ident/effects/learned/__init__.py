@@ -1,0 +1,1 @@
+"""Corrections that a diagnosis learned where nothing of the catalogue explains what is there."""

@@ -1,0 +1,72 @@
+"""A force learned where the catalogue has no name: on recordings of a rail whose friction falls with velocity."""
+
+import numpy as np
+import pytest
+
+from savgs_ident.core.rig import Rig
+from savgs_ident.diagnose.engine.climb import Mode, climb, search_of
+from savgs_ident.diagnose.engine.data import Data
+from savgs_ident.diagnose.engine.heldout import hold_out
+from savgs_ident.diagnose.rig.comparison import rig_plant
+from savgs_ident.diagnose.rig.learning import LearnedLaw, can_be_learned, learn
+from savgs_ident.diagnose.rig.plant import ITERATIONS, RigPlant
+from savgs_ident.diagnose.rig.rows import rows_of
+from savgs_ident.diagnose.settings import FREE
+from savgs_ident.effects.registry import CATALOGUE, LEARNED, MODELS, build_model
+from savgs_ident.model.values import as_values
+from savgs_ident.simulate.periodic import PeriodicSettings, resolve
+
+from ..fit.bench import only
+from .conftest import DWELLS, Measure
+
+BASELINE = MODELS["simtr"]
+
+
+@pytest.fixture(scope="module")
+def case(measure: Measure, rig: Rig) -> tuple[RigPlant, Data, Mode]:
+    """SimTR, recalibrated on six dwells of a rail that it does not have."""
+    response = measure("stribeck_rail")
+    few = only(response, np.isin(np.round(response.frequency, 2), DWELLS))
+    settings = PeriodicSettings(nodes=128, adaptations=1)
+    catalogue = {name: CATALOGUE[name] for name in BASELINE}
+    plant, data = rig_plant(few, rig, catalogue, BASELINE, FREE, settings=settings)
+    return plant, data, climb(search_of(plant, data), (), {}, plant.start({}))
+
+
+@pytest.fixture(scope="module")
+def law(case: tuple[RigPlant, Data, Mode]) -> LearnedLaw:
+    """The force at the rail."""
+    return learn(*case, "rail")
+
+
+def test_it_explains_tests_that_it_was_not_learned_from(
+    case: tuple[RigPlant, Data, Mode], law: LearnedLaw
+) -> None:
+    plant, data, base = case
+    assert law.mode.status.ok
+    without = hold_out(search_of(plant, data), base, ())
+    missed = [np.sum((data.measured - each.rows) ** 2 / data.variance) for each in (without, law.held)]
+    assert missed[1] < 0.1 * missed[0]
+    assert law.held.mean > without.mean
+
+
+def test_as_an_effect_of_the_model_it_does_what_the_fit_says(law: LearnedLaw, rig: Rig) -> None:
+    """The numbers alone, put into a model as an export does, give the response of the fit on the same nodes."""
+    model = build_model(rig, (*BASELINE, law.name))
+    p = as_values(law.plant.table.as_dict() | law.values)
+    solution = resolve(model, p, law.mode.prediction.near, ITERATIONS)
+    assert all(status.ok for status in solution.status())
+    rows = np.asarray(rows_of(model, law.plant.likelihood, p, solution, law.plant.orders))
+    fitted = law.mode.prediction.rows
+    assert np.linalg.norm(rows - fitted) < 1e-6 * np.linalg.norm(fitted)
+
+
+def test_it_knows_the_range_of_the_motion(law: LearnedLaw) -> None:
+    assert set(law.spans) == {f"learned_rail_{name}" for name in ("middle", "stroke", "speed", "carried")}
+    assert 0.005 < law.spans["learned_rail_stroke"] < 0.05
+    assert 0.05 < law.spans["learned_rail_speed"] < 1.0
+
+
+def test_only_forces_are_learned() -> None:
+    assert [port for port in ("rail", "frame", "road", "link", "inertia") if can_be_learned(port)] == ["rail"]
+    assert all(can_be_learned(effect.port.value) for effect in LEARNED.values())

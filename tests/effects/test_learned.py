@@ -1,0 +1,106 @@
+"""Learned forces: sums of known functions, nothing without coefficients, held at the edge of what was seen."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from jaxtyping import Array
+
+from savgs_ident.core.rig_form import KNOWN_UNITS
+from savgs_ident.effects.learned.forces import OF_THE_LOAD, coefficients_at, functions, words_at
+from savgs_ident.effects.registry import CATALOGUE, EFFECTS, LEARNED
+from savgs_ident.model.effect import AbstractEffect, AbstractForce, PortSignals
+from savgs_ident.model.values import Values, as_values
+from savgs_ident.symbolic.translate import to_casadi
+
+from .kinds import PORTS
+
+SPANS = {"middle": 0.4, "stroke": 0.03, "speed": 0.5, "carried": 8e3}
+
+each_learned = pytest.mark.parametrize("effect", LEARNED.values(), ids=LEARNED)
+
+
+def _given(effect: AbstractEffect, coefficient: float) -> dict[str, float]:
+    """Numbers of a learned force, all coefficients different."""
+    port = effect.port
+    spans = {f"learned_{port.value}_{name}": value for name, value in SPANS.items()}
+    names = coefficients_at(port)
+    return spans | {name: coefficient * (1.0 + place) for place, name in enumerate(names)}
+
+
+def _force(effect: AbstractEffect, p: Values, displacement: float, velocity: float, load: float) -> float:
+    assert isinstance(effect, AbstractForce)
+    signals = PortSignals(*(jnp.asarray(each) for each in (displacement, velocity, load)))
+    return float(effect.force(p, signals, jnp.zeros(0)))
+
+
+def test_there_is_one_for_every_port_of_a_force_and_none_is_looked_for() -> None:
+    assert {effect.port for effect in LEARNED.values()} == PORTS[AbstractForce]
+    assert not set(LEARNED) & set(CATALOGUE)
+    assert set(EFFECTS) == {*LEARNED, *CATALOGUE}
+    names = [each.name for effect in LEARNED.values() for each in effect.parameters]
+    assert len(set(names)) == len(names)
+    assert all(each.unit in KNOWN_UNITS for effect in LEARNED.values() for each in effect.parameters)
+
+
+@each_learned
+def test_it_is_nothing_at_its_null(effect: AbstractEffect) -> None:
+    p = as_values(_given(effect, 7.0) | dict(effect.null))
+    assert set(effect.null) == set(coefficients_at(effect.port))
+    assert _force(effect, p, 0.41, 0.2, 3e3) == 0.0
+
+
+@each_learned
+@given(
+    x=st.floats(-0.99, 0.99), v=st.floats(-0.99, 0.99), n=st.floats(0.0, 0.99), beyond=st.floats(1.0, 50.0)
+)
+def test_within_what_was_seen_it_is_the_sum_and_beyond_it_is_held(
+    effect: AbstractEffect, x: float, v: float, n: float, beyond: float
+) -> None:
+    given_, p = _given(effect, 7.0), as_values(_given(effect, 7.0))
+    loaded = OF_THE_LOAD[0] in words_at(effect.port)
+    values = [float(each) for each in functions(*(jnp.asarray(each) for each in (x, v, n)))]
+    weights = [given_[name] for name in coefficients_at(effect.port)]
+    expected = sum(c * f for c, f in zip(weights, values, strict=False))
+    at = (SPANS["middle"] + SPANS["stroke"] * x, SPANS["speed"] * v, SPANS["carried"] * n if loaded else 0.0)
+    assert _force(effect, p, *at) == pytest.approx(expected, rel=1e-7, abs=1e-7)
+    edge = _force(effect, p, SPANS["middle"] + SPANS["stroke"], SPANS["speed"], SPANS["carried"])
+    outside = (SPANS["middle"] + SPANS["stroke"] * beyond, SPANS["speed"] * beyond, SPANS["carried"] * beyond)
+    assert _force(effect, p, *outside) == pytest.approx(edge, rel=1e-12)
+
+
+@each_learned
+def test_its_derivatives_are_those_of_differences(effect: AbstractEffect) -> None:
+    assert isinstance(effect, AbstractForce)
+    numbers = _given(effect, 7.0)
+    names = [each.name for each in effect.parameters]
+
+    def at(values: Array) -> Array:
+        p = dict(zip(names, jnp.unstack(values), strict=True))
+        signals = PortSignals(jnp.asarray(0.413), jnp.asarray(-0.021), jnp.asarray(2.5e3))
+        return effect.force(p, signals, jnp.zeros(0))
+
+    start = jnp.asarray([numbers[name] for name in names])
+    slopes = np.asarray(jax.grad(at)(start))
+    for place, value in enumerate(start.tolist()):
+        step = 1e-5 * max(abs(value), 1e-3)
+        moved = [float(at(start.at[place].add(sign * step))) for sign in (1.0, -1.0)]
+        assert slopes[place] == pytest.approx((moved[0] - moved[1]) / (2.0 * step), rel=1e-5, abs=1e-6)
+
+
+@each_learned
+def test_casadi_computes_the_same(effect: AbstractEffect) -> None:
+    assert isinstance(effect, AbstractForce)
+    numbers = _given(effect, 7.0)
+    names, values = list(numbers), np.array(list(numbers.values()))
+
+    def force(signals: Array, p: Array) -> Array:
+        seen = PortSignals(*jnp.unstack(signals))
+        return effect.force(dict(zip(names, jnp.unstack(p), strict=True)), seen, jnp.zeros(0))[None]
+
+    told = to_casadi("force", force, {"signals": np.zeros(3), "p": values}, ["force"])
+    for signals in np.random.default_rng(3).uniform([0.36, -0.6, 0.0], [0.44, 0.6, 9e3], (40, 3)):
+        expected = float(force(jnp.asarray(signals), jnp.asarray(values))[0])
+        assert float(told(signals, values)) == pytest.approx(expected, rel=1e-10, abs=1e-9)
