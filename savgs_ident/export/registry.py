@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.export.exported_model import ExportedModel, Exporter
 
 
@@ -16,6 +17,10 @@ def _exporter(name: str, about: str) -> Exporter:
     """The function ``write_<name>`` of the format's file, found when it is called."""
 
     def write(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
+        if not folder.is_dir():
+            raise InputError(
+                "is no folder", source=folder, remedy="make it before anything is exported to it"
+            )
         files: tuple[Path, ...] = getattr(import_module(f"{__package__}.{name}_export"), f"write_{name}")(
             model, folder
         )

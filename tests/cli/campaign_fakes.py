@@ -5,11 +5,13 @@ Run as a program, it identifies them in processes or on a cluster, slowly, for t
     python -m tests.cli.campaign_fakes OUT SECONDS WORKERS|ADDRESS FOLDER ...
 """
 
+import csv
 import json
 import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,8 @@ from savgs_ident.fit.settings import FitSettings
 
 STDERR = 0.1
 DAY = 86400.0
+MONDAY = datetime(2026, 3, 2, 8, 0, tzinfo=UTC).timestamp()
+SILENT, TALKING = Voice(False, True), Voice(False, False)
 
 
 def campaign_file(path: Path, value: float, start: float | None = None, **more: Any) -> Path:
@@ -83,9 +87,31 @@ def read_number(task: Task) -> Outcome:
     return Kept(json.dumps(record), f"name = {json.dumps(task.source)}\n", told["start"])
 
 
+def never(*_: object) -> Any:
+    """For a run that must not identify anything."""
+    raise AssertionError("this is there already")
+
+
 def one_by_one(work: Callable[[Task], Outcome], tasks: Sequence[Task]) -> Iterator[tuple[int, Outcome]]:
     """The work in this process."""
     yield from ((number, work(task)) for number, task in enumerate(tasks))
+
+
+def run(*arguments: Path, out: Path, work: Any = read_number, voice: Voice = SILENT, **changes: Any) -> int:
+    """The exit code of a run in this process."""
+    return run_campaigns(job(*arguments, **changes), work, one_by_one, voice, out)
+
+
+def record_of(out: Path) -> dict[str, Any]:
+    """What a run wrote about all campaigns."""
+    found: dict[str, Any] = json.loads((out / "campaign.json").read_text())
+    return found
+
+
+def rows_of(out: Path) -> list[dict[str, str]]:
+    """The table that a run wrote."""
+    with (out / "campaigns.csv").open() as stream:
+        return list(csv.DictReader(stream))
 
 
 def slowly(seconds: float, task: Task) -> Outcome:

@@ -15,6 +15,7 @@ from savgs_ident.cli.arguments import spread_values
 from savgs_ident.cli.main import app
 
 from .. import relaxed
+from .campaign_fakes import DAY, MONDAY, campaign_file
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 Program = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -86,3 +87,11 @@ def short_campaign(nominal_campaign: Path, tmp_path_factory: pytest.TempPathFact
     path = tmp_path_factory.mktemp("short") / "short.csv"
     table[table["test"].isin(kept)].to_csv(path, index=False)
     return path
+
+
+@pytest.fixture
+def week(tmp_path: Path) -> Path:
+    """A folder of eight campaigns on eight days, mu_r growing by 0.2 a day; files named against the order of time."""
+    for day in range(8):
+        campaign_file(tmp_path / "week" / f"run{10 - day}.csv", 3.0 + 0.2 * day, MONDAY + day * DAY)
+    return tmp_path / "week"

@@ -1,12 +1,8 @@
 """Many campaigns: found and named, identified, resumed, and followed through time."""
 
-import csv
-import json
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -17,51 +13,15 @@ import pytest
 
 from savgs_ident.cli.campaign_search import LONGEST_NAME, find_campaigns, safe_name
 from savgs_ident.cli.campaign_store import FILES
-from savgs_ident.cli.campaign_work import identify_one
-from savgs_ident.cli.campaigns import run_campaigns
-from savgs_ident.cli.console import Voice
 from savgs_ident.cli.guard import BAD_INPUT, NOT_TRUSTED, OK
-from savgs_ident.fit.settings import FitSettings
 
-from .campaign_fakes import DAY, STDERR, campaign_file, job, one_by_one, read_number
-
-pytestmark = pytest.mark.slow
-
-
-SILENT, TALKING = Voice(False, True), Voice(False, False)
-MONDAY = datetime(2026, 3, 2, 8, 0, tzinfo=UTC).timestamp()
-
-
-def _never(*_: object) -> Any:
-    raise AssertionError("this is there already")
-
-
-def _record(out: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((out / "campaign.json").read_text())
-    return found
-
-
-def _rows(out: Path) -> list[dict[str, str]]:
-    with (out / "campaigns.csv").open() as stream:
-        return list(csv.DictReader(stream))
-
-
-@pytest.fixture
-def week(tmp_path: Path) -> Path:
-    """A folder of eight campaigns on eight days, mu_r growing by 0.2 a day; files named against the order of time."""
-    for day in range(8):
-        campaign_file(tmp_path / "week" / f"run{10 - day}.csv", 3.0 + 0.2 * day, MONDAY + day * DAY)
-    return tmp_path / "week"
-
-
-def _run(*arguments: Path, out: Path, work: Any = read_number, voice: Voice = SILENT, **changes: Any) -> int:
-    return run_campaigns(job(*arguments, **changes), work, one_by_one, voice, out)
+from .campaign_fakes import MONDAY, STDERR, TALKING, campaign_file, record_of, rows_of, run
 
 
 def test_every_campaign_has_its_row_in_the_order_of_time(week: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert _run(week, out=out) == OK
-    rows = _rows(out)
+    assert run(week, out=out) == OK
+    rows = rows_of(out)
     assert [row["name"] for row in rows] == [f"run{10 - day}" for day in range(8)]
     assert list(rows[0]) == [
         "name", "source", "start [UTC]", "status", "reason", "chi2/dof [1]",
@@ -81,8 +41,8 @@ def test_every_campaign_has_its_row_in_the_order_of_time(week: Path, tmp_path: P
 
 
 def test_the_trend_is_the_one_that_is_in_the_data(week: Path, tmp_path: Path) -> None:
-    _run(week, out=tmp_path / "out")
-    record = _record(tmp_path / "out")
+    run(week, out=tmp_path / "out")
+    record = record_of(tmp_path / "out")
     assert (record["order"], record["x"]["unit"], record["x"]["from"]) == (
         "start time",
         "day",
@@ -104,8 +64,8 @@ def test_the_trend_is_the_one_that_is_in_the_data(week: Path, tmp_path: Path) ->
 def test_without_times_the_order_is_that_of_names_with_their_numbers(tmp_path: Path) -> None:
     for number in (10, 2, 1):
         campaign_file(tmp_path / "data" / f"run{number}.csv", 1.0, None if number == 2 else MONDAY + number)
-    _run(tmp_path / "data", out=tmp_path / "out")
-    record = _record(tmp_path / "out")
+    run(tmp_path / "data", out=tmp_path / "out")
+    record = record_of(tmp_path / "out")
     assert [row["name"] for row in record["campaigns"]] == ["run1", "run2", "run10"]
     assert (record["order"], record["x"]["unit"], record["x"]["values"]) == (
         "name",
@@ -121,8 +81,8 @@ def test_campaigns_that_scatter_widen_the_errors_and_it_is_said(
     values = 3.0 + np.array([1.0, -1.0, 0.9, -0.8, 1.1, -1.2])
     for number, value in enumerate(values):
         campaign_file(tmp_path / "data" / f"run{number}.csv", value)
-    _run(tmp_path / "data", out=tmp_path / "out", voice=TALKING)
-    trend = _record(tmp_path / "out")["trends"]["mu_r"]
+    run(tmp_path / "data", out=tmp_path / "out", voice=TALKING)
+    trend = record_of(tmp_path / "out")["trends"]["mu_r"]
     assert trend["scatters"] is True
     assert trend["mean"]["chi2"] == pytest.approx(np.sum((values - values.mean()) ** 2) / STDERR**2)
     assert trend["slope"]["widening"] > 8.0
@@ -138,12 +98,12 @@ def test_a_failed_campaign_is_told_and_the_rest_is_finished(
     campaign_file(week / "bad.csv", 0.0, failure="ValueError: no good")
     campaign_file(week / "vague.csv", 900.0, MONDAY, trusted=False)
     out = tmp_path / "out"
-    assert _run(week, out=out) == NOT_TRUSTED
+    assert run(week, out=out) == NOT_TRUSTED
     said = capsys.readouterr().err.splitlines()
     assert "Failed: bad: ValueError: no good" in said
     assert "Not to be trusted: vague: the data cannot tell every free parameter." in said
     assert said[-1].startswith("1 of 10 campaigns failed and 1 of 10 campaigns is not to be trusted")
-    record = _record(out)
+    record = record_of(out)
     assert record["counts"] == {"ok": 8, "not trusted": 1, "failed": 1}
     assert record["campaigns"][-1]["name"] == "bad"
     assert record["trends"]["mu_r"]["campaigns"] == 8
@@ -154,82 +114,9 @@ def test_a_failed_campaign_is_told_and_the_rest_is_finished(
 def test_nothing_readable_is_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in "ab":
         campaign_file(tmp_path / "data" / f"{name}.csv", 0.0, failure="no column is known", unreadable=True)
-    assert _run(tmp_path / "data", out=tmp_path / "out") == BAD_INPUT
+    assert run(tmp_path / "data", out=tmp_path / "out") == BAD_INPUT
     assert "Error: no campaign could be read." in capsys.readouterr().err
-    assert _record(tmp_path / "out")["counts"]["failed"] == 2
-
-
-def test_a_second_run_keeps_what_is_done_and_says_so(
-    week: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "out"
-    _run(week, out=out)
-    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    assert _run(week, out=out, work=_never, voice=TALKING) == OK
-    assert "8 campaigns identified in an earlier run" in capsys.readouterr().err
-    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
-
-
-def _lost(path: Path) -> None:
-    (path / "model.toml").unlink()
-
-
-def _cut(path: Path) -> None:
-    (path / "fit.json").write_bytes((path / "fit.json").read_bytes()[:-10])
-
-
-def _unsealed(path: Path) -> None:
-    (path / "done.json").write_text("{")
-
-
-@pytest.mark.parametrize("harm", [_lost, _cut, _unsealed])
-def test_what_is_not_whole_is_done_anew(week: Path, tmp_path: Path, harm: Callable[[Path], None]) -> None:
-    out, seen = tmp_path / "out", []
-    _run(week, out=out)
-    (out / ".run3.x.part").mkdir()
-    (out / ".run3.x.part" / "fit.json").write_text("half")
-    (out / "run3" / "mine.txt").write_text("not to be touched")
-    harm(out / "run3")
-
-    def counting(task: Any) -> Any:
-        seen.append(task.job.campaign.name)
-        return read_number(task)
-
-    assert _run(week, out=out, work=counting) == OK
-    assert seen == ["run3.csv"]
-    assert (out / "run3" / "mine.txt").exists()
-    assert not list(out.glob(".*"))
-    assert _run(week, out=out, work=_never) == OK
-
-
-def test_other_settings_another_rig_and_other_data_are_done_anew(
-    week: Path, tmp_path: Path, rig: Any
-) -> None:
-    out = tmp_path / "out"
-    mine = tmp_path / "mine.toml"
-    given = job().one.rig.read_text()
-    mine.write_text(given)
-    seen: list[str] = []
-
-    def counting(task: Any) -> Any:
-        seen.append(task.job.campaign.name)
-        return read_number(task)
-
-    def again(**changes: Any) -> int:
-        seen.clear()
-        _run(week, out=out, work=counting, **changes)
-        return len(seen)
-
-    assert [again(), again(), again(rig=mine)] == [8, 0, 0]
-    assert again(max_frequency=4.0) == 8
-    assert again(settings=FitSettings(orders=5)) == 8
-    assert again(free=("mu_r",)) == 8
-    mine.write_text(given.replace("value = 320.0", "value = 321.0"))
-    assert [again(rig=mine), again(rig=mine)] == [8, 0]
-    campaign_file(week / "run5.csv", 1.0)
-    assert again(rig=mine) == 1
-    (week / "channels.toml").write_text("")
-    assert again(rig=mine) == 8
+    assert record_of(tmp_path / "out")["counts"]["failed"] == 2
 
 
 def test_names_are_unique_and_every_file_system_takes_them(tmp_path: Path) -> None:
@@ -243,15 +130,15 @@ def test_names_are_unique_and_every_file_system_takes_them(tmp_path: Path) -> No
         campaign_file(tmp_path / folder / "name.csv", 5.0)
     folders = [tmp_path / each for each in ("data", "one", "two")]
     out = tmp_path / "out"
-    assert _run(*folders, out=out) == OK
-    names = [row["name"] for row in _record(out)["campaigns"]]
+    assert run(*folders, out=out) == OK
+    names = [row["name"] for row in record_of(out)["campaigns"]]
     assert len({name.casefold() for name in names}) == len(hostile) - 1 + 2
     for name in names:
         assert name == safe_name(name)
         assert len(name.encode()) <= LONGEST_NAME + 13
         assert (out / name / "done.json").is_file()
     assert {"one_name", "two_name", "data_NAME"} <= set(names)
-    assert _run(*reversed(folders), out=out, work=_never) == OK
+    assert run(*reversed(folders), out=out, work=never) == OK
     page = (out / "campaign.html").read_text()
     assert "<b>" not in page
     assert "\x1b" not in page
@@ -278,14 +165,14 @@ def test_files_named_after_tests_are_one_campaign_others_one_each(tmp_path: Path
 def test_the_same_data_twice_is_noticed(tmp_path: Path) -> None:
     for name in ("first", "second"):
         campaign_file(tmp_path / "data" / f"{name}.csv", 1.0)
-    _run(tmp_path / "data", out=tmp_path / "out")
-    assert "second holds the same data as first: they count twice." in _record(tmp_path / "out")["notes"]
+    run(tmp_path / "data", out=tmp_path / "out")
+    assert "second holds the same data as first: they count twice." in record_of(tmp_path / "out")["notes"]
 
 
 def test_one_campaign_has_no_trend(tmp_path: Path) -> None:
     path = campaign_file(tmp_path / "only.csv", 1.0, MONDAY)
-    assert _run(path, out=tmp_path / "out") == OK
-    assert _record(tmp_path / "out")["trends"]["mu_r"]["slope"] is None
+    assert run(path, out=tmp_path / "out") == OK
+    assert record_of(tmp_path / "out")["trends"]["mu_r"]["slope"] is None
 
 
 @pytest.mark.parametrize(
@@ -323,46 +210,3 @@ def test_dask_that_is_not_installed_is_told_with_the_remedy(
     done = invoke("campaign", "data", "--scheduler", "tcp://127.0.0.1:1")
     assert done.exit_code == 2
     assert "Remedy: pip install 'savgs-ident[cluster]'." in " ".join(done.stderr.split())
-
-
-def test_a_campaign_that_cannot_be_read_is_a_failure_in_one_line(tmp_path: Path) -> None:
-    path = campaign_file(tmp_path / "a.csv", 1.0)
-    seen: list[Any] = []
-
-    def real(task: Any) -> Any:
-        seen.append(identify_one(task))
-        return seen[-1]
-
-    assert _run(path, out=tmp_path / "out", work=real) == BAD_INPUT
-    assert seen[0].unreadable
-    assert "\n" not in seen[0].reason
-    assert str(path) in seen[0].reason
-
-
-def test_data_that_changed_during_the_run_are_not_kept(short_campaign: Path, tmp_path: Path) -> None:
-    def late(task: Any) -> Any:
-        return identify_one(replace(task, data_sha256="0" * 64))
-
-    words = {
-        "free": ("c_sd",),
-        "max_frequency": 1.5,
-        "settings": FitSettings(orders=3, fixed_tolerances=True),
-    }
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("savgs_ident.cli.identify.fit_least_squares", lambda *args, **kwargs: None)
-        assert _run(short_campaign, out=tmp_path / "out", work=late, **words) == BAD_INPUT
-    assert "is not what it was when the run began" in _rows(tmp_path / "out")[0]["reason"]
-
-
-def test_ctrl_c_is_code_130_and_keeps_what_is_done(
-    invoke: Any, week: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def stopped(work: Any, tasks: Any) -> Iterator[tuple[int, Any]]:
-        yield 0, read_number(tasks[0])
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("savgs_ident.cli.campaigns.spread_of", lambda _: stopped)
-    done = invoke("campaign", week, "--out", "out")
-    assert done.exit_code == 130
-    assert done.stderr.endswith("Stopped by Ctrl-C; files that were finished are kept.\n")
-    assert len(list((tmp_path / "out").glob("*/done.json"))) == 1

@@ -21,9 +21,6 @@ from savgs_ident.model.road import flat_road
 from savgs_ident.model.values import as_values
 from savgs_ident.simulate.transient import TransientSolution, simulate_transient, unpack_state
 
-pytestmark = pytest.mark.slow
-
-
 fmpy = pytest.importorskip("fmpy", reason="needs FMPy")
 if shutil.which("gcc") is None:
     pytest.skip("needs gcc", allow_module_level=True)

@@ -20,9 +20,6 @@ from savgs_ident.export.linear_models import linear_models
 from savgs_ident.export.mat_export import write_mat
 from savgs_ident.model.values import as_values
 
-pytestmark = pytest.mark.slow
-
-
 FIELD = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 
 

@@ -22,9 +22,6 @@ from savgs_ident.model.road import cam_road
 from savgs_ident.model.values import as_values
 from savgs_ident.simulate.transient import simulate_transient
 
-pytestmark = pytest.mark.slow
-
-
 LIFT, FREQUENCY, DURATION = 0.0275, 2.35, 0.6
 """Of a cam that begins smoothly: [m], [Hz], [s]."""
 

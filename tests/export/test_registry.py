@@ -10,9 +10,6 @@ from savgs_ident.export import registry
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.registry import EXPORTS
 
-pytestmark = pytest.mark.slow
-
-
 HERE = Path(__file__).parent
 
 
