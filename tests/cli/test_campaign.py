@@ -15,7 +15,7 @@ from savgs_ident.cli.campaign_search import LONGEST_NAME, find_campaigns, safe_n
 from savgs_ident.cli.campaign_store import FILES
 from savgs_ident.cli.guard import BAD_INPUT, NOT_TRUSTED, OK
 
-from .campaign_fakes import MONDAY, STDERR, TALKING, campaign_file, record_of, rows_of, run
+from .campaign_fakes import MONDAY, STDERR, TALKING, campaign_file, never, record_of, rows_of, run
 
 
 def test_every_campaign_has_its_row_in_the_order_of_time(week: Path, tmp_path: Path) -> None:
