@@ -1,4 +1,4 @@
-"""The reports on linear models and on a design in a real browser: on a phone, on a desk, and under attack."""
+"""The reports made of sections in a real browser: on a phone, on a desk, and under attack."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,6 +16,8 @@ from savgs_ident.control.weights import DEFAULT_WEIGHTS
 from savgs_ident.core.rig import Rig
 from savgs_ident.effects.registry import MODELS, build_model, model_parameters
 from savgs_ident.model.values import Values, as_values
+from savgs_ident.report.campaigns_html import campaigns_html
+from savgs_ident.report.campaigns_study import CampaignRow, Identified, RowStatus, Study, study_campaigns
 from savgs_ident.report.design_html import design_html
 from savgs_ident.report.linear_html import linear_html
 from savgs_ident.report.loop_html import loop_html
@@ -25,8 +27,10 @@ from ..relaxed import with_kept_programs
 from .conftest import HOSTILE, SHOWN, Browser
 from .test_posterior_page import OPEN_ALL, OVERFLOWING, SIZES, SMALLEST_PICTURE_TEXT, SMALLEST_TEXT
 
-PICTURES = {"linear": 3, "design": 5, "loop": 4, "attacked": 5}
+PICTURES = {"linear": 3, "design": 5, "loop": 4, "campaigns": 1, "attacked": 5, "attacked campaigns": 1}
 EFFECTS = MODELS["simtr"]
+START = 1_772_438_400.0
+SETTINGS = {"model": "simtr", "free": ["mu_r", "c_sd"], "max_frequency_hz": None}
 
 
 @pytest.fixture(scope="module")
@@ -54,13 +58,34 @@ def loop(rig: Rig) -> Iterator[tuple[LoopStudy, Values]]:
         yield study_loop(model, p, controller, test, lambda _: None, rigs, causes=True), p
 
 
+def _campaigns(name: str) -> Study:
+    """Fourteen days, friction rising; a campaign that failed and one that is not to be trusted."""
+    rows = [
+        CampaignRow(
+            f"{name}{day}", f"recordings/{name}{day}.csv.gz", RowStatus.ok, "", START + 86400.0 * day, 1.02,
+            {
+                "mu_r": Identified(0.03 + 2e-4 * day, 3e-4, 2e-4, "1"),
+                "c_sd": Identified(5400.0 + 10.0 * (-1.0) ** day, 25.0, 20.0, "N s/m"),
+            },
+        )
+        for day in range(14)
+    ]  # fmt: skip
+    doubtful = replace(
+        rows[3], status=RowStatus.not_trusted, reason=f"{name}: not converged", data_sha256=name
+    )
+    failed = CampaignRow(
+        f"{name}x", f"{name}.csv", RowStatus.failed, f"{name}: no column is known", None, None, {}
+    )
+    return study_campaigns([*rows[:3], doubtful, *rows[4:], failed], str)
+
+
 @pytest.fixture(scope="module")
 def pages(
     results: tuple[LinearStudy, Design],
     loop: tuple[LoopStudy, Values],
     tmp_path_factory: pytest.TempPathFactory,
 ) -> dict[str, Path]:
-    """The three reports, and one of a controller that fails, with an attack in every name."""
+    """The four reports, and two with an attack in every name, one of a controller that fails."""
     study, design = results
     origin = model_origin("gt_rear", "gt_rear.toml", EFFECTS, ("savgs-ident", "design", "gt_rear.toml"))
     bad = ModelOrigin(HOSTILE, HOSTILE, (HOSTILE,), ("savgs-ident", HOSTILE), {HOSTILE: HOSTILE})
@@ -73,7 +98,9 @@ def pages(
         "linear": linear_html(study, origin),
         "design": design_html(design, origin),
         "loop": loop_html(*loop, origin, "designed here"),
+        "campaigns": campaigns_html(_campaigns("run"), SETTINGS, ("savgs-ident", "campaign", "recordings")),
         "attacked": design_html(failed, bad),
+        "attacked campaigns": campaigns_html(_campaigns(HOSTILE), {"free": [HOSTILE]}, (HOSTILE,)),
     }
     folder = tmp_path_factory.mktemp("sections")
     for name, text in texts.items():
@@ -115,7 +142,7 @@ def test_nothing_is_wider_than_the_window(
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-@pytest.mark.parametrize("name", ["linear", "design", "loop"])
+@pytest.mark.parametrize("name", ["linear", "design", "loop", "campaigns"])
 def test_all_text_is_large_enough_to_read(
     browser: Browser, pages: dict[str, Path], name: str, width: int
 ) -> None:
@@ -142,8 +169,9 @@ def test_tables_fit_beside_their_headings_on_a_desk(
     assert browser.ask(scrolling) == 0
 
 
-def test_hostile_text_is_text(browser: Browser, pages: dict[str, Path]) -> None:
-    browser.open(pages["attacked"])
+@pytest.mark.parametrize(("name", "times"), [("attacked", 8), ("attacked campaigns", 40)])
+def test_hostile_text_is_text(browser: Browser, pages: dict[str, Path], name: str, times: int) -> None:
+    browser.open(pages[name])
     browser.ask(OPEN_ALL)
     foreign = (
         "return document.querySelectorAll('script, b, iframe, object, embed, link:not([rel=icon])').length"
@@ -151,8 +179,13 @@ def test_hostile_text_is_text(browser: Browser, pages: dict[str, Path]) -> None:
     assert browser.ask(foreign) == 0
     armed = "return [...document.querySelectorAll('*')].filter(e => [...e.attributes].some(a => /^on/i.test(a.name)))"
     assert browser.ask(armed) == []
-    # Kind, note on the rigs, rig file, effects, rigs it was tried on, command, a package and its version.
-    assert browser.ask("return document.body.innerText").count(SHOWN) >= 8
+    # Kind, note on the rigs, rig file, effects, rigs it was tried on, command, a package and its version; of every
+    # campaign its name and where it is, of some what is wrong, the settings and the command.
+    assert browser.ask("return document.body.innerText").count(SHOWN) >= times
+
+
+def test_a_hostile_title_is_text(browser: Browser, pages: dict[str, Path]) -> None:
+    browser.open(pages["attacked"])
     assert SHOWN in browser.ask("return document.title")
 
 
@@ -164,7 +197,7 @@ def test_the_first_thing_to_read_is_that_it_is_not_to_be_trusted(
     assert browser.ask("return document.querySelector('.alarm').getBoundingClientRect().top") < 100.0
 
 
-@pytest.mark.parametrize("name", ["linear", "design"])
+@pytest.mark.parametrize("name", ["linear", "design", "campaigns"])
 def test_the_page_has_a_language_headings_in_order_and_links_that_lead_somewhere(
     browser: Browser, pages: dict[str, Path], name: str
 ) -> None:
