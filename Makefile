@@ -3,6 +3,7 @@
 #   make test        lint, types, import contracts, tests
 #   make test-slow   the tests that take minutes
 #   make bench       the benchmark table
+#   make docs        the guide and the reference, in build/docs
 #   make clean       remove .venv and caches
 # Another interpreter: make demo PYTHON=python3.12. Options for pytest: make test PYTEST_ARGS="-k rig".
 
@@ -12,7 +13,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-.PHONY: demo test lint test-slow bench clean
+.PHONY: demo test lint test-slow bench docs clean
 
 demo: $(VENV)/.installed
 	$(BIN)/savgs-ident demo
@@ -32,8 +33,14 @@ test-slow: $(VENV)/.installed-test
 bench: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks
 
+# Pages of modules that are gone would be read again.
+docs: $(VENV)/.installed-docs
+	rm -rf docs/reference
+	$(BIN)/python -m sphinx -W --keep-going -q -E docs build/docs
+	@echo "build/docs/index.html"
+
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis build dist
+	rm -rf docs/reference $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis build dist
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -49,6 +56,10 @@ $(VENV)/.installed: pyproject.toml | $(BIN)/python
 
 $(VENV)/.installed-test: pyproject.toml | $(BIN)/python
 	$(PIP) install --quiet --editable '.[test]'
+	@touch $@ $(VENV)/.installed
+
+$(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
+	$(PIP) install --quiet --editable '.[docs]'
 	@touch $@ $(VENV)/.installed
 
 $(VENV)/.installed-bench: pyproject.toml | $(BIN)/python

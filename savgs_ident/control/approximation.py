@@ -26,7 +26,7 @@ class Approximation:
     largest: float
 
     def __call__(self, angle: ArrayLike) -> NDArray[np.float64]:
-        """The approximated quantity at link angles [rad]."""
+        """The approximated quantity at link angles [rad], any shape; the result has the same."""
         return np.asarray(Polynomial(self.coefficients)(np.asarray(angle, dtype=np.float64)))
 
 

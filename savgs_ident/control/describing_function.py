@@ -125,7 +125,7 @@ def _bare(model: QuarterCar, p: Values) -> _Bare:
 
 
 def quasi_linear_response(model: QuarterCar, p: Values, described: Described) -> NDArray[np.complex128]:
-    """Response (D, 2) of the rig with the described elements, :data:`OUTPUTS` per metre of road."""
+    """Response (D, 2) of the rig with the described elements, :data:`OUTPUTS` per metre of road [unit/m]."""
     rig = _bare(model, p)
     position, velocity, acceleration, road, force = rig.residual
     rows = []

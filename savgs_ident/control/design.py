@@ -31,7 +31,10 @@ FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0)
 def controller_for(
     model: QuarterCar, p: Values, weights: ParameterTable, rate: float = RATE
 ) -> DigitalController:
-    """The sampled H-infinity controller of a rig, without the evidence; raises as :func:`design_controller` does."""
+    """The sampled H-infinity controller of a rig, sampled at ``rate`` [Hz], without the evidence.
+
+    Raises as :func:`design_controller` does.
+    """
     space = quarter_car_space(paper_masses(model, p))
     synthesis = synthesise_hinf(generalised_plant(space, float(p["motor_reference_bandwidth"]), weights))
     return DigitalController(discretise(synthesis.controller, rate), alpha_map(model, p))
@@ -39,7 +42,10 @@ def controller_for(
 
 @dataclass(frozen=True)
 class Regularised:
-    """What a regularising weight does: the design with it times ``factor``; no gamma where there is no design."""
+    """What a regularising weight does: the design with it times ``factor``; no gamma where there is no design.
+
+    ``factor`` and ``gamma_least`` have no dimension [1], ``fastest_pole`` is in [rad/s].
+    """
 
     weight: str
     factor: float

@@ -44,7 +44,7 @@ def motions_on_cam(
 
 
 def first_harmonic(model: QuarterCar, p: Values, solution: PeriodicSolution, peak_to_peak: float) -> Complex:
-    """First harmonics of the readings per metre of road, (D, 2)."""
+    """First harmonics of the readings per metre of road [unit/m], (D, 2), whose stroke is ``peak_to_peak`` [m]."""
     found = harmonics(model, p, solution, 1)[:, :, 1] / (peak_to_peak / 2.0)
     return np.asarray(found, np.complex128)
 

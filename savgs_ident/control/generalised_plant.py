@@ -115,7 +115,10 @@ def driven_loop(rig: control.StateSpace, bandwidth: float) -> control.StateSpace
 
 
 def design_loop(rig: control.StateSpace, bandwidth: float) -> control.StateSpace:
-    """What the controller works on: from its command (:data:`COMMAND`) to its :data:`MEASUREMENTS`, without noise."""
+    """What the controller works on: from its command (:data:`COMMAND`) to its :data:`MEASUREMENTS`, without noise.
+
+    ``bandwidth`` [Hz] is that of the drive.
+    """
     plant = _moved(rig, bandwidth)
     return control.ss(
         plant.A,

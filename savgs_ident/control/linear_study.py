@@ -79,7 +79,7 @@ class EquivalentStudy:
 
 @dataclass(frozen=True)
 class SmallMotions:
-    """Responses to a small cam, complex (F, 2), :data:`CHANNELS` per metre of road.
+    """Responses to a small cam, complex (F, 2), :data:`CHANNELS` per metre of road [unit/m].
 
     Attributes:
         frequency: [Hz], (F,).
@@ -103,7 +103,7 @@ class SmallMotions:
 
 @dataclass(frozen=True)
 class CamMotions:
-    """Responses to the cam of the test, friction included.
+    """Responses to the cam of the test [unit/m], (D, 2), friction included.
 
     Attributes:
         nonlinear: complex (D, 2), first harmonics of the nonlinear rig per metre of road.

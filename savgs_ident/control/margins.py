@@ -43,7 +43,7 @@ def loop_of(plant: control.StateSpace, controller: control.StateSpace) -> contro
 
 
 def sensitivity_of(loop: control.StateSpace, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """1/(1 + L) at frequencies [Hz]."""
+    """1/(1 + L) [1] at frequencies [Hz], (F,); the result has the same shape."""
     return np.asarray(1.0 / (1.0 + np.ravel(loop(2j * np.pi * frequency))))
 
 

@@ -40,7 +40,7 @@ class TwoMasses(NamedTuple):
 
 
 def lumped(m_s: float, m_u: float) -> Matrix:
-    """The mass matrix of eq. (8): the unsprung mass as a point at the wheel centre."""
+    """The mass matrix [kg], (2, 2), of eq. (8): the unsprung mass as a point at the wheel centre."""
     return np.diag([m_s, m_u])
 
 

@@ -40,20 +40,23 @@ def rigs_from_posterior(table: ParameterTable, path: Path, count: int) -> Rigs:
     return _rigs(table, f"{len(matrix)} samples of {path}", tuple(draws), matrix)
 
 
-def rigs_from_covariance(table: ParameterTable, provenance: Mapping[str, object], count: int) -> Rigs:
+def rigs_from_covariance(
+    table: ParameterTable, provenance: Mapping[str, object], count: int, source: object = ""
+) -> Rigs:
     """``count`` rigs from the normal distribution that an identified rig carries; from tolerances for a drawing.
 
-    Raises :class:`InputError` if what it carries is no covariance of its parameters.
+    Raises :class:`InputError`, which names the rig's file ``source``, if what it carries is no covariance of its
+    parameters.
     """
     carried = provenance.get("covariance")
     if carried is None:
         known = [entry for entry in table.entries if entry.tolerance > 0.0]
         names = tuple(entry.name for entry in known)
         covariance = np.diag([entry.tolerance**2 for entry in known])
-        source = f"{count} rigs within the tolerances of the drawing"
+        told = f"{count} rigs within the tolerances of the drawing"
     else:
-        names, covariance = _covariance(carried, table)
-        source = f"{count} rigs from the covariance of the fit"
+        names, covariance = _covariance(carried, table, source)
+        told = f"{count} rigs from the covariance of the fit"
     centre = np.array(table.values_of(names))
     lower = np.array([table[name].lower for name in names])
     upper = np.array([table[name].upper for name in names])
@@ -63,12 +66,16 @@ def rigs_from_covariance(table: ParameterTable, provenance: Mapping[str, object]
     zero = np.zeros(len(names))
     random = np.random.default_rng(SEED)
     drawn = centre + spread * random.multivariate_normal(zero, correlation, count, method="eigh")
-    return _rigs(table, source, names, np.clip(drawn, lower, upper))
+    return _rigs(table, told, names, np.clip(drawn, lower, upper))
 
 
-def _covariance(carried: object, table: ParameterTable) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+def _covariance(
+    carried: object, table: ParameterTable, source: object
+) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     wrong = InputError(
-        "provenance.covariance is no covariance of the rig's parameters", remedy="identify the rig again"
+        "provenance.covariance is no covariance of the rig's parameters",
+        source=source,
+        remedy="identify the rig again",
     )
     if not isinstance(carried, Mapping):
         raise wrong
@@ -77,7 +84,9 @@ def _covariance(carried: object, table: ParameterTable) -> tuple[tuple[str, ...]
         covariance = np.array(matrix, dtype=np.float64)
     except (TypeError, ValueError):
         raise wrong from None
-    if not isinstance(names, list | tuple) or any(name not in table for name in names):
+    if not isinstance(names, list | tuple) or not all(
+        isinstance(name, str) and name in table for name in names
+    ):
         raise wrong
     if covariance.shape != (len(names), len(names)) or not np.isfinite(covariance).all():
         raise wrong

@@ -36,7 +36,7 @@ SEED = 8608
 def iso_height(grade: str, speed: float, duration: float) -> NDArray[np.float64]:
     """Heights [m] every :data:`STEP` of a road of class ``grade`` met at ``speed`` [m/s] for ``duration`` [s].
 
-    A class that is not in :data:`ROUGHNESS` is a KeyError.
+    A class that is not in :data:`ROUGHNESS` is a KeyError. Heights are (n,).
     """
     count = round(duration / STEP) + 1
     n = np.fft.rfftfreq(count, STEP) / speed

@@ -29,7 +29,7 @@ def candidates_of(
     held: Mapping[str, HeldOut],
     search: Search,
 ) -> tuple[Candidate, ...]:
-    """All hypotheses, the most probable first."""
+    """All hypotheses, the most probable first. ``probability`` (n,) is that of each of those weighed."""
     scores = {score.term.name: score for score in findings.scores}
     gap, found = excess(search, findings.base), []
     for each, share in zip(weighed, probability, strict=True):

@@ -124,7 +124,8 @@ def alarm_bench(
 ) -> AlarmBench:
     """Recalibrate the baseline on a measured response, and judge it.
 
-    Raises :class:`InputError` as :func:`savgs_ident.diagnose.diagnose.diagnose_response` does.
+    Raises :class:`InputError` as :func:`savgs_ident.diagnose.diagnose.diagnose_response` does. ``values``
+    are parameters in SI.
     """
     with threadpool_limits(1, "blas"):
         case = recalibrate(measured, rig, settings, values, tell)
@@ -144,7 +145,7 @@ def _degrees_of_freedom(measured: HarmonicResponse, case: Case) -> NDArray[np.fl
 
 
 def rate_bound(alarms: int, drawn: int) -> float:
-    """Highest rate that so many alarms leave possible (Clopper and Pearson, 1934); 1 where none was drawn."""
+    """Highest rate [1] that so many alarms leave possible (Clopper and Pearson, 1934); 1 where none was drawn."""
     return 1.0 if alarms >= drawn else float(beta.ppf(CONFIDENCE, alarms + 1, drawn - alarms))
 
 

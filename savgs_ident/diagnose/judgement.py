@@ -52,7 +52,7 @@ NEAREST = 2
 class Case:
     """A rig as a plant, what it is held against, and the baseline as given and recalibrated.
 
-    ``given`` are the rows of the baseline as given, (m,).
+    ``given`` are the rows of the baseline as given, (m,) [unit of each reading].
     """
 
     plant: RigPlant
@@ -107,7 +107,7 @@ def recalibrate(
     values: Mapping[str, float],
     tell: Tell,
 ) -> Case:
-    """The baseline at its own best: what calibration alone can do."""
+    """The baseline at its own best: what calibration alone can do. It is started from ``values`` [SI]."""
     unknown = sorted({*options.without, *options.baseline} - set(CATALOGUE))
     if unknown:
         raise InputError(

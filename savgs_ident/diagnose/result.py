@@ -105,9 +105,9 @@ class Candidate:
         effects: names of its effects; empty for none and unknown.
         probability: its probability, all hypotheses sum to 1.
         score_sigma: significance at the null, nuisances projected out.
-        heldout_gain: rise of the log predictive density of left-out tests over the baseline, per datum.
-        share_closed: share that it explains of what the recalibrated baseline leaves beyond the noise, all tests; NaN
-            where it leaves nothing.
+        heldout_gain: rise of the log predictive density of left-out tests over the baseline, per datum [nat].
+        share_closed: share that it explains of what the recalibrated baseline leaves beyond the noise, all
+            tests; NaN where it leaves nothing.
         parameters: those of its effects.
         refitted: whether it was fitted in full, or judged by its score alone.
     """
@@ -124,7 +124,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Shrink:
-    """Relative rms gap over held-out tests (0.1 is 10 %): before, recalibrated, after, and of the noise alone.
+    """Relative rms gap [1] over held-out tests (0.1 is 10 %): before, recalibrated, after, and of the noise alone.
 
     ``share_closed`` is 1 - (after^2 - floor^2) / (before^2 - floor^2), ``interval`` its 95 % interval by
     resampling the tests.
@@ -140,7 +140,7 @@ class Shrink:
 
 @dataclass(frozen=True)
 class SweepShrink:
-    """The same of the first harmonic along the recorded sweep; NaN where nothing was computed."""
+    """The same [1] of the first harmonic along the recorded sweep; NaN where nothing was computed."""
 
     before: float
     recalibrated: float
@@ -159,7 +159,10 @@ class NextTest:
 
 @dataclass(frozen=True)
 class NotJudgeable:
-    """An effect that this campaign cannot show, and the smallest size of its parameter that it could have shown."""
+    """An effect that this campaign cannot show, and the smallest size of its parameter that it could have shown.
+
+    It is in ``unit``, SI.
+    """
 
     effect: str
     parameter: str
@@ -185,7 +188,7 @@ class ForceLoop:
         displacement: [m], (n,).
         velocity: [m/s], (n,).
         inferred: inferred signal [``unit``], (n,).
-        law: the named effect's law along the same motion, (n,); empty if none is named.
+        law: the named effect's law along the same motion [``unit``], (n,); empty if none is named.
         unit: N for a force, m or rad for what gives way, the channel's unit for a sensor.
     """
 
@@ -200,7 +203,10 @@ class ForceLoop:
 
 @dataclass(frozen=True)
 class Responses:
-    """Harmonics of both response channels, complex, (D, 2, K) each, channels as in RESPONSE_CHANNELS."""
+    """Harmonics of both response channels, complex, (D, 2, K) each, channels as in RESPONSE_CHANNELS.
+
+    Each is in the unit of its reading.
+    """
 
     before: NDArray[np.complex128]
     recalibrated: NDArray[np.complex128]

@@ -174,7 +174,7 @@ def weigh(findings: Findings, unknown: Unknown) -> list[Weighed]:
 
 
 def probabilities(weighed: list[Weighed]) -> NDArray[np.float64]:
-    """Their probabilities, which sum to 1."""
+    """Their probabilities, (n,), which sum to 1."""
     weights = np.array([each.weight for each in weighed])
     shares = np.exp(weights - weights.max())
     return np.asarray(shares / shares.sum())

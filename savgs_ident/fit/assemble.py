@@ -16,7 +16,10 @@ from savgs_ident.simulate.periodic import simulate_periodic
 
 
 class Outcome(NamedTuple):
-    """Where a fit ended: the response ``as_given`` before it, every start, the best, what it tells."""
+    """Where a fit ended: the response ``as_given`` before it, every start, the best, what it tells.
+
+    ``as_given`` are complex harmonics [unit of the reading], (D, 2, orders + 1).
+    """
 
     as_given: np.ndarray
     tried: tuple[Minimum, ...]

@@ -15,7 +15,7 @@ UNTOLD = 1e3
 
 
 class Spread(NamedTuple):
-    """Covariance (n, n) of the unconstrained coordinates."""
+    """Covariance (n, n) of the unconstrained coordinates [1]."""
 
     covariance: NDArray[np.float64]
 

@@ -34,7 +34,10 @@ def untold_groups(names: tuple[str, ...], covariance: NDArray[np.float64]) -> tu
 def known_combination(
     pair: tuple[str, str], names: tuple[str, ...], covariance: NDArray[np.float64]
 ) -> tuple[str, float]:
-    """The better known of ratio and product of two parameters, and its relative standard error [1]."""
+    """The better known of ratio and product of two parameters, and its relative standard error [1].
+
+    ``covariance`` (n, n) is that of the logarithms.
+    """
     i, j = (names.index(name) for name in pair)
     own = covariance[i, i] + covariance[j, j]
     ratio, product = (np.sqrt(max(own + sign * 2.0 * covariance[i, j], 0.0)) for sign in (-1.0, 1.0))

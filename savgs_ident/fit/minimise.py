@@ -38,8 +38,8 @@ NOTHING = 1e-10
 class Minimum(NamedTuple):
     """Where a minimisation ended.
 
-    ``residual`` (m,) and ``jacobian`` (m, n) of data and priors are those at ``u`` (n,); ``solution`` is the
-    model's there.
+    ``residual`` (m,) and ``jacobian`` (m, n) of data and priors are those at ``u`` (n,); ``solution`` is
+    the model's there. All of these have no dimension [1]: coordinates are scaled, residuals whitened.
     """
 
     u: Float[Array, " n"]
@@ -50,7 +50,7 @@ class Minimum(NamedTuple):
 
     @property
     def cost(self) -> float:
-        """Sum of squared residuals, priors included."""
+        """Sum of squared residuals [1], priors included."""
         return float(self.residual @ self.residual)
 
 
@@ -135,7 +135,7 @@ class Minimiser(eqx.Module):
         return _minimum(best, status)
 
     def evaluate(self, u: Float[Array, " n"], near: PeriodicSolution) -> Minimum:
-        """Residuals and Jacobian at ``u``, without moving."""
+        """Residuals and Jacobian at free coordinates ``u`` [1], without moving."""
         found = evaluate(self.problem, u, self.problem.unpinned, near)
         fine = bool(jnp.isfinite(found.at.residual).all())
         return _minimum(found, Status.CONVERGED if fine else Status.NOT_FINITE)

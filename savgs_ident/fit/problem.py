@@ -28,7 +28,10 @@ from savgs_ident.simulate.stored import placed, stored
 
 
 class Pins(NamedTuple):
-    """Coordinates held near a value: residuals ``weight`` (u - ``at``), both (n,); weight 0 leaves one free."""
+    """Free coordinates [1] held near a value.
+
+    Residuals ``weight`` (u - ``at``), both (n,); weight 0 leaves one free.
+    """
 
     weight: Float[Array, " n"]
     at: Float[Array, " n"]
@@ -93,7 +96,7 @@ def _slopes(free: FreeVector, u: Array) -> Array:
 
 
 class Linearised(NamedTuple):
-    """A problem about the point ``u`` (n,): residuals (m,) there and their Jacobian (m, n)."""
+    """A problem about the free coordinates ``u`` (n,): residuals (m,) there and their Jacobian (m, n)."""
 
     u: Float[Array, " n"]
     residual: Float[Array, " m"]
@@ -108,7 +111,7 @@ class Evaluation(NamedTuple):
 
 
 def evaluate(problem: Problem, u: Float[Array, " n"], pins: Pins, near: PeriodicSolution) -> Evaluation:
-    """Residuals of data, priors and pins at ``u``, on the nodes of ``near`` and started from it.
+    """Residuals of data, priors and pins at free coordinates ``u``, on the nodes of ``near`` and started from it.
 
     The solver is the one that made ``near``, compiled already.
     """
@@ -120,7 +123,8 @@ def evaluate(problem: Problem, u: Float[Array, " n"], pins: Pins, near: Periodic
 def evaluate_beside(problem: Problem, u: Float[Array, " n"], pins: Pins, best: Evaluation) -> Evaluation:
     """The same, started from a ``best`` point known so far; whose Jacobian it borrows if it is no better.
 
-    Such a point is rejected by any optimiser, and its own Jacobian would cost most of the evaluation.
+    Such a point is rejected by any optimiser, and its own Jacobian would cost most of the evaluation. ``u`` are
+    free coordinates.
     """
     u, pins = placed((u, pins))
     p = problem.parameters(u)

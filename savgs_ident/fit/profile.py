@@ -39,7 +39,7 @@ class Profile(NamedTuple):
 def held_at(
     minimiser: Minimiser, start: Minimum, name: str, coordinate: float, progress: Progress
 ) -> Minimum:
-    """Refit everything with one parameter's unconstrained coordinate held."""
+    """Refit everything with one parameter's unconstrained coordinate [1] held."""
     place = minimiser.problem.free.names.index(name)
     blank = jnp.zeros_like(start.u)
     pins = Pins(blank.at[place].set(PIN), blank.at[place].set(coordinate))
@@ -54,7 +54,7 @@ def profile_likelihood(
     coordinates: Float[Array, " k"] | NDArray[np.float64],
     progress: Progress,
 ) -> Profile:
-    """The profile of ``name`` at unconstrained ``coordinates``, each refitted from its neighbour.
+    """The profile of ``name`` at unconstrained ``coordinates`` [1], (k,), each refitted from its neighbour.
 
     Starts from the best fit outwards in both directions, so that warm starts stay close.
     """

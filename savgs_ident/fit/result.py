@@ -61,10 +61,10 @@ class Fit:
         measured: the response that was fitted.
         orders: highest harmonic order used.
         used: which entries of ``predicted`` were fitted, (D, 2, orders + 1).
-        predicted: identified model, complex, (D, 2, orders + 1), channels as in
+        predicted: identified model, complex [unit of the reading], (D, 2, orders + 1), channels as in
             :data:`savgs_ident.model.sensors.RESPONSE_CHANNELS`.
-        frictionless: SimQC at the same estimates, (D, 2, orders + 1).
-        as_given: the model before fitting, (D, 2, orders + 1).
+        frictionless: SimQC at the same estimates [unit of the reading], (D, 2, orders + 1).
+        as_given: the model before fitting [unit of the reading], (D, 2, orders + 1).
         starts: (chi2 reached, status) of each start of the optimisation.
         quantity: "harmonics" or "peak_to_peak", what was fitted.
         wall_s: time taken [s].
@@ -112,6 +112,6 @@ class Fit:
 
     @property
     def correlation(self) -> NDArray[np.float64]:
-        """Correlation of the estimates, (n, n)."""
+        """Correlation of the estimates [1], (n, n)."""
         sd = np.sqrt(np.diag(self.covariance))
         return np.asarray(self.covariance / np.outer(sd, sd))

@@ -10,6 +10,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
+from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.model.sensors import RESPONSE_CHANNELS
@@ -20,7 +21,8 @@ from savgs_ident.responses.peak_to_peak import peak_to_peak
 class HarmonicTarget(eqx.Module):
     """Complex harmonics of orders 1..n with their 2 x 2 covariances.
 
-    ``whitening`` (D, 2, n + 1, 2, 2) is the inverse Cholesky factor of the covariance, 0 where not ``used``.
+    ``whitening`` (D, 2, n + 1, 2, 2) is the inverse Cholesky factor of the covariance, 0 where not
+    ``used``. Harmonics are in the unit of their reading, ``whitening`` in one over it.
     """
 
     measured: Complex[Array, "D C K"]
@@ -45,7 +47,11 @@ class HarmonicTarget(eqx.Module):
 
 
 class PeakToPeakTarget(eqx.Module):
-    """Peak-to-peak values of the waveforms, truncated on both sides to the orders that the sensor carries."""
+    """Peak-to-peak values of the waveforms, truncated on both sides to the orders that the sensor carries.
+
+    ``measured`` is in the unit of each reading, ``weight`` in one over it; ``used`` (D, 2) says which
+    count.
+    """
 
     measured: Float[Array, "D C"]
     weight: Float[Array, "D C"]
@@ -71,7 +77,7 @@ class PeakToPeakTarget(eqx.Module):
 Target = HarmonicTarget | PeakToPeakTarget
 
 
-def response_channels(measured: HarmonicResponse) -> tuple[np.ndarray, list[int]]:
+def response_channels(measured: HarmonicResponse) -> tuple[NDArray[np.bool_], list[int]]:
     """Which response channels were recorded, (2,), and a stand-in index for those that were not."""
     present = np.array([name in measured.channels for name in RESPONSE_CHANNELS])
     if not present.any():

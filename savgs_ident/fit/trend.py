@@ -58,7 +58,7 @@ class Scatter:
 
     @property
     def widening(self) -> float:
-        """By what the errors are to be multiplied, 1 where the estimates lie within them."""
+        """By what the errors are to be multiplied [1], 1 where the estimates lie within them."""
         return float(np.sqrt(self.chi2 / self.dof)) if self.beyond_errors else 1.0
 
     @property
@@ -69,7 +69,7 @@ class Scatter:
 
 @dataclass(frozen=True)
 class Mean:
-    """The weighted mean.
+    """The weighted mean; all in the unit of the estimates.
 
     Attributes:
         value: of the mean.
@@ -90,7 +90,7 @@ class Mean:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Its ends with :data:`CONFIDENCE`."""
+        """Its ends with :data:`CONFIDENCE`. In the unit of the estimates."""
         half = float(np.hypot(self.scatter.quantile * self.own_stderr, _NORMAL * self.common_stderr))
         return self.value - half, self.value + half
 
@@ -115,7 +115,10 @@ class Line:
 
     @property
     def slope_interval(self) -> tuple[float, float]:
-        """The ends of the slope's interval with :data:`CONFIDENCE`."""
+        """The ends of the slope's interval with :data:`CONFIDENCE`.
+
+        In the unit of the estimates per unit of x.
+        """
         half = self.scatter.quantile * self.slope_stderr
         return self.slope - half, self.slope + half
 
@@ -126,7 +129,10 @@ class Line:
         return low > 0.0 or high < 0.0
 
     def at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The line at ``x`` (n,), and half the width of its band: (2, n)."""
+        """The line at ``x`` (n,), and half the width of its band: (2, n).
+
+        In the unit of the estimates; x in its own.
+        """
         away = x - self.centre
         half = self.scatter.quantile * np.hypot(self.value_stderr, away * self.slope_stderr)
         return np.stack([self.value + self.slope * away, half])

@@ -28,7 +28,7 @@ from savgs_ident.model.values import Values
 
 
 class Part(NamedTuple):
-    """An effect with its states and their rates."""
+    """An effect with its states and their rates. States are in their own units, rates in those per second."""
 
     effect: AbstractEffect
     state: Float[Array, " s"]
@@ -64,7 +64,10 @@ class Acting:
                 yield effect, part
 
     def way(self, port: Port, given: Float[Array, "2"], in_damper: bool = False) -> Way:
-        """How everything in series at a port gives way, ``given`` from outside included."""
+        """How everything in series at a port gives way, ``given`` from outside included.
+
+        ``given`` are displacement and velocity [m, m/s or rad, rad/s].
+        """
         way = Way(given[0], given[1])
         for _, part in self._series(port, in_damper):
             way = Way(way.displacement + part.state[0], way.velocity + part.rate[0])
@@ -73,7 +76,10 @@ class Acting:
     def carry(
         self, port: Port, total: Float[Array, ""], rest: Float[Array, ""], in_damper: bool = False
     ) -> None:
-        """Put everything in series at a port under its load, of which ``rest`` is there in the nominal state."""
+        """Put everything in series at a port under its load, of which ``rest`` is there in the nominal state.
+
+        Loads are in [N], or [N m] at the link.
+        """
         load = Load(total, rest)
         self.carried["damper" if in_damper else port.value] = load
         for effect, part in self._series(port, in_damper):

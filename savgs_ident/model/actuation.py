@@ -37,7 +37,7 @@ class AbstractActuation(eqx.Module):
 
     @abstractmethod
     def link(self, t: Scalar, state: Float[Array, " k"]) -> Link:
-        """The link's angle and velocity."""
+        """The link's angle [rad] and velocity [rad/s] at time ``t`` [s], from the states (k,) of what moves it."""
 
     @abstractmethod
     def rate(self, p: Values, t: Scalar, state: Float[Array, " k"], load: Scalar) -> Float[Array, " k"]:
@@ -81,7 +81,7 @@ def harmonic_link(mean: float, amplitude: float, frequency: float, settle: float
 
 
 def tabulated_link(time: ArrayLike, angle: ArrayLike, source: str = "") -> ImposedLink:
-    """A link angle [rad] given at times [s], with a C1 curve between.
+    """A link angle [rad], (n,), given at times [s], (n,), with a C1 curve between.
 
     Raises :class:`InputError` as :func:`savgs_ident.model.profile.tabulated` does.
     """

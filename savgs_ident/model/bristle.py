@@ -44,7 +44,10 @@ class Bristle(NamedTuple):
 
 
 def held_within(x: Float[Array, ""], lower: Float[Array, ""], upper: Float[Array, ""]) -> Float[Array, ""]:
-    """``x`` held within lower..upper. ``jnp.clip`` halves the slope in limits of zero, at the null."""
+    """``x`` held within lower..upper. ``jnp.clip`` halves the slope in limits of zero, at the null.
+
+    All are in the same unit.
+    """
     return jnp.where(x > upper, upper, jnp.where(x < lower, lower, x))
 
 
@@ -54,7 +57,7 @@ def _not_below_zero(x: Float[Array, ""]) -> Float[Array, ""]:
 
 
 def bristle(stick: Presliding, signals: PortSignals, grip: Grip, anchor: Float[Array, ""]) -> Bristle:
-    """The bristle's force and how fast its anchor is dragged."""
+    """The bristle's force and how fast its ``anchor`` [m] is dragged."""
     up, down = _not_below_zero(grip.against_up), -_not_below_zero(grip.against_down)
     stretch = signals.displacement - anchor
     resisting = held_within(stick.stiffness * stretch + stick.damping * signals.velocity, down, up)

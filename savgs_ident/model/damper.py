@@ -44,6 +44,7 @@ def equivalent_damping(velocity: np.ndarray, force: np.ndarray, amplitude: float
     """Energy-equivalent viscous coefficient [N s/m] of a table [m/s], [N] at a velocity amplitude [m/s].
 
     The table may be narrower than the amplitude: beyond it the curve is the one of :func:`damper_curve`.
+    Both columns of the table are (n,).
     """
     curve = _monotone_curve(velocity, force)
     corners = np.clip(curve.x / amplitude, -1.0, 1.0)

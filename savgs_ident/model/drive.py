@@ -136,7 +136,7 @@ def inertia_at_motor(p: Values) -> Scalar:
 
 
 def drive_state(state: Float[Array, " 8"]) -> DriveState:
-    """The drive's state vector by name."""
+    """The drive's state vector by name, in SI."""
     angle, velocity, current_d, current_q, *rest = jnp.unstack(state)
     return DriveState(angle, velocity, Axes(current_d, current_q), Axes(rest[0], rest[1]), rest[2], rest[3])
 
@@ -162,7 +162,7 @@ class Drive(AbstractActuation):
         return jnp.stack([self.angle_at_start, zero, *hold, commanded, self.reference.wanted(t)])
 
     def link(self, t: Scalar, state: Float[Array, " 8"]) -> Link:
-        """The link's angle and velocity, from the state."""
+        """The link's angle and velocity, from the state; ``t`` [s]."""
         return Link(state[0], state[1])
 
     def rate(self, p: Values, t: Scalar, state: Float[Array, " 8"], load: Scalar) -> Float[Array, " 8"]:
@@ -170,7 +170,10 @@ class Drive(AbstractActuation):
         return self._evaluate(p, t, state, load)[0]
 
     def signals(self, p: Values, t: Scalar, state: Float[Array, " 8"], load: Scalar) -> DriveSignals:
-        """Voltages and torques in a state."""
+        """Voltages and torques in a state.
+
+        At time ``t`` [s], under the torque ``load`` of the strut on the link [N m].
+        """
         return self._evaluate(p, t, state, load)[1]
 
     def _evaluate(

@@ -121,7 +121,10 @@ class AbstractForce(AbstractEffect):
 
     @abstractmethod
     def rate(self, p: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:
-        """Time derivatives of the internal states, shape (s,); empty for an effect without states."""
+        """Time derivatives of the internal states, shape (s,) [unit of each per second].
+
+        Empty for an effect without states.
+        """
 
 
 class Grip(NamedTuple):
@@ -143,14 +146,17 @@ class AbstractGrip(AbstractEffect):
 
 
 class Load(NamedTuple):
-    """A load, and what of it is there when the rig stands in its nominal state, as what it acts on was set up."""
+    """A load, and what of it is there when the rig stands in its nominal state, as what it acts on was set up.
+
+    Both are in [N], or [N m] at the link.
+    """
 
     total: Float[Array, ""]
     rest: Float[Array, ""]
 
     @property
     def beyond_rest(self) -> Float[Array, ""]:
-        """The load less that at rest."""
+        """The load less that at rest [N or N m]."""
         return self.total - self.rest
 
 
@@ -175,7 +181,7 @@ class AbstractSeries(AbstractEffect):
     def balance(
         self, p: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
     ) -> Float[Array, " s"]:
-        """What vanishes for the right ``rate`` of the states, shape (s,), growing with it."""
+        """What vanishes for the right ``rate`` of the states, shape (s,) [unit of each state], growing with it."""
 
 
 class AbstractChange(AbstractEffect):

@@ -31,7 +31,7 @@ class Imposed(NamedTuple):
 
 
 def nothing_imposed(like: Float[Array, "*n"]) -> Imposed:
-    """Zeros, one for each element of ``like``."""
+    """Zeros [SI], one for each element of ``like``."""
     zero = jnp.zeros_like(like)
     pair = jnp.zeros((*like.shape, 2), like.dtype)
     return Imposed(zero, zero, zero, zero, zero, pair, pair, pair, pair, pair, pair)

@@ -21,7 +21,7 @@ Scalar = Float[Array, ""]
 
 
 class Axes(NamedTuple):
-    """A quantity in the d and the q axis."""
+    """A quantity in the d and the q axis: a current [A] or a voltage [V]."""
 
     d: Scalar
     q: Scalar

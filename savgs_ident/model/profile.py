@@ -38,7 +38,7 @@ class AbstractProfile(eqx.Module):
 
 
 class Constant(AbstractProfile):
-    """A quantity that stays as it is."""
+    """A quantity that stays as it is, in its unit."""
 
     level: Number = eqx.field(converter=jnp.asarray)
 
@@ -157,8 +157,8 @@ class Tabulated(AbstractProfile):
 def tabulated(time: ArrayLike, values: ArrayLike, source: str = "") -> Tabulated:
     """The modified Akima curve through (time [s], values): C1 and local, so that it does not ring at a step.
 
-    Raises :class:`InputError` for fewer than two points, arrays of unequal length, values that are not finite,
-    or times that do not increase.
+    Raises :class:`InputError` for fewer than two points, arrays of unequal length, values that are not
+    finite, or times that do not increase. Both are (n,), values in the unit of the quantity.
     """
     knots, levels = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     remedy = "give two or more points, finite, with times that increase"
@@ -171,7 +171,13 @@ def tabulated(time: ArrayLike, values: ArrayLike, source: str = "") -> Tabulated
         raise InputError(
             "the time does not increase", source=source, time=float(knots[back[0] + 1]), remedy=remedy
         )
-    curve = Akima1DInterpolator(knots, levels, method="makima")
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            curve = Akima1DInterpolator(knots, levels, method="makima")
+    except ValueError:
+        raise InputError("the profile is too steep to be followed", source=source, remedy=remedy) from None
+    if not np.isfinite(curve.c).all():
+        raise InputError("the profile is too steep to be followed", source=source, remedy=remedy)
     parts = np.linspace(knots[0], knots[-1], knots.size)[:-1]
     first = np.searchsorted(knots, parts, side="right") - 1
     return Tabulated(jnp.asarray(knots), jnp.asarray(curve.c.T), jnp.asarray(first))

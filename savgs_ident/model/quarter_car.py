@@ -103,7 +103,10 @@ class QuarterCar(eqx.Module):
         return section_curves(self.effective(p))
 
     def read(self, p: Values, theta_LW: Float[Array, ""], acceleration: Float[Array, ""]) -> Readings:
-        """What the sensors would show if none had dynamics: see :meth:`transfers`."""
+        """What the sensors would show at a wishbone angle [rad] and an acceleration [m/s^2] if none had dynamics.
+
+        See :meth:`transfers`.
+        """
         return read_sensors(self.effective(p), theta_LW, acceleration)
 
     def transfers(self, p: Values, frequency: Float[Array, "*f"]) -> Complex[Array, "C *f"]:
@@ -209,7 +212,7 @@ class QuarterCar(eqx.Module):
         inputs: Inputs,
         curves: SectionCurves | None = None,
     ) -> Loads:
-        """Forces and reactions along a motion."""
+        """Forces and reactions along a motion; ``s`` and ``sd`` (s,) as in :meth:`residual`, in their units."""
         p = self.effective(p)
         at = (curves or partial(section, p))(motion.q.theta_LW)
         return self._evaluate(p, at, motion, s, sd, inputs)[2]

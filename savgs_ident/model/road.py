@@ -4,6 +4,7 @@ road = cam_road(peak_to_peak=0.0275, frequency=2.35, settle=1.0)
 road.height(t), road.velocity(t)
 """
 
+import warnings
 from pathlib import Path
 
 import equinox as eqx
@@ -65,7 +66,7 @@ def sweep_road(peak_to_peak: float, start: float, end: float, duration: float) -
 
 
 def tabulated_road(time: ArrayLike, height: ArrayLike, source: str = "") -> RoadMotion:
-    """A height [m] given at times [s], with a C1 curve between.
+    """A height [m], (n,), given at times [s], (n,), with a C1 curve between.
 
     Raises :class:`InputError` as :func:`savgs_ident.model.profile.tabulated` does.
     """
@@ -91,8 +92,10 @@ def read_road(path: Path | str) -> RoadMotion:
     Raises :class:`InputError` if the file cannot be read or is no such table.
     """
     try:
-        table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    except (OSError, ValueError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", UserWarning)
+            table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+    except (OSError, ValueError, UserWarning) as error:
         raise InputError(
             f"is not a readable road: {error}", source=path, remedy="give a header and rows of time, height"
         ) from error

@@ -73,7 +73,7 @@ def _section_of(p: Values, swing_: Swing) -> Section:
 
 
 class SectionCurves(eqx.Module):
-    """Chebyshev coefficients of all entries of a section over ``theta_LW / TRAVEL``, (22, n)."""
+    """Chebyshev coefficients of all entries of a section over ``theta_LW / TRAVEL``, (22, n) [SI]."""
 
     coefficients: Float[Array, "entries n"]
 

@@ -42,7 +42,8 @@ def _columns(slope: Callable[[Vector], Vector], like: Vector) -> Float[Array, "n
 def solve_dense(matrix: Float[Array, "n n"], right: Vector) -> Vector:
     """Solve a small linear system by Gaussian elimination with scalars, unrolled.
 
-    Rows are taken in the order given: for matrices whose leading minors do not vanish, such as mass matrices.
+    Rows are taken in the order given: for matrices whose leading minors do not vanish, such as mass
+    matrices. Numbers are in scaled coordinates or in any consistent units of SI.
     """
     size = matrix.shape[0]
     rows = [[*jnp.unstack(matrix[i]), right[i]] for i in range(size)]
@@ -68,8 +69,9 @@ def find_root(
 ) -> Vector:
     """The root (n,) of ``function`` that Newton's method reaches from ``start``; NaN if it reaches none.
 
-    ``scale`` (n,) is the typical size of each unknown; ``solve`` has to suit the function's slopes. Where the
-    function may be closed over traced values, derivatives in these are exact.
+    ``scale`` (n,) is the typical size of each unknown [its unit], ``precision`` [1] that of the root in it;
+    ``solve`` has to suit the function's slopes. Where the function may be closed over traced values,
+    derivatives in these are exact.
     """
 
     def newton(function: Callable[[Vector], Vector], start: Vector) -> Vector:

@@ -74,7 +74,7 @@ def group_by_clock(
 
 
 def highest_fitted_order(group: ClockGroup, frequency: float) -> int:
-    """Orders to fit: all that the stamps tell apart, with samples to spare."""
+    """Orders of ``frequency`` [Hz] to fit: all that the stamps tell apart, with samples to spare."""
     by_line = (shared_line(group, frequency) - 1) // 2
     by_count = (group.time.size // _SAMPLES_PER_UNKNOWN - 2) // 2
     by_use = max(int(_NYQUIST_SHARE * group.rate_hz / frequency), _MOST_FOLDED)
@@ -82,7 +82,10 @@ def highest_fitted_order(group: ClockGroup, frequency: float) -> int:
 
 
 def shared_line(group: ClockGroup, frequency: float) -> int:
-    """The smallest difference of two orders that fall on one line of the record, given the sampling."""
+    """The smallest difference of two orders that fall on one line of the record, given the sampling.
+
+    ``frequency`` [Hz] is their fundamental.
+    """
     difference = np.arange(1, max(_FARTHEST, int(2.0 * group.rate_hz / frequency)))
     folds = difference * frequency / group.rate_hz
     apart = np.abs(folds - np.round(folds)) * group.rate_hz * group.span_s
@@ -91,7 +94,10 @@ def shared_line(group: ClockGroup, frequency: float) -> int:
 
 
 def highest_valid_order(group: ClockGroup, frequency: float, orders: int) -> int:
-    """The highest order up to ``orders`` well below the Nyquist frequency; -1 if not even 1 is."""
+    """The highest order of ``frequency`` [Hz] up to ``orders`` well below the Nyquist frequency.
+
+    -1 if not even 1 is.
+    """
     carried = min(int(_TRUSTED_SHARE * group.rate_hz / frequency), highest_fitted_order(group, frequency))
     return min(carried, orders) if carried >= 1 else -1
 

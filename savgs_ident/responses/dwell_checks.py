@@ -19,7 +19,7 @@ _CLOCK_SIGMAS = 5.0
 
 
 def check_frequency(source: str, recording: Recording, measured: float) -> tuple[DataWarning, ...]:
-    """A warning where the road moves at another frequency than the test's name or label says."""
+    """A warning where the road moves at another frequency [Hz] than the test's name or label says."""
     asked = recording.frequency_hz
     if asked is None or abs(measured - asked) <= _FREQUENCY_MISS * asked:
         return ()
@@ -126,7 +126,7 @@ def clock_rates(fits: Mapping[str, DwellFit]) -> dict[str, tuple[float, float]]:
 def check_clocks(
     source: str, fits: Mapping[str, DwellFit], road: str
 ) -> tuple[dict[str, float], tuple[DataWarning, ...]]:
-    """Factors by which to stretch the time of channels whose clock differs from the road's, with warnings."""
+    """Factors [1] by which to stretch the time of channels whose clock differs from the road's, with warnings."""
     rates = clock_rates(fits)
     stretch: dict[str, float] = {}
     found = []

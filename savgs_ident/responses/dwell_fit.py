@@ -25,7 +25,7 @@ _ENOUGH_FOR_SLOPE = 5
 
 @dataclass(frozen=True)
 class ChannelFit:
-    """Harmonics 0..m of one channel, m the highest valid order; times counted from mid-record.
+    """Harmonics 0..m of one channel, arrays (m + 1,), m the highest valid order; times counted from mid-record.
 
     ``density`` [unit^2] and ``dof`` describe the noise; ``variance`` and ``pseudo_variance`` are E|dX|^2 and
     E(dX^2), ``folded`` the part of the former that comes from orders folded by the sampling; ``drift_hz`` is

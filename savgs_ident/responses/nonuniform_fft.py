@@ -29,8 +29,10 @@ class TransformPlan:
     """Where and how much each of N samples touches the grid, for orders 0..``highest``.
 
     Attributes:
-        place: grid points, (N, 14). weight: kernel values there, (N, 14).
-        size: points of the grid. correction: 1 over the kernel's transform, (highest + 1,).
+        place: grid points, (N, 14).
+        weight: kernel values there [1], (N, 14).
+        size: points of the grid.
+        correction: 1 over the kernel's transform [1], (highest + 1,).
     """
 
     place: NDArray[np.int64]
@@ -54,7 +56,10 @@ def plan_transform(phase: NDArray[np.float64], highest: int) -> TransformPlan:
 
 
 def sums(plan: TransformPlan, rows: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """sum_j y_j exp(-i k phase_j) for every row y of ``rows`` (C, N) and order k: (C, highest + 1)."""
+    """sum_j y_j exp(-i k phase_j) for every row y of ``rows`` (C, N) and order k: (C, highest + 1).
+
+    Rows of any unit, and sums in the same.
+    """
     place = plan.place.ravel()
     grids = np.stack([np.bincount(place, (plan.weight * row[:, None]).ravel(), plan.size) for row in rows])
     result: NDArray[np.complex128] = scipy.fft.rfft(grids)[:, : plan.correction.size] * plan.correction
@@ -62,7 +67,10 @@ def sums(plan: TransformPlan, rows: NDArray[np.float64]) -> NDArray[np.complex12
 
 
 def signals(plan: TransformPlan, amplitude: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """X_0 + Re sum_k X_k exp(i k phase_j) for every row X of ``amplitude`` (C, m + 1), m <= highest."""
+    """X_0 + Re sum_k X_k exp(i k phase_j) for every row X of ``amplitude`` (C, m + 1), m <= highest.
+
+    Amplitudes of any unit, and signals in the same.
+    """
     spectrum = 0.5 * plan.size * amplitude * plan.correction[: amplitude.shape[1]]
     spectrum[:, 0] = 2.0 * spectrum[:, 0].real
     grids = scipy.fft.irfft(spectrum, plan.size)

@@ -48,8 +48,8 @@ class PeriodicFit:
         amplitude: X_0..X_K [unit], (C, K + 1), at the time origin of the stamps given.
         slope: drift [unit/s], (C,).
         residual: signal less fit [unit], (C, N).
-        gain: E|dX_k|^2 for noise of unit variance per sample, orders 0..m, (m + 1,).
-        pseudo_gain: E(dX_k^2) for the same noise, complex, (m + 1,): zero when Re and Im are alike.
+        gain: E|dX_k|^2 for noise of unit variance per sample [1], orders 0..m, (m + 1,).
+        pseudo_gain: E(dX_k^2) for the same noise [1], complex, (m + 1,): zero when Re and Im are alike.
     """
 
     amplitude: NDArray[np.complex128]
@@ -60,7 +60,7 @@ class PeriodicFit:
 
 
 def plan_basis(time: NDArray[np.float64], frequency: float, highest: int) -> PeriodicBasis:
-    """The basis in which orders up to ``highest`` of ``frequency`` [Hz] can be fitted at ``time`` [s].
+    """The basis in which orders up to ``highest`` of ``frequency`` [Hz] can be fitted at ``time`` [s], (N,).
 
     Stamps should be counted from near the middle of the record, which keeps harmonics and drift apart.
     """
@@ -70,7 +70,7 @@ def plan_basis(time: NDArray[np.float64], frequency: float, highest: int) -> Per
 def fit_periodic(
     basis: PeriodicBasis, values: NDArray[np.float64], highest: int, gains_to: int
 ) -> PeriodicFit:
-    """Harmonics 0..``highest`` of ``values`` (C, N), no higher than ``basis`` was planned for.
+    """Harmonics 0..``highest`` of ``values`` (C, N) [unit], no higher than ``basis`` was planned for.
 
     Noise gains are given for the orders 0..``gains_to``, to better than 1e-6 of themselves. Raises
     :class:`numpy.linalg.LinAlgError` when the stamps do not determine the harmonics.

@@ -9,7 +9,7 @@ the product itself, and many times more on a machine that is busy."""
 
 
 def normal_products(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A' A of ``columns`` (N, p), shape (p, p), for a p of a few tens."""
+    """A' A of ``columns`` of any unit, (N, p), shape (p, p), for a p of a few tens."""
     total = np.zeros((columns.shape[1], columns.shape[1]))
     for start in range(0, columns.shape[0], _ROWS):
         part = columns[start : start + _ROWS]

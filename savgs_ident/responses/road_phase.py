@@ -29,13 +29,13 @@ class LocalPhase:
     speed_sd: float
 
     def at(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Phase [rad] at ``time`` [s], 0 at the middle."""
+        """Phase [rad] at ``time`` [s], (n,), 0 at the middle."""
         since = time - self.middle
         return self.speed * since + 0.5 * self.acceleration * since**2
 
 
 def crossing_times(time: NDArray[np.float64], road: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Times [s] at which the road passes mid stroke, up and down in turn.
+    """Times [s], (k,), at which the road (n,) passes mid stroke, up and down in turn.
 
     A passage runs from one threshold, 30 % of the amplitude off the middle, to the opposite one; its time is
     that of a straight line through the samples in between, so that noise near zero does not multiply it.
@@ -55,7 +55,7 @@ def crossing_times(time: NDArray[np.float64], road: NDArray[np.float64]) -> NDAr
 
 
 def phase_at_crossings(times: NDArray[np.float64]) -> PchipInterpolator:
-    """Monotone phase [rad] over time, pi more at each crossing."""
+    """Monotone phase [rad] over time, pi more at each crossing, (k,)."""
     return PchipInterpolator(times, np.pi * np.arange(times.size))
 
 

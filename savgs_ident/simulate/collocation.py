@@ -44,7 +44,7 @@ class Linearised(NamedTuple):
     """A trajectory's linearisation, ready to solve for any right side.
 
     ``imbalance`` is -(dr/dy)^-1 r, (2 + s, P); ``slope`` is dy/dx, (2 + s, 4 + s, P); ``mass`` dr/dy;
-    ``inverse`` A^-1.
+    ``inverse`` A^-1. Rows are in the units of the residual (SI), columns in those of x and y.
     """
 
     imbalance: Nodes
@@ -74,13 +74,13 @@ def blank_linearised(model: QuarterCar, layout: Layout) -> Linearised:
 def node_residual(
     model: QuarterCar, p: Values, curves: SectionCurves, parts: tuple[Array, ...], inputs: Inputs
 ) -> Array:
-    """The model's residual at one node from its scalar unknowns (x then y)."""
+    """The model's residual at one node from its scalar unknowns (x then y), each () and in SI; it is (2 + s,)."""
     motion, states, rates = node_motion(model, parts)
     return model.residual(p, motion, states, rates, inputs, curves)
 
 
 def node_motion(model: QuarterCar, parts: tuple[Array, ...]) -> tuple[Motion, Array, Array]:
-    """Motion, internal states (s,) and their rates (s,) at one node from its scalar unknowns (x then y)."""
+    """Motion, internal states (s,) and their rates (s,) at one node from its scalar unknowns (x then y), in SI."""
     size = len(model.states)
     states = jnp.stack(parts[4 : 4 + size]) if size else jnp.zeros(0)
     rates = jnp.stack(parts[6 + size :]) if size else jnp.zeros(0)
@@ -93,7 +93,7 @@ def node_motion(model: QuarterCar, parts: tuple[Array, ...]) -> tuple[Motion, Ar
 def residual_at_nodes(
     model: QuarterCar, p: Values, curves: SectionCurves, parts: tuple[Array, ...], inputs: Inputs
 ) -> Nodes:
-    """The residual at all nodes of all dwells, (2 + s, P)."""
+    """The residual at all nodes of all dwells, (2 + s, P), in SI."""
 
     def one(inputs: Inputs, *parts: Array) -> Array:
         return node_residual(model, p, curves, parts, inputs)
@@ -119,7 +119,7 @@ def _residual_and_columns(function: Callable[..., Array], parts: tuple[Array, ..
 
 
 def implicitness(model: QuarterCar) -> Float[Array, "m 1"]:
-    """Weight g of the far end of a step for each state."""
+    """Weight g [1] of the far end of a step for each state."""
     weights = [0.5] * 4 + [1.0 if state.slips else 0.5 for state in model.states]
     return jnp.asarray(weights)[:, None]
 
@@ -150,13 +150,13 @@ def linearise(
 def step_defects(
     model: QuarterCar, at: Trajectory, rate: Nodes, layout: Layout, steps: Float[Array, " P"]
 ) -> Nodes:
-    """By how much x_n plus its step misses x_{n+1}, for rates xd = ``rate``."""
+    """By how much x_n plus its step misses x_{n+1}, for rates xd = ``rate``, in SI; ``steps`` [s]."""
     weight = implicitness(model)
     step = steps * ((1.0 - weight) * rate + weight * rate[:, layout.following])
     return at.x - at.x[:, layout.following] + step
 
 
 def solve_linearised(layout: Layout, lin: Linearised, defects: Nodes, imbalance: Nodes) -> Trajectory:
-    """Changes (dx, dy) that cancel step defects given that dy = slope dx + imbalance at the nodes."""
+    """Changes (dx, dy) that cancel step defects given that dy = slope dx + imbalance at the nodes, all in SI."""
     dx = cyclic.apply(lin.inverse, cyclic.solve(layout, lin.factors, defects))
     return Trajectory(dx, imbalance + cyclic.apply(lin.slope, dx))

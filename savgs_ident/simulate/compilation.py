@@ -2,7 +2,9 @@
 
 import gc
 import os
+import shutil
 import sys
+import warnings
 from importlib.metadata import version
 from pathlib import Path
 
@@ -10,6 +12,9 @@ import jax
 
 MANY_REGIONS = 20_000
 """Mapped regions of memory above which compiled programs are let go; Linux ends a process at 65 530."""
+
+LEAST_ROOM = 64 * 2**20
+"""Space on the disk [byte] below which no programs are kept: half of one would be found in every later run."""
 
 _QUICK = "--xla_cpu_use_fusion_emitters=false"
 _QUICK_IS_KNOWN_TO = "0.10."
@@ -26,32 +31,38 @@ def _spare_the_compiler() -> None:
 
 
 def cache_folder() -> Path:
-    """Where programs are kept: ``SAVGS_IDENT_CACHE``, else the platform's cache folder."""
+    """Where programs are kept: ``SAVGS_IDENT_CACHE``, else the platform's cache folder.
+
+    Raises :class:`RuntimeError` where that is in a home folder and the user has none.
+    """
     chosen = os.environ.get("SAVGS_IDENT_CACHE")
     if chosen:
         return Path(chosen)
     if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
     elif sys.platform == "darwin":
         base = Path.home() / "Library" / "Caches"
     else:
-        base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return base / "savgs_ident" / "xla"
 
 
 def use_persistent_cache() -> bool:
-    """Keep compiled programs from now on; False where the folder cannot be written, and nothing is kept.
+    """Keep compiled programs from now on; False where there is no folder that can take them, and none is kept.
 
     To be called before anything is computed: the compiler is set up here too.
     """
     _spare_the_compiler()
-    folder = cache_folder()
     try:
+        folder = cache_folder()
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
+        room = shutil.disk_usage(folder).free
+    except (OSError, RuntimeError):
         return False
-    if not os.access(folder, os.W_OK):
+    if not os.access(folder, os.W_OK) or room < LEAST_ROOM:
         return False
+    # What cannot be kept, or read again, is compiled: slower, and no concern of the user's.
+    warnings.filterwarnings("ignore", message="Error (reading|writing) persistent compilation cache entry")
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     return True

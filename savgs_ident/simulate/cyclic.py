@@ -26,17 +26,17 @@ Vectors = Float[Array, "m P"]
 
 
 def product(left: Matrices, right: Matrices) -> Matrices:
-    """Matrix products at every node."""
+    """Matrix products at every node, of any units."""
     return jnp.sum(left[:, :, None] * right[None], axis=1)
 
 
 def apply(left: Matrices, right: Vectors) -> Vectors:
-    """Matrix times vector at every node."""
+    """Matrix times vector at every node, of any units."""
     return jnp.sum(left * right[None], axis=1)
 
 
 def solve_nodes(matrix: Matrices, right: Matrices) -> Matrices:
-    """Solve small systems at every node by Gaussian elimination without pivoting.
+    """Solve small systems of any units at every node by Gaussian elimination without pivoting.
 
     For matrices with a dominant diagonal (mass matrices; I - h J with a small step h).
     """
@@ -49,7 +49,10 @@ def solve_nodes(matrix: Matrices, right: Matrices) -> Matrices:
 
 
 class CyclicFactors(NamedTuple):
-    """Factorised recurrence: step matrices, products over chunks, inverses of I - (product of a period)."""
+    """Factorised recurrence: step matrices, products over chunks, inverses of I - (product of a period).
+
+    Entries are in the units of the states per those of the states.
+    """
 
     steps: Float[Array, "m m P"]
     chunks: Float[Array, "m m C"]
@@ -66,7 +69,7 @@ def _over_chunks(layout: Layout, array: Float[Array, "*k C"], absent: Array) -> 
 
 
 def factorise(layout: Layout, steps: Float[Array, "m m P"]) -> CyclicFactors:
-    """Factorise the recurrence with step matrices M_n."""
+    """Factorise the recurrence with step matrices M_n [units of the states per those of the states]."""
 
     def compose(matrices: Array) -> Array:
         total, _ = jax.lax.scan(lambda done, step: (product(step, done), None), matrices[0], matrices[1:])
@@ -80,7 +83,10 @@ def factorise(layout: Layout, steps: Float[Array, "m m P"]) -> CyclicFactors:
 
 
 def solve(layout: Layout, factors: CyclicFactors, right: Float[Array, "m P"]) -> Float[Array, "m P"]:
-    """The periodic x_n for right sides d_n, which belong to the step from node n to the next."""
+    """The periodic x_n for right sides d_n, which belong to the step from node n to the next.
+
+    States keep the units of the right sides.
+    """
 
     def end(x: Array, step: tuple[Array, Array]) -> tuple[Array, None]:
         return apply(step[0], x) + step[1], None

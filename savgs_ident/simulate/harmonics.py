@@ -49,7 +49,10 @@ def harmonics(
 def harmonics_of(
     model: QuarterCar, p: Values, motions: Trajectory, known: PeriodicSolution, orders: int
 ) -> Complex[Array, "D C K"]:
-    """The same of motions on the nodes of a ``known`` solution, as a part of a larger program that is compiled."""
+    """The same of motions on the nodes of a ``known`` solution, as a part of a larger program that is compiled.
+
+    Each is in the unit of its reading.
+    """
     seen = analyse(_readings(model, p, motions), known.mesh, orders)
     return seen * _sensors(model, p, known.excitation.frequency, orders)
 
@@ -65,7 +68,7 @@ def _sensors(
 def truncation_error(
     model: QuarterCar, p: Values, solution: PeriodicSolution, orders: int
 ) -> Float[Array, "D C"]:
-    """Largest change of any order 1..orders when the nodes are doubled, relative to the first harmonic.
+    """Largest change of any order 1..orders when the nodes are doubled, relative to the first harmonic [1].
 
     The error of ``solution`` itself is about four thirds of it (the rule is of second order).
     """

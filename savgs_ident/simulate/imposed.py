@@ -18,7 +18,10 @@ from savgs_ident.simulate.sensitivity import linear_response
 def answers(
     model: QuarterCar, p: Values, solution: PeriodicSolution, orders: int
 ) -> Callable[[Imposed], Complex[Array, "D C K"]]:
-    """Derivatives of the harmonics along signals imposed at the nodes, each (P,) or (P, 2); to be mapped over."""
+    """Derivatives of the harmonics along signals imposed at the nodes, each (P,) or (P, 2) and in SI.
+
+    To be mapped over.
+    """
     at, mesh = solution.trajectory, solution.mesh
     driven, curves = inputs_at(solution.excitation, mesh), model.curves(p)
     still = nothing_imposed(driven.road.height)

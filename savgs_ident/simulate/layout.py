@@ -60,6 +60,9 @@ class Layout:
 
 
 def layout_for(frequency: NDArray[np.float64], nodes: int, slow: float) -> Layout:
-    """``nodes`` per period, more in proportion to the period below the frequency ``slow`` [Hz]."""
+    """``nodes`` per period, more in proportion to the period below the frequency ``slow`` [Hz].
+
+    ``frequency`` [Hz] is that of each dwell, (D,).
+    """
     wanted = nodes * np.maximum(1.0, slow / np.asarray(frequency))
     return Layout(tuple(int(count) for count in CHUNK * np.ceil(wanted / CHUNK)))

@@ -31,7 +31,7 @@ class Mesh(NamedTuple):
         layout: how many nodes belong to which dwell.
         phase: phase of the nodes [rad], (P,), growing from 0 in every dwell.
         gap: phase from each node to the next, cyclically [rad], (P,); sums to 2 pi over a dwell.
-        weight: quadrature weights of the mean over the period, (P,); sum to 1 over a dwell.
+        weight: quadrature weights of the mean over the period [1], (P,); sum to 1 over a dwell.
     """
 
     layout: Layout
@@ -41,7 +41,10 @@ class Mesh(NamedTuple):
 
 
 def turns(phase: Float[Array | np.ndarray, " P"], orders: int) -> Complex[Array, "P K"]:
-    """exp(i k phase) of orders k = 0..``orders``, by multiplication: exponentials would cost as much as a motion."""
+    """exp(i k phase) [1] of phases [rad] and orders k = 0..``orders``, by multiplication.
+
+    Exponentials would cost as much as a motion.
+    """
     once = jnp.exp(1j * jnp.asarray(phase))
     powers = [jnp.ones_like(once)]
     for _ in range(orders):

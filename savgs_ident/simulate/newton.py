@@ -40,7 +40,7 @@ LINK = 0.01
 
 
 class NewtonResult(NamedTuple):
-    """A trajectory, its linearisation, the last relative step of each dwell (D,), and iterations used."""
+    """A trajectory, its linearisation, the last relative step of each dwell [1], (D,), and iterations used."""
 
     trajectory: Trajectory
     linearised: Linearised
@@ -64,7 +64,10 @@ class _Progress(NamedTuple):
 def motion_scale(
     model: QuarterCar, inputs: Inputs, frequency: Float[Array, " D"], layout: Layout
 ) -> Float[Array, "m P"]:
-    """A typical size of every state: what moves road and link, seen over an arm of a third of a metre."""
+    """A typical size of every state [its unit] at the dwells' frequencies [Hz].
+
+    What moves road and link, seen over an arm of a third of a metre.
+    """
     lift = _amplitude(inputs.road.height, layout) + LINK * _amplitude(inputs.link.angle, layout)
     speed = 2.0 * jnp.pi * frequency * lift
     states = [jnp.full_like(lift, state.scale) for state in model.states]
@@ -82,7 +85,7 @@ def _amplitude(values: Float[Array, " P"], layout: Layout) -> Float[Array, " D"]
 
 
 def rates_of(at: Trajectory) -> Array:
-    """xd = (velocities, y)."""
+    """xd = (velocities, y), (4 + s, P), in SI per second."""
     return jnp.concatenate([at.x[2:4], at.y])
 
 
@@ -105,7 +108,11 @@ def solve_newton(
     limit: Int[Array, ""],
     enough: Float[Array, ""],
 ) -> NewtonResult:
-    """Iterate until every dwell's step is below ``enough`` or ``limit`` iterations are used."""
+    """Iterate until every dwell's step is below ``enough`` or ``limit`` iterations are used.
+
+    ``steps`` [s] lead from node to node, ``scale`` is the size of each state [its unit]; a step counts
+    relative to it [1].
+    """
 
     def advance(progress: _Progress) -> _Progress:
         before = progress.result

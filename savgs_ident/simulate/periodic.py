@@ -55,7 +55,7 @@ class PeriodicSettings:
 class PeriodicSolution(eqx.Module):
     """Periodic motions of D dwells on P nodes, with what is needed to differentiate them.
 
-    ``last_step`` is the last Newton step of each dwell relative to the size of its motion, (D,).
+    ``last_step`` is the last Newton step of each dwell relative to the size of its motion [1], (D,).
     """
 
     excitation: Excitation
@@ -114,7 +114,7 @@ def _solve(
 def solve_near(
     model: QuarterCar, p: Values, known: PeriodicSolution, start: Trajectory, limit: int, enough: float
 ) -> tuple[Trajectory, Float[Array, ""]]:
-    """Motions on the nodes of a ``known`` solution from a close ``start``, and their last relative step.
+    """Motions on the nodes of a ``known`` solution from a close ``start``, and their last relative step [1].
 
     To be a part of a larger program that is compiled. Look at the step: it is above ``enough`` where ``limit``
     iterations were too few.

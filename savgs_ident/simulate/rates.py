@@ -24,7 +24,7 @@ STATE_TIME = 1e-2
 
 
 class Rates(NamedTuple):
-    """Accelerations, and rates of the internal states (s,)."""
+    """Accelerations [m/s^2, rad/s^2], and rates of the internal states (s,) [unit of each per second]."""
 
     qdd: Coordinates
     sd: Float[Array, " s"]
@@ -40,7 +40,7 @@ def solve_rates(
     curves: SectionCurves | None = None,
     near: Float[Array, " y"] | None = None,
 ) -> Rates:
-    """Accelerations and rates that make the residual vanish; NaN where there are none.
+    """Accelerations and rates that make the residual vanish; NaN where there are none; all in SI.
 
     ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`; ``near`` (2 + s,) are accelerations
     and rates of a moment ago, from where they are found sooner. Differentiable in everything, exactly, by the

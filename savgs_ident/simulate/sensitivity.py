@@ -23,14 +23,17 @@ from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
 def harmonic_sensitivities(
     model: QuarterCar, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
 ) -> Complex[Array, "n D C K"]:
-    """Derivatives of the harmonics 0..orders of the sensor readings in the named parameters."""
+    """Derivatives of the harmonics 0..orders of the sensor readings in the named parameters.
+
+    They are in the unit of the reading per unit of the parameter.
+    """
     return jax.lax.map(directional(model, p, solution, names, orders), jnp.eye(len(names)))
 
 
 def directional(
     model: QuarterCar, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
 ) -> Callable[[Float[Array, " n"]], Complex[Array, "D C K"]]:
-    """The same along directions (n,) of the named parameters, to be mapped over."""
+    """The same along directions (n,) [units of the parameters] of the named parameters, to be mapped over."""
     at = solution.trajectory
     moved_along = _linear_motion(model, p, solution)
 
@@ -77,7 +80,7 @@ def _linear_motion(
 def linear_response(
     model: QuarterCar, p: Values, solution: PeriodicSolution
 ) -> Callable[[Float[Array, "k P"]], Trajectory]:
-    """The change of the trajectory that a change of the residual at the nodes, (2 + s, P), brings about."""
+    """The change of the trajectory that a change of the residual at the nodes, (2 + s, P), brings about, in SI."""
     lin, at, layout = solution.linearised, solution.trajectory, solution.mesh.layout
     steps = node_steps(solution.excitation, solution.mesh)
     still = Trajectory(jnp.zeros_like(at.x), jnp.zeros_like(at.y))

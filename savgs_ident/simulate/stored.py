@@ -25,8 +25,9 @@ _DIGEST = hashlib.sha256().digest_size
 def stored(function: Callable[..., tuple[Array, ...]], *args: Any) -> tuple[Array, ...]:
     """``function(*args)`` from its stored program, if one was kept; else trace it, and keep it.
 
-    ``function`` is pure, defined at the top of a module of this package, and gives a flat tuple of arrays. A
-    stored program can be compiled within a larger one, but neither differentiated nor batched.
+    ``function`` is pure, defined at the top of a module of this package, and gives a flat tuple of arrays
+    of any shape and any units. A stored program can be compiled within a larger one, but neither
+    differentiated nor batched.
     """
     folder = jax.config.values["jax_compilation_cache_dir"]
     key = fingerprint(function, args) if folder else None

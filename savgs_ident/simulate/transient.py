@@ -51,7 +51,7 @@ MOST_STEPS = 2_000_000
 class RigState(eqx.Module):
     """All that the future of a motion depends on.
 
-    Coordinates and velocities; internal states of the effects (s,); states of what moves the link (k,).
+    Coordinates and velocities; internal states of the effects (s,) [SI]; states of what moves the link (k,).
     """
 
     q: Coordinates
@@ -66,13 +66,13 @@ class TransientSolution(eqx.Module):
     Attributes:
         times: [s], (n,).
         motion: coordinates, velocities and accelerations, each (n,).
-        s: internal states of the effects, (n, s).
+        s: internal states of the effects [unit of each], (n, s).
         sd: their rates, (n, s).
-        actuation: states of what moves the link, (n, k).
+        actuation: states of what moves the link [SI], (n, k).
         inputs: what the road and the link did, each (n,).
         readings: what the sensors show, each (n,); the deflection counts from standstill at the nominal link
             angle.
-        steps: steps that the integration took, rejected ones included.
+        steps: number of steps that the integration took, rejected ones included [1], ().
         result: how the integration ended.
     """
 
@@ -146,7 +146,7 @@ def state_rates(
     curves: SectionCurves | None = None,
     near: Float[Array, " y"] | None = None,
 ) -> RigState:
-    """Time derivative of the state: the right side of the differential equations.
+    """Time derivative of the state at time ``t`` [s], in SI: the right side of the differential equations.
 
     ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`, ``near`` as in
     :func:`savgs_ident.simulate.rates.solve_rates`.
@@ -162,12 +162,12 @@ def _scales(model: QuarterCar, link: AbstractActuation) -> Float[Array, " x"]:
 
 
 def pack_state(state: RigState) -> Float[Array, " x"]:
-    """The state as one vector: coordinates, velocities, internal states, states of what moves the link."""
+    """The state as one vector in SI: coordinates, velocities, internal states, states of what moves the link."""
     return jnp.concatenate([jnp.stack([*state.q, *state.qd]), state.s, state.actuation])
 
 
 def unpack_state(model: QuarterCar, x: Float[Array, " x"]) -> RigState:
-    """The state that :func:`pack_state` made a vector of."""
+    """The state that :func:`pack_state` made a vector of, in SI."""
     end = 4 + len(model.states)
     return RigState(Coordinates(x[0], x[1]), Coordinates(x[2], x[3]), x[4:end], x[end:])
 

@@ -29,12 +29,12 @@ class Grid(NamedTuple):
 
     @property
     def places(self) -> NDArray[np.int64]:
-        """The place of each entry in ``items``, as an array of the grid's shape."""
+        """The place of each entry in ``items``, as an array of the same shape."""
         return np.arange(len(self.items)).reshape(self.shape)
 
 
 Operand = Grid | NDArray[np.generic]
-"""What an operation works on: expressions, or numbers that are known already."""
+"""What an operation works on: expressions, or numbers that are known already, of any shape and any unit."""
 
 
 def as_grid(operand: Operand) -> Grid:
@@ -45,7 +45,10 @@ def as_grid(operand: Operand) -> Grid:
 
 
 def as_known(operand: Operand) -> NDArray[np.float64] | None:
-    """The values of an operand that does not depend on the inputs, None for one that does."""
+    """The values of an operand, of its shape and in its unit, if it does not depend on the inputs.
+
+    None if it does.
+    """
     if not isinstance(operand, Grid):
         return np.asarray(operand, np.float64)
     if not all(item.is_constant() for item in operand.items):

@@ -31,7 +31,10 @@ class Failure(eqx.Module):
 
 
 class Kind(NamedTuple):
-    """A kind of failure: what it is in words, the drive that is left, the sensors that are left."""
+    """A kind of failure: what it is in words, the drive that is left, the sensors that are left.
+
+    ``drive`` is the share that is left of its torque, ``alive`` those of the three readings [1].
+    """
 
     about: str
     drive: float

@@ -33,7 +33,7 @@ class AbstractLaw(eqx.Module):
 
     @abstractmethod
     def start(self) -> Float[Array, " c"]:
-        """The state in which the law begins."""
+        """The state in which the law begins, in its own units."""
 
     @abstractmethod
     def command(

@@ -135,7 +135,10 @@ def loop_field(case: LoopCase, asked: Array, t: Array, x: Array, near: Array) ->
 
 
 def loop_sample(case: LoopCase, t: Array, x: Array, rates: Array, held: Array) -> tuple[Array, Array]:
-    """True values for the instruments (3,), and the :class:`Signals` of a sample, in a state with its rates."""
+    """True values for the instruments (3,), and the :class:`Signals` of a sample, in a state with its rates.
+
+    At time ``t`` [s]; all in SI.
+    """
     now, change = unpack_state(case.model, x), unpack_state(case.model, rates)
     drive = _drive_of(case, held)
     inputs = Inputs(case.road.at(t), drive.link(t, now.actuation), case.road.cam_at(t))
@@ -210,7 +213,7 @@ class _Sampled(dfx.AbstractSolver[None]):
 
 
 def loop_rest(case: LoopCase) -> Float[Array, " x"]:
-    """State of rig and drive at rest at the nominal link angle, at time 0."""
+    """State of rig and drive at rest at the nominal link angle, at time 0, in SI."""
     still = jnp.zeros(())
     drive = _drive_of(case, still)
     return pack_state(rest_state(case.model, case.p, case.road, drive, still, case.curves))

@@ -43,7 +43,10 @@ Ways = Mapping[str, tuple[Way, ...]]
 
 
 def ways_of(bench: Bench, given: Mapping[str, float], solution: PeriodicSolution) -> Ways:
-    """What every effect that the baseline lacks would do to a rig whose motions are ``solution``."""
+    """What every effect that the baseline lacks would do to a rig whose motions are ``solution``.
+
+    ``given`` are its parameters in SI.
+    """
     terms = [term_of(each) for name, each in CATALOGUE.items() if name not in bench.baseline]
     model, noise = bench.model(()), noise_rows(bench)
     ways: dict[str, list[Way]] = {term.name: [] for term in terms}

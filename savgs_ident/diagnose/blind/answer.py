@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 Drawn = Literal["none", "effect", "two", "unknown"]
 """What a trial's rig has beyond its model: nothing, an effect, two, or one that the catalogue then lacks."""
@@ -37,19 +37,3 @@ class Answer:
     parameters: Mapping[str, float]
     rig: Mapping[str, float]
     without: tuple[str, ...]
-
-
-def answer_of(record: Mapping[str, Any]) -> Answer:
-    """The answer that ``dataclasses.asdict`` and JSON made ``record`` of; raises ``KeyError`` for another."""
-    return Answer(
-        number=record["number"],
-        kind=record["kind"],
-        effects=tuple(record["effects"]),
-        ports=tuple(record["ports"]),
-        changes=dict(record["changes"]),
-        sigmas=dict(record["sigmas"]),
-        imitators=tuple(record["imitators"]),
-        parameters=dict(record["parameters"]),
-        rig=dict(record["rig"]),
-        without=tuple(record["without"]),
-    )

@@ -79,7 +79,7 @@ class Bench:
     ) -> PeriodicSolution | None:
         """Periodic motions in all dwells, from motions of the same effects nearby if there are any.
 
-        None if a dwell has none.
+        None if a dwell has none. ``given`` are parameters in SI.
         """
         model, p = self.model(effects), self.values(given)
         if near is not None:
@@ -92,7 +92,7 @@ class Bench:
     def response(
         self, effects: Sequence[str], given: Mapping[str, float], solution: PeriodicSolution
     ) -> NDArray[np.complex128]:
-        """Harmonics 0..ORDERS of both response channels, (D, 2, ORDERS + 1)."""
+        """Harmonics 0..ORDERS [unit of the reading] of both response channels, (D, 2, ORDERS + 1)."""
         return np.asarray(harmonics(self.model(effects), self.values(given), solution, ORDERS))
 
 

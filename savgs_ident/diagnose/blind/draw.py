@@ -54,7 +54,7 @@ class Shares:
 
 
 def draw_rig(bench: Bench, random: np.random.Generator) -> dict[str, float]:
-    """Parameters of the rig that are not those of the sheet: normal about them, within their bounds."""
+    """Parameters of the rig [SI] that are not those of the sheet: normal about them, within their bounds."""
     drawn = {}
     for each in bench.rig.parameters.entries:
         spread = each.tolerance or (OFF * abs(each.value) if each.name in bench.free else 0.0)

@@ -41,7 +41,10 @@ TINY = 1e-300
 
 @dataclass(frozen=True)
 class Present:
-    """An effect of a size: its parameters [SI], its change of the response, the response with it alone."""
+    """An effect of a size: its parameters [SI], its change of the response, the response with it alone.
+
+    ``response`` is (D, 2, K) [unit of the reading].
+    """
 
     name: str
     parameters: Mapping[str, float]
@@ -56,7 +59,7 @@ class Present:
     def at(self, sizes: NDArray[np.float64]) -> dict[str, float]:
         """Its parameters with the amplitudes multiplied by the first of the sizes, shapes by exp of the others.
 
-        Within their bounds.
+        Within their bounds. Sizes are (k,) [1], parameters SI.
         """
         effect = CATALOGUE[self.name]
         shapes = [each.name for each in term_of(effect).shapes]
@@ -70,7 +73,7 @@ class Present:
 
     @cached_property
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The sizes (k,) between which no parameter leaves its bounds."""
+        """The sizes (k,) [1] between which no parameter leaves its bounds."""
         effect = CATALOGUE[self.name]
         shapes = [each.name for each in term_of(effect).shapes]
         lower, upper = np.full(self.sizes, -np.inf), np.full(self.sizes, np.inf)
@@ -95,7 +98,7 @@ class Drawing:
     Attributes:
         bench: what it is put through.
         rig: its parameters off the sheet, SI.
-        response: its response, (D, 2, K).
+        response: its response [unit of the reading], (D, 2, K).
         hiding: what can hide an effect.
         starts: its motions, by the effects with states that the model has.
     """
@@ -107,7 +110,7 @@ class Drawing:
     starts: dict[tuple[str, ...], PeriodicSolution | None] = field(default_factory=dict)
 
     def solve(self, names: Sequence[str], given: Mapping[str, float]) -> NDArray[np.complex128] | None:
-        """The response with effects; None where a dwell has no motion."""
+        """The response [unit of the reading], (D, 2, K), with effects; None where a dwell has no motion."""
         solution = self._motions(names, given)
         return None if solution is None else self.bench.response(names, given, solution)
 
@@ -138,7 +141,8 @@ class Drawing:
     def sigma(self, target: NDArray[np.complex128], beside: Present | None = None) -> float:
         """How far a response stands out of what the rig can do, with the effect ``beside`` of any size and shape.
 
-        No tolerance is broken by more than :data:`STANDS_OUT`: what does not hide within it stands out anyway.
+        No tolerance is broken by more than :data:`STANDS_OUT`: what does not hide within it stands out
+        anyway. In standard deviations; ``target`` (D, 2, K) is in the units of the readings.
         """
         names = () if beside is None else (beside.name,)
         noise, known = self.hiding.noise, len(self.hiding.names)
@@ -182,7 +186,10 @@ class Drawing:
         }
 
     def imitators(self, present: Present, limit: float = TOLD_APART) -> tuple[str, ...]:
-        """Effects that, of some size and shape, do the same: beside them it stands out by less than ``limit``."""
+        """Effects that, of some size and shape, do the same.
+
+        Beside them it stands out by less than ``limit`` standard deviations.
+        """
         change = rows_of(present.response) - rows_of(self.response)
         found = []
         for name, parameters in similar(self.hiding, change, self.ways, present.name).items():
@@ -204,7 +211,7 @@ class Drawing:
 
 
 def drawing_of(bench: Bench, rig: Mapping[str, float]) -> Drawing | None:
-    """The rig with these parameters, without effects; None where a dwell has no motion."""
+    """The rig with these parameters [SI], without effects; None where a dwell has no motion."""
     solution = bench.solve((), rig)
     if solution is None:
         return None

@@ -54,7 +54,7 @@ class Hiding(NamedTuple):
 
 
 def rows_of(response: NDArray[np.complex128]) -> Real:
-    """Real and imaginary parts of the orders from 1 on, (m,), of a response (..., K)."""
+    """Real and imaginary parts of the orders from 1 on, (m,), of a response (..., K) [unit of the reading]."""
     kept = response[..., 1:]
     return np.stack([kept.real, kept.imag], axis=-1).ravel()
 
@@ -68,7 +68,10 @@ def noise_rows(bench: Bench) -> Real:
 
 
 def moved(each: Parameter, value: float, x: float, free: bool) -> float:
-    """A parameter moved from ``value`` by ``x`` of what is known of it beforehand, within its bounds."""
+    """A parameter moved from ``value`` [its unit] by ``x`` of what is known of it beforehand, within its bounds.
+
+    ``x`` is in standard deviations.
+    """
     there = value * np.exp(x) if free else value + each.tolerance * x
     return float(np.clip(there, each.lower, each.upper))
 
@@ -76,7 +79,7 @@ def moved(each: Parameter, value: float, x: float, free: bool) -> float:
 def hiding_at(
     bench: Bench, effects: Sequence[str], given: Mapping[str, float], solution: PeriodicSolution
 ) -> Hiding:
-    """What can hide an effect of the rig with these effects and parameters, whose motions are ``solution``."""
+    """What can hide an effect of the rig with these effects and parameters [SI], whose motions are ``solution``."""
     model, p = bench.model(effects), bench.values(given)
     used = used_parameters(model, bench.table)
     known = [name for name in known_to_tolerance(bench.table, bench.free) if name in used]
@@ -98,14 +101,20 @@ def _step(columns: Real, miss: Real, x: Real, known: int, bounds: tuple[Real, Re
 
 
 class Closest(NamedTuple):
-    """How far a change stands out of the nearest that can be done, and the sizes (k,) of free columns there."""
+    """How far a change stands out of the nearest that can be done, and the sizes (k,) of free columns there.
+
+    ``sigma`` is in standard deviations, sizes are in units of the columns.
+    """
 
     sigma: float
     sizes: Real
 
 
 def closest(hiding: Hiding, change: Real, flat: Real) -> Closest:
-    """The nearest to ``change`` (m,) to first order, with columns ``flat`` (m, k) that may have any size."""
+    """The nearest to ``change`` (m,) to first order, with columns ``flat`` (m, k) that may have any size.
+
+    ``change`` is in the units of the rows, ``flat`` in those of their noise.
+    """
     columns, known = np.concatenate([hiding.columns, flat], axis=1), hiding.columns.shape[1]
     miss = change / hiding.noise
     x = _step(columns, miss, np.zeros(columns.shape[1]), known)

@@ -46,7 +46,7 @@ class Sensors:
         deflection: of the deflection [m].
         road: of the road's height [m].
         hunting: rms by which a drive that holds the link moves it to and fro [rad].
-        counts: of the link's encoder per turn of the link.
+        counts: of the link's encoder per turn of the link [1].
     """
 
     rate: float = 500.0

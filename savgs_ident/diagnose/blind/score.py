@@ -9,15 +9,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from savgs_ident.core.records import record_of
 from savgs_ident.diagnose.blind.answer import Answer, Drawn
+from savgs_ident.effects.registry import CATALOGUE
 
 FAILED = "failed"
 """The verdict of a diagnosis that ended with an error."""
 
+_VERDICTS = ("none", "effect", "several", "unknown", FAILED)
+
 
 @dataclass(frozen=True)
 class Interval:
-    """True value of an effect's parameter, and the 95 % interval that the diagnosis gave."""
+    """True value of an effect's parameter, and the 95 % interval that the diagnosis gave, SI."""
 
     true: float
     low: float
@@ -99,10 +103,13 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any]) -> Score:
 
 
 def score_from(record: Mapping[str, Any]) -> Score:
-    """The marks that ``dataclasses.asdict`` and JSON made ``record`` of; ``KeyError`` or ``TypeError`` for others."""
-    lists = {name: tuple(record[name]) for name in ("effects", "changes", "said")}
-    intervals = {name: Interval(**each) for name, each in record["intervals"].items()}
-    return Score(**{**record, **lists, "intervals": intervals})
+    """The marks that ``dataclasses.asdict`` and JSON made ``record`` of; ``ValueError`` for others."""
+    score = record_of(Score, record)
+    if score.verdict not in _VERDICTS or not {*score.effects, *score.said} <= {*CATALOGUE}:
+        raise ValueError(f"trial {score.number} is about something unknown")
+    if (score.kind == "effect" and len(score.effects) != 1) or (score.verdict == "effect" and not score.said):
+        raise ValueError(f"trial {score.number} names no effect")
+    return score
 
 
 def failed(why: str) -> dict[str, Any]:

@@ -16,7 +16,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.diagnose.blind.answer import Answer, answer_of
+from savgs_ident.core.records import record_of
+from savgs_ident.diagnose.blind.answer import Answer
 
 _REMEDY = "record the trial again: remove its folder"
 
@@ -45,15 +46,15 @@ def sealed(envelope: Envelope, recordings: str) -> Seal:
 def opened(seal: Seal, envelope: Envelope, recordings: str) -> Answer:
     """The answer; raises :class:`InputError` if it or the recordings are not those that were sealed."""
     if _digest(envelope) != seal.answer:
-        raise InputError("the answer is not the one that was sealed", source="answer", remedy=_REMEDY)
+        raise InputError("the answer is not the one that was sealed", remedy=_REMEDY)
     if recordings != seal.recordings:
-        raise InputError("the recordings are not those that were sealed", source="campaign", remedy=_REMEDY)
+        raise InputError("the recordings are not those that were sealed", remedy=_REMEDY)
     return envelope.answer
 
 
 def envelope_of(record: Mapping[str, Any]) -> Envelope:
-    """The envelope from what ``dataclasses.asdict`` and JSON made of it; ``KeyError`` for something else."""
-    return Envelope(answer_of(record["answer"]), record["salt"])
+    """The envelope from what ``dataclasses.asdict`` and JSON made of it; ``ValueError`` for something else."""
+    return record_of(Envelope, {name: record.get(name) for name in ("answer", "salt")})
 
 
 def _digest(envelope: Envelope) -> str:

@@ -49,7 +49,7 @@ class Form:
     most: float
 
     def at(self, size: float) -> dict[str, float]:
-        """All parameters at so many typical sizes."""
+        """All parameters [SI] at so many typical sizes."""
         return {name: self.null[name] + size * step for name, step in self.direction.items()} | dict(
             self.shapes
         )
@@ -90,7 +90,7 @@ def _room(each: Parameter, null: float, step: float) -> float:
 
 
 def find_size(change: Change, target: float, most: float) -> float | None:
-    """The size at which the response changes by ``target``; None if it does nowhere up to ``most``.
+    """The size [1] at which the response changes by ``target`` [1]; None if it does nowhere up to ``most``.
 
     Steps along the logarithms of size and change, held between what was too small and what was too large.
     """

@@ -17,7 +17,7 @@ NOTHING, TWO, OTHERS, UNKNOWN = "nothing", "both of two", "other effects", "unkn
 
 @dataclass(frozen=True)
 class Rate:
-    """So many of so many, and the bounds that the rate should keep.
+    """So many of so many, and the bounds that the rate should keep [1].
 
     ``low`` and ``high`` are its 95 % interval after Wilson (1927); 0 and 1 if there is nothing to count.
     """
@@ -29,7 +29,7 @@ class Rate:
 
     @property
     def rate(self) -> float | None:
-        """The rate; None if there is nothing to count."""
+        """The rate [1]; None if there is nothing to count."""
         return self.count / self.total if self.total else None
 
     @property
@@ -46,12 +46,12 @@ class Rate:
 
     @property
     def low(self) -> float:
-        """Lower end of the interval."""
+        """Lower end of the interval [1]."""
         return self._ends()[0]
 
     @property
     def high(self) -> float:
-        """Upper end of the interval."""
+        """Upper end of the interval [1]."""
         return self._ends()[1]
 
     def _ends(self) -> tuple[float, float]:

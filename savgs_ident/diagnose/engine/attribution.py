@@ -33,7 +33,8 @@ FREE_SIZE = 100.0
 class Law(NamedTuple):
     """Change of the rows per function of a law, the same in all tests, (m, q); how probable the law is beforehand.
 
-    Probabilities count beside those of the other laws of a place.
+    Probabilities count beside those of the other laws of a place. ``columns`` are in the units of the rows,
+    per size of a function [1].
     """
 
     columns: Matrix
@@ -47,7 +48,7 @@ class Place:
     Attributes:
         name: its name.
         laws: that the place may follow, one of them.
-        free: change of the rows per component of a free signal, in each test its own, (m, f).
+        free: change of the rows per component of a free signal, in each test its own [unit of the row], (m, f).
     """
 
     name: str
@@ -64,8 +65,8 @@ class Attribution:
         share: share of the gap in left-out tests that the most probable law explains; 0 if it makes it worse.
         reach: share that a free signal explains.
         evidence: log evidence of the baseline with a law, linearised, over all laws and widths of their priors.
-        held_out: rows (m,) of each test, predicted by the law and parameters that the others set.
-        coefficients: those of the free signal by test, (tests, f).
+        held_out: rows (m,) [their units] of each test, predicted by the law and parameters that the others set.
+        coefficients: those of the free signal by test [its unit], (tests, f).
     """
 
     name: str

@@ -39,11 +39,11 @@ class Mode:
     Attributes:
         terms: names of the terms in it.
         coordinates: its n parameters.
-        x: their coordinates, (n,).
+        x: their coordinates [1], (n,).
         prediction: the plant there.
-        slopes: slopes of the rows in the coordinates, (m, n).
+        slopes: slopes of the rows in the coordinates [unit of the row], (m, n).
         misfit: noise scale and discrepancy.
-        precision: precision of the coordinates, (n, n).
+        precision: precision of the coordinates [1], (n, n).
         evidence: log evidence by Laplace's method, up to what all hypotheses share.
         status: how the search ended.
         precise: whether the plant was made as precise there as it can be.
@@ -66,7 +66,7 @@ class Mode:
         return values_at(self.coordinates, self.x)
 
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance of the coordinates, (n, n)."""
+        """Covariance of the coordinates [1], (n, n)."""
         return np.asarray(np.linalg.inv(self.precision), np.float64)
 
 
@@ -79,7 +79,7 @@ class Search:
     kept: NDArray[np.bool_]
 
     def residual(self, prediction: Prediction) -> NDArray[np.float64]:
-        """Measured less predicted, (m,)."""
+        """Measured less predicted [unit of the row], (m,)."""
         return self.data.measured - prediction.rows
 
     def part(self) -> Data:

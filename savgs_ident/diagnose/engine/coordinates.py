@@ -20,10 +20,10 @@ class AbstractCoordinate:
     Attributes:
         name: name of the parameter.
         unit: its unit, SI.
-        centre: the value at x = 0.
+        centre: the value at x = 0 [unit].
         scale: one standard deviation of the prior [unit, or 1 for a logarithmic coordinate].
-        lower: smallest value.
-        upper: largest value.
+        lower: smallest value [unit].
+        upper: largest value [unit].
     """
 
     name: str
@@ -43,7 +43,7 @@ class AbstractCoordinate:
 
     @abstractmethod
     def at(self, value: float) -> float:
-        """The coordinate of a value."""
+        """The coordinate [1] of a value [unit]."""
 
     @property
     def halved(self) -> bool:
@@ -52,7 +52,7 @@ class AbstractCoordinate:
 
     @property
     def reach(self) -> tuple[float, float]:
-        """The coordinates of the bounds."""
+        """The coordinates of the bounds [1]."""
         return self.at(self.lower), self.at(self.upper)
 
 
@@ -99,11 +99,11 @@ def values_at(coordinates: Coordinates, x: NDArray[np.float64]) -> dict[str, flo
 
 
 def slopes_at(coordinates: Coordinates, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """d value / dx of every parameter, (n,)."""
+    """d value / dx of every parameter [its unit], (n,)."""
     return np.array([each.slope(float(at)) for each, at in zip(coordinates, x, strict=True)])
 
 
 def reach_of(coordinates: Sequence[AbstractCoordinate]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lower and upper bounds of the coordinates, (n,) each."""
+    """Lower and upper bounds of the coordinates [1], (n,) each."""
     bounds = np.array([each.reach for each in coordinates]).reshape(-1, 2)
     return bounds[:, 0], bounds[:, 1]

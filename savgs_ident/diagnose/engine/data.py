@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Data:
-    """m independent numbers.
+    """m independent numbers, each in a unit of its own.
 
     Attributes:
         measured: the numbers, (m,).

@@ -30,7 +30,10 @@ class HeldOut:
 
 
 def held_out_by_law(search: Search, rows: NDArray[np.float64]) -> HeldOut:
-    """Left-out predictions (m,) of a learned law, with the noise scale and discrepancy that they show."""
+    """Left-out predictions (m,) of a learned law, with the noise scale and discrepancy that they show.
+
+    In the units of the rows.
+    """
     miss = search.data.measured - rows
     spread = misfit_of(search.data, miss).spread
     return HeldOut(rows, -0.5 * (miss**2 / spread + np.log(spread / search.data.variance)))

@@ -41,7 +41,8 @@ def best_of(
 ) -> Top:
     """The best point for residuals (measured - predicted, m) with slopes (m, n) of the prediction at ``x`` (n,).
 
-    Only the rows ``kept`` (m,) count, all by default.
+    Only the rows ``kept`` (m,) count, all by default. Rows are in their units, coordinates in standard
+    deviations.
     """
     rows = np.ones(residual.size, bool) if kept is None else kept
     part = Data(data.measured[rows], data.variance[rows], data.reach[rows], data.test[rows])
@@ -82,5 +83,5 @@ def _held(
 
 
 def log_determinant(precision: Vector) -> float:
-    """log det of a precision matrix. Raises :class:`numpy.linalg.LinAlgError` if it is none."""
+    """log det [1] of a precision matrix (n, n). Raises :class:`numpy.linalg.LinAlgError` if it is none."""
     return float(2.0 * np.sum(np.log(np.diag(np.linalg.cholesky(precision)))))

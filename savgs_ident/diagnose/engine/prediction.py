@@ -17,7 +17,8 @@ MULTIPLES = (0.4, 1.0, 2.5)
 class Prediction(NamedTuple):
     """A plant at a point: rows (m,), their slopes in the named values (m, n), and what it starts from nearby.
 
-    ``solved`` says whether the rows are to be trusted.
+    ``solved`` says whether the rows are to be trusted. Rows are in their own units, slopes in those per
+    unit of the value.
     """
 
     rows: NDArray[np.float64]
@@ -58,7 +59,7 @@ class Term:
         return tuple(self._at(multiple) for multiple in MULTIPLES)
 
     def at_multiples(self, multiples: Sequence[float]) -> "Term":
-        """The same term, looked for at other multiples of its typical shapes."""
+        """The same term, looked for at other multiples [1] of its typical shapes."""
         return replace(self, tries=tuple(self._at(multiple) for multiple in multiples))
 
     def _at(self, multiple: float) -> dict[str, float]:
@@ -75,10 +76,13 @@ class Plant(Protocol):
     def predict(
         self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], near: Any
     ) -> Prediction:
-        """Rows with the given terms at ``values``, with slopes in ``names``, started from ``near`` if not None."""
+        """Rows with the given terms at ``values``, with slopes in ``names``, started from ``near`` if not None.
+
+        Values are in SI.
+        """
 
     def refined(self, terms: tuple[str, ...], values: Mapping[str, float], near: Any) -> Any:
-        """What to start from nearby, made as precise as it can be."""
+        """What to start from nearby, made as precise as it can be. Values are in SI."""
 
     def columns(
         self, terms: tuple[str, ...], values: Mapping[str, float], near: Any, candidates: Sequence[Term]

@@ -53,7 +53,10 @@ def score_terms(search: Search, mode: Mode, terms: list[Term]) -> list[Score]:
 def scores_of(
     search: Search, mode: Mode, terms: Sequence[Term], columns: Sequence[NDArray[np.float64]]
 ) -> list[Score]:
-    """The same with known ``columns``, (tries, m, amplitudes) of each term, best first."""
+    """The same with known ``columns``, (tries, m, amplitudes) of each term, best first.
+
+    Columns are in the units of the rows per unit of the amplitude.
+    """
     found = [_score(search, mode, term, each) for term, each in zip(terms, columns, strict=True)]
     return sorted(found, key=lambda each: -each.evidence)
 
@@ -89,7 +92,7 @@ def _score(search: Search, mode: Mode, term: Term, columns: NDArray[np.float64])
 
 
 def cosine(one: Score, other: Score) -> float:
-    """How much two candidates look alike, -1 to 1."""
+    """The cosine between what two candidates do, -1 to 1."""
     return float(one.direction @ other.direction)
 
 

@@ -80,7 +80,7 @@ class Findings:
 
 
 def excess(search: Search, mode: Mode) -> float:
-    """Mean square of the residuals in noise variances, less one: what the noise does not explain."""
+    """Mean square of the residuals in noise variances, less one [1]: what the noise does not explain."""
     kept = search.kept
     residual = search.residual(mode.prediction)[kept]
     return max(float(np.mean(residual**2 / search.data.variance[kept])) - 1.0, 0.0)

@@ -24,7 +24,7 @@ class Strain(NamedTuple):
     Attributes:
         gain: rise of the log evidence of the mode if one of the tolerances may not hold, no matter which.
         parameter: the one that is strained most; empty where none is known to a tolerance.
-        tolerances: how many of its tolerances it is off its sheet.
+        tolerances: how many of its tolerances (standard deviations) it is off its sheet.
     """
 
     gain: float

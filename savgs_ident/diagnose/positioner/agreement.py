@@ -24,7 +24,7 @@ DRAWS = 2000
 
 
 def relative_error(data: Data, force: NDArray[np.float64]) -> float:
-    """Norm of measured less predicted force (m,), relative to the measured."""
+    """Norm of measured less predicted force (m,) [N], relative to the measured."""
     return float(np.linalg.norm(data.measured - force) / np.linalg.norm(data.measured))
 
 
@@ -36,7 +36,7 @@ def share_closed(gap: float, left: float, floor: float) -> float:
 def shrink_of(
     data: Data, before: NDArray[np.float64], recalibrated: NDArray[np.float64], after: NDArray[np.float64]
 ) -> Shrink:
-    """The gap of three predictions (m,) each."""
+    """The gap of three predictions [N], (m,) each."""
     floor = float(np.sqrt(np.sum(data.variance)) / np.linalg.norm(data.measured))
     gap, left = relative_error(data, before), relative_error(data, after)
     squares = [

@@ -39,10 +39,10 @@ class NamedStep:
         added: whether it was added.
         sigma: significance of its score at the null, rows taken as independent; 0 if dropped.
         evidence_gain: log evidence that it brings.
-        heldout_gain: rise of the log predictive density per row that it brings in parts left out.
+        heldout_gain: rise of the log predictive density [nat] per row that it brings in parts left out.
         heldout_error: standard error of that, from its scatter over blocks of time.
-        error: relative force error after the step, where it was fitted.
-        heldout_recording_error: the same on the other recording.
+        error: relative force error after the step [1], where it was fitted.
+        heldout_recording_error: the same on the other recording [1].
         share_closed: share of the recalibrated gap that is closed on the other recording after the step.
         parameters: all parameters after the step.
     """

@@ -48,7 +48,7 @@ class Law:
     refines: str = ""
 
     def shapes(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Its shapes among ``values``, typical where not given."""
+        """Its shapes among ``values`` [SI], typical where not given."""
         return {each.name: values.get(each.name, each.centre) for each in self.term.shapes}
 
     def force(self, motion: Motion, values: Mapping[str, float]) -> NDArray[np.float64]:
@@ -57,7 +57,10 @@ class Law:
         return np.asarray(sizes @ self.basis(motion, self.shapes(values)))
 
     def slope(self, motion: Motion, values: Mapping[str, float], name: str) -> NDArray[np.float64]:
-        """Slope of the force in one of its parameters, (n,); that in a shape by a complex step, to rounding."""
+        """Slope of the force in one of its parameters [N per unit], (n,).
+
+        That in a shape by a complex step, to rounding.
+        """
         for place, each in enumerate(self.term.amplitudes):
             if each.name == name:
                 return np.asarray(self.basis(motion, self.shapes(values))[place])

@@ -54,7 +54,7 @@ class _Element(NamedTuple):
 
 
 def read_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
-    """The named numeric arrays of a MATLAB file, as real double precision.
+    """The named numeric arrays of a MATLAB file, as real double precision, of any shape and any unit.
 
     Raises :class:`InputError` for a file that is none, that is too large, that lacks one of them or has it twice,
     or where one is not a real numeric array.

@@ -61,7 +61,7 @@ class PositionerPlant:
         return Prediction(rows[0], rows[1:].T, True, None)
 
     def refined(self, terms: tuple[str, ...], values: Mapping[str, float], near: Any) -> Any:
-        """Nothing is started from nearby."""
+        """Nothing is started from nearby. Values are in SI."""
         return near
 
     def columns(
@@ -79,7 +79,7 @@ class PositionerPlant:
 
 
 def pitch_choices(motion: Motion, law: Law) -> tuple[float, ...]:
-    """Multiples of a typical pitch that leave no pitch out: half a wave apart over the whole travel."""
+    """Multiples [1] of a typical pitch that leave no pitch out: half a wave apart over the whole travel."""
     travel = float(np.ptp(motion.position))
     waves = np.arange(1.0 / LARGEST_PITCH, 1.0 / LEAST_PITCH, 0.5 / travel)
     return tuple(float(each) for each in 1.0 / (waves * law.term.shapes[0].centre))

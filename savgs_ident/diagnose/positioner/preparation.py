@@ -53,7 +53,7 @@ class Motion:
         return max(round(1.0 / (ROWS_HZ * self.step)), 1)
 
     def thinned(self, signals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Signals (..., n) on the rows, (..., m)."""
+        """Signals (..., n) of any unit on the rows, (..., m)."""
         if self.every > 1:
             signals = np.asarray(sosfiltfilt(_low_pass(PASSED / self.every), signals, axis=-1))
         edge = round(CUT_S / self.step)

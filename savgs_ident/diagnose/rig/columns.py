@@ -59,7 +59,10 @@ def columns_with_states(
     effects: Sequence[AbstractEffect],
     typical: Sequence[Mapping[str, float]],
 ) -> NDArray[np.float64]:
-    """Change of the rows by each effect at its ``typical`` parameters, (effects, m)."""
+    """Change of the rows by each effect at its ``typical`` parameters, (effects, m).
+
+    Rows are in the units of their readings, ``typical`` in SI.
+    """
     signals, steps = _evenly(model, p, solution)
     fields = []
     for effect, given in zip(effects, typical, strict=True):
@@ -81,7 +84,10 @@ def rehearse(p: Values, effects: Sequence[AbstractEffect], tests: int) -> None:
 def marched_effect(
     model: QuarterCar, p: Values, solution: PeriodicSolution, effect: AbstractEffect
 ) -> NDArray[np.float64]:
-    """What an effect with states does at its port along a motion: a force (P,), or a way and its rate (P, 2)."""
+    """What an effect with states does at its port along a motion.
+
+    A force (P,) [N], or a way and its rate (P, 2).
+    """
     signals, steps = _evenly(model, p, solution)
     return _at_nodes(np.asarray(_marched(effect, placed(dict(p)), signals, steps)), solution)
 
@@ -101,7 +107,10 @@ def impose(
     solution: PeriodicSolution,
     fields: Sequence[tuple[str, NDArray[np.float64]]],
 ) -> NDArray[np.float64]:
-    """Change of the rows by signals at the nodes, (P,) or (P, 2) each, imposed one at a time; (signals, m)."""
+    """Change of the rows by signals at the nodes, (P,) or (P, 2) each, imposed one at a time; (signals, m).
+
+    All in SI.
+    """
     found = []
     nodes = solution.mesh.layout.total
     blank = nothing_imposed(jnp.zeros(nodes))

@@ -17,7 +17,10 @@ SEED = 7
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of the three models, (m,) each, and the channel of each row, an index of RESPONSE_CHANNELS."""
+    """Rows of the three models, (m,) each, and the channel of each row, an index of RESPONSE_CHANNELS.
+
+    Rows are in the unit of their reading.
+    """
 
     before: NDArray[np.float64]
     recalibrated: NDArray[np.float64]

@@ -121,6 +121,9 @@ def _law(
 def strut_force(
     p: Values, way: NDArray[np.float64], rate: NDArray[np.float64], in_damper: bool
 ) -> NDArray[np.float64]:
-    """By how much spring and damper push more, apart, where something in series with them gives way [m], [m/s]."""
+    """By how much spring and damper push more, apart, where something in series with them gives way [m], [m/s].
+
+    ``way`` and ``rate`` are (n,), and so is the force [N].
+    """
     spring = 0.0 if in_damper else float(p["k_sd"])
     return -(spring * way + float(p["c_sd"]) * rate)

@@ -117,7 +117,10 @@ def places_of(plant: RigPlant, terms: tuple[str, ...], p: Values, solution: Peri
 
 
 def free_signal(coefficients: Signal, phase: Signal) -> Signal:
-    """The free signal of a test at phases [rad], from its coefficients."""
+    """The free signal of a test at phases [rad], from its coefficients.
+
+    Phases and signal are (n,), coefficients (f,).
+    """
     order = np.arange(1, coefficients.size // 2 + 1)[:, None]
     return np.asarray(coefficients[0::2] @ np.cos(order * phase) + coefficients[1::2] @ np.sin(order * phase))
 

@@ -62,7 +62,8 @@ class RigPlant:
         likelihood: what is compared, as rows.
         shape: tests, channels and orders of the harmonics that the likelihood takes.
         settings: how finely to solve.
-        corrections: by terms, what is added to the rows, (m,), for the motions that are found on finitely many nodes.
+        corrections: by terms, what is added to the rows [unit of each], (m,), for the motions that are
+            found on finitely many nodes.
     """
 
     rig: Rig
@@ -157,7 +158,7 @@ class RigPlant:
         return as_values(self.table.as_dict() | dict(given))
 
     def start(self, values: Mapping[str, float]) -> PeriodicSolution:
-        """Periodic motions of the baseline from a cold start.
+        """Periodic motions of the baseline from a cold start at ``values`` [SI].
 
         Raises :class:`InputError` if there are none.
         """
@@ -185,13 +186,13 @@ class RigPlant:
     def refined(
         self, terms: tuple[str, ...], values: Mapping[str, float], near: PeriodicSolution
     ) -> PeriodicSolution:
-        """The same motions on nodes that follow them."""
+        """The same motions on nodes that follow them. ``values`` are in SI."""
         return adapt(self.model(terms), self.values(values), near, near.mesh.layout, self.settings.iterations)
 
     def predict(
         self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], near: Any
     ) -> Prediction:
-        """Rows with ``terms`` at ``values``, with slopes in ``names``, on the nodes of ``near``."""
+        """Rows with ``terms`` at ``values`` [SI], with slopes in ``names``, on the nodes of ``near``."""
         model, p = self.model(terms), placed(self.values(values))
         solution = resolve(model, p, near, ITERATIONS, self._fitting(model, near))
         rows = np.asarray(rows_of(model, self.likelihood, p, solution, self.orders))
@@ -202,7 +203,7 @@ class RigPlant:
     def corrected(
         self, terms: tuple[str, ...], values: Mapping[str, float], near: PeriodicSolution
     ) -> "RigPlant":
-        """The plant with rows as they would be on nodes without end, about ``values``.
+        """The plant with rows as they would be on nodes without end, about ``values`` [SI].
 
         The rule of the collocation is of second order: four thirds of what twice the nodes change. The plant as it
         is where they do not lead to a motion.

@@ -19,13 +19,13 @@ from savgs_ident.simulate.stored import stored
 def rows_of(
     model: QuarterCar, likelihood: Likelihood, p: Values, solution: PeriodicSolution, orders: int
 ) -> Array:
-    """Rows of a motion, (m,)."""
+    """Rows of a motion [unit of the reading], (m,)."""
     return likelihood.rows(harmonics(model, p, solution, orders))
 
 
 @eqx.filter_jit
 def slopes_of(*args: Any) -> tuple[Array, ...]:
-    """Their slopes along directions (k, n) of named parameters, (k, m)."""
+    """Their slopes along directions (k, n) of named parameters, (k, m) [unit of the reading]."""
     return stored(_directional_rows, *args)
 
 

@@ -60,6 +60,7 @@ def frequencies_of(dwells: Signal, sweep: SweepResponse) -> Signal | None:
     """As many frequencies [Hz] as there are dwells: those in the sweep's range, its end, and what lies between.
 
     Its end is left out where all dwells lie in its range: then it is compared up to the fastest of them.
+    Frequencies are (D,).
     """
     lowest, highest = float(sweep.frequency.min()), float(sweep.frequency.max())
     inside = np.unique(dwells[(dwells >= lowest) & (dwells < highest)])

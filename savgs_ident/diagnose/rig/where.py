@@ -16,7 +16,10 @@ REVERSAL, MID_STROKE = 0.3, 0.8
 
 
 def gap_map(plant: RigPlant, data: Data, rows: NDArray[np.float64]) -> tuple[MapCell, ...]:
-    """The gap of every harmonic that is compared."""
+    """The gap of every harmonic that is compared.
+
+    ``rows`` (m,) are those that a model predicts [unit of the reading].
+    """
     shape = plant.shape
     measured = plant.likelihood.harmonics(data.measured[None], shape)[0]
     residual = plant.likelihood.harmonics((data.measured - rows)[None], shape)[0]
@@ -35,7 +38,10 @@ def gap_map(plant: RigPlant, data: Data, rows: NDArray[np.float64]) -> tuple[Map
 
 
 def cycle_positions(plant: RigPlant, data: Data, rows: NDArray[np.float64]) -> tuple[CyclePosition, ...]:
-    """The gap of the waveforms at reversal, in mid-stroke and between, by channel; every test counts alike."""
+    """The gap of the waveforms at reversal, in mid-stroke and between, by channel; every test counts alike.
+
+    ``rows`` (m,) are those that a model predicts [unit of the reading].
+    """
     shape = plant.shape
     measured = plant.likelihood.harmonics(data.measured[None], shape)[0]
     residual = plant.likelihood.harmonics((data.measured - rows)[None], shape)[0]

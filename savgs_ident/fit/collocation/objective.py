@@ -17,7 +17,10 @@ from savgs_ident.fit.collocation.unknowns import READINGS, Unknowns
 
 
 class Objective(NamedTuple):
-    """1/2 w' H w - c' w + rest over all unknowns w: half of chi2 of data and priors."""
+    """1/2 w' H w - c' w + rest over all unknowns w: half of chi2 of data and priors.
+
+    ``slope`` c is (n,), for n unknowns.
+    """
 
     curvature: csc_array
     slope: NDArray[np.float64]
@@ -28,7 +31,10 @@ class Objective(NamedTuple):
 def assemble_objective(
     unknowns: Unknowns, points: Points, misfits: list[dict[int, Misfit]], priors: NDArray[np.intp]
 ) -> Objective:
-    """The objective of the misfits of all dwells by channel and of unit normal ``priors`` on some parameters."""
+    """The objective of the misfits of all dwells by channel and of unit normal ``priors`` on some parameters.
+
+    ``priors`` (k,) are the places of these parameters.
+    """
     first = unknowns.states + unknowns.partners
     rows, columns, values = [priors], [priors], [np.ones(priors.size)]
     slope, rest, count = np.zeros(unknowns.size), 0.0, 0

@@ -37,7 +37,8 @@ class Samples(NamedTuple):
 class Misfit(NamedTuple):
     """Half the weighted sum of squares, 1/2 v' H v - c' v + rest, of v = (values at the nodes, zero of the sensor).
 
-    ``curvature`` H (n + 1, n + 1), ``slope`` c (n + 1,), of so many ``samples``.
+    ``curvature`` H (n + 1, n + 1), ``slope`` c (n + 1,), of so many ``samples``. It has no dimension [1]: v
+    is in the unit of the channel, c in one over it.
     """
 
     curvature: csr_array

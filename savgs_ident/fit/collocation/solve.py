@@ -24,7 +24,7 @@ _OUTCOMES = {
 
 
 class Solution(NamedTuple):
-    """Unknowns ``w`` where IPOPT ended, the objective there, and its iterations."""
+    """Scaled unknowns ``w`` [1], (n,), where IPOPT ended, the objective there [1], and its iterations."""
 
     w: NDArray[np.float64]
     objective: float
@@ -35,7 +35,7 @@ class Solution(NamedTuple):
 def solve_program(
     program: Program, start: NDArray[np.float64], iterations: int, tolerance: float
 ) -> Solution:
-    """IPOPT from ``start``, until constraints and scaled slopes are within ``tolerance``.
+    """IPOPT from scaled unknowns ``start`` [1], (n,), until constraints and scaled slopes are within ``tolerance``.
 
     Look at ``status`` of the solution: any end but the one asked for is a failure, and where IPOPT does not say
     more the problem counts as stalled.

@@ -14,7 +14,7 @@ from savgs_ident.fit.covariance import Spread, spread_of
 
 
 def information(program: Program, w: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Information matrix (n, n) of the parameters' coordinates at the solution ``w``, priors included.
+    """Information matrix (n, n) of the parameters' coordinates at the solution ``w`` [1], (m,), priors included.
 
     Raises :class:`RuntimeError` where the constraints do not fix the motions.
     """
@@ -36,6 +36,9 @@ def information(program: Program, w: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def spread_at(program: Program, w: NDArray[np.float64]) -> Spread:
-    """The spread of the parameters' coordinates; directions that the samples do not tell as in a fit."""
+    """The spread of the parameters' coordinates; directions that the samples do not tell as in a fit.
+
+    ``w`` [1], (m,), are the scaled unknowns of the solution.
+    """
     values, axes = np.linalg.eigh(information(program, w))
     return spread_of((axes * np.sqrt(np.maximum(values, 0.0))).T)

@@ -10,7 +10,10 @@ from savgs_ident.simulate.periodic import PeriodicSolution
 
 
 def start_vector(task: Task, program: Program, points: Points, near: PeriodicSolution) -> NDArray[np.float64]:
-    """All unknowns: the rig's values, the motions ``near`` them, and what the sensors would read of these."""
+    """All unknowns, scaled [1], (n,).
+
+    The rig's values, the motions ``near`` them, and what the sensors would read of these.
+    """
     unknowns = program.unknowns
     w = np.zeros(unknowns.size)
     w[: unknowns.parameters] = task.problem.free.to_unconstrained(task.table.as_dict())

@@ -36,7 +36,10 @@ BALANCES = (320.0, 20.0)
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Sizes and scales: ``parameters`` n, ``points`` P, ``dwells`` D, ``internal`` sizes of internal states."""
+    """Sizes and scales.
+
+    ``parameters`` n, ``points`` P, ``dwells`` D, ``internal`` sizes of internal states [SI].
+    """
 
     parameters: int
     points: int
@@ -65,13 +68,16 @@ class Unknowns:
 
     @property
     def scale(self) -> NDArray[np.float64]:
-        """Typical sizes of the unknowns of a point, (width,)."""
+        """Typical sizes of the unknowns of a point [SI], (width,)."""
         rates = tuple(PACE * size for size in self.internal)
         return np.array([*COORDINATES, *VELOCITIES, *self.internal, *ACCELERATIONS, *rates, *READINGS])
 
     @property
     def residual_scale(self) -> NDArray[np.float64]:
-        """Typical sizes of the equations of a point: the model's residual, then what the sensors read."""
+        """Typical sizes of the equations of a point [SI], (rows,).
+
+        The model's residual, then what the sensors read.
+        """
         return np.array([*BALANCES, *(PACE * size for size in self.internal), *READINGS])
 
     @property

@@ -1,0 +1,71 @@
+"""The documentation builds without a warning, and the reference has a page for every public module."""
+
+import html
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+PACKAGE = REPOSITORY / "savgs_ident"
+MODULES = [
+    ".".join(path.relative_to(REPOSITORY).with_suffix("").parts).removesuffix(".__init__")
+    for path in sorted(PACKAGE.rglob("*.py"))
+    if (not path.stem.startswith("_") or path.stem == "__init__") and path.parent != PACKAGE
+]
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The built pages; the generated sources are kept out of the repository."""
+    folder = tmp_path_factory.mktemp("documentation")
+    source = shutil.copytree(REPOSITORY / "docs", folder / "docs", ignore=shutil.ignore_patterns("reference"))
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", source, folder / "out"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
+    assert done.returncode == 0, done.stderr[-4000:]
+    return folder / "out"
+
+
+def _text_of(built: Path, module: str) -> str:
+    page = (built / "reference" / f"{module}.html").read_text(encoding="utf-8")
+    return " ".join(html.unescape(re.sub(r"<[^>]*>", "", page)).split())
+
+
+@pytest.mark.slow
+def test_every_public_module_has_its_page_and_no_other_has(built: Path) -> None:
+    pages = {page.stem for page in (built / "reference").glob("*.html")}
+    assert pages == set(MODULES)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["index", "guide", "reference"])
+def test_the_pages_by_hand_are_there(built: Path, page: str) -> None:
+    assert (built / f"{page}.html").is_file()
+
+
+@pytest.mark.slow
+def test_signatures_and_fields_are_shown_as_written(built: Path) -> None:
+    rig = _text_of(built, "savgs_ident.model.quarter_car")
+    assert "transfers( p: Values, frequency: Float[Array, '*f'], ) → Complex[Array, 'C *f']" in rig
+    fit = _text_of(built, "savgs_ident.fit.result")
+    assert "covariance: NDArray[float64]" in fit
+    assert "of the estimates in their order [products of their units], (n, n)." in fit
+    assert "Annotated" not in _text_of(built, "savgs_ident.cli.simulate_command")
+
+
+@pytest.mark.slow
+def test_private_names_and_those_of_others_are_left_out(built: Path) -> None:
+    periodic = _text_of(built, "savgs_ident.simulate.periodic")
+    assert "nodes: int = 256" in periodic
+    assert "_riding_the_road" not in periodic
+    assert "partial" not in _text_of(built, "savgs_ident.control.linearisation")
+
+
+@pytest.mark.slow
+def test_names_lead_to_where_they_are_told(built: Path) -> None:
+    page = (built / "reference" / "savgs_ident.fit.result.html").read_text(encoding="utf-8")
+    assert 'href="savgs_ident.core.rig.html#savgs_ident.core.rig.Rig"' in page
+    assert 'href="savgs_ident.model.sensors.html#savgs_ident.model.sensors.RESPONSE_CHANNELS"' in page
