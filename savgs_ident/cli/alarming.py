@@ -1,6 +1,8 @@
 """Draws one after the other, each kept as soon as it is there."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from savgs_ident.cli.console import Progress, Voice, complain
@@ -9,6 +11,7 @@ from savgs_ident.cli.diagnosing import baseline_of
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
 from savgs_ident.cli.kept_trials import begin_trials, completed, known_trials
 from savgs_ident.cli.reading import read_response
+from savgs_ident.core.records import record_of
 from savgs_ident.core.rig import default_rig_path, read_rig
 from savgs_ident.diagnose.false_alarms import AlarmBench, NullDraw, alarm_bench
 from savgs_ident.report.false_alarms import alarms_figure, alarms_record, alarms_text
@@ -45,7 +48,7 @@ def count_false_alarms(job: Job, voice: Voice, out: Path) -> int:
     prepare_folder(out)
     use_persistent_cache()
     kept = out / "draws.jsonl"
-    done = known_trials(kept, job.marks(), lambda fields: NullDraw(**fields)) if job.resume else []
+    done = draws_in(kept, job.marks()) if job.resume else []
     with voice.working() as progress:
         bench = _bench(job, progress)
         if not done:
@@ -60,6 +63,11 @@ def count_false_alarms(job: Job, voice: Voice, out: Path) -> int:
         return OK
     complain("Not to be trusted: there are more false alarms than there may be.")
     return NOT_TRUSTED
+
+
+def draws_in(kept: Path, marks: Mapping[str, object]) -> list[NullDraw]:
+    """The draws of an earlier run; raises as :func:`savgs_ident.cli.kept_trials.known_trials` does."""
+    return known_trials(kept, marks, partial(record_of, NullDraw))
 
 
 def _bench(job: Job, progress: Progress) -> AlarmBench:

@@ -13,14 +13,16 @@ import json
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from savgs_ident.cli.console import Progress
 from savgs_ident.cli.reading import first_sweep, read_response
-from savgs_ident.core.errors import InputError
+from savgs_ident.core.errors import InputError, blamed_on
+from savgs_ident.core.records import record_of
 from savgs_ident.core.rig import Rig, read_rig
 from savgs_ident.diagnose.blind.answer import Answer
 from savgs_ident.diagnose.blind.bench import Bench
@@ -45,6 +47,8 @@ SWEEP = 60.0
 """Length of the sweep [s], where there is one."""
 
 SILENT = Progress(None, None)
+
+Parsed = TypeVar("Parsed")
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,14 @@ class Drawn:
     recordings: tuple[Recording, ...]
 
 
+@dataclass(frozen=True)
+class HandedOver:
+    """What goes with the recordings: the seal, and what the catalogue of this trial lacks."""
+
+    without: tuple[str, ...]
+    seal: Seal
+
+
 Draw = Callable[[Plan, Bench, int], Drawn]
 """The rig of the trial with a number; always the same."""
 
@@ -107,11 +119,13 @@ def run_trial(plan: Plan, draw: Draw, diagnose: Diagnose, out: Path, number: int
     if not _is_recorded(folder, plan, number):
         _record(folder, plan, draw(plan, bench, number), number)
     campaign = folder / "campaign"
-    found = _diagnosed(diagnose, campaign, bench.rig, _without(folder))
+    found = _diagnosed(diagnose, campaign, bench.rig, _handed_over(folder).without)
     write_json(folder / "diagnosis.json", found)
-    seal = Seal(**_read(campaign / "seal.json")["seal"])
-    envelope = envelope_of(_read(folder / "answer.json"))
-    return score_of(opened(seal, envelope, read_campaign(campaign).sha256), found)
+    seal = _handed_over(folder).seal
+    envelope = _read(folder / "answer.json", envelope_of)
+    with blamed_on(campaign / "seal.json"):
+        answer = opened(seal, envelope, read_campaign(campaign).sha256)
+    return score_of(answer, found)
 
 
 def diagnose_folder(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
@@ -171,19 +185,24 @@ def _is_recorded(folder: Path, plan: Plan, number: int) -> bool:
     whole = all(path.is_file() for path in (campaign / "seal.json", campaign / FILE, folder / "answer.json"))
     if not whole:
         return False
-    record = _read(folder / "answer.json")
-    return bool(record.get("trial") == number and record.get("settings") == plan.marks())
+    told = _read(folder / "answer.json", lambda record: (record.get("trial"), record.get("settings")))
+    return told == (number, plan.marks())
 
 
-def _without(folder: Path) -> tuple[str, ...]:
-    return tuple(_read(folder / "campaign" / "seal.json")["without"])
+def _handed_over(folder: Path) -> HandedOver:
+    return _read(folder / "campaign" / "seal.json", partial(record_of, HandedOver))
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(path: Path, parse: Callable[[dict[str, Any]], Parsed]) -> Parsed:
+    """What ``parse`` makes of the JSON object in a file of the trial."""
     try:
-        record: dict[str, Any] = json.loads(path.read_text())
-    except ValueError as error:
+        record = json.loads(path.read_text("utf-8"))
+        if not isinstance(record, dict):
+            raise ValueError("it is no table")
+        return parse(record)
+    except (ValueError, RecursionError) as error:
         raise InputError(
-            "is not valid JSON", source=path, remedy="remove the trial's folder to record it again"
+            f"is not what a trial leaves behind: {error}",
+            source=path,
+            remedy="remove the trial's folder to record it again",
         ) from error
-    return record

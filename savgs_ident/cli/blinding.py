@@ -26,7 +26,7 @@ from savgs_ident.simulate.compilation import use_persistent_cache
 
 @dataclass(frozen=True)
 class Job:
-    """How many trials to run, of what, and how."""
+    """How many trials to run, of what, and how. ``shares`` of the kinds of trials sum to 1."""
 
     trials: int
     seed: int | None
@@ -73,7 +73,7 @@ def plan_of(job: Job, kept: Path) -> Plan:
     seed = job.seed
     if seed is None:
         told = marks_in(kept).get("seed")
-        seed = told if isinstance(told, int) else secrets.randbits(32)
+        seed = told if type(told) is int and told >= 0 else secrets.randbits(32)
     return Plan(job.rig or default_rig_path(), seed, job.shares, job.every, job.sweep)
 
 

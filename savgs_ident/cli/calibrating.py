@@ -1,6 +1,6 @@
 """Trials one after the other, each kept as soon as it is there."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,8 +10,9 @@ from savgs_ident.cli.kept_trials import begin_trials, completed, known_trials
 from savgs_ident.cli.models import effects_in, identified_in, rig_before
 from savgs_ident.cli.reading import read_response
 from savgs_ident.cli.selection import every_so_many
+from savgs_ident.core.records import record_of
 from savgs_ident.core.rig import Rig, read_rig
-from savgs_ident.posterior.calibration import Trial, calibrator
+from savgs_ident.posterior.calibration import RANKED, Trial, calibrator
 from savgs_ident.posterior.result import Sampler
 from savgs_ident.posterior.sample import Question
 from savgs_ident.posterior.settings import SamplingSettings
@@ -55,7 +56,7 @@ def calibrate_by_trials(job: Job, voice: Voice, out: Path) -> int:
     prepare_folder(out)
     use_persistent_cache()
     kept = out / "trials.jsonl"
-    done = known_trials(kept, job.marks(), lambda fields: Trial(**fields)) if job.resume else []
+    done = trials_in(kept, job.marks()) if job.resume else []
     with voice.working() as progress:
         rig = read_rig(job.model)
         trials = _run(job, rig, kept, done, progress)
@@ -71,6 +72,22 @@ def calibrate_by_trials(job: Job, voice: Voice, out: Path) -> int:
         return OK
     complain("Not to be trusted: coverage or ranks are not what they should be.")
     return NOT_TRUSTED
+
+
+def trials_in(kept: Path, marks: Mapping[str, object]) -> list[Trial]:
+    """The trials of an earlier run; raises as :func:`savgs_ident.cli.kept_trials.known_trials` does."""
+    ranked: set[str] = set()
+
+    def trial(fields: Mapping[str, object]) -> Trial:
+        found = record_of(Trial, fields)
+        ranked.update(found.rank)
+        if found.rank.keys() != found.inside.keys() or (found.rank and found.rank.keys() != ranked):
+            raise ValueError("trials are of different parameters")
+        if not all(0 <= rank <= RANKED for rank in found.rank.values()):
+            raise ValueError("a rank is none")
+        return found
+
+    return known_trials(kept, marks, trial)
 
 
 def _run(job: Job, rig: Rig, kept: Path, done: list[Trial], progress: Progress) -> list[Trial]:

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.files import spelled_out
 from savgs_ident.recordings.kinds import kind_of
 from savgs_ident.recordings.readers import READERS, is_campaign_file
 
@@ -41,7 +42,7 @@ class Found:
     @property
     def source(self) -> str:
         """The path as text that can be written anywhere; bytes that are no text are spelled out."""
-        return str(self.path).encode("utf-8", "backslashreplace").decode()
+        return spelled_out(self.path)
 
 
 def find_campaigns(

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from savgs_ident.core.files import cannot_write
+from savgs_ident.recordings.epoch import unix_time
 from savgs_ident.recordings.read import campaign_files, digest_of, map_beside
-from savgs_ident.report.files import to_json, write_bytes
+from savgs_ident.report.files import to_json
 
 FILES = ("fit.json", "model.toml")
 """What a result is made of."""
@@ -82,10 +83,10 @@ def kept_result(folder: Path, digest: str) -> Kept | None:
         texts = [(folder / name).read_bytes() for name in FILES]
         if seal["digest"] != digest or seal["files"] != _digests(texts):
             return None
-        start = None if seal["start"] is None else float(seal["start"])
+        start = None if seal["start"] is None else unix_time(float(seal["start"]))
         kept = Kept(texts[0].decode("utf-8"), texts[1].decode("utf-8"), start)
         return kept if "parameters" in kept.record else None
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return None
 
 
@@ -112,7 +113,7 @@ def keep_result(folder: Path, result: Kept, origin: MadeFrom) -> None:
         raise cannot_write(folder, error) from error
     try:
         for name, content in contents.items():
-            write_bytes(part / name, content)
+            (part / name).write_bytes(content)
         # No file of this result ever stands beside one of another.
         for name in (_SEAL, *FILES):
             (folder / name).unlink(missing_ok=True)

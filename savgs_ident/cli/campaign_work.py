@@ -8,6 +8,7 @@ from savgs_ident.cli.campaign_store import Kept
 from savgs_ident.cli.console import Progress
 from savgs_ident.cli.identify import Job, fit_campaign, identified_rig
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.files import spelled_out
 from savgs_ident.core.rig import parse_rig, rig_text
 from savgs_ident.report.files import to_json
 from savgs_ident.report.fit_record import fit_record
@@ -61,7 +62,7 @@ def identify_one(task: Task) -> Outcome:
 
 def one_line(text: object) -> str:
     """``text`` in one line that can be written anywhere."""
-    return " ".join(str(text).split()).encode("utf-8", "backslashreplace").decode()
+    return spelled_out(" ".join(str(text).split()))
 
 
 def _identified(task: Task) -> Kept:

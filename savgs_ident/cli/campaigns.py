@@ -195,7 +195,7 @@ def _code(ended: Sequence[_Ended], why_not: str) -> int:
         elif each.row.status is RowStatus.not_trusted:
             complain(f"Not to be trusted: {each.row.name}: {each.row.reason}.")
     if all(each.unreadable for each in ended):
-        complain("Error: no campaign could be read.")
+        complain("Error: no campaign could be read. Remedy: mend what is said of each above.")
         return BAD_INPUT
     if not why_not:
         return OK

@@ -89,7 +89,7 @@ def _rigs(job: Job, table: ParameterTable, provenance: Mapping[str, object]) -> 
     if job.posterior is not None:
         return rigs_from_posterior(table, job.posterior, job.rigs)
 
-    return rigs_from_covariance(table, provenance, job.rigs)
+    return rigs_from_covariance(table, provenance, job.rigs, job.rig)
 
 
 def _controller(job: Job, model: QuarterCar, p: Values, progress: Progress) -> tuple[DigitalController, str]:

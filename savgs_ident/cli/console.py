@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 from rich.console import Console, RenderableType
 from rich.status import Status
+from rich.text import Text
 
-from savgs_ident.report.files import to_json
+from savgs_ident.report.files import json_bytes
 from savgs_ident.report.terminal import plain
 
 
@@ -37,8 +38,10 @@ class Voice:
     def hand_over(self, record: object) -> None:
         """Print the result as JSON to standard output, if that was asked for."""
         if self.json:
-            sys.stdout.write(to_json(record))
+            # JSON is UTF-8 whatever the terminal speaks, byte for byte what is in the file.
             sys.stdout.flush()
+            sys.stdout.buffer.write(json_bytes(record))
+            sys.stdout.buffer.flush()
 
     @contextmanager
     def working(self) -> Iterator["Progress"]:
@@ -63,9 +66,9 @@ class Progress:
     def __call__(self, message: str) -> None:
         """Say what is being done now."""
         if self.status is not None:
-            self.status.update(plain(message))
+            self.status.update(_line(message))
         elif self.console is not None:
-            self.console.print(plain(message), soft_wrap=True)
+            self.console.print(_line(message), soft_wrap=True)
 
     def fraction(self, message: str) -> "FractionTold":
         """A listener for fractions done, 0 to 1, that says ``message`` with a percentage."""
@@ -80,11 +83,16 @@ class FractionTold:
     message: str
 
     def __call__(self, fraction: float) -> None:
-        """Take note that ``fraction`` of the work is done."""
+        """Take note that a ``fraction`` of the work [1] is done."""
         if self.progress.status is not None:
             self.progress(f"{self.message} ({100.0 * fraction:.0f} %)")
 
 
 def complain(message: str) -> None:
     """One line to standard error, whatever was asked for."""
-    Console(stderr=True, highlight=False).print(plain(message), soft_wrap=True)
+    Console(stderr=True, highlight=False).print(_line(message), soft_wrap=True)
+
+
+def _line(message: str) -> Text:
+    """``message`` in one line, whatever is in the names that it tells."""
+    return plain(message.replace("\n", "\\n"))

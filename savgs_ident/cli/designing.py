@@ -28,7 +28,7 @@ from savgs_ident.simulate.compilation import use_persistent_cache
 
 @dataclass(frozen=True)
 class Job:
-    """What to design for what: see the options of the command."""
+    """What to design for what: see the options of the command; ``rate`` [Hz]."""
 
     rig: Path
     model: ModelName | None
@@ -75,4 +75,4 @@ def _rigs(job: Job, rig: Rig, table: ParameterTable) -> Rigs:
     """What the controller is tried on."""
     if job.posterior is not None:
         return rigs_from_posterior(table, job.posterior, job.rigs)
-    return rigs_from_covariance(table, rig.provenance, job.rigs)
+    return rigs_from_covariance(table, rig.provenance, job.rigs, job.rig)

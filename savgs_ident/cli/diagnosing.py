@@ -33,7 +33,7 @@ PACKAGES = ("jax", "numpy", "scipy")
 
 @dataclass(frozen=True)
 class Job:
-    """What to diagnose from what."""
+    """What to diagnose from what. ``max_frequency`` [Hz] leaves out faster dwells."""
 
     campaign: Path
     channels: Path | None
@@ -69,7 +69,7 @@ def run_diagnosis(job: Job, voice: Voice, out: Path) -> int:
 
 
 def baseline_of(rig: Rig, job: Job, source: object) -> tuple[Rig, DiagnosisSettings, Mapping[str, float]]:
-    """The rig as known before its own fit, what the baseline is, and the values that it is given with.
+    """The rig as known before its own fit, what the baseline is, and the values that it is given with [SI].
 
     Raises :class:`InputError` for an identified rig of another model than the job asks for.
     """

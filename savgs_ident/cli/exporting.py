@@ -40,7 +40,7 @@ def run_export(job: Job, voice: Voice, out: Path) -> int:
     _check_formats(job.formats)
     prepare_folder(out)
     rig = read_rig(job.rig)
-    gathered = _gathered(job, rig)
+    gathered = gathered_for(job, rig)
     model = gathered.model
     _check_covariance(model, job.rig)
     use_persistent_cache()
@@ -60,7 +60,11 @@ def run_export(job: Job, voice: Voice, out: Path) -> int:
     return NOT_TRUSTED
 
 
-def _gathered(job: Job, rig: Rig) -> Gathered:
+def gathered_for(job: Job, rig: Rig) -> Gathered:
+    """The model of a rig with what the job's other files say of it.
+
+    Raises :class:`InputError` for a file that cannot be used, or two that do not belong together.
+    """
     diagnosis = {} if job.diagnosis is None else read_diagnosis(job.diagnosis)
     effects = _effects(job, rig, diagnosis)
     try:

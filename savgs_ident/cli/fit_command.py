@@ -86,6 +86,8 @@ def demo(
 
     Writes fit.json, model.toml, bode.png and bode.pdf.
 
+    Exit code 1 if the fit did not converge or the data cannot tell every parameter.
+
     Example: savgs-ident demo
     """
     from savgs_ident.cli.identify import Job, identify

@@ -3,8 +3,6 @@
 0 ok; 1 ran, but the result is not to be trusted; 2 bad input or usage; 130 stopped by Ctrl-C.
 """
 
-import os
-import sys
 from collections.abc import Callable
 from functools import wraps
 from typing import ParamSpec
@@ -41,13 +39,12 @@ def _code_of(work: Callable[[], int]) -> int:
     except InputError as error:
         complain(f"Error: {error}")
         return BAD_INPUT
-    except BrokenPipeError:
-        # The reader of our output has left (`| head`); Python would complain once more at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return OK
     except OSError as error:
-        place = f"{error.filename}: " if error.filename else ""
-        complain(
-            f"Error: {place}{error.strerror or error}. Remedy: check the path, its permissions, the disk."
-        )
-        return BAD_INPUT
+        return code_of_refusal(error)
+
+
+def code_of_refusal(error: OSError) -> int:
+    """Say what the system refused, in one line; the exit code."""
+    place = f"{error.filename}: " if error.filename else ""
+    complain(f"Error: {place}{error.strerror or error}. Remedy: check the path, its permissions, the disk.")
+    return BAD_INPUT

@@ -34,7 +34,10 @@ from savgs_ident.simulate.measured import measured_excitation
 
 @dataclass(frozen=True)
 class Job:
-    """What to identify from what; ``free`` empty means the paper's parameters."""
+    """What to identify from what; ``free`` empty means the paper's parameters.
+
+    ``max_frequency`` [Hz] leaves out faster dwells.
+    """
 
     campaign: Path
     rig: Path

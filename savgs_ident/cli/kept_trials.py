@@ -27,7 +27,7 @@ def marks_in(kept: Path) -> dict[str, Any]:
     try:
         first, ended, _ = kept.read_text().partition("\n")
         marks = json.loads(first) if ended else {}
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise _no_list(kept) from error
     if not isinstance(marks, dict):
         raise _no_list(kept)
@@ -55,7 +55,7 @@ def known_trials(
     lines = kept.read_text().split("\n")[1:-1]
     try:
         found = [trial(json.loads(line)) for line in lines]
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise _no_list(kept) from error
     _write(kept, [json.dumps(marks), *lines])
     return found

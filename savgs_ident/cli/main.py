@@ -5,6 +5,7 @@ Commands import what they need when they run, so that ``savgs-ident --help`` ans
 
 import atexit
 import gc
+import signal
 import sys
 from typing import Annotated
 
@@ -26,9 +27,12 @@ from savgs_ident.cli.inspect_command import inspect
 from savgs_ident.cli.linearise_command import linearise
 from savgs_ident.cli.posterior_command import posterior
 from savgs_ident.cli.simulate_command import simulate
+from savgs_ident.cli.streams import mend_streams
+from savgs_ident.cli.usage import Commands
 
 app = typer.Typer(
     name="savgs-ident",
+    cls=Commands,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -68,4 +72,9 @@ def run() -> None:
     # among them, at the usual pace and once more at the end, takes a sixth of the time that a fit takes.
     gc.set_threshold(100_000, 20, 100)
     atexit.register(gc.freeze)
-    app(args=spread_values(sys.argv[1:]))
+    mend_streams()
+    try:
+        app(args=spread_values(sys.argv[1:]))
+    finally:
+        # The end is near; another Ctrl-C could only spoil it.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)

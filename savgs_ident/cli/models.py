@@ -1,12 +1,12 @@
 """Which model a command works with: the names on the command line, and what a rig file remembers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from savgs_ident.core.errors import InputError
+from savgs_ident.core.errors import InputError, blamed_on
 
 if TYPE_CHECKING:
     from savgs_ident.core.parameter import ParameterTable
@@ -49,16 +49,20 @@ def effects_in(rig: "Rig", source: object) -> tuple[str, ...]:
 
     Raises :class:`InputError` if what it says is no list of known effects.
     """
-    from savgs_ident.effects.registry import EFFECTS
+    from savgs_ident.effects.registry import EFFECTS, model_parameters
 
     named = rig.provenance.get("effects", effects_of(ModelName.simtr))
-    if not isinstance(named, list | tuple) or any(name not in EFFECTS for name in named):
+    found = _list_of(EFFECTS, named)
+    if found is None:
         raise InputError(
             f"provenance.effects is {named!r}",
             source=source,
             remedy="list known effects: " + ", ".join(sorted(EFFECTS)),
         )
-    return tuple(named)
+    with blamed_on(source):
+        # What these effects bring along must go with what the file has.
+        model_parameters(rig, found)
+    return found
 
 
 def free_parameters(wanted: Sequence[str], model: ModelName, known: "ParameterTable") -> tuple[str, ...]:
@@ -79,7 +83,7 @@ def free_parameters(wanted: Sequence[str], model: ModelName, known: "ParameterTa
 def identified_in(
     rig: "Rig", effects: tuple[str, ...], source: object
 ) -> tuple[tuple[str, ...], dict[str, float]]:
-    """The parameters that an identified rig left free, and the values of all that its fit moved.
+    """The parameters that an identified rig left free, and the values of all that its fit moved [SI].
 
     Those of the paper and the rig's own values for a drawing. Raises :class:`InputError` if the list in the
     file is none of known parameters.
@@ -89,11 +93,12 @@ def identified_in(
     table = model_parameters(rig, effects)
     by_default = free_parameters((), ModelName.simtr if effects else ModelName.simqc, table)
     named = rig.provenance.get("free", by_default)
-    if not isinstance(named, list | tuple) or not named or any(name not in table for name in named):
+    found = _list_of(table, named)
+    if not found:
         raise InputError(
             f"provenance.free is {named!r}", source=source, remedy="list parameters of the model"
         )
-    return tuple(named), {name: table[name].value for name in (*named, *_before(rig, source))}
+    return found, {name: table[name].value for name in (*found, *_before(rig, table, source))}
 
 
 def rig_before(rig: "Rig", effects: tuple[str, ...], source: object) -> "Rig":
@@ -105,14 +110,30 @@ def rig_before(rig: "Rig", effects: tuple[str, ...], source: object) -> "Rig":
 
     from savgs_ident.effects.registry import model_parameters
 
-    before = _before(rig, source)
-    return replace(rig, parameters=model_parameters(rig, effects).with_values(before)) if before else rig
+    table = model_parameters(rig, effects)
+    before = _before(rig, table, source)
+    with blamed_on(source):
+        return replace(rig, parameters=table.with_values(before)) if before else rig
 
 
-def _before(rig: "Rig", source: object) -> dict[str, float]:
+def _list_of(known: Collection[str], named: object) -> tuple[str, ...] | None:
+    """What a file names, if it is a list of what is known, nothing in it twice; else None."""
+    if not isinstance(named, list | tuple) or not all(isinstance(name, str) for name in named):
+        return None
+    right = all(name in known for name in named) and len(set(named)) == len(named)
+    return tuple(named) if right else None
+
+
+def _before(rig: "Rig", known: Collection[str], source: object) -> dict[str, float]:
     before = rig.provenance.get("before", {})
+    wrong = InputError(
+        "provenance.before is no table of numbers", source=source, remedy="identify the rig again"
+    )
     if not isinstance(before, Mapping) or not all(isinstance(each, int | float) for each in before.values()):
-        raise InputError(
-            "provenance.before is no table of numbers", source=source, remedy="identify the rig again"
-        )
-    return {str(name): float(value) for name, value in before.items()}
+        raise wrong
+    if any(name not in known for name in before):
+        raise wrong
+    try:
+        return {str(name): float(value) for name, value in before.items()}
+    except OverflowError:
+        raise wrong from None

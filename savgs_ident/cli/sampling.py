@@ -27,7 +27,7 @@ PACKAGES = ("jax", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
 
 @dataclass(frozen=True)
 class Job:
-    """What to sample from what."""
+    """What to sample from what. ``max_frequency`` [Hz] leaves out faster dwells."""
 
     model: Path
     campaign: Path

@@ -37,7 +37,7 @@ def simulate_responses(
     voice: Voice,
     out: Path,
 ) -> bool:
-    """Periodic responses, shown and written; whether all were found."""
+    """Periodic responses at frequencies [Hz], shown and written; whether all were found."""
     with voice.working() as progress:
         excitation = _excitation(rig, frequency, campaign, orders, progress)
         progress(f"solving {excitation.frequency.shape[0]} periodic motions")

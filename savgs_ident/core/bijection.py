@@ -79,7 +79,10 @@ class Tolerated(AbstractBijection):
 
 
 class OneSided(AbstractBijection):
-    """The log of the distance to one bound; ``sign`` is 1 for a lower bound and -1 for an upper one."""
+    """The log of the distance to one bound; ``sign`` is 1 for a lower bound and -1 for an upper one.
+
+    ``bound`` and ``scale`` are in the unit of the parameter.
+    """
 
     bound: float
     scale: float
@@ -95,7 +98,10 @@ class OneSided(AbstractBijection):
 
 
 class TwoSided(AbstractBijection):
-    """A logistic curve between two bounds, through the start value at u = 0."""
+    """A logistic curve between two bounds, through the start value at u = 0.
+
+    Bounds are in the unit of the parameter; ``offset`` is the place of the start on the curve [1].
+    """
 
     lower: float
     upper: float
@@ -116,7 +122,7 @@ class TwoSided(AbstractBijection):
 
 
 class Unbounded(AbstractBijection):
-    """A shift and a scale, for a parameter without bounds."""
+    """A shift and a scale, for a parameter without bounds, both in its unit."""
 
     nominal: float
     scale: float
@@ -168,7 +174,7 @@ def tolerated_bijection(parameter: Parameter) -> AbstractBijection:
 
 
 def move_inside(parameter: Parameter, value: float) -> float:
-    """``value`` itself, or a hundredth of the room off the bound that it is on.
+    """``value`` [unit of the parameter] itself, or a hundredth of the room off the bound that it is on.
 
     Room is the distance of the bounds or, with one bound, from it to the table's value, or the tolerance.
     Raises :class:`InputError` for a value outside the bounds, or on a bound where nothing tells the room.

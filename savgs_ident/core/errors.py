@@ -8,15 +8,39 @@ data it concerns, so that every report can show it.
     run7.csv: column 'sprung_accel' is missing. Remedy: name it in channels.toml.
 """
 
+import unicodedata
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+
+_LONGEST = {"name": 100, "what": 400, "remedy": 2000}
+"""Characters of each part that a message shows: names and values come from files that may be anything."""
+
+
+def one_line(text: str, most: int) -> str:
+    """``text`` as at most so many characters of one line: control characters spelled out, the middle left out."""
+    if len(text) > most:
+        text = f"{text[: most - 40]} ... {text[-35:]}"
+    if text.isprintable():
+        return text
+    return "".join(_spelled(char) if _is_control(char) else char for char in text)
+
+
+def _is_control(char: str) -> bool:
+    return unicodedata.category(char) in ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
+
+
+def _spelled(char: str) -> str:
+    return char.encode("unicode_escape").decode()
 
 
 def _compose(what: str, source: str, test: str, channel: str, time: float | None, remedy: str) -> str:
-    place = [source]
+    what, remedy = one_line(what, _LONGEST["what"]), one_line(remedy, _LONGEST["remedy"])
+    place = [one_line(source, len(source))]
     if test:
-        place.append(f"test '{test}'")
+        place.append(f"test '{one_line(test, _LONGEST['name'])}'")
     if channel:
-        place.append(f"channel '{channel}'")
+        place.append(f"channel '{one_line(channel, _LONGEST['name'])}'")
     if time is not None:
         place.append(f"at {time:.3f} s")
     head = ", ".join(part for part in place if part)
@@ -44,11 +68,30 @@ class InputError(SavgsIdentError):
         super().__init__(_compose(what, self.source, test, channel, time, remedy))
 
 
+@contextmanager
+def blamed_on(source: object) -> Iterator[None]:
+    """An :class:`InputError` from within that names no file is one of ``source``."""
+    try:
+        yield
+    except InputError as error:
+        if error.source:
+            raise
+        raise InputError(
+            error.what,
+            source=source,
+            test=error.test,
+            channel=error.channel,
+            time=error.time,
+            remedy=error.remedy,
+        ) from None
+
+
 @dataclass(frozen=True)
 class DataWarning:
     """Something in the data that a careful reader would want to know, with a stable ``code``.
 
-    ``code`` is a short name such as ``clipped_sensor``; the other fields are those of :class:`InputError`.
+    ``code`` is a short name such as ``clipped_sensor``; the other fields are those of :class:`InputError`,
+    ``time`` [s].
     """
 
     code: str

@@ -4,10 +4,16 @@ Whoever stops a command, or runs out of disk, keeps what was finished and finds 
 """
 
 import os
+import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from savgs_ident.core.errors import InputError
+
+LEAST_ROOM = 32 * 2**20
+"""Space that a temporary folder has to offer [byte]."""
 
 
 def write_bytes(path: Path, content: bytes) -> Path:
@@ -27,6 +33,27 @@ def write_bytes(path: Path, content: bytes) -> Path:
     finally:
         part.unlink(missing_ok=True)
     return path
+
+
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """A temporary folder with room for what libraries write to files only, and cannot be trusted to fail at.
+
+    HDF5 takes the process down where a disk fills under it. Raises :class:`InputError` if there is no room.
+    """
+    with tempfile.TemporaryDirectory(prefix="savgs-ident-") as name:
+        if shutil.disk_usage(name).free < LEAST_ROOM:
+            raise InputError(
+                "the disk is full",
+                source=tempfile.gettempdir(),
+                remedy="make room there, or name another folder in TMPDIR",
+            )
+        yield Path(name)
+
+
+def spelled_out(text: object) -> str:
+    r"""``text`` as every file can hold it; a byte of a file name that is no text becomes ``\udcff`` or the like."""
+    return str(text).encode("utf-8", "backslashreplace").decode()
 
 
 def cannot_write(path: Path, error: OSError) -> InputError:

@@ -82,7 +82,7 @@ class ParameterTable(Mapping[str, Parameter]):
         return {entry.name: entry.value for entry in self.entries}
 
     def with_values(self, values: Mapping[str, float]) -> "ParameterTable":
-        """The same table with some values replaced.
+        """The same table with some values replaced, in SI.
 
         Raises :class:`InputError` for a name that is not in the table or a value outside its bounds.
         """

@@ -39,8 +39,9 @@ def compose_rig(
 ) -> str:
     """The text of a rig file; what :func:`read_rig` makes the same rig of.
 
-    Raises :class:`InputError` for a missing parameter, a unit that rig files do not know, or a ``provenance``
-    that TOML cannot say (it takes texts, numbers, booleans, dates, lists and tables of these).
+    Raises :class:`InputError` for a missing parameter, a unit that rig files do not know, or a
+    ``provenance`` that TOML cannot say (it takes texts, numbers, booleans, dates, lists and tables of
+    these). The damper's table is ``damper_force`` [N] over ``damper_velocity`` [m/s].
     """
     missing = [entry for entry in SECTION_OF if entry not in parameters]
     if missing:

@@ -9,12 +9,11 @@ signals.json says what stands where, ``rates_work`` how much work space is neede
 """
 
 import contextlib
-import tempfile
 from pathlib import Path
 
 from casadi import CodeGenerator
 
-from savgs_ident.core.files import write_bytes
+from savgs_ident.core.files import scratch_folder, write_bytes
 from savgs_ident.export.casadi_functions import casadi_functions
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.json_export import write_json
@@ -27,7 +26,7 @@ STEM = "savgs_model"
 
 def write_c(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
     """Write savgs_model.c, savgs_model.h and signals.json, and all that is known about the model in model.json."""
-    with tempfile.TemporaryDirectory(prefix="savgs-ident-") as scratch, contextlib.chdir(scratch):
+    with scratch_folder() as scratch, contextlib.chdir(scratch):
         generator = CodeGenerator(STEM, {"with_header": True, "casadi_int": "long long int"})
         for function in casadi_functions(model).values():
             generator.add(function)

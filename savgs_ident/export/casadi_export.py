@@ -7,10 +7,9 @@ Nothing of this package is needed to load them. They are of SX and can be differ
 problem of optimal control as they are.
 """
 
-import tempfile
 from pathlib import Path
 
-from savgs_ident.core.files import write_bytes
+from savgs_ident.core.files import scratch_folder, write_bytes
 from savgs_ident.export.casadi_functions import casadi_functions
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.json_export import write_json
@@ -22,8 +21,9 @@ def write_casadi(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
     """Write rates, outputs and residual (.casadi), signals.json, and all that is known of the model in model.json."""
     files = []
     for name, function in casadi_functions(model).items():
-        with tempfile.TemporaryDirectory(prefix="savgs-ident-") as scratch:
-            file = Path(scratch) / name
+        # CasADi does not notice a disk that fills under it.
+        with scratch_folder() as scratch:
+            file = scratch / name
             function.save(str(file))
             files.append(write_bytes(folder / f"{name}.casadi", file.read_bytes()))
     signals = write_json_text(folder / "signals.json", signals_record(model))

@@ -105,7 +105,7 @@ class Equations:
     def accelerations(
         self, x: Float[Array, " x"], u: Float[Array, " u"], p: Float[Array, " p"]
     ) -> Float[Array, " y"]:
-        """The y for which the residual vanishes."""
+        """The y [SI] for which the residual vanishes, of x, u and p in SI."""
 
         def balance(y: Array) -> Array:
             return self.residual(x, y, u, p)
@@ -120,11 +120,11 @@ class Equations:
     def rates(
         self, x: Float[Array, " x"], u: Float[Array, " u"], p: Float[Array, " p"]
     ) -> Float[Array, " x"]:
-        """dx/dt."""
+        """dx/dt, all in SI."""
         return jnp.concatenate([x[2:4], self.accelerations(x, u, p)])
 
     def read(self, x: Float[Array, " x"], u: Float[Array, " u"], p: Float[Array, " p"]) -> Float[Array, " o"]:
-        """The outputs."""
+        """The outputs, all in SI."""
         values, y, inputs = self._values(p), self.accelerations(x, u, p), _inputs(u)
         motion = _motion(x, y)
         loads = self.model.loads(values, motion, x[4:], y[2:], inputs)

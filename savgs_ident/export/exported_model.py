@@ -45,7 +45,10 @@ class ExportedModel:
 
     @property
     def covariance(self) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-        """Names and covariance of the estimated parameters; empty for a drawing."""
+        """Names and covariance [products of their units], (n, n), of the estimated parameters.
+
+        Empty for a drawing.
+        """
         carried = self.rig.provenance.get("covariance")
         if not isinstance(carried, Mapping):
             return (), np.zeros((0, 0))

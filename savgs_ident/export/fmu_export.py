@@ -6,7 +6,6 @@ is installed by the extra ``fmu``.
 """
 
 import contextlib
-import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from importlib.util import find_spec
@@ -15,7 +14,7 @@ from pathlib import Path
 import casadi as ca
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.files import write_bytes
+from savgs_ident.core.files import scratch_folder, write_bytes
 from savgs_ident.export.casadi_functions import casadi_functions
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.fmi_units import base_units
@@ -38,7 +37,7 @@ def write_fmu(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
     """
     headers = _headers()
     builder = _builder(model)
-    with tempfile.TemporaryDirectory(prefix="savgs-ident-") as scratch, contextlib.chdir(scratch):
+    with scratch_folder() as scratch, contextlib.chdir(scratch):
         files = builder.export_fmu({"no_warning": True})
         _conform(Path(_DESCRIPTION), _starts(model))
         (knowledge,) = write_json(model, Path())

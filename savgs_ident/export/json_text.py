@@ -21,7 +21,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import write_bytes
 
 Plain = dict[str, object] | list[object] | str | int | float | bool | None
-"""What JSON can say."""
+"""What JSON can say, numbers in any unit."""
 
 
 def as_plain(value: object, where: str) -> Plain:

@@ -81,7 +81,7 @@ class Place:
         return found
 
     def number(self) -> float:
-        """A finite number."""
+        """A finite number, of any unit."""
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
             raise self.wrong("a finite number")
         try:
@@ -93,11 +93,11 @@ class Place:
         return number
 
     def vector(self) -> NDArray[np.float64]:
-        """A list of finite numbers, (n,)."""
+        """A list of finite numbers of any unit, (n,)."""
         return np.array([entry.number() for entry in self.items()], dtype=np.float64)
 
     def matrix(self, rows: int, columns: int) -> NDArray[np.float64]:
-        """A list of rows of finite numbers, (rows, columns)."""
+        """A list of rows of finite numbers of any unit, (rows, columns)."""
         found = [entry.vector() for entry in self.items()]
         if len(found) != rows or any(row.size != columns for row in found):
             raise self.wrong(f"a matrix of {rows} rows and {columns} columns")

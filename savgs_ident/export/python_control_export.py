@@ -74,7 +74,7 @@ def load_python_control(path: str | Path) -> dict[str, System]:
 def resting_point(path: str | Path) -> tuple[Vector, Vector]:
     """States and inputs of ``nonlinear`` at rest, the link at its nominal angle: where a simulation begins.
 
-    Raises as :func:`load_python_control` does.
+    Raises as :func:`load_python_control` does. States are (n,), inputs (k,), both SI.
     """
     return read_document(Path(path), REMEDY, lambda place: _at_rest(_fields(place)))
 

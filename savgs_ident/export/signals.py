@@ -11,14 +11,14 @@ from savgs_ident.model.values import as_values
 
 
 def resting_state(model: ExportedModel) -> list[float]:
-    """x at rest at the nominal link angle, the plate at its zero: where a simulation begins."""
+    """x [SI] at rest at the nominal link angle, the plate at its zero: where a simulation begins."""
     p = as_values(model.table.as_dict())
     rest = static_equilibrium(model.equations.model, p, p["psi_nominal"], jnp.zeros(()))
     return [float(rest.q.z_s), float(rest.q.theta_LW), 0.0, 0.0, *(float(state) for state in rest.s)]
 
 
 def resting_inputs(model: ExportedModel) -> list[float]:
-    """u at rest: everything zero but the link's nominal angle."""
+    """u [SI] at rest: everything zero but the link's nominal angle."""
     nominal = model.table["psi_nominal"].value
     return [nominal if signal.name == "link_angle" else 0.0 for signal in model.equations.inputs]
 

@@ -15,7 +15,10 @@ from savgs_ident.posterior.words import log_covariance
 
 
 def advise(task: Task, mode: Mode, draws: Mapping[str, NDArray[np.float64]]) -> tuple[str, ...]:
-    """Sentences on dwells that would help; none if all identified parameters are told."""
+    """Sentences on dwells that would help; none if all identified parameters are told.
+
+    ``draws`` (s,) are in SI, by name.
+    """
     covariance = log_covariance(task.problem.free.identified, draws)
     if np.sqrt(np.diag(covariance)).max() <= TOLD:
         return ()

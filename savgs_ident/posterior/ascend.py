@@ -29,7 +29,10 @@ def ascend(
     held: Float[np.ndarray, " n+2"] | None = None,
     level: float = 0.0,
 ) -> Top:
-    """The highest point of ``surrogate`` from ``start``; with ``held . t = level`` if a direction is held."""
+    """The highest point of ``surrogate`` from ``start``; with ``held . t = level`` if a direction is held.
+
+    Points are in standard deviations of the surrogate's coordinates t [1].
+    """
     direction = np.zeros_like(start) if held is None else held / np.linalg.norm(held)
     place = 0.0 if held is None else level / float(np.linalg.norm(held))
     args = placed((surrogate, jnp.asarray(start), jnp.asarray(direction), jnp.asarray(place)))

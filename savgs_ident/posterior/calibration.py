@@ -52,9 +52,9 @@ RANKED = 39
 class Trial:
     """One synthetic campaign.
 
-    ``rank`` is the place of each true value among :data:`RANKED` draws, 0..RANKED; ``inside`` whether its 95 %
-    interval holds it; both empty if the campaign could not be simulated (``solved`` is false), or its mode was
-    not found (``found`` is false).
+    ``rank`` is the place of each true value among :data:`RANKED` draws, 0..RANKED; ``inside`` whether its
+    95 % interval holds it; both empty if the campaign could not be simulated (``solved`` is false), or its
+    mode was not found (``found`` is false). ``ess`` is the least effective sample size.
     """
 
     number: int

@@ -10,10 +10,11 @@ class Chains(NamedTuple):
     """Draws so far, in S steps of C chains.
 
     Attributes:
-        points: (S, C, n + 2).
-        log_density: of the exact model, (S, C).
+        points: free coordinates and nuisance scales [1], (S, C, n + 2).
+        log_density: log density of the exact model, (S, C).
         accepted: whether the step moved, (S, C).
-        log_ratio: exact over surrogate density at the proposals; empty where proposals depend on each other.
+        log_ratio: log ratio of exact to surrogate density at the proposals; empty where proposals depend on
+            each other.
         divergences: of the gradient-based sampler.
         evaluations: responses of the exact model.
         unsolved: of these without a periodic motion.
@@ -29,6 +30,9 @@ class Chains(NamedTuple):
 
 
 def unsettled(log_density: Float[np.ndarray, "S C"]) -> int:
-    """Leading steps at which some chain has been nowhere yet where the model is solved."""
+    """Leading steps at which some chain has been nowhere yet where the model is solved.
+
+    ``log_density`` [1] is minus infinity there.
+    """
     solved = np.isfinite(log_density).all(axis=1)
     return int(np.argmax(solved)) if solved.any() else len(solved)

@@ -38,7 +38,10 @@ DIVERGING = 0.01
 
 
 class Mixing(NamedTuple):
-    """How well one parameter's draws mix; NaN where chains are too short or do not move."""
+    """How well one parameter's draws mix.
+
+    NaN where chains are too short or do not move; all in draws or without dimension [1].
+    """
 
     ess_bulk: float
     ess_tail: float
@@ -47,7 +50,7 @@ class Mixing(NamedTuple):
 
 
 def mixing_of(draws: Float[np.ndarray, "S C"]) -> Mixing:
-    """The mixing of one parameter's draws, steps by chains."""
+    """The mixing of one parameter's draws [its unit], steps by chains."""
     if draws.shape[0] < LEAST_DRAWS or np.ptp(draws) == 0.0:
         return Mixing(np.nan, np.nan, np.nan, np.nan)
     axes = {"chain_axis": 1, "draw_axis": 0}
@@ -57,7 +60,7 @@ def mixing_of(draws: Float[np.ndarray, "S C"]) -> Mixing:
 
 
 def least_ess(mixing: Sequence[Mixing]) -> float:
-    """The least of bulk and tail over several parameters; 0 where nothing can be said."""
+    """The least effective sample size of bulk and tail over several parameters; 0 where nothing can be said."""
     # NumPy's minimum is NaN if one of them is; Python's depends on their order.
     least = np.min([(each.ess_bulk, each.ess_tail) for each in mixing]) if mixing else np.nan
     return float(least) if np.isfinite(least) else 0.0
@@ -87,7 +90,10 @@ def judge_chains(
     target: float,
     doubts: Sequence[str],
 ) -> Convergence:
-    """Whether the draws may be used; ``doubts`` are reasons against it that are known already."""
+    """Whether the draws may be used; ``doubts`` are reasons against it that are known already.
+
+    ``target`` is the effective sample size asked for.
+    """
     ess = least_ess(identified)
     r_hat = _greatest_r_hat(identified) if identified else np.nan
     r_hat_others = _greatest_r_hat(others) if others else 1.0

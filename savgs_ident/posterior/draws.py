@@ -1,6 +1,7 @@
 """The draws of a posterior, read back from its file."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from math import prod
 from pathlib import Path
 
 import h5py
@@ -8,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
+
+LARGEST = 2**28
+"""Most bytes that all draws, or a piece of the file that has to be unpacked for them, may take in memory."""
 
 REMEDY = "give the posterior.nc that `savgs-ident posterior` wrote for this model"
 
@@ -24,10 +28,11 @@ def read_draws(
         with h5py.File(path, "r") as file:
             group = file["posterior"]
             held = set(group.keys())
+            _check_size(path, [group[name] for name in names if name in held])
             draws = {name: np.ravel(group[name][()]) for name in names if name in held}
     except OSError as error:
         raise InputError(f"cannot be read: {error}", source=path, remedy=REMEDY) from error
-    except (KeyError, TypeError, AttributeError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError, RuntimeError) as error:
         raise InputError("is no posterior", source=path, remedy=REMEDY) from error
     lengths = {values.size for values in draws.values()}
     finite = all(values.dtype.kind == "f" and np.isfinite(values).all() for values in draws.values())
@@ -36,3 +41,11 @@ def read_draws(
     total = lengths.pop()
     chosen = np.unique(np.linspace(0, total - 1, min(count or total, total)).astype(int))
     return {name: values[chosen].astype(np.float64) for name, values in draws.items()}
+
+
+def _check_size(path: Path, held: Sequence[h5py.Dataset]) -> None:
+    """A file of some kilobytes can declare terabytes, and be read as so many zeros."""
+    whole = sum(each.size * each.dtype.itemsize for each in held)
+    pieces = [prod(each.chunks) * each.dtype.itemsize for each in held if each.chunks]
+    if max([whole, *pieces]) > LARGEST:
+        raise InputError(f"declares more than {LARGEST} bytes of draws", source=path, remedy=REMEDY)

@@ -46,6 +46,8 @@ def sample_by_emcee(exact: ExactModel, surrogate: Surrogate, seed: int, keep: Ke
         sampler = emcee.EnsembleSampler(
             WALKERS, size, tally.log_density, moves=move, backend=backend, vectorize=True
         )
+        # Without emcee's wrapping, which prints all that is raised, Ctrl-C among it, to standard output.
+        sampler.log_prob_fn = tally.log_density
         state = sampler.get_last_sample() if backend.iteration else _first_state(surrogate, seed)
         while True:
             # A walker that began where the model is not solved compares minus infinity with itself.

@@ -33,20 +33,23 @@ LIMIT = 30
 
 
 class Anchor(eqx.Module):
-    """A point u (n,) where the model is known: its motions and their derivatives in u, (n, ...) each."""
+    """Free coordinates u (n,) where the model is known: its motions and their derivatives in u, (n, ...) each."""
 
     u: Float[Array, " n"]
     solution: PeriodicSolution
     slopes: Trajectory
 
     def predicted(self, u: Float[Array, " n"]) -> Trajectory:
-        """The motions at ``u``, to first order."""
+        """The motions at free coordinates ``u``, to first order."""
         parts = zip(self.solution.trajectory, self.slopes, strict=True)
         return Trajectory(*(value + jnp.tensordot(u - self.u, slope, 1) for value, slope in parts))
 
 
 class Responses(NamedTuple):
-    """Harmonics (W, D, 2, K) of the model at W points, and whether all dwells were solved, (W,)."""
+    """Harmonics (W, D, 2, K) of the model at W points, and whether all dwells were solved, (W,).
+
+    Harmonics are in the unit of their reading.
+    """
 
     harmonics: Complex[np.ndarray, "W D C K"]
     solved: np.ndarray
@@ -60,27 +63,30 @@ class ExactModel(eqx.Module):
     anchor: Anchor
 
     def responses(self, us: Float[np.ndarray, "W n"]) -> Responses:
-        """The model at several parameter sets, on as many cores as there are."""
+        """The model at several sets of free coordinates, on as many cores as there are."""
         found = in_parallel(lambda u: _response(self.problem, self.anchor, placed(jnp.asarray(u))), us)
         harmonics = np.stack([np.asarray(each[0]) for each in found])
         step = np.array([float(each[1]) for each in found])
         return Responses(harmonics, (step <= ENOUGH) & np.isfinite(harmonics).all(axis=(1, 2, 3)))
 
     def rows(self, us: Float[np.ndarray, "W n"]) -> tuple[Float[np.ndarray, "W m"], np.ndarray]:
-        """Their rows of the likelihood, (W, m), and whether they were solved, (W,)."""
+        """Their rows of the likelihood [unit of the reading], (W, m), and whether they were solved, (W,)."""
         found = self.responses(us)
         return np.asarray(_rows_of(self.likelihood, placed(jnp.asarray(found.harmonics)))), found.solved
 
 
 def in_parallel(work: Any, items: Sequence[Any] | np.ndarray) -> list[Any]:
-    """``work`` on every item, in their order; a solver leaves Python free while it runs."""
+    """``work`` on every item, numbers of any unit and arrays of any shape, in their order.
+
+    A solver leaves Python free while it runs.
+    """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     with ThreadPoolExecutor(cores) as pool:
         return list(pool.map(work, items))
 
 
 def anchor_at(problem: Problem, u: Float[Array, " n"], solution: PeriodicSolution) -> Anchor:
-    """The anchor at ``u`` (n,), where the model has ``solution``."""
+    """The anchor at free coordinates ``u`` (n,), where the model has ``solution``."""
     u = placed(u)
     slopes = Trajectory(*_slopes_of(problem, u, problem.parameters(u), solution))
     return Anchor(u, solution, slopes)
@@ -95,7 +101,8 @@ def rows_and_slopes(
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m n"], PeriodicSolution]:
     """The rows (m,) of the model at ``u``, their derivatives in u (m, n), and its motions there.
 
-    Solved on the nodes of ``near``, from its motions or a better ``start``.
+    Solved on the nodes of ``near``, from its motions or a better ``start``. ``u`` are free coordinates,
+    rows are in the unit of their reading.
     """
     u = placed(u)
     p = problem.parameters(u)

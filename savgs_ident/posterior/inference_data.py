@@ -3,14 +3,13 @@
 Complex harmonics stand in it as real and imaginary parts. The file is netCDF, for any ArviZ to read.
 """
 
-import tempfile
 from pathlib import Path
 
 import arviz_base
 import numpy as np
 import xarray as xr
 
-from savgs_ident.core.files import write_bytes
+from savgs_ident.core.files import scratch_folder, write_bytes
 from savgs_ident.model.sensors import RESPONSE_CHANNELS
 from savgs_ident.posterior.result import Posterior
 
@@ -38,6 +37,8 @@ def inference_data(posterior: Posterior) -> xr.DataTree:
             "channel": list(RESPONSE_CHANNELS),
             "order": np.arange(orders),
         },
+        # A run that was stopped early may have fewer draws than walkers.
+        check_conventions=False,
     )
     for marginal in posterior.marginals:
         tree["posterior"][marginal.name].attrs.update(
@@ -51,8 +52,8 @@ def inference_data(posterior: Posterior) -> xr.DataTree:
 
 def write_inference_data(posterior: Posterior, path: Path) -> Path:
     """Write the inference data, whole or not at all; raises :class:`InputError` if it cannot be written."""
-    with tempfile.TemporaryDirectory(prefix="savgs-ident-") as folder:
-        file = Path(folder) / "posterior.nc"
+    with scratch_folder() as folder:
+        file = folder / "posterior.nc"
         inference_data(posterior).to_netcdf(file, engine="h5netcdf")
         return write_bytes(path, file.read_bytes())
 

@@ -2,21 +2,23 @@
 
 The file is HDF5. It is written elsewhere and moved to its place, so that a run that is killed at any moment
 leaves the state after some step, whole. The file says what it is a chain of; another problem's is refused.
+Behind the HDF5 stands its digest (SHA-256): a file that is not as it was written is refused before HDF5 reads it.
 """
 
 import hashlib
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.files import write_bytes
+from savgs_ident.core.files import scratch_folder, write_bytes
 
 _ATTRIBUTE = "savgs_ident_case"
+_DIGEST = hashlib.sha256().digest_size
 
 
 class Keep:
@@ -31,8 +33,8 @@ class Keep:
     @contextmanager
     def scratch(self) -> Iterator[Path]:
         """A file to write to, which holds what was kept so far."""
-        with tempfile.TemporaryDirectory(prefix="savgs-ident-") as folder:
-            file = Path(folder) / "chain.h5"
+        with scratch_folder() as folder:
+            file = folder / "chain.h5"
             if self.content is not None:
                 file.write_bytes(self.content)
             yield file
@@ -44,7 +46,8 @@ class Keep:
         with h5py.File(scratch, "a") as file:
             file.attrs[_ATTRIBUTE] = self.case
             file.attrs["counts"] = counts
-        write_bytes(self.path, scratch.read_bytes())
+        content = scratch.read_bytes()
+        write_bytes(self.path, content + hashlib.sha256(content).digest())
 
 
 def new_keep(path: Path | None, case: str) -> Keep:
@@ -58,12 +61,12 @@ def open_keep(path: Path, case: str) -> Keep:
     Raises :class:`InputError` if it cannot be read or is the chain of another case.
     """
     try:
-        content = path.read_bytes()
-        with h5py.File(path, "r") as file:
+        content = _whole(path.read_bytes())
+        with h5py.File(BytesIO(content), "r") as file:
             kept, counts = file.attrs[_ATTRIBUTE], file.attrs["counts"]
     except FileNotFoundError:
         return new_keep(path, case)
-    except (OSError, KeyError) as error:
+    except (OSError, KeyError, ValueError) as error:
         raise InputError(
             f"is no chain that can be resumed: {error}", source=path, remedy="leave out --resume"
         ) from error
@@ -74,6 +77,14 @@ def open_keep(path: Path, case: str) -> Keep:
             remedy="resume with what it was begun with, or leave out --resume",
         )
     return Keep(path, case, content, (int(counts[0]), int(counts[1])))
+
+
+def _whole(content: bytes) -> bytes:
+    """A file's content without the digest that it ends with; ``ValueError`` if it is not of this content."""
+    begun, digest = content[:-_DIGEST], content[-_DIGEST:]
+    if hashlib.sha256(begun).digest() != digest:
+        raise ValueError("it is not as it was written")
+    return begun
 
 
 def digest_of(parts: Mapping[str, object]) -> str:

@@ -32,9 +32,10 @@ FALL: Mapping[str, int] = {"sprung_accel": 1, "susp_deflection": 2}
 class Likelihood(eqx.Module):
     """Measured harmonics as m independent rows.
 
-    ``axes`` (D, 2, K, 2, 2) turns (Re, Im) of every harmonic into its principal axes, ``place`` (m,) picks the
-    rows that are compared; ``measured`` (m,) is what they are, ``variance`` (m,) their noise, ``reach`` (m,)
-    their a_k. ``scales`` says what a point's last two coordinates mean.
+    ``axes`` (D, 2, K, 2, 2) turns (Re, Im) of every harmonic into its principal axes, ``place`` (m,) picks
+    the rows that are compared; ``measured`` (m,) is what they are, ``variance`` (m,) their noise, ``reach``
+    (m,) their a_k. ``scales`` says what a point's last two coordinates mean. Rows are in the unit of their
+    reading, ``variance`` in its square, ``axes`` and ``place`` without dimension.
     """
 
     axes: Float[Array, "D C K 2 2"]
@@ -50,19 +51,19 @@ class Likelihood(eqx.Module):
         return jnp.einsum("dckij,dckj->dcki", self.axes, parts).ravel()[self.place]
 
     def spread(self, point: Float[Array, " n+2"]) -> Float[Array, " m"]:
-        """Variance of the rows about the model's, noise and discrepancy together."""
+        """Variance of the rows [unit^2] about the model's, noise and discrepancy together."""
         noise, miss = self.scales.noise_scale(point), self.scales.miss(point)
         return noise**2 * self.variance + (miss * self.reach) ** 2
 
     def __call__(self, rows: Float[Array, " m"], point: Float[Array, " n+2"]) -> Float[Array, ""]:
-        """Log likelihood of the model's ``rows``, up to a constant."""
+        """Log likelihood of the model's ``rows``, up to a constant. Rows are in the unit of their reading."""
         spread = self.spread(point)
         return -0.5 * jnp.sum((rows - self.measured) ** 2 / spread + jnp.log(spread / self.variance))
 
     def harmonics(
         self, rows: Float[np.ndarray, "S m"], shape: tuple[int, ...]
     ) -> Complex[np.ndarray, "S D C K"]:
-        """Rows as complex harmonics (S, *shape); zero where nothing is compared."""
+        """Rows [unit of the reading] as complex harmonics ``(S, *shape)``; zero where nothing is compared."""
         parts = np.zeros((rows.shape[0], 2 * int(np.prod(shape))))
         parts[:, self.place] = rows
         turned = np.einsum("dckij,sdcki->sdckj", np.asarray(self.axes), parts.reshape(-1, *shape, 2))

@@ -70,7 +70,10 @@ class Case(NamedTuple):
 
 
 def find_mode(case: Case, u: Float[Array, " n"], near: PeriodicSolution, tell: Progress) -> Mode:
-    """The mode from ``u`` (n,), where the model has the motions ``near``; its nodes are adapted there."""
+    """The mode from free coordinates ``u`` (n,), where the model has the motions ``near``.
+
+    Its nodes are adapted there.
+    """
     mode = _climb(case, _first_foothold(case, u, near), tell)
     if not mode.status.ok:
         return mode

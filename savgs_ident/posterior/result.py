@@ -27,7 +27,7 @@ class ProfileLine:
 
 @dataclass(frozen=True)
 class Marginal:
-    """One parameter's posterior; all values in ``unit``.
+    """One parameter's posterior; all values in [``unit``].
 
     Attributes:
         name: the parameter.
@@ -164,5 +164,5 @@ class Posterior:
         return tuple(each for each in self.marginals if each.role == role)
 
     def correlation(self, names: tuple[str, ...]) -> NDArray[np.float64]:
-        """Correlation of the draws of the named parameters, (n, n)."""
+        """Correlation [1] of the draws of the named parameters, (n, n)."""
         return np.atleast_2d(np.corrcoef(np.stack([self.draws[name].ravel() for name in names])))

@@ -24,11 +24,11 @@ class Shear(eqx.Module):
     share: Float[Array, "q n"]
 
     def __call__(self, t: Float[Array, " n"]) -> Float[Array, " n"]:
-        """The v of round coordinates."""
+        """The v of round coordinates t, both in standard deviations."""
         return t - (t[self.first] * t[self.second]) @ self.share
 
     def inverse(self, v: Float[np.ndarray, "w n"]) -> Float[np.ndarray, "w n"]:
-        """The round coordinates of several v."""
+        """The round coordinates of several v, both in standard deviations."""
         t, share = np.array(v), np.asarray(self.share)
         for axis in reversed(range(t.shape[1])):
             t[:, axis] = v[:, axis] + (t[:, self.first] * t[:, self.second]) @ share[:, axis]
@@ -46,7 +46,8 @@ def shear_of(
 ) -> Shear:
     """The shear that makes up for ``second`` derivatives in v of rows with ``slope`` in v.
 
-    ``weight`` (m,) is one over the rows' deviations; columns of slope and prior together are orthonormal.
+    ``weight`` (m,) is one over the rows' deviations; columns of slope and prior together are orthonormal. v
+    is in standard deviations.
     """
     count = second.shape[0]
     first, other = np.triu_indices(count)

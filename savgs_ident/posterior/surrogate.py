@@ -36,7 +36,10 @@ class Bend(NamedTuple):
 
 
 class Surrogate(eqx.Module):
-    """Log density over t (n + 2,); ``rows`` (m,) and ``slope`` (m, n) are the model's at v = 0."""
+    """Log density over t (n + 2,); ``rows`` (m,) and ``slope`` (m, n) are the model's at v = 0.
+
+    t is in standard deviations, rows are in the unit of their reading.
+    """
 
     likelihood: Likelihood
     prior: Prior
@@ -48,11 +51,11 @@ class Surrogate(eqx.Module):
     shear: Shear
 
     def point(self, t: Float[Array, " n+2"]) -> Float[Array, " n+2"]:
-        """The point of the posterior at ``t``."""
+        """The point of the posterior [free coordinates, 1] at ``t`` in standard deviations."""
         return self.centre + self.scale @ self._straight(t)
 
     def predicted(self, t: Float[Array, " n+2"]) -> Float[Array, " m"]:
-        """The rows of the likelihood at ``t``, to second order."""
+        """The rows of the likelihood [unit of the reading] at ``t``, to second order."""
         v = self._straight(t)[: -len(NUISANCE)]
         products = v[self.bend.first] * v[self.bend.second]
         return self.rows + self.slope @ v + (products @ self.bend.share) @ self.bend.shape
@@ -64,18 +67,21 @@ class Surrogate(eqx.Module):
 
     @property
     def start(self) -> Float[np.ndarray, " n+2"]:
-        """Where to look for the top from: off the symmetry plane of the discrepancy, which is a saddle."""
+        """Where to look for the top from, in standard deviations.
+
+        Off the symmetry plane of the discrepancy, which is a saddle.
+        """
         t = np.zeros(self.centre.size)
         t[-1] = 1.0
         return t
 
     def points(self, ts: Float[np.ndarray, "*w n+2"]) -> Float[np.ndarray, "*w n+2"]:
-        """The points at several t."""
+        """The points at several t, which are in standard deviations."""
         flat = jnp.asarray(ts).reshape(-1, self.centre.size)
         return np.asarray(_points(self, flat)).reshape(ts.shape)
 
     def coordinates(self, points: Float[np.ndarray, "w n+2"]) -> Float[np.ndarray, "w n+2"]:
-        """The t of several points."""
+        """The t of several points, in standard deviations."""
         v = np.linalg.solve(np.asarray(self.scale), (points - np.asarray(self.centre)).T).T
         split = v.shape[1] - len(NUISANCE)
         return np.concatenate([self.shear.inverse(v[:, :split]), v[:, split:]], axis=1)
@@ -97,7 +103,10 @@ def no_bend(rows: int) -> Bend:
 
 
 def bend_of(second: Float[np.ndarray, "n n m"], weight: Float[np.ndarray, " m"]) -> Bend:
-    """The bend of second derivatives in v, symmetrised; ``weight`` (m,) is one over the rows' deviations."""
+    """The bend of second derivatives in v, symmetrised; ``weight`` (m,) is one over the rows' deviations.
+
+    v is in standard deviations.
+    """
     symmetric = 0.5 * (second + np.swapaxes(second, 0, 1))
     first, other = np.triu_indices(symmetric.shape[0])
     pairs = symmetric[first, other] * np.where(first == other, 0.5, 1.0)[:, None] * weight

@@ -14,7 +14,7 @@ from savgs_ident.posterior.scales import NUISANCE, Scales
 def values_of(
     free: FreeVector, scales: Scales, points: Float[np.ndarray, "*w n+2"]
 ) -> dict[str, NDArray[np.float64]]:
-    """Points as SI values by name, the nuisance scales after the parameters."""
+    """Points as SI values by name, ``(*w,)`` each, the nuisance scales after the parameters."""
     flat = jnp.asarray(points.reshape(-1, points.shape[-1]))
     values = {name: np.asarray(each) for name, each in _constrained(free, flat[:, :-2]).items()}
     values |= dict(

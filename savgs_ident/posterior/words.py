@@ -23,7 +23,7 @@ def sentences_of(
     draws: Mapping[str, NDArray[np.float64]],
     advice: tuple[str, ...],
 ) -> tuple[str, ...]:
-    """The statements of a report, the most important first."""
+    """The statements of a report, the most important first. ``draws`` (s,) are in SI, by name."""
     identified = [each for each in marginals if each.role == "identified"]
     names = tuple(each.name for each in identified)
     covariance = log_covariance(names, draws)

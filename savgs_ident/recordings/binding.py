@@ -88,7 +88,7 @@ def mapped_channels(channel_map: ChannelMap) -> frozenset[str]:
 def factor_or_si(
     unit: str | None, channel: str, label: str, source: str, warnings: list[DataWarning]
 ) -> float:
-    """The factor of a unit, or 1 with a warning where none is written."""
+    """The factor of a unit [SI per unit], or 1 with a warning where none is written."""
     if unit:
         return unit_factor(unit, channel, source=source)
     si = CANONICAL_UNITS.get(channel, "s")

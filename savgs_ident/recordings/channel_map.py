@@ -77,7 +77,7 @@ def read_channel_map(path: Path | str) -> ChannelMap:
         content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", source=path, remedy="check the path") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"is not TOML: {error}", source=path, remedy="mend the line it names") from error
     _only(content, ("channels", "time", "tests"), path, "table")
     time = _table(content, "time", path)
@@ -152,6 +152,13 @@ def _text(table: dict[str, object], key: str, path: Path | str) -> str | None:
 
 def _number(table: dict[str, object], key: str, path: Path | str, channel: str) -> float:
     value = table[key]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        raise InputError(f"'{key}' is not a finite number", source=path, channel=channel, remedy="mend it")
-    return float(value)
+    wrong = InputError(f"'{key}' is not a finite number", source=path, channel=channel, remedy="mend it")
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise wrong
+    try:
+        number = float(value)
+    except OverflowError:
+        raise wrong from None
+    if not isfinite(number):
+        raise wrong
+    return number

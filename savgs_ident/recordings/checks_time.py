@@ -37,7 +37,7 @@ def check_time(
 ) -> tuple[Channel, tuple[DataWarning, ...]]:
     """The channel with repeated stamps removed, and what there was to say.
 
-    ``longest_gap`` is how long a gap may be, as a fraction of the record.
+    ``longest_gap`` is how long a gap may be, as a share of the record.
     Raises :class:`InputError` for stamps that run backwards, are mostly repeated, or whose rate no logger
     has.
     """

@@ -37,8 +37,9 @@ def check_missing(
 ) -> tuple[Channel | None, tuple[DataWarning, ...]]:
     """The channel without its missing samples; None where there is nothing else.
 
-    Missing samples that come regularly are those of a slower sensor in a faster table, and no fault.
-    Raises :class:`InputError` for infinite values, and where more is missing than the estimates stand.
+    Missing samples that come regularly are those of a slower sensor in a faster table, and no fault. Raises
+    :class:`InputError` for infinite values, and where more is missing than the estimates stand.
+    ``longest_gap`` is how long a gap may be, as a share of the record.
     """
     infinite = np.flatnonzero(np.isinf(channel.values))
     if infinite.size:

@@ -26,7 +26,7 @@ _SAME_EPOCH_NS = 2_000_000_000
 
 @dataclass(frozen=True)
 class ClockChoice:
-    """The time of every sample [ns, on the scale of the log time], the clock's name, and what to tell."""
+    """The time of every sample [ns, on the scale of the log time], (n,), the clock's name, and what to tell."""
 
     time: NDArray[np.int64]
     name: str
@@ -34,7 +34,10 @@ class ClockChoice:
 
 
 def irregularity(time: NDArray[np.int64]) -> float:
-    """10-90 % spread of the increments over their median; infinite where the clock stands still."""
+    """10-90 % spread of the increments of a clock (n,) over their median [1].
+
+    Infinite where the clock stands still.
+    """
     if time.size < 3:
         return inf
     low, middle, high = np.quantile(np.diff(time[:_JUDGED]), [0.1, 0.5, 0.9])

@@ -1,6 +1,7 @@
 """The head of a CSV file: delimiter, decimal mark, encoding, column names, and a row of units if any."""
 
 import csv
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ from savgs_ident.recordings.names import canonical_name, split_header
 from savgs_ident.recordings.units import find_unit
 
 _DELIMITERS = (",", ";", "\t")
+_CONTENT = re.compile(rb"^[ \t\r\v\f]*[^\s#][^\n]*", re.MULTILINE)
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
@@ -69,13 +71,8 @@ def _encoding(block: bytes) -> str:
 
 def _content_lines(block: bytes) -> Iterator[tuple[bytes, bytes, int]]:
     """Lines that are neither blank nor comments: the line, what follows it, and its number from 1."""
-    count = 0
-    while block:
-        line, _, block = block.partition(b"\n")
-        count += 1
-        line = line.strip()
-        if line and not line.startswith(b"#"):
-            yield line, block, count
+    for found in _CONTENT.finditer(block):
+        yield found[0].strip(), block[found.end() + 1 :], block.count(b"\n", 0, found.start()) + 1
 
 
 def _cells(line: str, delimiter: str) -> tuple[str, ...]:

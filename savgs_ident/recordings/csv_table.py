@@ -47,7 +47,7 @@ class CsvTable:
         self._line += block.count(b"\n")
 
     def take(self, position: int) -> NDArray[np.float64]:
-        """The whole column; it is handed over, not kept."""
+        """The whole column (rows,) in the unit of its header; it is handed over, not kept."""
         blocks = self._blocks.pop(position)
         return np.concatenate(blocks) if blocks else np.empty(0)
 

@@ -24,7 +24,7 @@ from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.reading import Progress
 
 MAGIC = b"\x89MCAP0\r\n"
-LARGEST_CHUNK = 1 << 30
+LARGEST_CHUNK = 1 << 27
 """Bytes that one chunk may unfold to. Writers use about 1 MiB: this is an accident or worse."""
 
 _HEAD = struct.Struct("<BQ")
@@ -177,7 +177,8 @@ class McapRecords:
         while position + smallest <= size:
             opcode, length, channel_id = unpack(data, position)
             end = position + 9 + length
-            if end > size:
+            # There is no opcode 0: these are zeros, and millions of them in a chunk of little else.
+            if end > size or not opcode:
                 break
             if opcode == message:
                 if length < _MESSAGE_HEAD:

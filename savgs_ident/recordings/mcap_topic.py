@@ -25,13 +25,16 @@ class Decoder(Protocol):
 
     notes: tuple[DataWarning, ...]
 
-    def candidates(self, first: bytes) -> tuple[Candidate, ...]: ...
+    def candidates(self, first: bytes) -> tuple[Candidate, ...]:
+        """The fields of a first message that hold numbers."""
 
-    def find(self, field: str, first: bytes) -> str | None: ...
+    def find(self, field: str, first: bytes) -> str | None:
+        """The key of a field as the user wrote it; None if the first message has none."""
 
     def decode(
         self, block: MessageBlock, keys: Sequence[str]
-    ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int64] | None]: ...
+    ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int64] | None]:
+        """Values (n,) by key [unit of the field], and the stamps of the headers [ns], (n,), if there are any."""
 
 
 def decoder_for(channel: McapChannel, schema: Schema | None) -> Decoder:
@@ -59,7 +62,7 @@ class TopicData:
     values: dict[str, NDArray[np.float64]]
 
     def in_order(self, order: NDArray[np.intp]) -> "TopicData":
-        """The same samples in another order."""
+        """The same samples in another ``order``, (n,)."""
         log = self.log[order]
         return replace(
             self,

@@ -46,7 +46,7 @@ def gather(data: bytes, positions: NDArray[np.int64], code: str) -> NDArray[Any]
 
 
 def message_block(data: bytes, records: NDArray[np.int64]) -> MessageBlock:
-    """The messages whose records begin at ``records`` in ``data``."""
+    """The messages whose records begin at ``records`` (n,) in ``data``."""
     length = gather(data, records + _LENGTH_AT, "<u8").astype(np.int64)
     log = gather(data, records + _LOG_AT, "<i8").astype(np.int64)
     publish = gather(data, records + _PUBLISH_AT, "<i8").astype(np.int64)

@@ -14,11 +14,11 @@ class Place:
     channel: str = ""
 
     def error(self, what: str, remedy: str, time: float | None = None) -> InputError:
-        """An error here."""
+        """An error here, at ``time`` [s] if it has one."""
         return InputError(
             what, source=self.source, test=self.test, channel=self.channel, time=time, remedy=remedy
         )
 
     def warning(self, code: str, what: str, remedy: str, time: float | None = None) -> DataWarning:
-        """A warning here."""
+        """A warning here, at ``time`` [s] if it has one."""
         return DataWarning(code, what, self.source, self.test, self.channel, time, remedy)

@@ -9,7 +9,7 @@ from savgs_ident.recordings.channel_map import ChannelMap
 from savgs_ident.recordings.recording import Recording
 
 Progress = Callable[[float], None]
-"""Told the fraction of the source that has been read, 0 to 1."""
+"""Told the share of the source that has been read, 0 to 1."""
 
 
 @dataclass(frozen=True)

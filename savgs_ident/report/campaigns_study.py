@@ -42,7 +42,7 @@ class Identified:
 
     @property
     def common_stderr(self) -> float:
-        """The part that is the same in all campaigns."""
+        """The part of the standard error that is the same in all campaigns."""
         return float(np.sqrt(max(self.stderr**2 - self.own_stderr**2, 0.0)))
 
 
@@ -120,7 +120,10 @@ class Study:
 def row_of(
     name: str, source: str, record: Mapping[str, Any], start: float | None, data_sha256: str
 ) -> CampaignRow:
-    """The row of a campaign that was fitted, from what its ``fit.json`` says."""
+    """The row of a campaign that was fitted, from what its ``fit.json`` says.
+
+    ``start`` is when it began [s since 1970, UTC].
+    """
     ratio = record["chi2_per_dof"]
     trusted = bool(record["trusted"])
     return CampaignRow(

@@ -90,7 +90,7 @@ def measured_points(response: HarmonicResponse) -> MeasuredPoints:
 
 
 def phase_deg(transfer: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Phase of one channel over frequency [deg], without jumps, beginning within [-90, 270).
+    """Phase of one channel over frequency [deg], (n,), without jumps, beginning within [-90, 270).
 
     A suspension's readings begin between 0 and 180 deg: neither end of that range is near.
     """

@@ -75,7 +75,8 @@ def gap_map_figure(diagnosis: Diagnosis, channel: str) -> Figure:
 def colour_steps(values: NDArray[np.float64], first: float, least: float) -> tuple[float, ...]:
     """Where the colour changes: at 0, at ``first``, then at round numbers up to the largest value.
 
-    The scale reaches ``least`` at least, so that a small gap looks small; the last step has no end.
+    The scale reaches ``least`` at least, so that a small gap looks small; the last step has no end. Values
+    of any shape and any unit, and the steps in the same unit.
     """
     largest = max(float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0)), least)
     beyond = [step for step in _ROUND if first < step <= largest]

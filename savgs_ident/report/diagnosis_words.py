@@ -127,7 +127,7 @@ def probability_words(probability: float) -> str:
 
 
 def gain_words(gain: float) -> str:
-    """A gain with its sign and three digits."""
+    """A gain [nat] with its sign and three digits."""
     if not isfinite(gain) or gain == 0.0:
         return signed(gain, 2)
     return signed(gain, min(max(2 - floor(log10(abs(gain))), 0), 3))

@@ -16,7 +16,10 @@ MOST = 0.02
 
 
 def alarms_record(draws: Sequence[NullDraw], odds: float, command: Sequence[str]) -> dict[str, Any]:
-    """How many of the draws were false alarms, the rate that they leave possible, and all odds."""
+    """How many of the draws were false alarms, the rate that they leave possible, and all odds.
+
+    Odds are log odds.
+    """
     solved = [each.odds for each in draws if each.odds is not None]
     alarms = sum(each.alarm for each in draws)
     return {
@@ -53,7 +56,7 @@ def alarms_text(record: Mapping[str, Any]) -> str:
 
 
 def alarms_figure(draws: Sequence[NullDraw], odds: float) -> Figure:
-    """Histogram of the odds of the draws, with those of the campaign and the threshold."""
+    """Histogram of the log odds of the draws, with those of the campaign and the threshold."""
     solved = np.array([each.odds for each in draws if each.odds is not None])
     with styled():
         figure = new_figure(6.4, 3.4)

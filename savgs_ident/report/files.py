@@ -10,7 +10,7 @@ from pathlib import Path
 
 from savgs_ident.core.files import cannot_write, write_bytes
 
-__all__ = ["Json", "prepare_folder", "to_json", "write_bytes", "write_json", "write_table"]
+__all__ = ["Json", "json_bytes", "prepare_folder", "to_json", "write_bytes", "write_json", "write_table"]
 
 Json = dict[str, object] | list[object] | str | int | float | bool | None
 """What a JSON file can say."""
@@ -34,9 +34,14 @@ def to_json(record: object) -> str:
     return json.dumps(_plain(record), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
+def json_bytes(record: object) -> bytes:
+    """:func:`to_json` of a record as UTF-8; a byte of a file name that is no text is spelled out as JSON does."""
+    return to_json(record).encode("utf-8", "backslashreplace")
+
+
 def write_json(path: Path, record: object) -> Path:
-    """Write :func:`to_json` of a record."""
-    return write_bytes(path, to_json(record).encode("utf-8", "backslashreplace"))
+    """Write :func:`json_bytes` of a record."""
+    return write_bytes(path, json_bytes(record))
 
 
 def write_table(path: Path, columns: Mapping[str, Sequence[object]]) -> Path:

@@ -70,7 +70,7 @@ def gap_record(fit: Fit) -> dict[str, object]:
 
 
 def gap_entry(before: Gap, after: Gap) -> dict[str, float]:
-    """One gap before and after as JSON has it."""
+    """One gap before and after as JSON has it, relative [1] and in noise standard deviations."""
     return {
         "before": before.relative,
         "after": after.relative,

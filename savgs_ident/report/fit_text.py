@@ -32,7 +32,10 @@ def fit_text(fit: Fit) -> RenderableType:
 
 
 def value_with_error(value: float, error: float) -> str:
-    """A value to the second significant digit of its error, ``0.03001 ± 0.00012``."""
+    """A value to the second significant digit of its error, ``0.03001 ± 0.00012``.
+
+    Both are in the same unit.
+    """
     if isinf(error):
         return f"{value:.3g}, not told"
     if not error > 0.0:

@@ -18,7 +18,7 @@ _UNKNOWN = float("nan")
 
 
 def digits(value: float) -> str:
-    """A number to four digits."""
+    """A number of any unit to four digits."""
     return numeral(value, _UNKNOWN)
 
 

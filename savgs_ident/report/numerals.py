@@ -24,17 +24,20 @@ _PLAIN = (-4, 5)
 
 
 def numeral(value: float, error: float) -> str:
-    """``value`` to the second significant digit of ``error``; to four digits of its own where that is unknown."""
+    """``value`` to the second significant digit of ``error``; to four digits of its own where that is unknown.
+
+    Both are in the same unit.
+    """
     return _scaled("{}", (value,), error)
 
 
 def with_error(value: float, error: float) -> str:
-    """A value and its error, both to the second significant digit of the error."""
+    """A value and its error in the same unit, both to the second significant digit of the error."""
     return _scaled("{} ± {}", (value, error), error)
 
 
 def interval(low: float, high: float, error: float) -> str:
-    """Two ends of an interval, to the second significant digit of ``error``."""
+    """Two ends of an interval, to the second significant digit of ``error``. All are in the same unit."""
     return _scaled("{} to {}", (low, high), error)
 
 
@@ -69,17 +72,17 @@ def percentage(share: float, places: int = 1) -> str:
 
 
 def decimal(number: float, places: int) -> str:
-    """A number with so many decimals; a dash where there is none."""
+    """A number of any unit with so many decimals; a dash where there is none."""
     return _grouped(number, places) if isfinite(number) else DASH
 
 
 def count(number: float) -> str:
-    """A whole number in groups of three; a dash where there is none."""
+    """A whole number [1] in groups of three; a dash where there is none."""
     return _grouped(round(number), 0) if isfinite(number) else DASH
 
 
 def signed(value: float, places: int) -> str:
-    """A number with its sign, none if it rounds to zero; a dash where there is no number."""
+    """A number of any unit with its sign, none if it rounds to zero; a dash where there is no number."""
     if not isfinite(value):
         return DASH
     rounded = round(value, places)

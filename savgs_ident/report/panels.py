@@ -76,7 +76,10 @@ def draw_peak_to_peak(
 
 
 def draw_residuals(axes: Axes, frequency: NDArray[np.float64], residuals: NDArray[np.float64]) -> None:
-    """Whitened residuals (D, K, 2): both parts of every order, the first harmonic on top; labelled."""
+    """Whitened residuals (D, K, 2): both parts of every order, the first harmonic on top; labelled.
+
+    ``frequency`` [Hz].
+    """
     axes.set_ylabel("residual [noise sd]")
     axes.axhspan(-_SIGMAS, _SIGMAS, color=PALE, alpha=0.6, linewidth=0.0, zorder=0)
     axes.axhline(0.0, color=INK, linewidth=0.8)

@@ -44,7 +44,7 @@ class Band:
 
     @property
     def misses(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Distance of measured magnitude and phase from the middle of their bands [half-widths], (D,) each."""
+        """How far magnitude and phase lie off the middle of their bands, in units of half their widths, (D,) each."""
         turned = np.angle(self.measured * np.conj(self.middle))
         return _in_half_widths(np.abs(self.measured), self.magnitude), _in_half_widths(turned, self.phase)
 

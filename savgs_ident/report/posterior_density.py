@@ -15,7 +15,10 @@ _COARSE = 90
 
 
 def limits_of(draws: NDArray[np.float64], *others: float) -> tuple[float, float]:
-    """Limits of an axis that shows nearly all ``draws`` and every one of ``others`` that is finite."""
+    """Limits of an axis that shows nearly all ``draws`` and every one of ``others`` that is finite.
+
+    ``draws`` (n,) and limits are in the same unit.
+    """
     inner = np.quantile(draws, (0.002, 0.998))
     known = [value for value in others if np.isfinite(value)]
     low, high = min(float(inner[0]), *known, np.inf), max(float(inner[1]), *known, -np.inf)
@@ -55,7 +58,10 @@ def joint_density(
 
 
 def region_levels(shares: NDArray[np.float64], contents: Sequence[float]) -> list[float]:
-    """Heights above which the densest regions hold these ``contents`` of all draws, in increasing order."""
+    """Heights above which the densest regions hold these ``contents`` of all draws, in increasing order.
+
+    ``shares`` of the draws are of any shape.
+    """
     falling = np.sort(shares.ravel())[::-1]
     held = np.cumsum(falling)
     levels = [falling[min(int(np.searchsorted(held, content)), held.size - 1)] for content in contents]

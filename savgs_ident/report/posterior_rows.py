@@ -25,7 +25,7 @@ _LEAST_WIDE = 1.2
 
 @dataclass(frozen=True)
 class Strip:
-    """Where two intervals lie on a common scale from 0 to 100, the one before the data and the one after.
+    """Where two intervals lie on a common scale from 0 to 100 per cent, the one before the data and the one after.
 
     ``words`` says the same for those who cannot see it.
     """

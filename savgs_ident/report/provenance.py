@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from savgs_ident.core.files import spelled_out
 from savgs_ident.fit.result import Fit
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.report.origin import versions_of
@@ -16,8 +17,8 @@ def provenance(fit: Fit, campaign: Campaign, command: Sequence[str]) -> dict[str
     the covariance is in the order of its names. SI.
     """
     return {
-        "command": " ".join(command),
-        "data": campaign.source,
+        "command": spelled_out(" ".join(command)),
+        "data": spelled_out(campaign.source),
         "data_sha256": campaign.sha256,
         "effects": list(fit.effects),
         "free": list(fit.free_names),

@@ -56,7 +56,10 @@ def comparable(measured: HarmonicResponse, orders: int) -> NDArray[np.bool_]:
 def gaps(
     measured: HarmonicResponse, predicted: NDArray[np.complex128], used: NDArray[np.bool_]
 ) -> dict[str, Gap]:
-    """The gap between the measured response and a prediction, by channel and "together"."""
+    """The gap between the measured response and a prediction, by channel and "together".
+
+    Prediction [unit of the reading] and ``used`` are (D, 2, K).
+    """
     orders = predicted.shape[2]
     sigma = whitened(measured, predicted, used)
     harmonics = _readings_of(measured, measured.harmonics)[..., :orders]
@@ -117,7 +120,8 @@ def _readings_of(measured: HarmonicResponse, field: NDArray[Any]) -> NDArray[Any
 
 def _pooled(each: list[Gap]) -> Gap:
     def rms(values: list[float]) -> float:
-        return float(np.sqrt(np.mean(np.square(values))))
+        # No channel has a gap where the model's motion was found in no dwell.
+        return float(np.sqrt(np.mean(np.square(values)))) if values else float("nan")
 
     return Gap(
         rms([gap.relative for gap in each]),

@@ -48,12 +48,12 @@ def styled() -> AbstractContextManager[None]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of this size [inch] that lays its parts out by itself."""
+    """An empty figure of this size [in, 25.4 mm] that lays its parts out by itself."""
     return Figure(figsize=(width, height), layout="constrained", facecolor="white")
 
 
 def frequency_axis(axes: Axes, lowest: float, highest: float, labelled: bool = True) -> None:
-    """A logarithmic frequency axis over [lowest, highest] Hz with round numbers on it."""
+    """A logarithmic frequency axis from ``lowest`` to ``highest`` [Hz] with round numbers on it."""
     axes.set_xscale("log")
     axes.set_xlim(lowest / 1.06, highest * 1.06)
     axes.xaxis.set_major_locator(FixedLocator([tick for tick in _TICKS if lowest / 1.06 <= tick]))

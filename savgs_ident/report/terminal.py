@@ -32,10 +32,10 @@ def table(
 
 
 def fixed(value: float | None, places: int) -> str:
-    """A number with ``places`` decimals, a dash where there is none."""
+    """A number of any unit with ``places`` decimals, a dash where there is none."""
     return "-" if value is None else f"{value:.{places}f}"
 
 
 def figure_of(value: float | None, digits: int = 4) -> str:
-    """A number with ``digits`` significant digits, a dash where there is none."""
+    """A number of any unit with ``digits`` significant digits, a dash where there is none."""
     return "-" if value is None else f"{value:.{digits}g}"

@@ -16,6 +16,7 @@ from savgs_ident.cli.main import app
 
 from .. import relaxed
 from .campaign_fakes import DAY, MONDAY, campaign_file
+from .installed import Installed
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 Program = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -48,6 +49,12 @@ def program(tmp_path: Path, environment: dict[str, str]) -> Program:
         )
 
     return run
+
+
+@pytest.fixture
+def installed(tmp_path: Path, environment: dict[str, str]) -> Installed:
+    """The installed program, in an empty folder."""
+    return Installed(tmp_path, environment)
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from savgs_ident.core.rig import default_rig_path
-from savgs_ident.effects.registry import CATALOGUE
+from savgs_ident.effects.registry import EFFECTS
 from savgs_ident.report import files
 
 
@@ -87,7 +87,7 @@ def test_effects_that_nobody_knows_are_refused(invoke, tmp_path: Path) -> None:
     done = invoke("simulate", "model.toml", "--frequency", "2")
     assert done.exit_code == 2
     assert "'[bold]magic[/]'" in flat(done.stderr)
-    assert f"list known effects: {', '.join(sorted(CATALOGUE))}." in flat(done.stderr)
+    assert f"list known effects: {', '.join(sorted(EFFECTS))}." in flat(done.stderr)
 
 
 def test_markup_in_a_path_is_shown_as_it_is(invoke) -> None:

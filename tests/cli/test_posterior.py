@@ -16,7 +16,7 @@ import pytest
 import xarray as xr
 from click.testing import Result
 
-from savgs_ident.cli.models import identified_in, rig_before
+from savgs_ident.cli.models import effects_in, identified_in, rig_before
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.rig import default_campaign_path, default_rig_path, read_rig, write_rig
 from savgs_ident.effects.registry import MODELS
@@ -153,12 +153,30 @@ def test_priors_are_those_from_before_the_fit() -> None:
 
 
 @pytest.mark.parametrize(
-    "broken", [{"before": 3}, {"before": {"k_sd": "much"}}, {"free": ["nonsense"]}, {"free": []}]
+    "broken",
+    [
+        {"before": 3},
+        {"before": {"k_sd": "much"}},
+        {"before": {"k_sd": 10**400}},
+        {"before": {"nonsense": 1.0}},
+        {"free": ["nonsense"]},
+        {"free": []},
+        {"free": [["mu_r"]]},
+        {"free": ["mu_r", "mu_r"]},
+    ],
 )
 def test_a_model_file_that_remembers_nonsense_is_refused(broken: dict[str, object]) -> None:
     rig = replace(read_rig(default_rig_path()), provenance=broken)
     with pytest.raises(InputError, match="provenance"):
         identified_in(rig, MODELS["simtr"], "x")
+
+
+def test_what_a_model_file_remembers_is_refused_with_its_name() -> None:
+    rig = replace(read_rig(default_rig_path()), provenance={"before": {"m_s": -1.0}, "effects": [["a"]]})
+    with pytest.raises(InputError, match=r"model\.toml: parameter 'm_s'"):
+        rig_before(rig, MODELS["simtr"], "model.toml")
+    with pytest.raises(InputError, match=r"model\.toml: provenance\.effects"):
+        effects_in(rig, "model.toml")
 
 
 @pytest.fixture

@@ -75,6 +75,7 @@ BAD_COVARIANCES: dict[str, object] = {
     "no names": {"matrix": [[1.0]]},
     "no matrix": {"names": ["m_s"]},
     "an unknown name": {"names": ["m_s", "mass"], "matrix": [[1.0, 0.0], [0.0, 1.0]]},
+    "a list for a name": {"names": [["m_s"]], "matrix": [[1.0]]},
     "a text for a name list": {"names": "m_s", "matrix": [[1.0]]},
     "a matrix too small": {"names": ["m_s", "m_u"], "matrix": [[1.0]]},
     "ragged": {"names": ["m_s", "m_u"], "matrix": [[1.0, 0.0], [0.0]]},
@@ -89,8 +90,9 @@ BAD_COVARIANCES: dict[str, object] = {
 @pytest.mark.parametrize("fault", BAD_COVARIANCES)
 def test_what_is_no_covariance_is_refused(table: ParameterTable, fault: str) -> None:
     with pytest.raises(InputError, match="no covariance") as caught:
-        rigs_from_covariance(table, {"covariance": BAD_COVARIANCES[fault]}, 5)
+        rigs_from_covariance(table, {"covariance": BAD_COVARIANCES[fault]}, 5, "model.toml")
     assert caught.value.remedy
+    assert caught.value.source == "model.toml"
 
 
 def _posterior(path: Path, **draws: object) -> Path:

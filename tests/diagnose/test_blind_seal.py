@@ -46,6 +46,7 @@ def test_every_part_of_the_answer_is_sealed(field: str) -> None:
     ("open_it", "said"),
     [
         (lambda: opened(SEAL, replace(ENVELOPE, salt="00fe"), DATA), "answer is not the one"),
+        (lambda: opened(SEAL, replace(ENVELOPE, salt="\ud800"), DATA), "answer is not the one"),
         (lambda: opened(SEAL, ENVELOPE, "b" * 64), "recordings are not those"),
         (lambda: opened(replace(SEAL, answer="c" * 64), ENVELOPE, DATA), "answer is not the one"),
         (lambda: opened(replace(SEAL, recordings="c" * 64), ENVELOPE, DATA), "recordings are not those"),

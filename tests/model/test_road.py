@@ -194,3 +194,19 @@ def test_links_are_held_swung_and_tabulated() -> None:
     table = tabulated_link([0.0, 1.0], [1.0, 2.0]).link(t, none)
     assert float(table.angle) == pytest.approx(1.25)
     assert float(table.velocity) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time,height\n", "is not a readable road"),
+        ("", "is not a readable road"),
+        ("time,height\n0,0\n1,1e308\n2,-1e308\n3,1e308\n4,0\n", "too steep"),
+    ],
+)
+def test_a_road_without_rows_or_beyond_all_numbers_is_refused(text: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "road.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=said) as caught:
+        read_road(path)
+    assert caught.value.source == str(path)

@@ -1,6 +1,8 @@
 """Draws are read back as they were written, evenly thinned; what holds none is refused."""
 
+import tracemalloc
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -61,6 +63,28 @@ def test_what_holds_no_draws_is_refused(tmp_path: Path, content: dict[str, np.nd
     assert said in caught.value.what
     assert caught.value.source == str(path)
     assert "savgs-ident posterior" in caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    "declared",
+    [
+        {"shape": (1 << 40,), "chunks": (1 << 16,)},
+        {"shape": (1 << 15, 1 << 15), "chunks": (64, 64), "fillvalue": 1.0},
+        {"shape": (4,), "maxshape": (None,), "chunks": (1 << 27,)},
+    ],
+)
+def test_numbers_that_are_declared_and_not_there_take_no_memory(
+    tmp_path: Path, declared: dict[str, Any]
+) -> None:
+    path = tmp_path / "x.nc"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("posterior/a", dtype="f8", **declared)
+    assert path.stat().st_size < 100_000
+    tracemalloc.start()
+    with pytest.raises(InputError, match="declares more than"):
+        read_draws(path, ("a",))
+    assert tracemalloc.get_traced_memory()[1] < 1 << 22
+    tracemalloc.stop()
 
 
 def test_what_is_no_file_is_refused(tmp_path: Path) -> None:

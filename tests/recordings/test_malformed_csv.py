@@ -242,6 +242,10 @@ MAPS = {
         '[channels.road_height]\ncolumn = "x"\nscale = "big"',
         "'scale' is not a finite number",
     ),
+    "scale without end": (
+        f'[channels.road_height]\ncolumn = "x"\nscale = {"9" * 400}',
+        "'scale' is not a finite number",
+    ),
     "column as number": ("[channels.road_height]\ncolumn = 3", "'column' is not a text"),
     "not a table": ("channels = 3", "'channels' is not a table"),
     "unknown clock": ('[time]\nclock = "sun"', "clock 'sun' is not known.*header, log, publish"),

@@ -59,4 +59,4 @@ def envelope_of(record: Mapping[str, Any]) -> Envelope:
 
 def _digest(envelope: Envelope) -> str:
     text = json.dumps(asdict(envelope.answer), sort_keys=True, ensure_ascii=False)
-    return hashlib.sha256(f"{envelope.salt}\n{text}".encode()).hexdigest()
+    return hashlib.sha256(f"{envelope.salt}\n{text}".encode("utf-8", "surrogatepass")).hexdigest()

@@ -1,0 +1,225 @@
+"""Files of models: rigs, drawn and identified, weights, controllers, draws, exported models, diagnoses."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import control
+import h5py
+import jax.numpy as jnp
+import numpy as np
+
+from fuzz.loader import Original
+from savgs_ident.cli.exporting import Job, gathered_for
+from savgs_ident.cli.models import ModelName, effects_in, effects_of, identified_in, rig_before
+from savgs_ident.control.alpha_map import AlphaMap
+from savgs_ident.control.controller_file import DigitalController, controller_record, read_controller
+from savgs_ident.control.rigs import rigs_from_covariance, rigs_from_posterior
+from savgs_ident.control.weights import DEFAULT_WEIGHTS, read_weights
+from savgs_ident.core.rig import Rig, default_rig_path, read_rig, rig_text
+from savgs_ident.effects.registry import model_parameters
+from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.json_export import model_record, read_model_json, write_json
+from savgs_ident.export.json_text import json_text
+from savgs_ident.export.linear_models import LINEAR
+from savgs_ident.export.python_control_export import KIND, SCHEMA, load_python_control, resting_point
+
+ESTIMATED = ("mu_r", "mu_t", "ydot_Hth", "c_sd", "k_t")
+EFFECTS = effects_of(ModelName.simtr)
+MOUNT = ("mount_compliance", "mount_damping")
+DRAWS = 6
+
+
+def drawing() -> Original:
+    """The shipped rig."""
+    return Original((default_rig_path().read_bytes(),))
+
+
+def identified() -> Original:
+    """The rig as an identification leaves it."""
+    return Original((rig_text(identified_rig()).encode(),))
+
+
+def weights() -> Original:
+    """All weights of a design."""
+    return Original(
+        (
+            "".join(
+                f'{e.name} = {{ value = {e.value}, unit = "{e.unit}" }}\n' for e in DEFAULT_WEIGHTS.entries
+            ).encode(),
+        )
+    )
+
+
+def controller() -> Original:
+    """A controller of two states."""
+    space = control.ss([[0.9, 0.1], [0.0, 0.8]], np.ones((2, 3)), [[0.1, -1.0]], [[0.0, 2.0, 1e-3]], 1e-3)
+    alpha = AlphaMap(jnp.asarray(np.pi / 2.0), jnp.asarray([-0.017, 0.001, 0.009]))
+    return Original((json.dumps(controller_record(DigitalController(space, alpha))).encode(),))
+
+
+def posterior() -> Original:
+    """Draws of two chains."""
+    stream = BytesIO()
+    random = np.random.default_rng(4)
+    with h5py.File(stream, "w") as file:
+        for name, value in zip(ESTIMATED, _values(), strict=True):
+            file[f"posterior/{name}"] = value * (1.0 + 0.01 * random.standard_normal((2, DRAWS)))
+        file["posterior/chain"] = np.arange(2)
+        file["sample_stats/lp"] = random.standard_normal((2, DRAWS))
+    return Original((stream.getvalue(),))
+
+
+def exported() -> Original:
+    """A model with covariance, draws and a diagnosis."""
+    return _written(lambda folder: write_json(_model(), folder))
+
+
+def python_control() -> Original:
+    """The same as state spaces; both are that of equation (8), as the exact one takes long to make."""
+    model = model_record(_model())
+    space = model["linear_equivalent"]["state_space"]  # type: ignore[index]
+    states, inputs = len(_model().equations.states), len(_model().equations.inputs)
+    record = {
+        "schema": SCHEMA,
+        "kind": KIND,
+        "model": model,
+        "state_spaces": dict.fromkeys(LINEAR, space),
+        "at_rest": {"x": [0.0] * states, "u": [0.0] * inputs},
+    }
+    return Original((json_text(record).encode(),))
+
+
+def diagnosis() -> Original:
+    """Diagnoses that name an effect, nothing, and something unknown."""
+    kinds = {"effect": (["mount_compliance"], ["strut"]), "none": ([], []), "unknown": ([], ["frame"])}
+    return Original(tuple(json.dumps(_diagnosis(kind, *named)).encode() for kind, named in kinds.items()))
+
+
+def read_drawing(path: Path) -> object:
+    """The rig of a file."""
+    return read_rig(path)
+
+
+def read_identified(path: Path) -> object:
+    """The rig with all that commands take from its provenance: effects, parameters, priors, rigs to try."""
+    rig = read_rig(path)
+    effects = effects_in(rig, path)
+    free, values = identified_in(rig, effects, path)
+    before = rig_before(rig, effects, path)
+    rigs = rigs_from_covariance(model_parameters(rig, effects), rig.provenance, DRAWS, path)
+    # The provenance itself travels along as it is.
+    return replace(rig, provenance={}), replace(before, provenance={}), effects, free, values, rigs
+
+
+def read_weights_file(path: Path) -> object:
+    """The weights of a file."""
+    return read_weights(path)
+
+
+def read_controller_file(path: Path) -> object:
+    """The controller of a file, and its rate."""
+    found = read_controller(path)
+    return found, found.rate
+
+
+def read_posterior(path: Path) -> object:
+    """Rigs of a file of draws."""
+    return rigs_from_posterior(model_parameters(_shipped(), EFFECTS), path, DRAWS)
+
+
+def read_exported(path: Path) -> object:
+    """The model of a document, and how it would be exported again."""
+    found = read_model_json(path)
+    return found.rig.parameters, found.samples, found.table, found.effects
+
+
+def read_python_control(path: Path) -> object:
+    """The systems of a file, and where they rest."""
+    systems = load_python_control(path)
+    return {name: each for name, each in systems.items() if name != "nonlinear"}, resting_point(path)
+
+
+def read_diagnosis_file(path: Path) -> object:
+    """The diagnosis, and the model with what it names, as an export has it."""
+    job = Job(default_rig_path(), (), None, DRAWS, path, None, ())
+    gathered = gathered_for(job, _shipped())
+    return gathered.model.rig.parameters, gathered.model.effects, gathered.said, gathered.doubts
+
+
+def identified_rig() -> Rig:
+    """The shipped rig, as if it had been identified."""
+    rig, size = _shipped(), np.array(_values())
+    root = np.random.default_rng(5).standard_normal((size.size, size.size)) * 0.01 * size[:, None]
+    provenance = {
+        "effects": list(EFFECTS),
+        "free": ["mu_r", "c_sd"],
+        "trusted": True,
+        "status": "converged",
+        "data": "campaign.csv.gz",
+        "before": dict(zip(ESTIMATED, size.tolist(), strict=True)),
+        "covariance": {"names": list(ESTIMATED), "matrix": (root @ root.T).tolist()},
+    }
+    changed = dict(zip(ESTIMATED, (1.01 * size).tolist(), strict=True))
+    return replace(rig, parameters=rig.parameters.with_values(changed), provenance=provenance)
+
+
+@lru_cache(maxsize=1)
+def _shipped() -> Rig:
+    return read_rig(default_rig_path())
+
+
+def _values() -> tuple[float, ...]:
+    return model_parameters(_shipped(), EFFECTS).values_of(ESTIMATED)
+
+
+@lru_cache(maxsize=1)
+def _model() -> ExportedModel:
+    random = np.random.default_rng(6)
+    samples = {
+        name: value * (1.0 + 0.01 * random.standard_normal(DRAWS))
+        for name, value in zip(ESTIMATED, _values(), strict=True)
+    }
+    effects = (*EFFECTS, "mount_compliance")
+    return ExportedModel(
+        identified_rig(), effects, samples, _diagnosis("effect", ["mount_compliance"], ["strut"])
+    )
+
+
+def _written(write: Callable[[Path], tuple[Path, ...]]) -> Original:
+    with TemporaryDirectory() as folder:
+        (path,) = write(Path(folder))
+        return Original((path.read_bytes(),))
+
+
+def _diagnosis(kind: str, effects: list[str], ports: list[str]) -> dict[str, object]:
+    fitted = {
+        name: {"value": value, "lo": 0.99 * value, "hi": 1.01 * value, "unit": unit}
+        for name, value, unit in zip(MOUNT, (1.65e-6, 357.0), ("m/N", "N s/m"), strict=True)
+    }
+    return {
+        "schema": 1,
+        "baseline": {"model": "simtr", "parameters": {"mu_r": 0.03}, "effects": list(EFFECTS)},
+        "verdict": {
+            "kind": kind,
+            "effects": effects,
+            "ports": ports,
+            "confusable_with": [],
+            "sentence": "In words.",
+        },
+        "where": {"ports": [{"port": "strut", "share": 0.97}], "map": []},
+        "which": [
+            {"effect": "none", "probability": 0.0, "parameters": {}, "effects": [], "share_closed": None},
+            {"effect": MOUNT[0], "probability": 0.996, "parameters": fitted, "effects": [MOUNT[0]]},
+        ],
+        "shrink": {"before": 0.33, "after": 0.0019},
+        "next_test": [],
+        "identified": {"mu_r": 0.0301, "k_t": 264423.0}
+        | ({MOUNT[0]: 1.65e-6, MOUNT[1]: 357.0} if effects else {}),
+        "converged": True,
+        "provenance": {"data": "campaign.csv.gz", "data_sha256": "ab12", "model": "gt_rear.toml"},
+    }

@@ -1,0 +1,79 @@
+"""Every way in which the package reads a file of data, a line or two each."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from fuzz import kept, models, recordings
+from fuzz.loader import Form, Loader
+
+_CSV = (
+    "recordings.csv_reader.read_csv", "recordings.csv_table.CsvTable._parse", "recordings.csv_header._cells",
+)  # fmt: skip
+_JSON_MCAP = (
+    "recordings.json_decoder.JsonDecoder._parse", "recordings.json_decoder._schema_units",
+    "recordings.events._from_json", "recordings.mcap_records.McapRecords._decompress",
+)  # fmt: skip
+_CDR_MCAP = (
+    "recordings.events._cdr_string", "recordings.cdr_layout._Walk._length",
+    "recordings.mcap_records.McapRecords._undo",
+)  # fmt: skip
+_MATLAB = tuple(
+    f"diagnose.positioner.mat_file.{name}" for name in ("_unpacked", "_arrays", "_element", "_header")
+)
+_RESULT = ("cli.campaign_store.kept_result", "cli.campaign_store.Kept.record")
+_TRIALS = ("cli.kept_trials.marks_in", "cli.kept_trials.known_trials")
+_BLIND = ("cli.blind_trial._read",)
+_EXPORT = ("export.place.read_document",)
+
+_LOADERS = (
+    Loader("csv", "campaign as a table", "campaign.csv", Form.table, recordings.table, recordings.read_table, _CSV),
+    Loader("csv-gz", "campaign as a table, gzipped", "campaign.csv.gz", Form.packed_table, recordings.packed_table,
+           recordings.read_table, ("recordings.text_blocks.TextBlocks._inflated",)),
+    Loader("mcap-json", "campaign in MCAP, JSON", "campaign.mcap", Form.mcap, recordings.json_mcap,
+           recordings.read_table, _JSON_MCAP),
+    Loader("mcap-cdr", "campaign in MCAP, ROS 2 CDR", "campaign.mcap", Form.mcap, recordings.cdr_mcap,
+           recordings.read_table, _CDR_MCAP),
+    Loader("channels", "channels.toml, and the campaign that it maps", "channels.toml", Form.toml,
+           recordings.channel_map, recordings.read_map, ("recordings.channel_map.read_channel_map",)),
+    Loader("road", "road as a table", "road.csv", Form.table, recordings.road, recordings.read_road_file,
+           ("model.road.read_road",)),
+    Loader("positioner", "recording of the positioner", "run.mat", Form.matlab, recordings.positioner,
+           recordings.read_positioner_file, _MATLAB),
+    Loader("rig", "drawing of a rig", "rig.toml", Form.toml, models.drawing, models.read_drawing,
+           ("core.rig._load",)),
+    Loader("model", "identified model.toml, with its provenance", "model.toml", Form.toml, models.identified,
+           models.read_identified, ("core.rig._load",)),
+    Loader("weights", "weights.toml of a design", "weights.toml", Form.toml, models.weights,
+           models.read_weights_file, ("control.weights.read_weights",)),
+    Loader("controller", "controller.json", "controller.json", Form.json, models.controller,
+           models.read_controller_file, ("control.controller_file.read_controller",)),
+    Loader("posterior", "draws in posterior.nc", "posterior.nc", Form.hdf5, models.posterior,
+           models.read_posterior, ("posterior.draws.read_draws",)),
+    Loader("model-json", "exported model.json", "model.json", Form.json, models.exported, models.read_exported,
+           _EXPORT),
+    Loader("python-control", "exported model-control.json", "model-control.json", Form.json,
+           models.python_control, models.read_python_control, _EXPORT),
+    Loader("diagnosis", "diagnosis.json, and the model with it", "diagnosis.json", Form.json, models.diagnosis,
+           models.read_diagnosis_file, _EXPORT),
+    Loader("kept-seal", "done.json of a campaign's result", "nominal/done.json", Form.json, kept.kept_seal,
+           kept.read_result, _RESULT),
+    Loader("kept-fit", "fit.json of a campaign's result", "nominal/fit.json", Form.json, kept.kept_fit,
+           kept.read_result, _RESULT),
+    Loader("kept-blind", "marks of blind trials", "trials.jsonl", Form.lines, kept.kept_blind, kept.read_blind,
+           _TRIALS),
+    Loader("kept-draws", "draws of `false-alarms`", "draws.jsonl", Form.lines, kept.kept_draws, kept.read_draws,
+           _TRIALS),
+    Loader("kept-trials", "trials of `calibrate`", "trials.jsonl", Form.lines, kept.kept_trials,
+           kept.read_trials, _TRIALS),
+    Loader("blind-seal", "seal.json of a blind trial", "trial_0001/campaign/seal.json", Form.json,
+           kept.blind_seal, kept.read_blind_seal, _BLIND),
+    Loader("blind-answer", "answer.json of a blind trial", "trial_0001/answer.json", Form.json,
+           kept.blind_answer, kept.read_blind_answer, _BLIND),
+    Loader("chain-nuts", "kept chain of NUTS", "chain.h5", Form.hdf5, kept.nuts_chain, kept.read_nuts_chain,
+           ("posterior.keep.open_keep", "posterior.nuts_sampler._load")),
+    Loader("chain-emcee", "kept chain of emcee", "chain.h5", Form.hdf5, kept.emcee_chain, kept.read_emcee_chain,
+           ("posterior.keep.open_keep",)),
+)  # fmt: skip
+
+LOADERS: Mapping[str, Loader] = MappingProxyType({each.name: each for each in _LOADERS})
+"""All loaders by name."""

@@ -1,0 +1,148 @@
+"""Names that nobody should give to a file, a test, a column, a topic or a rig: shown as they are, never obeyed."""
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from mcap.writer import Writer
+
+from savgs_ident.core.rig import default_rig_path
+
+from ..report.page_reader import Reader
+from .installed import Installed, files_in
+
+FILES = (
+    b"<script>alert(1)<script>.csv",
+    b"[bold red]run[link=x].csv",
+    b"two\nlines\x1b[31m\x1b]0;title\x07.csv",
+    b"\xff\xfe\xed\xa0\x80.csv",
+    b"..%2f..%2fx.csv",
+    b"-rf.csv",
+    b"x" * 240 + b".csv",
+)
+TESTS = (
+    "<script>alert(1)</script>_2Hz",
+    "../../../escaped_2Hz",
+    "two\nlines\x1b[31m_2Hz",
+    "[bold red]_[/bold red][/]_2Hz",
+    "y" * 5000 + "_2Hz",
+)
+EVIL = "<script>alert(1)</script><img src=x onerror=alert(2)>[bold]\"'&\x1b[31m../../x"
+
+
+def _sound(text: str) -> None:
+    assert "\x1b" not in text
+    assert "Traceback" not in text
+
+
+def _harmless(page: Path) -> None:
+    """A page without a script or an attribute that is one, in which the name stands as text."""
+    reader = Reader(page.read_text("utf-8"))
+    assert "script" not in {tag for tag, _ in reader.tags}
+    assert not [name for _, attributes in reader.tags for name in attributes if name.startswith("on")]
+    assert any("<script>alert(1)" in text for text in reader.texts)
+
+
+@pytest.mark.parametrize("name", FILES, ids=range(len(FILES)))
+def test_a_file_of_any_name_is_read_and_nothing_is_written_elsewhere(
+    installed: Installed, short_campaign: Path, name: bytes
+) -> None:
+    shutil.copy(short_campaign, installed.folder / os.fsdecode(name))
+    for more in ((), ("--json",)):
+        done = installed.run("inspect", "--out", "o", *more, b"./" + name, LC_ALL="C.UTF-8")
+        assert done.returncode == 0, done.stderr
+        _sound(done.stdout + done.stderr)
+        assert done.stderr.splitlines()[1:] == ["estimating responses", "drawing"]
+    record = json.loads((installed.folder / "o" / "inspect.json").read_text("utf-8"))
+    assert record["source"] == os.fsdecode(name)
+    assert files_in(installed.folder) == sorted(
+        [os.fsdecode(name), "o/inspect.json", "o/inspect.pdf", "o/inspect.png"]
+    )
+
+
+@pytest.mark.parametrize("test", TESTS, ids=range(len(TESTS)))
+def test_a_test_and_a_column_of_any_name(installed: Installed, short_campaign: Path, test: str) -> None:
+    table = pd.read_csv(short_campaign)
+    table["test"] = table["test"].replace({"dwell_2.35Hz": test})
+    table[f"{test} [m]"] = 0.0
+    table.to_csv(installed.folder / "run.csv", index=False)
+    done = installed.run("inspect", "run.csv", "--out", "o")
+    assert done.returncode in (0, 2)
+    _sound(done.stdout + done.stderr)
+    assert set(files_in(installed.folder)) <= {
+        "run.csv", "o/inspect.json", "o/inspect.pdf", "o/inspect.png"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("topic", [EVIL, "/" + "t" * 5000, "two\nlines\x1b[31m"])
+def test_a_topic_of_any_name(installed: Installed, topic: str) -> None:
+    with (installed.folder / "run.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel(topic, "json", 0)
+        for number in range(3):
+            writer.add_message(channel, 10**9 * number, json.dumps({topic: 1.0}).encode(), 10**9 * number)
+        writer.finish()
+    done = installed.run("inspect", "run.mcap", "--out", "o", "--quiet")
+    assert done.returncode == 2
+    _sound(done.stderr)
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("Error: run.mcap")
+    assert files_in(installed.folder) == ["run.mcap"]
+
+
+@pytest.mark.slow
+def test_an_identified_rig_remembers_any_name(installed: Installed, short_campaign: Path) -> None:
+    quick = ("--free", "c_sd", "--max-frequency", "2", "--fixed-tolerances", "--quiet")
+    for number, name in enumerate(FILES[:4]):
+        shutil.copy(short_campaign, installed.folder / os.fsdecode(name))
+        done = installed.run("fit", *quick, "--out", f"o{number}", b"./" + name)
+        assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+        again = installed.run(
+            "export", f"o{number}/model.toml", "--to", "json", "--out", f"e{number}", "--quiet"
+        )
+        assert (again.returncode, again.stderr) == (0, "")
+    names = {os.fsdecode(name) for name in FILES[:4]}
+    assert {path.name for path in installed.folder.iterdir()} == names | {
+        f"{kind}{number}" for kind in "oe" for number in range(4)
+    }
+
+
+@pytest.mark.slow
+def test_the_report_on_campaigns_shows_their_names(installed: Installed, short_campaign: Path) -> None:
+    data = installed.folder / "data"
+    data.mkdir()
+    for name in FILES[:4]:
+        shutil.copy(short_campaign, data / os.fsdecode(name))
+    quick = ("--free", "c_sd", "--max-frequency", "2", "--fixed-tolerances", "--workers", "1")
+    done = installed.run("campaign", data, *quick, "--out", "o")
+    assert done.returncode == 0, done.stderr
+    _sound(done.stdout + done.stderr)
+    _harmless(installed.folder / "o" / "campaign.html")
+    assert {path.name for path in installed.folder.iterdir()} == {"data", "o"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "page"),
+    [
+        (("linearise",), "linearise.html"),
+        (("design", "--rigs", "1"), "design.html"),
+        (("simulate", "--frequency", "2"), None),
+        (("export", "--to", "json", "mat", "python-control", "casadi", "c"), None),
+    ],
+)
+def test_a_rig_of_any_name(installed: Installed, words: tuple[str, ...], page: str | None) -> None:
+    text = default_rig_path().read_text("utf-8")
+    assert 'name = "gt_rear"' in text
+    rig = installed.folder / "rig.toml"
+    rig.write_text(text.replace('name = "gt_rear"', f"name = {json.dumps(EVIL)}", 1), "utf-8")
+    done = installed.run(*words[:1], "rig.toml", *words[1:], "--out", "o")
+    assert done.returncode == 0, done.stderr
+    _sound(done.stdout + done.stderr)
+    if page is not None:
+        _harmless(installed.folder / "o" / page)
+    assert {path.name for path in installed.folder.iterdir()} == {"rig.toml", "o"}
