@@ -79,7 +79,7 @@ def kept_draws() -> Original:
 def kept_trials() -> Original:
     """Trials of a calibration."""
     trials = [
-        Trial(number, True, True, 120.0, {"mu_r": 40 + number, "c_sd": 9}, {"mu_r": True, "c_sd": False})
+        Trial(number, True, True, 120.0, {"mu_r": 30 + number, "c_sd": 9}, {"mu_r": True, "c_sd": False})
         for number in range(3)
     ]
     return _lines(MARKS, [*trials, Trial(3, False, False, 0.0, {}, {})])
