@@ -29,7 +29,7 @@ LIFT, DURATION = 0.02, 2.0
 """From how high the rig is let go [m], and for how long it is watched [s]."""
 
 
-@pytest.fixture(scope="module", params=["simqc", "simtr"])
+@pytest.fixture(scope="module", params=[pytest.param("simqc", marks=pytest.mark.slow), "simtr"])
 def exported(
     rig: Rig, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[ExportedModel, Path]:

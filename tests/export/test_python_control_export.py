@@ -63,6 +63,7 @@ def test_linear_systems_come_back_to_the_last_digit(systems: dict[str, Any], mod
         )
 
 
+@pytest.mark.slow
 def test_the_nonlinear_right_side_is_the_equations(systems: dict[str, Any], model: ExportedModel) -> None:
     rig, equations = systems["nonlinear"], model.equations
     assert isinstance(rig, control.NonlinearIOSystem)

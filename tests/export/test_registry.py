@@ -23,7 +23,13 @@ def _write(name: str, model: ExportedModel, folder: Path) -> tuple[Path, ...]:
         pytest.skip(str(error))
 
 
-@pytest.mark.parametrize("name", EXPORTS)
+COMPILED = ("casadi", "c", "fmu")
+"""Formats that take long, and whose own tests write them anyway."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(each, marks=pytest.mark.slow if each in COMPILED else ()) for each in EXPORTS]
+)
 def test_every_format_writes_the_files_that_it_says_and_nothing_else(
     name: str, model: ExportedModel, tmp_path: Path
 ) -> None:
