@@ -4,6 +4,7 @@
 #   make test-slow   the tests that take minutes
 #   make bench       the benchmark table
 #   make docs        the guide and the reference, in build/docs
+#   make fuzz        every loader on damaged files, counted in docs/fuzzing.md
 #   make clean       remove .venv and caches
 # Another interpreter: make demo PYTHON=python3.12. Options for pytest: make test PYTEST_ARGS="-k rig".
 
@@ -13,7 +14,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-.PHONY: demo test lint test-slow bench docs clean
+.PHONY: demo test lint test-slow bench docs fuzz clean
 
 demo: $(VENV)/.installed
 	$(BIN)/savgs-ident demo
@@ -38,6 +39,9 @@ docs: $(VENV)/.installed-docs
 	rm -rf docs/reference
 	$(BIN)/python -m sphinx -W --keep-going -q -E docs build/docs
 	@echo "build/docs/index.html"
+
+fuzz: $(VENV)/.installed-test
+	$(BIN)/python -m fuzz --count 2000 --seed 1 --jobs 2 --out docs/fuzzing.md
 
 clean:
 	rm -rf docs/reference $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis build dist

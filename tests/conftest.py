@@ -37,6 +37,13 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 SHARED = REPOSITORY.parent / "shared" / "data"
 
 
+def pytest_configure() -> None:
+    """Have the compiler as users have it, twice as fast: later than here, the first program may be compiled."""
+    from savgs_ident.simulate.compilation import spare_the_compiler
+
+    spare_the_compiler()
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """One line where reports were not opened in a browser, because there is none: a green run must not hide it."""
     reasons = [str(report.longrepr) for report in terminalreporter.stats.get("skipped", [])]

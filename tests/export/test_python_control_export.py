@@ -96,6 +96,7 @@ def test_it_rests_where_it_says(systems: dict[str, Any], path: Path) -> None:
     assert systems["nonlinear"].dynamics(0.0, x, u) == pytest.approx(np.zeros(x.size), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_it_moves_as_the_simulator_says(systems: dict[str, Any], model: ExportedModel, path: Path) -> None:
     """On a cam, with friction and the mount: python-control's integration against ours."""
     # Between these instants python-control takes the inputs as straight lines: of a cam, that is off by 3e-8 m.
@@ -175,6 +176,7 @@ def test_a_rest_that_does_not_fit_is_refused(path: Path, tmp_path: Path) -> None
         resting_point(broken)
 
 
+@pytest.mark.slow
 def test_a_rig_without_friction_has_the_same_systems(rig: Rig, tmp_path: Path) -> None:
     (path,) = write_python_control(ExportedModel(rig, MODELS["simqc"]), tmp_path)
     found = load_python_control(path)
