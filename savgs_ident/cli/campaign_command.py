@@ -46,7 +46,7 @@ def campaign(
         typer.Option(
             "--workers",
             min=1,
-            help="Campaigns at a time on this machine; one for each core if not given.",
+            help="Campaigns at a time on this machine, each on one core; as many as there are cores if not given.",
             show_default=False,
         ),
     ] = None,

@@ -12,7 +12,11 @@ from savgs_ident.core.files import spelled_out
 from savgs_ident.core.rig import parse_rig, rig_text
 from savgs_ident.report.files import to_json
 from savgs_ident.report.fit_record import fit_record
-from savgs_ident.simulate.compilation import make_room_for_programs, use_persistent_cache
+from savgs_ident.simulate.compilation import (
+    compute_on_one_core,
+    make_room_for_programs,
+    use_persistent_cache,
+)
 
 
 @dataclass(frozen=True)
@@ -47,9 +51,10 @@ Outcome = Kept | Failure
 def identify_one(task: Task) -> Outcome:
     """Fit the campaign; whatever goes wrong with it is its result and ends nothing else."""
     try:
+        # There are as many of these as there are cores.
+        compute_on_one_core()
         use_persistent_cache()
         make_room_for_programs()
-        # There are as many of these as there are cores.
         with threadpool_limits(1, "blas"):
             return _identified(task)
     except InputError as error:

@@ -25,8 +25,8 @@ Result = TypeVar("Result")
 ATTEMPTS = 3
 """How often a task is begun before it is given up."""
 
-TASKS = 16
-"""Tasks of a process before it makes room for a new one: compiled programs would fill the memory in time."""
+TASKS = 64
+"""Tasks of a process before it makes room for a new one: what libraries keep would fill the memory in time."""
 
 _PATIENCE_S = 5.0
 """How long a process may take to end by itself."""
