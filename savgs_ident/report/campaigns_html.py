@@ -3,10 +3,17 @@
 from collections.abc import Mapping, Sequence
 
 from savgs_ident.report.campaigns_figure import campaigns_figure
-from savgs_ident.report.campaigns_record import utc_text
+from savgs_ident.report.campaigns_record import utc_minute
 from savgs_ident.report.campaigns_study import RowStatus, Study
 from savgs_ident.report.campaigns_text import TREND_HEADERS, trend_rows
-from savgs_ident.report.campaigns_words import alarm, headline, over, parameter_words, widening_words
+from savgs_ident.report.campaigns_words import (
+    alarm,
+    headline,
+    over,
+    parameter_headers,
+    value_words,
+    widening_words,
+)
 from savgs_ident.report.html import embed
 from savgs_ident.report.numerals import DASH, count, decimal
 from savgs_ident.report.origin import versions_of
@@ -81,14 +88,20 @@ def _campaigns(study: Study) -> Section:
     rows = tuple(
         (
             row.name,
-            *((utc_text(row.start) or DASH,) if timed else ()),
+            *((utc_minute(row.start) or DASH,) if timed else ()),
             row.status.value,
             DASH if row.chi2_per_dof is None else decimal(row.chi2_per_dof, 3),
-            *(parameter_words(row.parameters[name]) if name in row.parameters else DASH for name in names),
+            *(value_words(row.parameters[name]) if name in row.parameters else DASH for name in names),
         )
         for row in study.rows
     )
-    headers = ("Campaign", *(("Start [UTC]",) if timed else ()), "Status", "chi2/dof", *names)
+    headers = (
+        "Campaign",
+        *(("Start [UTC]",) if timed else ()),
+        "Status",
+        "chi2/dof",
+        *parameter_headers(study),
+    )
     numeric = tuple(range(2 + timed, len(headers)))
     return Section("campaigns", "Campaigns", table=Table("One by one", headers, rows, numeric))
 

@@ -41,6 +41,13 @@ def utc_text(start: float | None) -> str | None:
     return datetime.fromtimestamp(start, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
+def utc_minute(start: float | None) -> str | None:
+    """A time [s since 1970] to the minute, in UTC: for tables that are read, and narrow."""
+    if start is None:
+        return None
+    return datetime.fromtimestamp(start, UTC).strftime("%Y-%m-%d %H:%M")
+
+
 def campaigns_columns(study: Study) -> dict[str, list[object]]:
     """A column a quantity, headed by its name and unit, a row a campaign; None where there is no number."""
     rows = study.rows

@@ -2,14 +2,15 @@
 
 from rich.console import Group, RenderableType
 
-from savgs_ident.report.campaigns_record import utc_text
+from savgs_ident.report.campaigns_record import utc_minute
 from savgs_ident.report.campaigns_study import RowStatus, Study
 from savgs_ident.report.campaigns_words import (
     headline,
-    parameter_words,
+    parameter_headers,
     scatter_words,
     slope_words,
     trend_words,
+    value_words,
     widening_words,
     with_unit,
 )
@@ -47,13 +48,19 @@ TREND_HEADERS = ("Parameter", "Weighted mean", "chi2/dof about it", "Trend", "Ch
 def _campaigns(study: Study) -> RenderableType:
     names = tuple(study.units)
     timed = any(row.start is not None for row in study.rows)
-    headers = ("campaign", *(("start [UTC]",) if timed else ()), "status", "chi2/dof", *names)
+    headers = (
+        "campaign",
+        *(("start [UTC]",) if timed else ()),
+        "status",
+        "chi2/dof",
+        *parameter_headers(study),
+    )
     rows = []
     for row in study.rows:
         known = row.parameters
-        told = (parameter_words(known[name]) if name in known else DASH for name in names)
+        told = (value_words(known[name]) if name in known else DASH for name in names)
         status = row.status.value.upper() if row.status is not RowStatus.ok else row.status.value
-        start = (utc_text(row.start) or DASH,) if timed else ()
+        start = (utc_minute(row.start) or DASH,) if timed else ()
         rows.append((row.name, *start, status, fixed(row.chi2_per_dof, 3), *told))
     return table("Campaigns", headers, rows, texts=tuple(range(2 + timed)))
 

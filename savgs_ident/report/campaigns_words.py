@@ -10,8 +10,20 @@ from savgs_ident.report.numerals import DASH, decimal, interval, numeral, with_e
 def parameter_words(told: Identified) -> str:
     """Value, error and unit: ``5790 ± 12 N s/m``."""
     if not isfinite(told.stderr):
-        return f"{numeral(told.value, told.stderr)}, not told by the data"
-    return with_unit(with_error(told.value, told.stderr), told.unit)
+        return f"{value_words(told)} by the data"
+    return with_unit(value_words(told), told.unit)
+
+
+def value_words(told: Identified) -> str:
+    """Value and error in the parameter's unit, for a column that is headed by it: ``5790 ± 12``."""
+    if not isfinite(told.stderr):
+        return f"{numeral(told.value, told.stderr)}, not told"
+    return with_error(told.value, told.stderr)
+
+
+def parameter_headers(study: Study) -> tuple[str, ...]:
+    """The names of the parameters with their units, to head a column each."""
+    return tuple(name if unit == "1" else f"{name} [{unit}]" for name, unit in study.units.items())
 
 
 def with_unit(text: str, unit: str) -> str:
