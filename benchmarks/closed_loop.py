@@ -92,9 +92,9 @@ class _ByScipy:
             t: Array, x: Array, normal: Array, law: Array, asked: Array
         ) -> tuple[Array, Array, Array]:
             rates = loop_field(case, asked, t, x, still)
-            truth, row = loop_sample(case, t, x, rates, asked)
-            readings = case.loop.failure.shown(t, case.loop.instruments.read(truth, normal))
-            return row, *case.loop.law.command(law, readings, fastest)
+            measured, signals = loop_sample(case, t, x, rates, asked)
+            readings = case.loop.failure.shown(t, case.loop.instruments.read(measured, normal))
+            return jnp.stack(signals), *case.loop.law.command(law, readings, fastest)
 
         self.sampled = jax.jit(sampled)
         self.field = jax.jit(lambda x, t, asked: loop_field(case, asked, t, x, still))

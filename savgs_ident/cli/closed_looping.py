@@ -77,7 +77,7 @@ def close_loop(job: Job, voice: Voice, out: Path) -> int:
         files += _draw(study, p, origin, told, out)
     voice.show(loop_text(study), plain("Written: " + ", ".join(str(file) for file in files)))
     voice.hand_over(record)
-    if study.stable:
+    if study.trusted:
         return OK
     complain(f"Not to be trusted: {alarm(study)}")
     return NOT_TRUSTED

@@ -8,7 +8,7 @@ import numpy as np
 
 from savgs_ident.control.alpha_map import alpha_map
 from savgs_ident.control.controller_file import DigitalController
-from savgs_ident.control.digital import RATE, discretise, reduce_order
+from savgs_ident.control.digital import RATE, discretise, reduce_order, sampled_plant
 from savgs_ident.control.generalised_plant import design_loop, driven_loop, generalised_plant
 from savgs_ident.control.margins import Margins, margins_of
 from savgs_ident.control.quarter_car_space import TwoMasses, quarter_car_space
@@ -66,7 +66,7 @@ class Design:
         controller: continuous, as it is used: that of the synthesis, or one of lower order.
         margins: of that controller.
         digital: the same, sampled.
-        digital_margins: of the sampled controller on the sampled rig.
+        digital_margins: of the sampled controller on the sampled rig, with the sample that the computer needs.
         rigs: what it was tried on.
         robustness: how it did.
         regularisation: what the regularising weights do.
@@ -88,6 +88,11 @@ class Design:
     def plant(self) -> control.StateSpace:
         """From command to measurements."""
         return design_loop(quarter_car_space(self.masses), self.bandwidth)
+
+    @property
+    def sampled_plant(self) -> control.StateSpace:
+        """From command to measurements as the computer meets it: sampled, held, and a sample late."""
+        return sampled_plant(self.plant, self.digital.rate)
 
     @property
     def closed(self) -> control.StateSpace:
@@ -132,7 +137,6 @@ def design_controller(
     controller = synthesis.controller if order is None else reduce_order(synthesis.controller, order)
     plant = design_loop(space, bandwidth)
     sampled = discretise(controller, rate)
-    held = control.sample_system(plant, 1.0 / rate, method="zoh")
     progress(f"trying it on {len(rigs.values)} rigs")
     robustness = examine(
         controller, (paper_masses(model, as_values(each)) for each in rigs.values), bandwidth, weights
@@ -146,7 +150,7 @@ def design_controller(
         controller,
         margins_of(plant, controller),
         DigitalController(sampled, alpha_map(model, p)),
-        margins_of(held, sampled),
+        margins_of(sampled_plant(plant, rate), sampled),
         rigs,
         robustness,
         tuple(

@@ -24,6 +24,15 @@ def discretise(controller: control.StateSpace, rate: float = RATE) -> control.St
     )
 
 
+def sampled_plant(plant: control.StateSpace, rate: float) -> control.StateSpace:
+    """What a computer of ``rate`` [1/s] meets: its command is held, and takes effect a sample after its readings."""
+    held = control.sample_system(plant, 1.0 / rate, method="zoh")
+    late = control.ss(0.0, 1.0, 1.0, 0.0, 1.0 / rate)
+    found = held * late
+    found.update_names(inputs=held.input_labels, outputs=held.output_labels)
+    return found
+
+
 def reduce_order(controller: control.StateSpace, order: int) -> control.StateSpace:
     """The controller with ``order`` states, by balanced truncation with its static gain kept.
 

@@ -24,7 +24,6 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.model.actuation import link_torque
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.equilibrium import static_equilibrium
 from savgs_ident.model.inputs import Inputs
@@ -87,14 +86,13 @@ def _outputs(model: QuarterCar, p: Values, motion: Motion, s: Array, sd: Array, 
     loads = model.loads(p, motion, s, sd, inputs)
     rig = model.effective(p)
     travel = suspension_travel(rig, motion.q.theta_LW)
-    torque = link_torque(rig, loads.strut, motion.q.theta_LW, inputs.link.angle)
     return jnp.stack(
         [
             motion.qdd.z_s,
             travel,
             inputs.road.height - motion.q.z_s - travel,
             loads.vertical,
-            torque,
+            loads.link_torque,
             inputs.link.angle,
         ]
     )

@@ -158,7 +158,7 @@ def judge(case: Case, tell: Tell) -> Judged:
 
 
 def _rest(case: Case, findings: Findings, tell: Tell) -> tuple[Findings, float]:
-    """The findings, and the log evidence of a law beside the heaviest of them, if this leaves something.
+    """The findings, and the log evidence of a law beside the heaviest of them, if this leaves something that matters.
 
     Where it leaves much, the effects at the ports where such a law explains most are tried beside its members.
     """
@@ -176,7 +176,9 @@ def _rest(case: Case, findings: Findings, tell: Tell) -> tuple[Findings, float]:
         findings = of_material_parts(more, partial(_change_without, case))
         if heaviest(findings).terms != best.terms:
             return _rest(case, findings, tell)
-    return findings, anywhere(places)
+    place = max(places, key=lambda each: each.evidence)
+    beside = _change(case, place.held_out - best.prediction.rows)
+    return findings, anywhere(places) if beside.matters else -np.inf
 
 
 def settle(case: Case, judged: Judged, tell: Tell) -> tuple[Case, Judged]:

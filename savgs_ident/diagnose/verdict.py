@@ -22,8 +22,12 @@ PRIOR_UNKNOWN = 0.1
 PRIOR_STRAINED = 0.01
 """Prior probability that, beside what a hypothesis says, one of the sheet's tolerances does not hold."""
 
-SURE = 10.0
-"""Log odds against the baseline from which on something is said to be missing."""
+SURE = 4.0
+"""Log odds against the baseline from which on something is said to be missing.
+
+Where nothing is missing, and priors and noise are what they are taken for, such odds or higher ones arise in at most
+exp(-4) = 1.8 % of all campaigns (Markov's inequality).
+"""
 
 MATERIAL = 0.003
 """Change of the response by an effect, as a share of it, below which it does not matter, unless it does somewhere."""
@@ -200,19 +204,21 @@ def kind_of(weighed: list[Weighed], change: Change, left: float) -> tuple[Kind, 
     best = fitted[0] if fitted else none
     if odds_of(weighed) < SURE:
         return "none", none
-    if unknown.weight > best.weight or left > LEFT:
+    if unknown.weight > best.weight:
         return "unknown", unknown
     if not change.matters:
         return "none", none
+    if left > LEFT:
+        return "unknown", unknown
     return ("effect" if len(best.effects) == 1 else "several"), best
 
 
 def rivals_of(weighed: list[Weighed], chosen: Weighed) -> tuple[str, ...]:
-    """Single effects that cannot be told from the chosen hypothesis."""
-    return tuple(
-        each.effects[0]
+    """Effects that cannot be told from those of the chosen hypothesis: one of them in place of one of these."""
+    near = [
+        each.effects
         for each in weighed
-        if len(each.effects) == 1
-        and each.effects != chosen.effects
-        and each.weight > chosen.weight - CONFUSED
-    )
+        if len(each.effects) == len(chosen.effects) and each.weight > chosen.weight - CONFUSED
+    ]
+    others = (tuple(name for name in effects if name not in chosen.effects) for effects in near)
+    return tuple(dict.fromkeys(names[0] for names in others if len(names) == 1))

@@ -13,7 +13,6 @@ IMPERFECT = 0.005
 def verdict_of(judged: Judged, rivals: tuple[str, ...], gap: Shrink) -> Verdict:
     """The verdict with its sentence."""
     kind, chosen, place = judged.kind, judged.chosen, judged.place
-    told = rivals if kind == "effect" else ()
     if kind == "none":
         sentence = (
             f"Nothing is missing that these data show: recalibrated, the model misses by "
@@ -37,9 +36,10 @@ def verdict_of(judged: Judged, rivals: tuple[str, ...], gap: Shrink) -> Verdict:
         f"recalibrated ({_percent(gap.before)} as given) to {_percent(gap.after)} of the response; the noise is "
         f"{_percent(gap.floor)}."
     )
-    if told:
-        sentence += f" This campaign cannot tell it from {' or '.join(told)}."
-    return Verdict(kind, chosen.effects, ports, told, sentence)
+    if rivals:
+        which = "it" if one else "one of them"
+        sentence += f" This campaign cannot tell {which} from {' or '.join(rivals)}."
+    return Verdict(kind, chosen.effects, ports, rivals, sentence)
 
 
 def _doubted(odds: float) -> str:
@@ -68,8 +68,8 @@ def _nearest(judged: Judged) -> str:
     effects = " and ".join(heaviest(judged.findings).terms)
     if not effects:
         return ""
-    left = 100.0 * judged.left
-    return f" The nearest in the catalogue, {effects}, leaves {left:.2g} % of the misfit beyond the noise."
+    left = "all" if judged.left >= 0.995 else f"{100.0 * judged.left:.2g} %"
+    return f" The nearest in the catalogue, {effects}, leaves {left} of the misfit beyond the noise."
 
 
 def warnings_of(case: Case, after: Mode, judged: Judged) -> tuple[str, ...]:

@@ -23,7 +23,6 @@ from jaxtyping import Array, Float
 
 from savgs_ident.core.rig import Rig
 from savgs_ident.effects.registry import build_model, model_parameters
-from savgs_ident.model.actuation import link_torque
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.effect import AbstractRoadFault, Cam
 from savgs_ident.model.inputs import Inputs
@@ -137,7 +136,7 @@ class Equations:
                 loads.vertical,
                 loads.rail,
                 loads.strut,
-                link_torque(rig, loads.strut, x[1], inputs.link.angle),
+                loads.link_torque,
             ]
         )
 

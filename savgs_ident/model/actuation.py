@@ -7,13 +7,11 @@ velocity from the state, and the state's rates under the torque with which the s
 from abc import abstractmethod
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 from numpy.typing import ArrayLike
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.model.kinematics import strut_length
 from savgs_ident.model.profile import AbstractProfile, Constant, Sine, tabulated
 from savgs_ident.model.strut import Link
 from savgs_ident.model.values import Values
@@ -99,8 +97,3 @@ def recorded_link(recording: Recording) -> ImposedLink:
         )
     channel = recording.channels["link_angle"]
     return tabulated_link(channel.time, channel.values, channel.source)
-
-
-def link_torque(p: Values, strut: Scalar, theta_LW: Scalar, theta_SL: Scalar) -> Scalar:
-    """Torque [N m] towards greater link angles of a strut that pushes apart with a force ``strut`` [N]."""
-    return strut * jax.grad(strut_length, argnums=2)(p, theta_LW, theta_SL)

@@ -60,6 +60,11 @@ class Loads(NamedTuple):
     ports: dict[str, PortSignals]
     carried: dict[str, Load]
 
+    @property
+    def link_torque(self) -> Float[Array, ""]:
+        """Torque [N m] of the strut on the link, towards greater angles."""
+        return self.carried[Port.LINK.value].total
+
 
 class QuarterCar(eqx.Module):
     """The rig without friction, plus the effects that were added to it with ``+``.

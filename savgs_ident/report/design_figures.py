@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-import control
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -116,7 +115,7 @@ def _sampled_sensitivity(design: Design) -> tuple[NDArray[np.float64], NDArray[n
     """Frequencies below half the rate [Hz], and the magnitude of the sampled loop's sensitivity there."""
     rate = design.digital.rate
     below = WIDE[: np.searchsorted(WIDE, 0.5 * rate)]
-    loop = loop_of(control.sample_system(design.plant, 1.0 / rate, method="zoh"), design.digital.space)
+    loop = loop_of(design.sampled_plant, design.digital.space)
     return below, np.abs(1.0 / (1.0 + np.ravel(loop(np.exp(2j * np.pi * below / rate)))))
 
 

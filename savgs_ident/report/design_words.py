@@ -61,6 +61,7 @@ def complaints(design: Design) -> tuple[str, ...]:
     unstable = sum(not each.stable for each in design.robustness.margins)
     found = {
         "the sweep over frequency does not confirm gamma": not design.synthesis.holds,
+        "the loop is not stable with the controller as it is used": not design.margins.stable,
         f"the loop is not stable when sampled at {design.digital.rate:g} Hz": not design.digital_margins.stable,
         f"the loop is not stable on {unstable} of {len(design.rigs.values)} rigs": unstable > 0,
     }

@@ -16,7 +16,7 @@ from savgs_ident.control.linear_study import (
     LinearStudy,
     SmallMotions,
 )
-from savgs_ident.report.linear_words import ELEMENT_WORDS
+from savgs_ident.report.linear_words import ELEMENT_WORDS, sign_of_alpha
 from savgs_ident.report.readings import READINGS
 from savgs_ident.report.style import (
     BLUE,
@@ -60,10 +60,15 @@ def linear_figures(study: LinearStudy) -> dict[str, Figure]:
 
 def alpha_figure(study: EquivalentStudy) -> Figure:
     """k_eq, c_eq and the magnitude of alpha over the link angle, with what stands for them: Fig. 7 of the paper."""
+    itself = sign_of_alpha(study)
     panels = (
         ("k_eq", 1e-3, "equivalent stiffness k_eq [kN/m]"),
         ("c_eq", 1e-3, "equivalent damping c_eq [kN s/m]"),
-        ("alpha", -1e3, "magnitude of alpha [mm/rad]\n(alpha itself is negative)"),
+        (
+            "alpha",
+            1e3 if itself == "positive" else -1e3,
+            f"magnitude of alpha [mm/rad]\n(alpha itself is {itself})",
+        ),
     )
     with styled():
         figure = new_figure(10.5, 4.2)

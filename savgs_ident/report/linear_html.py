@@ -9,6 +9,7 @@ from savgs_ident.report.linear_words import (
     described_words,
     digits,
     headline,
+    sign_of_alpha,
     slow_words,
     step_words,
 )
@@ -82,7 +83,8 @@ def _equivalent(study: EquivalentStudy) -> Section:
         "Over the link angle",
         note=(
             "The strut as a spring and a damper between the masses, and a turn of the link as a displacement alpha of"
-            " their upper end. With the deflection positive in bump alpha is negative; its magnitude is drawn."
+            f" their upper end. With the deflection positive in bump alpha is {sign_of_alpha(study)}; drawn is its"
+            " magnitude."
         ),
         picture=embed(alpha_figure(study), words),
         caption=(

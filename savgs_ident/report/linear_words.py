@@ -3,7 +3,9 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from savgs_ident.control.linear_study import LinearStudy, SmallMotions
+import numpy as np
+
+from savgs_ident.control.linear_study import EquivalentStudy, LinearStudy, SmallMotions
 from savgs_ident.report.numerals import decimal, numeral, percentage, signed
 
 ELEMENT_WORDS: Mapping[str, str] = MappingProxyType(
@@ -34,6 +36,11 @@ def step_words(small: SmallMotions) -> dict[str, str]:
         "The static load turns with the wishbones, too, and the tyre's contact point moves with the camber.",
     )
     return dict(zip(small.models, sentences, strict=True))
+
+
+def sign_of_alpha(study: EquivalentStudy) -> str:
+    """Whether alpha is negative or positive over the link angle, in a word."""
+    return "negative" if np.nanmean(study.resting.alpha) < 0.0 else "positive"
 
 
 def slow_words(small: SmallMotions) -> str:

@@ -16,12 +16,14 @@ SIGNAL_UNITS = {
     "sprung_accel": "m/s^2",
     "susp_deflection": "m",
     "tyre_load": "N",
+    "wishbone_angle": "rad",
     "link_angle": "rad",
     "link_velocity": "rad/s",
     "asked": "rad/s",
     "motor_torque": "N m",
     "shaft_power": "W",
     "electric_power": "W",
+    "doubted": "1",
 }
 """Units of the signals of a run."""
 
@@ -56,6 +58,8 @@ def loop_record(study: LoopStudy, origin: ModelOrigin, controller: str) -> dict[
         "energy_j": drive.energy,
         "energy_returned_j": drive.returned,
         "stable": study.stable,
+        "angle_doubted_from_s": study.doubted_from,
+        "trusted": study.trusted,
         "passive": _ride(study.passive_ride),
         "active": _ride(study.active_ride),
         "failures": {

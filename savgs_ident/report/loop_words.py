@@ -17,6 +17,8 @@ def headline(study: LoopStudy) -> str:
     """What the loop does, in one sentence."""
     if not study.active_ride.stable:
         return f"The loop is not stable: {study.test.title}."
+    if not study.passive_ride.stable:
+        return f"The passive rig does not come to rest: {study.test.title}."
     gain = study.gain
     return (
         f"The body accelerates {fell_words(gain.sprung_accel)} and the suspension deflects"
@@ -26,8 +28,19 @@ def headline(study: LoopStudy) -> str:
 
 def alarm(study: LoopStudy) -> str:
     """Why the loop is not to be used; empty if nothing was found."""
-    if not study.active_ride.stable:
-        return "The loop is not stable on this rig: its motion does not end with the road's."
+    for ride, run, what in (
+        (study.passive_ride, study.passive, "The passive rig"),
+        (study.active_ride, study.active, "The loop"),
+    ):
+        if not run.status.ok:
+            return f"{what} leaves the travel of its linkage, or its motion grows without bound."
+        if not ride.stable:
+            return f"{what} is not stable on this rig: its motion does not end with the road's."
+    if study.doubted_from is not None:
+        return (
+            f"From {decimal(study.doubted_from, 1)} s on the law did not believe the link angle, which moved further"
+            " in a sample than the motor can turn it: the link stood still from then on."
+        )
     bad = sum(not each.stable for each in study.on_rigs)
     return f"The loop is not stable on {bad} of {len(study.on_rigs)} rigs that the data allow." if bad else ""
 
@@ -35,6 +48,8 @@ def alarm(study: LoopStudy) -> str:
 def saturation_words(study: LoopStudy) -> str:
     """Whether and when more speed was asked for than the drive gives."""
     drive = study.drive
+    if not study.active.status.ok:
+        return "What the drive did is not known: the run did not end well."
     if drive.saturated_from is None:
         return "The drive was never asked for more speed than it gives."
     told = (
@@ -80,10 +95,14 @@ def rigs_words(study: LoopStudy) -> str:
     if study.rigs is None or not study.on_rigs:
         return "The loop was tried on no other rig."
     stable = sum(each.stable for each in study.on_rigs)
-    accel = [each.gain.sprung_accel for each in study.on_rigs]
-    deflection = [each.gain.susp_deflection for each in study.on_rigs]
+    told = f"Stable on {stable} of {len(study.on_rigs)} ({study.rigs.source})"
+    ended = [each.gain for each in study.on_rigs if np.isfinite(each.gain.sprung_accel)]
+    if not ended:
+        return f"{told}."
+    accel = [gain.sprung_accel for gain in ended]
+    deflection = [gain.susp_deflection for gain in ended]
     return (
-        f"Stable on {stable} of {len(study.on_rigs)} ({study.rigs.source}); the acceleration falls by"
+        f"{told}; the acceleration falls by"
         f" {decimal(min(accel), 1)} to {decimal(max(accel), 1)} %, the deflection by {decimal(min(deflection), 1)} to"
         f" {decimal(max(deflection), 1)} %."
     )

@@ -21,7 +21,7 @@ from jaxtyping import Array, Float
 from numpy.typing import ArrayLike
 
 from savgs_ident.core.status import Status
-from savgs_ident.model.actuation import AbstractActuation, link_torque
+from savgs_ident.model.actuation import AbstractActuation
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.equilibrium import deflection_zero, static_equilibrium
 from savgs_ident.model.inputs import Inputs
@@ -29,6 +29,8 @@ from savgs_ident.model.quarter_car import Loads, QuarterCar
 from savgs_ident.model.road import RoadMotion
 from savgs_ident.model.section import TRAVEL, SectionCurves
 from savgs_ident.model.sensors import Readings, pass_through
+from savgs_ident.model.strut import Link
+from savgs_ident.model.tyre import Road
 from savgs_ident.model.values import Values
 from savgs_ident.simulate.rates import Rates, solve_rates
 
@@ -116,10 +118,11 @@ def rest_state(
     """
     angle = link.start_angle(t)
     rest = static_equilibrium(model, p, angle, road.height(t), curves)
-    still = Coordinates(jnp.zeros_like(angle), jnp.zeros_like(angle))
-    return RigState(
-        rest.q, still, rest.s, link.start(p, t, link_torque(p, rest.strut, rest.q.theta_LW, angle))
-    )
+    zero = jnp.zeros_like(angle)
+    still = Coordinates(zero, zero)
+    inputs = Inputs(Road(road.height(t), zero), Link(angle, zero))
+    loads = model.loads(p, Motion(rest.q, still, still), rest.s, jnp.zeros_like(rest.s), inputs, curves)
+    return RigState(rest.q, still, rest.s, link.start(p, t, loads.link_torque))
 
 
 def _inputs_and_rates(
@@ -152,9 +155,8 @@ def state_rates(
     :func:`savgs_ident.simulate.rates.solve_rates`.
     """
     inputs, rates = _inputs_and_rates(model, p, road, link, t, now, curves, near)
-    strut = model.loads(p, Motion(now.q, now.qd, rates.qdd), now.s, rates.sd, inputs, curves).strut
-    load = link_torque(p, strut, now.q.theta_LW, inputs.link.angle)
-    return RigState(now.qd, rates.qdd, rates.sd, link.rate(p, t, now.actuation, load))
+    loads = model.loads(p, Motion(now.q, now.qd, rates.qdd), now.s, rates.sd, inputs, curves)
+    return RigState(now.qd, rates.qdd, rates.sd, link.rate(p, t, now.actuation, loads.link_torque))
 
 
 def _scales(model: QuarterCar, link: AbstractActuation) -> Float[Array, " x"]:

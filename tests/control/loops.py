@@ -8,7 +8,7 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.control.closed_loop.instruments import ideal_instruments
-from savgs_ident.control.closed_loop.laws import HoldLaw
+from savgs_ident.control.closed_loop.laws import hold_law
 from savgs_ident.control.closed_loop.programme import LoopTest, harmonic_test
 from savgs_ident.control.closed_loop.run import ClosedLoopRun, Loop, Signals, run_loop
 from savgs_ident.model.quarter_car import QuarterCar
@@ -33,7 +33,7 @@ def cam(frequency: float, peak_to_peak: float = CAM) -> LoopTest:
 
 def passive(loop: Loop, p: Values) -> Loop:
     """The same with the link held."""
-    return loop._replace(law=HoldLaw(p["psi_nominal"]))
+    return loop._replace(law=hold_law(p["psi_nominal"], loop.rate))
 
 
 def ideal(loop: Loop) -> Loop:

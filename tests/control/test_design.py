@@ -36,6 +36,7 @@ def test_no_evidence_may_be_missing(design: Design) -> None:
     passed = replace(design.synthesis, peak=1.01 * design.synthesis.gamma)
     shaken = Robustness((*design.robustness.margins[1:], unstable), design.robustness.peaks)
     assert not replace(design, synthesis=passed).trusted
+    assert not replace(design, margins=unstable).trusted
     assert not replace(design, digital_margins=unstable).trusted
     assert not replace(design, robustness=shaken).trusted
 

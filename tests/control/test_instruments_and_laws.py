@@ -20,8 +20,8 @@ from savgs_ident.control.closed_loop.laws import (
     JUMP,
     AbstractLaw,
     HinfLaw,
-    HoldLaw,
     hinf_law,
+    hold_law,
 )
 from savgs_ident.control.controller_file import DigitalController
 from savgs_ident.control.linear_equivalent import equivalents
@@ -128,7 +128,7 @@ def test_a_failure_changes_nothing_before_its_time_and_what_it_is_named_for_afte
 
 
 def test_a_held_link_comes_back_as_a_loop_of_ten_hertz_and_asks_nothing_at_its_place() -> None:
-    law = HoldLaw(NOMINAL)
+    law = hold_law(jnp.asarray(NOMINAL), 1.0 / SAMPLE)
     angle, count = NOMINAL + 0.1, 50
     for _ in range(count):
         _, asked = _command(law, law.start(), jnp.array([3.0, 0.1, angle]), jnp.asarray(FASTEST))

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from savgs_ident.control.linearisation import INPUTS, OUTPUTS, OperatingPoint, linearise, resting
 from savgs_ident.core.errors import InputError
-from savgs_ident.model.actuation import link_torque
 from savgs_ident.model.dynamics import Coordinates, Motion
 from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.kinematics import suspension_travel
+from savgs_ident.model.kinematics import strut_length, suspension_travel
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.strut import Link
 from savgs_ident.model.tyre import Road
@@ -61,7 +60,7 @@ def _rates_and_outputs(model: QuarterCar, p: Values, v: Array) -> Array:
     rates = solve_rates(model, p, q, qd, s, inputs)
     loads = model.loads(p, Motion(q, qd, rates.qdd), s, rates.sd, inputs)
     travel = suspension_travel(p, q.theta_LW)
-    torque = link_torque(p, loads.strut, q.theta_LW, inputs.link.angle)
+    torque = loads.strut * jax.grad(strut_length, argnums=2)(p, q.theta_LW, inputs.link.angle)
     rated = [*qd, *rates.qdd, *jnp.unstack(rates.sd), v[-2], v[-1]]
     outputs = [rates.qdd.z_s, travel, v[-4] - q.z_s - travel, loads.vertical, torque, v[-3]]
     return jnp.stack([*rated, *outputs])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from savgs_ident.control.design import Design
-from savgs_ident.control.digital import RATE
+from savgs_ident.control.digital import RATE, sampled_plant
 from savgs_ident.control.margins import loop_of, margins_of
 
 
@@ -17,7 +17,11 @@ def _stable(loop: control.StateSpace) -> bool:
 
 
 def _sampled_loop(design: Design) -> control.StateSpace:
-    return loop_of(control.sample_system(design.plant, 1.0 / RATE, method="zoh"), design.digital.space)
+    """By hand: the plant's exact step response to a held command, which arrives a sample after the readings."""
+    held = control.sample_system(design.plant, 1.0 / RATE, method="zoh")
+    a = np.block([[held.A, held.B], [np.zeros((1, held.nstates + 1))]])
+    b, c = np.eye(held.nstates + 1)[:, -1:], np.hstack([held.C, held.D])
+    return loop_of(control.ss(a, b, c, 0.0, 1.0 / RATE), design.digital.space)
 
 
 def test_the_gain_margin_is_where_the_loop_turns_unstable(design: Design) -> None:
@@ -60,19 +64,18 @@ def test_the_phase_margin_and_the_peak_are_those_of_a_brute_sweep(design: Design
     assert design.margins.sensitivity == pytest.approx(np.max(1.0 / np.abs(1.0 + response)), rel=1e-4)
 
 
-def test_sampling_costs_half_a_sample_of_the_delay_margin(design: Design) -> None:
-    """What the computer holds is, on average, half a sample old; gain and phase hardly change."""
+def test_sampling_costs_one_and_a_half_samples_of_the_delay_margin(design: Design) -> None:
+    """The computer needs one, and what it holds is on average half a sample old; the rest hardly changes."""
     lost = design.margins.delay - design.digital_margins.delay
-    assert lost == pytest.approx(0.5 / RATE, rel=0.05)
-    assert design.digital_margins.gain_up == pytest.approx(design.margins.gain_up, rel=0.05)
-    assert design.digital_margins.phase_deg == pytest.approx(design.margins.phase_deg, abs=2.0)
-    assert design.digital_margins.sensitivity == pytest.approx(design.margins.sensitivity, rel=0.05)
+    assert lost == pytest.approx(1.5 / RATE, rel=0.05)
+    assert design.digital_margins.gain_up == pytest.approx(design.margins.gain_up, rel=0.1)
+    assert design.digital_margins.phase_deg == pytest.approx(design.margins.phase_deg, abs=4.0)
+    assert design.digital_margins.sensitivity == pytest.approx(design.margins.sensitivity, rel=0.1)
 
 
 def test_the_margins_of_a_faster_computer_are_nearer_to_the_continuous_ones(design: Design) -> None:
     def sampled(rate: float) -> float:
         space = control.sample_system(design.controller, 1.0 / rate, method="bilinear")
-        held = control.sample_system(design.plant, 1.0 / rate, method="zoh")
-        return abs(margins_of(held, space).phase_deg - design.margins.phase_deg)
+        return abs(margins_of(sampled_plant(design.plant, rate), space).phase_deg - design.margins.phase_deg)
 
     assert sampled(4000.0) < 0.5 * sampled(1000.0) < 0.25 * sampled(250.0)

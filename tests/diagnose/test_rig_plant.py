@@ -10,7 +10,7 @@ from savgs_ident.core.rig import Rig
 from savgs_ident.diagnose.engine.data import Data
 from savgs_ident.diagnose.engine.prediction import MULTIPLES, Term
 from savgs_ident.diagnose.rig.columns import impose, marched_effect, node_loads
-from savgs_ident.diagnose.rig.coordinates import free_coordinate
+from savgs_ident.diagnose.rig.coordinates import baseline_coordinate
 from savgs_ident.diagnose.rig.loops import strut_force
 from savgs_ident.diagnose.rig.places import free_signal, nodes_of, places_of
 from savgs_ident.diagnose.rig.plant import RigPlant
@@ -216,4 +216,4 @@ def test_a_free_signal_has_as_many_orders_as_it_has_coefficients(orders: int) ->
 
 def test_a_parameter_that_starts_at_nothing_cannot_be_identified(rig: Rig) -> None:
     with pytest.raises(InputError, match="mu_r is to be identified from 0"):
-        free_coordinate(replace(rig.parameters["mu_r"], value=0.0))
+        baseline_coordinate(replace(rig.parameters["mu_r"], value=0.0))

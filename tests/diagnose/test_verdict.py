@@ -51,7 +51,8 @@ def _weighed(weights: Mapping[str, float], scored: tuple[str, ...] = ()) -> list
         ({"none": 0.0, "unknown": 400.0, "rail_viscous": 500.0}, 0.05, LEFT * 2.0, "unknown", "unknown"),
         ({"none": 0.0, "unknown": 600.0, "rail_viscous": 500.0}, 0.05, 0.0, "unknown", "unknown"),
         ({"none": 0.0, "unknown": 600.0}, 0.0, 1.0, "unknown", "unknown"),
-        ({"none": 0.0, "unknown": 5.0}, 0.0, 1.0, "none", "none"),
+        ({"none": 0.0, "unknown": SURE - 1.0}, 0.0, 1.0, "none", "none"),
+        ({"none": 0.0, "unknown": 400.0, "rail_viscous": 500.0}, MATERIAL / 2.0, LEFT * 2.0, "none", "none"),
         (
             {"none": 0.0, "unknown": 5.0, "spring_rate": 90.0, "spring_rate + accel_lag": 800.0},
             0.05,
@@ -94,6 +95,20 @@ def test_rivals_are_single_effects_that_the_data_hardly_tell_apart() -> None:
     weighed = _weighed(weights)
     chosen = next(each for each in weighed if each.name == "mount_compliance")
     assert rivals_of(weighed, chosen) == ("gear_compliance",)
+
+
+def test_rivals_of_a_pair_stand_in_for_one_of_its_members() -> None:
+    weights = {
+        "none": 0.0,
+        "unknown": 99.0,
+        "mount_compliance + accel_gain": 100.0,
+        "mount_compliance + accel_tilt": 99.0,
+        "gear_compliance + accel_gain": 100.0 - CONFUSED - 1.0,
+        "gear_compliance + accel_tilt": 99.5,
+        "accel_tilt": 98.0,
+    }
+    weighed = _weighed(weights)
+    assert rivals_of(weighed, weighed[0]) == ("accel_tilt",)
 
 
 def _mode(evidence: float, *terms: str) -> Mode:

@@ -11,7 +11,7 @@ from jaxtyping import Array
 from savgs_ident.core.rig import Rig
 from savgs_ident.core.status import Status
 from savgs_ident.effects.registry import MODELS, build_model, model_parameters
-from savgs_ident.model.actuation import harmonic_link, held_link, link_torque
+from savgs_ident.model.actuation import harmonic_link, held_link
 from savgs_ident.model.drive import holding_drive
 from savgs_ident.model.dynamics import upright_mass
 from savgs_ident.model.equilibrium import static_equilibrium
@@ -116,12 +116,17 @@ def _energy(p: Values, motion: transient.Motion, road: Array, angle: Array) -> A
     return energy + p["k_sd"] * squeeze**2 / 2.0 + p["k_t"] * pressed**2 / 2.0
 
 
+def lever(p: Values, theta_LW: Array, angle: Array) -> Array:
+    """Slope of the strut's length in the link angle [m/rad]."""
+    return jax.grad(strut_length, argnums=2)(p, theta_LW, angle)
+
+
 def _power(bench: Bench, solution: TransientSolution) -> dict[str, np.ndarray]:
     """What every source brings in [W], (n,); the losses are negative."""
     p, (q, qd, _), (road, link, *_) = bench.p, solution.motion, solution.inputs
     loads = transient_loads(bench.model, p, solution)
     spring = p["k_sd"] * (p["l_free"] - jax.vmap(lambda a, b: strut_length(p, a, b))(q.theta_LW, link.angle))
-    torque = jax.vmap(lambda *at: link_torque(p, *at))(loads.strut, q.theta_LW, link.angle)
+    torque = jax.vmap(lambda *at: at[0] * lever(p, *at[1:]))(loads.strut, q.theta_LW, link.angle)
     pressed = p["k_t"] * jnp.maximum(loads.touch.compression, 0.0)
     power = {
         "road": loads.vertical * road.velocity,
@@ -248,7 +253,7 @@ def test_static_equilibrium_holds_and_carries_the_weight(simtr: Bench) -> None:
     assert abs(float(rest.q.z_s)) < 1e-8
     assert abs(float(rest.q.theta_LW)) < 1e-8
     assert float(rest.strut) == pytest.approx(5310.0, abs=0.5)
-    torque = float(link_torque(p, rest.strut, rest.q.theta_LW, jnp.asarray(NOMINAL)))
+    torque = float(rest.strut * lever(p, rest.q.theta_LW, jnp.asarray(NOMINAL)))
     assert torque == pytest.approx(-57.5, rel=0.02)
     for angle in (0.3, 2.8):
         away = equilibrium(jnp.asarray(angle))

@@ -12,7 +12,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from savgs_ident.control.closed_loop.instruments import ideal_instruments
-from savgs_ident.control.closed_loop.laws import HinfLaw, HoldLaw
+from savgs_ident.control.closed_loop.laws import HinfLaw, hold_law
 from savgs_ident.control.closed_loop.metrics import Gain, gain_of, ride_of
 from savgs_ident.control.closed_loop.programme import LoopTest
 from savgs_ident.control.closed_loop.run import Loop, run_loop
@@ -37,7 +37,7 @@ class Cause:
 def measure_causes(model: QuarterCar, p: Values, law: HinfLaw, loop: Loop, test: LoopTest) -> Iterator[Cause]:
     """The variants one after the other; ``loop`` is that of the rig as it is, ``law`` its law."""
     for variant, values, changed in _variants(model, p, law, loop):
-        hold = changed._replace(law=HoldLaw(p["psi_nominal"]))
+        hold = changed._replace(law=hold_law(p["psi_nominal"], loop.rate))
         passive, active = (
             ride_of(run_loop(model, values, test.road, each, test.duration), test) for each in (hold, changed)
         )

@@ -24,6 +24,12 @@ ENDS = (np.radians(20.0), np.radians(160.0))
 GUARD_RATE = 2.0 * np.pi * 3.0
 """How fast the guard lets the link approach an end, per angle that is left [1/s]."""
 
+HOLD = 2.0 * np.pi * 10.0
+"""Velocity that is asked for per missing angle where the link is to stand still [1/s]."""
+
+HOLD_PER_RATE = 0.1
+"""The most of it per rate of the law [1]: beyond about five times this its own delay makes it unstable."""
+
 JUMP = 3.0
 """An angle that moves by more than this times what the motor can do in a sample is not believed."""
 
@@ -45,12 +51,16 @@ class AbstractLaw(eqx.Module):
         furthest that the motor turns the link in a sample.
         """
 
+    def doubted(self, state: Float[Array, " c"]) -> Scalar:
+        """1 once a reading was not believed [1]; a law without doubts never has any."""
+        return jnp.zeros(())
+
 
 class HoldLaw(AbstractLaw):
     """Passive: the link is kept at ``angle`` [rad]; ``stiffness`` [1/s] asks for velocity per angle."""
 
     angle: Scalar = eqx.field(converter=jnp.asarray)
-    stiffness: Scalar = eqx.field(converter=jnp.asarray, default=2.0 * np.pi * 10.0)
+    stiffness: Scalar = eqx.field(converter=jnp.asarray)
 
     def start(self) -> Float[Array, " 0"]:
         """Nothing."""
@@ -96,6 +106,15 @@ class HinfLaw(AbstractLaw):
         asked = jnp.where(doubted > 0.0, 0.0, guarded)
         after = self.a @ inner + self.b @ seen
         return jnp.concatenate([after, jnp.stack([angle, doubted])]), asked
+
+    def doubted(self, state: Float[Array, " m"]) -> Scalar:
+        """1 once an angle was not believed [1]."""
+        return state[-1]
+
+
+def hold_law(angle: Scalar, rate: float) -> HoldLaw:
+    """A law of ``rate`` [1/s] that keeps the link at ``angle`` [rad]: as stiff as it may be, slower at low rates."""
+    return HoldLaw(angle, jnp.asarray(min(HOLD, HOLD_PER_RATE * rate)))
 
 
 def hinf_law(controller: DigitalController) -> HinfLaw:

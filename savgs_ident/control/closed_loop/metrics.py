@@ -102,12 +102,21 @@ def _ride(run: ClosedLoopRun, start: float, end: float) -> Ride:
     )
 
 
+def doubted_from(run: ClosedLoopRun) -> float | None:
+    """When the law ceased to believe the link angle [s]; None if it never did, or the run did not end well."""
+    if not run.status.ok:
+        return None
+    return _first(np.asarray(run.signals.time), np.asarray(run.signals.doubted) > 0.0)
+
+
 def _first(time: Array, when: NDArray[np.bool_]) -> float | None:
     return float(time[when][0]) if when.any() else None
 
 
 def drive_use(run: ClosedLoopRun, test: LoopTest, p: Values) -> DriveUse:
-    """What the drive did in a run that ended well."""
+    """What the drive did in a run; nothing is known of one that did not end well."""
+    if not run.status.ok:
+        return DriveUse(np.nan, np.nan, None, None, (np.nan, np.nan), np.nan, np.nan, np.nan)
     signals, judged = run.signals, _between(run.signals, test.start, test.end)
     ratio, limit = float(p["motor_gear_ratio"]), float(p["motor_speed_limit"])
     time = np.asarray(signals.time)[judged]
@@ -138,10 +147,10 @@ class Gain:
 
 
 def gain_of(passive: Ride, active: Ride) -> Gain:
-    """By how much the rms values fell [%]; a rig that did not move gains nothing."""
+    """By how much the rms values fell [%]: nothing on a rig that did not move, NaN where a run did not end well."""
 
     def fell(before: float, after: float) -> float:
-        return 100.0 * (1.0 - after / before) if before > 0.0 else 0.0
+        return 0.0 if before == 0.0 else 100.0 * (1.0 - after / before)
 
     return Gain(
         fell(passive.sprung_accel, active.sprung_accel),

@@ -6,6 +6,7 @@ Every test ends with a road that stands still, so that a motion which does not d
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from math import ceil
 from types import MappingProxyType
 
 from savgs_ident.control.roads import bump_road, iso_road
@@ -25,7 +26,10 @@ SWEEP = (0.0, 3.0, 60.0)
 """First and last frequency [Hz] and duration [s] of the sweep of Fig. 11."""
 
 BUMP = (0.05, 2.0, 5.0)
-"""Height and length [m] of the bump, and how long its test lasts [s]."""
+"""Height and length [m] of the bump, and how long its test lasts at least [s]."""
+
+BEYOND = 2.0
+"""How long the test of a bump goes on behind it at least [s]."""
 
 
 class LoopKind(StrEnum):
@@ -95,8 +99,9 @@ def iso_test(grade: str, speed: float, duration: float = 20.0) -> LoopTest:
 
 def bump_test(speed: float) -> LoopTest:
     """A speed bump at ``speed`` [m/s]."""
-    height, length, duration = BUMP
+    height, length, shortest = BUMP
     begins = 0.5
+    duration = max(shortest, ceil(begins + length / speed + BEYOND))
     road = bump_road(height, length, speed, begins)
     title = f"speed bump, {1e3 * height:g} mm high and {length:g} m long, at {3.6 * speed:g} km/h"
     return LoopTest(LoopKind.bump, title, road, 0.0, duration, begins + 0.5 * length / speed)

@@ -2,11 +2,12 @@
 
 The law samples the instruments at its rate; what it asks for is held from the next sample on, since the computer
 needs the time between two. Between samples the rig and the drive move continuously, by steps of
-:mod:`savgs_ident.control.closed_loop.stabilised`. A step of the solve is a frame of :data:`FRAME` samples; what
-happened at each of them is kept.
+:mod:`savgs_ident.control.closed_loop.stabilised`, as many as what decays fastest asks for. A step of the solve is a
+frame of :data:`FRAME` samples; what happened at each of them is kept.
 """
 
 from functools import partial
+from math import ceil
 from typing import Any, ClassVar, NamedTuple
 
 import diffrax as dfx
@@ -19,23 +20,28 @@ from jaxtyping import Array, Float
 from savgs_ident.control.closed_loop.failure import Failure
 from savgs_ident.control.closed_loop.instruments import NUMBER, Instruments
 from savgs_ident.control.closed_loop.laws import AbstractLaw
-from savgs_ident.control.closed_loop.stabilised import stabilised_step
+from savgs_ident.control.closed_loop.stabilised import STABLE, stabilised_step
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.status import Status
-from savgs_ident.model.actuation import link_torque
+from savgs_ident.model.bristle import DRAG_TIME
 from savgs_ident.model.drive import Drive, VelocityReference, drive_state
 from savgs_ident.model.dynamics import Coordinates, Motion
+from savgs_ident.model.effect import SETTLING, AbstractRoadFault, AbstractSensorFault, AbstractSeries
 from savgs_ident.model.equilibrium import deflection_zero
 from savgs_ident.model.inputs import Inputs
 from savgs_ident.model.kinematics import suspension_travel
 from savgs_ident.model.profile import Constant
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.road import RoadMotion
-from savgs_ident.model.section import SectionCurves
+from savgs_ident.model.section import TRAVEL, SectionCurves
 from savgs_ident.model.values import Values
 from savgs_ident.simulate.transient import pack_state, rest_state, state_rates, unpack_state
 
 FRAME = 20
 """Samples of the law in one step of the solve."""
+
+LONGEST = 1e-3
+"""Longest step [s]: what is not stiff is followed within 0.01 % by it."""
 
 SEED = 1
 """Of the instruments' noise."""
@@ -59,6 +65,7 @@ class Signals(NamedTuple):
         sprung_accel: true acceleration of the sprung mass [m/s^2].
         susp_deflection: true deflection from standstill at the nominal link angle [m].
         tyre_load: F_tz [N].
+        wishbone_angle: theta_LW [rad].
         link_angle: [rad].
         link_velocity: [rad/s].
         asked: link velocity that the law asks for [rad/s].
@@ -67,6 +74,7 @@ class Signals(NamedTuple):
             comes out 2 % low, at 3 Hz the peak power 3 % high. Positions and velocities are right to 0.01 %.
         shaft_power: that the motor gives to its shaft [W].
         electric_power: that the motor takes [W]; negative while it gives back.
+        doubted: 1 from the time on at which the law does not believe the link angle any more, 0 before [1].
     """
 
     time: Array
@@ -74,12 +82,14 @@ class Signals(NamedTuple):
     sprung_accel: Array
     susp_deflection: Array
     tyre_load: Array
+    wishbone_angle: Array
     link_angle: Array
     link_velocity: Array
     asked: Array
     motor_torque: Array
     shaft_power: Array
     electric_power: Array
+    doubted: Array
 
 
 class ClosedLoopRun(NamedTuple):
@@ -134,21 +144,21 @@ def loop_field(case: LoopCase, asked: Array, t: Array, x: Array, near: Array) ->
     )
 
 
-def loop_sample(case: LoopCase, t: Array, x: Array, rates: Array, held: Array) -> tuple[Array, Array]:
-    """True values for the instruments (3,), and the :class:`Signals` of a sample, in a state with its rates.
+def loop_sample(case: LoopCase, t: Array, x: Array, rates: Array, held: Array) -> tuple[Array, Signals]:
+    """What the instruments measure (3,), gains included, and the signals of a sample, in a state with its rates.
 
-    At time ``t`` [s]; all in SI.
+    At time ``t`` [s]; all in SI. What the law makes of the measurements is not known yet: ``doubted`` is 0.
     """
     now, change = unpack_state(case.model, x), unpack_state(case.model, rates)
     drive = _drive_of(case, held)
     inputs = Inputs(case.road.at(t), drive.link(t, now.actuation), case.road.cam_at(t))
     motion = Motion(now.q, now.qd, Coordinates(*change.qd))
     loads = case.model.loads(case.p, motion, now.s, change.s, inputs, case.curves)
-    deflection = suspension_travel(case.model.effective(case.p), now.q.theta_LW) - case.zero
+    rig = case.model.effective(case.p)
+    deflection = suspension_travel(rig, now.q.theta_LW) - case.zero
     acceleration, motor = change.qd.z_s, drive_state(now.actuation)
     p = _values_at(case, t)
-    load = link_torque(p, loads.strut, now.q.theta_LW, motor.angle)
-    inside = drive.signals(p, t, now.actuation, load)
+    inside = drive.signals(p, t, now.actuation, loads.link_torque)
     speed = p["motor_gear_ratio"] * motor.velocity
     voltage, current = jnp.stack(inside.voltage), jnp.stack(motor.current)
     row = Signals(
@@ -157,20 +167,35 @@ def loop_sample(case: LoopCase, t: Array, x: Array, rates: Array, held: Array) -
         acceleration,
         deflection,
         loads.vertical,
+        now.q.theta_LW,
         motor.angle,
         motor.velocity,
         held,
         inside.torque,
         inside.torque * speed,
         1.5 * voltage @ current,
+        jnp.zeros_like(t),
     )
-    return jnp.stack([acceleration, deflection, motor.angle]), jnp.stack(row)
+    measured = [rig["accel_gain"] * acceleration, rig["deflection_gain"] * deflection, motor.angle]
+    return jnp.stack(measured), row
+
+
+def steps_within(model: QuarterCar, period: float) -> int:
+    """Steps [1] for which a ``period`` [s] between two samples of the law is short enough.
+
+    An anchor of a sliding bristle decays faster than the current of the motor, and what gives way in the path of a
+    load faster still.
+    """
+    series = any(isinstance(effect, AbstractSeries) for effect in model.effects)
+    longest = min(LONGEST, STABLE * (SETTLING if series else DRAG_TIME))
+    return max(1, ceil(period / longest - 1e-9))
 
 
 class _Sampled(dfx.AbstractSolver[None]):
     """Steps of one frame: sample, ask, and move on by the stabilised method, :data:`FRAME` times."""
 
     case: LoopCase
+    steps: int = eqx.field(static=True)
     term_structure: ClassVar = dfx.ODETerm
     interpolation_cls: ClassVar = dfx.LocalLinearInterpolation
 
@@ -191,20 +216,29 @@ class _Sampled(dfx.AbstractSolver[None]):
     ) -> tuple[Any, None, dict[str, Any], None, Any]:
         """One frame."""
         loop, p = self.case.loop, self.case.p
-        step = (t1 - t0) / FRAME
+        period = (t1 - t0) / FRAME
+        step = period / self.steps
         number = jnp.round(t0 * loop.rate / FRAME).astype(jnp.int32)
-        fastest = p["motor_speed_limit"] / p["motor_gear_ratio"] * step
+        fastest = p["motor_speed_limit"] / p["motor_gear_ratio"] * period
 
         def one(now: _LoopState, at: tuple[Array, Array]) -> tuple[_LoopState, Array]:
             share, normal = at
-            t = t0 + share * step
+            t = t0 + share * period
             field = partial(loop_field, self.case, now.asked)
             rates = field(t, now.rig, now.rates)
-            truth, row = loop_sample(self.case, t, now.rig, rates, now.asked)
-            readings = loop.failure.shown(t, loop.instruments.read(truth, normal))
+            measured, signals = loop_sample(self.case, t, now.rig, rates, now.asked)
+            readings = loop.failure.shown(t, loop.instruments.read(measured, normal))
             law, asked = loop.law.command(now.law, readings, fastest)
-            rig, last = stabilised_step(field, t, now.rig, rates, step)
-            return _LoopState(rig, last, law, asked, now.kept), row
+            moved = stabilised_step(field, t, now.rig, rates, step)
+            if self.steps > 1:
+
+                def further(moved: tuple[Array, Array], k: Array) -> tuple[tuple[Array, Array], None]:
+                    at = t + k * step
+                    return stabilised_step(field, at, moved[0], field(at, *moved), step), None
+
+                moved, _ = jax.lax.scan(further, moved, jnp.arange(1.0, self.steps))
+            row = jnp.stack(signals._replace(doubted=loop.law.doubted(law)))
+            return _LoopState(*moved, law, asked, now.kept), row
 
         places = jnp.arange(FRAME, dtype=jnp.float64)
         end, rows = jax.lax.scan(one, y0, (places, self.case.noise[number]))
@@ -232,7 +266,7 @@ def _solve(case: LoopCase, ends: Float[Array, " frames"]) -> tuple[Array, dfx.RE
 
     found = dfx.diffeqsolve(
         dfx.ODETerm(rates),
-        _Sampled(case),
+        _Sampled(case, steps_within(case.model, 1.0 / case.loop.rate)),
         ends[0],
         ends[-1],
         None,
@@ -248,7 +282,17 @@ def _solve(case: LoopCase, ends: Float[Array, " frames"]) -> tuple[Array, dfx.RE
 
 
 def loop_case(model: QuarterCar, p: Values, road: RoadMotion, loop: Loop, duration: float) -> LoopCase:
-    """The case of a run of ``duration`` [s], a whole number of frames."""
+    """The case of a run of ``duration`` [s], a whole number of frames.
+
+    Raises :class:`InputError` for a rig with an effect that belongs to the recordings and not to the loop.
+    """
+    kinds = AbstractSensorFault | AbstractRoadFault
+    foreign = [effect.name for effect in model.effects if isinstance(effect, kinds)]
+    if foreign:
+        raise InputError(
+            f"an error of the test bench cannot be part of a closed loop: {', '.join(foreign)}",
+            remedy="choose a model without it by --model, or take it out of the rig file's effects",
+        )
     frames = round(duration * loop.rate / FRAME)
     curves = model.curves(p)
     noise = np.random.default_rng(SEED).standard_normal((frames, FRAME, NUMBER))
@@ -256,13 +300,17 @@ def loop_case(model: QuarterCar, p: Values, road: RoadMotion, loop: Loop, durati
 
 
 def run_loop(model: QuarterCar, p: Values, road: RoadMotion, loop: Loop, duration: float) -> ClosedLoopRun:
-    """A run of ``duration`` [s], a whole number of frames, from rest at the nominal link angle."""
+    """A run of ``duration`` [s], a whole number of frames, from rest at the nominal link angle.
+
+    A motion beyond the linkage's travel counts as none. Raises :class:`InputError` as :func:`loop_case` does.
+    """
     case = loop_case(model, p, road, loop, duration)
     frames = case.noise.shape[0]
     rows, result = _solve(case, jnp.arange(frames + 1) * (FRAME / loop.rate))
     signals = Signals(*np.asarray(rows).T)
     finite = all(np.isfinite(each).all() for each in signals)
-    ended = bool(result == dfx.RESULTS.successful) and finite
+    within = bool(np.max(np.abs(signals.wishbone_angle)) <= TRAVEL)
+    ended = bool(result == dfx.RESULTS.successful) and finite and within
     return ClosedLoopRun(signals, Status.CONVERGED if ended else Status.NOT_FINITE)
 
 

@@ -19,6 +19,9 @@ from numpy.polynomial.chebyshev import Chebyshev
 STAGES = 4
 """Stages of a step."""
 
+STABLE = 0.98 * 2.0 / 3.0 * (STAGES**2 - 1)
+"""Fastest decay in a step, rate times step [1], for which a step is stable."""
+
 DAMPING = 2.0 / 13.0
 """Damping of the stability polynomial, after the paper: it trades 2 % of the interval for decay within it."""
 

@@ -3,14 +3,17 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from savgs_ident.control.closed_loop.causes import Cause, measure_causes
 from savgs_ident.control.closed_loop.failure import KINDS, NOTHING, failing
 from savgs_ident.control.closed_loop.instruments import sheet_instruments
-from savgs_ident.control.closed_loop.laws import HoldLaw, hinf_law
+from savgs_ident.control.closed_loop.laws import hinf_law, hold_law
 from savgs_ident.control.closed_loop.metrics import (
     DriveUse,
     Gain,
     Ride,
+    doubted_from,
     drive_use,
     gain_of,
     ride_after,
@@ -20,8 +23,12 @@ from savgs_ident.control.closed_loop.programme import LoopTest
 from savgs_ident.control.closed_loop.run import ClosedLoopRun, Loop, run_loop
 from savgs_ident.control.controller_file import DigitalController
 from savgs_ident.control.rigs import Rigs
+from savgs_ident.core.errors import InputError
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values, as_values
+
+SAME_ANGLE = 0.01
+"""Within this two nominal link angles are the same [deg]."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +81,19 @@ class LoopStudy:
 
     @property
     def stable(self) -> bool:
-        """Whether the loop is stable on the rig and on all others that it was tried on."""
-        return self.active_ride.stable and all(each.stable for each in self.on_rigs)
+        """Whether the loop is stable on the rig and on all others that it was tried on, passive and active."""
+        both = self.passive_ride.stable and self.active_ride.stable
+        return both and all(each.stable for each in self.on_rigs)
+
+    @property
+    def trusted(self) -> bool:
+        """Whether it is stable, and the law was at work all of the time."""
+        return self.stable and self.doubted_from is None
+
+    @property
+    def doubted_from(self) -> float | None:
+        """When the law ceased to believe the link angle although nothing failed [s]; None if it never did."""
+        return doubted_from(self.active)
 
 
 def loop_around(p: Values, controller: DigitalController) -> Loop:
@@ -93,9 +111,19 @@ def study_loop(
     rigs: Rigs | None = None,
     causes: bool = False,
 ) -> LoopStudy:
-    """Run a test of a controller on a rig, with each failure, and on ``rigs``."""
+    """Run a test of a controller on a rig, with each failure, and on ``rigs``.
+
+    Raises :class:`InputError` if the controller was designed for another link angle than the rig stands at, and as
+    :func:`savgs_ident.control.closed_loop.run.loop_case` does.
+    """
+    stands, designed = (float(np.degrees(each)) for each in (p["psi_nominal"], controller.alpha.nominal))
+    if abs(stands - designed) > SAME_ANGLE:
+        raise InputError(
+            f"the controller was designed for a link at {designed:g} deg, and the rig's stands at {stands:g} deg",
+            remedy="design a controller for this rig",
+        )
     loop = loop_around(p, controller)
-    hold = loop._replace(law=HoldLaw(p["psi_nominal"]))
+    hold = loop._replace(law=hold_law(p["psi_nominal"], loop.rate))
 
     def ran(values: Values, around: Loop) -> ClosedLoopRun:
         return run_loop(model, values, test.road, around, test.duration)

@@ -1,6 +1,6 @@
 """Parameters of rig and effects on coordinates with the unit normal for prior.
 
-What the sheet knows to a tolerance is normal about it. What is to be identified is log-normal about its start,
+What the sheet knows to a tolerance is normal about it. What else is to be identified is log-normal about its start,
 wide. The amplitude of an effect begins at its null, two typical sizes wide; what shapes an effect is log-normal
 about its typical value, to a factor of two.
 """
@@ -21,23 +21,20 @@ SHAPE = 0.7
 """Width of the logarithm of what shapes an effect."""
 
 
-def free_coordinate(parameter: Parameter) -> AbstractCoordinate:
-    """The coordinate of a parameter that is to be identified.
+def baseline_coordinate(parameter: Parameter) -> AbstractCoordinate:
+    """The coordinate of a parameter that is known to a tolerance, or else is to be identified.
 
-    Raises :class:`InputError` for one whose start is not positive.
+    Raises :class:`InputError` for one without a tolerance whose start is not positive.
     """
+    if parameter.tolerance > 0.0:
+        each = parameter
+        return Linear(each.name, each.unit, each.value, each.tolerance, each.lower, each.upper)
     if not parameter.value > 0.0:
         raise InputError(
             f"{parameter.name} is to be identified from {parameter.value:g} {parameter.unit}",
             remedy="give it a positive value in the rig file: its size, roughly",
         )
     return _logarithmic(parameter, FREE)
-
-
-def tolerance_coordinate(parameter: Parameter) -> AbstractCoordinate:
-    """The coordinate of a parameter that is known to a tolerance."""
-    each = parameter
-    return Linear(each.name, each.unit, each.value, each.tolerance, each.lower, each.upper)
 
 
 def term_of(effect: AbstractEffect) -> Term:

@@ -1,9 +1,10 @@
 """The rig's ports as places of an unknown signal: laws of what a port sees, and free harmonics.
 
 A force may be any law of displacement, velocity and load of its port, or what a contact there carries that gives a
-little before it slides; what gives way, of the load there and its rate; a sensor's error, of its reading; the road's,
-of the cam's angle. A law is a sum of smooth functions, some sharp about zero velocity, where friction turns round.
-Where a force may be unknown and something may give way, these are two laws: a place follows one.
+little before it slides; what gives way, of the load there and its rate; a sensor's error, a linear filter of its
+reading or a law of the reading and its rate; the road's, of the cam's angle. A law is a sum of smooth functions, some
+sharp about zero velocity, where friction turns round. Where a force may be unknown and something may give way, these
+are two laws, and so are the two of a sensor: a place follows one.
 """
 
 from typing import NamedTuple
@@ -38,6 +39,9 @@ SIMPLE = 0.05
 
 RESONANCES = (3.0, 4.0, 5.4, 7.3, 9.8, 13.0, 18.0, 24.0, 33.0, 50.0)
 """Natural frequencies [Hz] of what the frame may do."""
+
+INSTANTS = 256
+"""Instants of a period at which a law of a sensor's reading is evaluated."""
 
 FREE_ORDERS = 9
 """Highest order of a free signal."""
@@ -201,7 +205,7 @@ def _resonances(load: Signal, nodes: Nodes) -> list[Signal]:
 
 
 def _sensor_places(plant: RigPlant, p: Values, solution: PeriodicSolution) -> list[Place]:
-    """Errors of a sensor: linear filters of its reading; and free harmonics of it."""
+    """Errors of a sensor: linear filters of its reading, or a law of reading and rate; and free harmonics of it."""
     read = np.array(harmonics(plant.complete(()), p, solution, plant.orders))
     order = np.arange(plant.orders + 1)
     omega = 2.0 * np.pi * np.asarray(solution.excitation.frequency)[:, None] * order
@@ -216,10 +220,20 @@ def _sensor_places(plant: RigPlant, p: Values, solution: PeriodicSolution) -> li
         mine = read[:, c]
         filters = [1.0 + 0.0 * omega, 1j * omega / 20.0, -((omega / 20.0) ** 2)]
         filters += [corner / (corner + 1j * omega) for corner in (20.0, 60.0, 180.0)]
-        law = np.stack([rows_of(mine * each) for each in filters], axis=1)
+        dynamic = np.stack([rows_of(mine * each) for each in filters], axis=1)
+        static = np.stack([rows_of(each) for each in _reading_laws(mine, omega)], axis=1)
         unit = [
             np.where(order == k, 1.0, 0.0) * turn for k in range(1, plant.orders + 1) for turn in (1.0, -1j)
         ]
         free = np.stack([rows_of(np.broadcast_to(each, mine.shape)) for each in unit], axis=1)
-        places.append(Place(f"sensor.{channel}", (Law(law),), free))
+        places.append(Place(f"sensor.{channel}", (Law(dynamic), Law(static)), free))
     return places
+
+
+def _reading_laws(reading: NDArray[np.complex128], omega: Signal) -> list[NDArray[np.complex128]]:
+    """Harmonics of functions of a reading and its rate, from its harmonics; both (dwells, orders), rad/s."""
+    orders = reading.shape[1]
+    turn = np.exp(2j * np.pi * np.outer(np.arange(orders), np.arange(INSTANTS)) / INSTANTS)
+    along, rate = (np.real(each[:, 1:] @ turn[1:]) for each in (reading, 1j * omega * reading))
+    laws = _force_laws(along.ravel(), rate.ravel(), np.zeros(along.size))
+    return [np.fft.rfft(each.reshape(along.shape))[:, :orders] * 2.0 / INSTANTS for each in laws]

@@ -21,7 +21,7 @@ from savgs_ident.core.rig import Rig, merge_parameters
 from savgs_ident.diagnose.engine.coordinates import Coordinates
 from savgs_ident.diagnose.engine.prediction import Prediction, Term
 from savgs_ident.diagnose.rig.columns import columns_with_states, rehearse
-from savgs_ident.diagnose.rig.coordinates import free_coordinate, term_of, tolerance_coordinate
+from savgs_ident.diagnose.rig.coordinates import baseline_coordinate, term_of
 from savgs_ident.diagnose.rig.rows import rows_of, slopes_of
 from savgs_ident.effects.registry import MODELS
 from savgs_ident.fit.problem import used_parameters
@@ -108,16 +108,17 @@ class RigPlant:
 
     @cached_property
     def nuisances(self) -> Coordinates:
-        """The free parameters of the baseline, then those known to a tolerance that matter."""
+        """The free parameters of the baseline, then those known to a tolerance that matter.
+
+        What is identified and known to a tolerance all the same, as the damping is, is held against it.
+        """
         used = used_parameters(self.model(()), self.table)
         known = [name for name in known_to_tolerance(self.table, self.free) if name in used]
-        return tuple(free_coordinate(self.table[name]) for name in self.free) + tuple(
-            tolerance_coordinate(self.table[name]) for name in known
-        )
+        return tuple(baseline_coordinate(self.table[name]) for name in (*self.free, *known))
 
     @cached_property
     def candidates(self) -> tuple[Term, ...]:
-        """All effects that the baseline does not have, but for those that its free parameters are."""
+        """All effects that the baseline does not have."""
         terms = [term_of(effect) for name, effect in self.catalogue.items() if name not in self.baseline]
         return tuple(term for term in terms if term.amplitudes)
 

@@ -1,0 +1,30 @@
+"""A drive holds its link against the strut as the rig really is, not as its drawing says."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from savgs_ident.core.rig import Rig
+from savgs_ident.effects.registry import MODELS, build_model, model_parameters
+from savgs_ident.model.drive import holding_drive
+from savgs_ident.model.road import flat_road
+from savgs_ident.model.values import as_values
+from savgs_ident.simulate.transient import rest_state, state_rates
+
+NOMINAL = np.pi / 2.0
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.05])
+def test_a_link_mounted_off_by_an_angle_is_that_of_another_drawing(rig: Rig, moved: float) -> None:
+    road, drive, zero = flat_road(), holding_drive(NOMINAL), jnp.zeros(())
+    offset = (*MODELS["simtr"], "link_offset")
+    given = as_values(model_parameters(rig, offset).as_dict() | {"link_offset": moved})
+    drawn = {**given, "theta_0": given["theta_0"] + moved}
+    ways = ((build_model(rig, offset), given), (build_model(rig, MODELS["simtr"]), drawn))
+    states, rates = [], []
+    for model, p in ways:
+        states.append(rest_state(model, p, road, drive, zero))
+        rates.append(state_rates(model, p, road, drive, zero, states[-1]))
+    assert np.max(np.abs(states[0].actuation)) > 0.01
+    for one, other in (states, rates):
+        assert np.asarray(one.actuation) == pytest.approx(np.asarray(other.actuation), rel=1e-9, abs=1e-9)
