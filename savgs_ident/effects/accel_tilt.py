@@ -2,7 +2,7 @@
 
     reading / truth = cos(tilt) = 1 - v
 
-with the versine v = 1 - cos(tilt) [1], in which the reading is linear; 0.015 is 10 deg, and hardly anyone mounts a
+with the versine v = 1 - cos(tilt) [1], in which the reading is linear; 0.0075 is 7 deg, and hardly anyone mounts a
 sensor further off. It looks like a gain below one, and nothing in the readings can tell the two apart.
 """
 
@@ -25,7 +25,7 @@ class AccelTilt(AbstractSensorFault):
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
             "accel_tilt_versine",
-            0.015,
+            0.0075,
             "1",
             lower=0.0,
             upper=0.5,
