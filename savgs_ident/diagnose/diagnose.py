@@ -187,7 +187,7 @@ def _assemble(
         responses=_responses(plant, case.given, base.prediction.rows, fitted),
         measured=measured,
         converged=base.status.ok and after.status.ok,
-        warnings=warnings_of(case, after, judged),
+        warnings=warnings_of(case, after, judged, together),
         wall_s=0.0,
         learned=None if law is None else _offered(law),
     )

@@ -72,7 +72,7 @@ def _nearest(judged: Judged) -> str:
     return f" The nearest in the catalogue, {effects}, leaves {left} of the misfit beyond the noise."
 
 
-def warnings_of(case: Case, after: Mode, judged: Judged) -> tuple[str, ...]:
+def warnings_of(case: Case, after: Mode, judged: Judged, gap: Shrink) -> tuple[str, ...]:
     """What a reader must know."""
     base, left, kind = case.base, judged.left, judged.kind
     found = [
@@ -87,6 +87,11 @@ def warnings_of(case: Case, after: Mode, judged: Judged) -> tuple[str, ...]:
     for mode, name in ((base, "the recalibrated baseline"), (after, "the model with the named effects")):
         if not mode.status.ok:
             found.append(f"The search for {name} did not end well: {mode.status.advice}.")
+    if kind == "none" and gap.recalibrated**2 - gap.floor**2 > MATERIAL**2:
+        found.append(
+            f"The recalibrated model misses by {_percent(gap.recalibrated)} of the response where the noise is "
+            f"{_percent(gap.floor)}, by errors that follow no law at any port: look at the tests that miss most."
+        )
     if kind in ("effect", "several") and left > IMPERFECT:
         found.append(
             f"The named effects leave {100.0 * left:.1f} % of the baseline's excess misfit: their laws are not quite "

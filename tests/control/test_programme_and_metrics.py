@@ -160,6 +160,26 @@ def test_a_rig_that_did_not_move_gains_nothing() -> None:
     assert gain_of(still, still) == Gain(0.0, 0.0, 0.0)
 
 
+def test_what_a_lost_run_gains_is_not_known() -> None:
+    lost = Ride(np.nan, np.nan, np.nan, np.nan, stable=False)
+    moving = Ride(1.0, 0.01, 300.0, 0.0, stable=True)
+    for passive, active in ((lost, moving), (moving, lost)):
+        gain = gain_of(passive, active)
+        assert np.isnan([gain.sprung_accel, gain.susp_deflection, gain.tyre_load]).all()
+    use = drive_use(a_run(AT_TWO, Status.NOT_FINITE), AT_TWO, DRIVE)
+    assert np.isnan([use.speed_peak_rpm, use.saturated, use.energy, *use.angle_deg]).all()
+    assert use.saturated_from is None
+
+
+@pytest.mark.parametrize("speed", [0.2, 1.0, 5.5, 30.0])
+def test_the_test_of_a_bump_ends_behind_it(speed: float) -> None:
+    test = bump_test(speed)
+    _, velocity = along(test.road, np.linspace(test.end - 1.5, test.duration, 50))
+    height, _ = along(test.road, np.linspace(0.0, test.end, 20_001))
+    assert np.max(height) == pytest.approx(0.05, rel=1e-3)
+    assert np.all(velocity == 0.0)
+
+
 def test_speed_angle_and_power_are_the_extremes_of_the_judged_time() -> None:
     time = times_of(AT_TWO)
     inside = (time >= AT_TWO.start) & (time < AT_TWO.end)

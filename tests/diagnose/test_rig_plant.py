@@ -55,6 +55,28 @@ def test_what_the_papers_models_have_beyond_the_baseline_is_known_to_be_missing_
     assert replace(plant, baseline=(), catalogue=less).known == ()
 
 
+@pytest.mark.parametrize("baseline", [(), ("rail_coulomb",), ("rail_coulomb", "tyre_friction")])
+def test_a_motion_of_the_smaller_model_is_one_of_the_complete_model(
+    plant_and_data: Case, baseline: tuple[str, ...]
+) -> None:
+    """They have the same states, the rail's anchor among them."""
+    plant = replace(plant_and_data[0], baseline=baseline)
+    stateful = [name for name, effect in CATALOGUE.items() if effect.states]
+    assert len(stateful) > 5
+    for terms in ((), *((name,) for name in stateful), (stateful[0], "rail_preload"), tuple(stateful[:2])):
+        assert plant.model(terms).states == plant.complete(terms).states
+
+
+def test_what_the_sheet_knows_is_held_against_it_though_it_is_identified(
+    plant_and_data: Case, rig: Rig
+) -> None:
+    known = {each.name: each for each in plant_and_data[0].nuisances}
+    assert known["c_sd"] == baseline_coordinate(rig.parameters["c_sd"])
+    centre, tolerance = rig.parameters["c_sd"].value, rig.parameters["c_sd"].tolerance
+    assert float(known["c_sd"].value(1.0)) == pytest.approx(centre + tolerance)
+    assert float(known["mu_r"].value(1.0)) == pytest.approx(np.e * rig.parameters["mu_r"].value)
+
+
 def test_slopes_are_those_of_differences(plant_and_data: Case, start: PeriodicSolution) -> None:
     plant, data = plant_and_data
     steps = {"m_s": 0.05, "k_t": 50.0, "spring_rate_change": 1e-4, "accel_lag_time": 1e-5, "cam_cos_2": 1e-6}

@@ -1,5 +1,6 @@
 """What a diagnosis says where the verdict needs a reason."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -73,7 +74,7 @@ def test_a_tolerance_that_does_not_hold_is_named(weights: dict[str, float], star
     ("odds", "told"),
     [
         (-3.0, ""),
-        (4.0, "Evidence of 4.0 nat speaks for something missing"),
+        (3.0, "Evidence of 3.0 nat speaks for something missing"),
         (SURE + 90.0, "too little to matter"),
     ],
 )
@@ -90,6 +91,18 @@ def test_what_could_not_be_judged_or_settled_is_a_warning() -> None:
         "unknown", "law", {"none": 0.0, "unknown": 900.0}, lost=(("gear_backlash",),), settled=False
     )
     case: Any = SimpleNamespace(base=_mode(0.0))
-    told = " ".join(warnings_of(case, _mode(0.0), judged))
+    told = " ".join(warnings_of(case, _mode(0.0), judged, GAP))
     assert "The fit of gear_backlash found no motion" in told
     assert "could not be found again on twice the nodes" in told
+
+
+@pytest.mark.parametrize(("recalibrated", "warned"), [(0.0016, False), (0.003, False), (0.02, True)])
+def test_a_baseline_that_misses_by_what_no_law_explains_is_warned_of(
+    recalibrated: float, warned: bool
+) -> None:
+    judged = _judged("none", "law", {"none": 0.0, "unknown": -20.0})
+    gap = replace(GAP, recalibrated=recalibrated)
+    case: Any = SimpleNamespace(base=_mode(0.0))
+    told = warnings_of(case, _mode(0.0), judged, gap)
+    assert bool(told) is warned
+    assert all("follow no law at any port" in each for each in told)

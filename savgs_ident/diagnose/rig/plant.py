@@ -26,7 +26,7 @@ from savgs_ident.diagnose.rig.rows import rows_of, slopes_of
 from savgs_ident.effects.registry import MODELS
 from savgs_ident.fit.problem import used_parameters
 from savgs_ident.model.damper import damper_curve
-from savgs_ident.model.effect import AbstractEffect
+from savgs_ident.model.effect import AbstractEffect, AbstractGrip
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values, as_values
 from savgs_ident.posterior.likelihood import Likelihood
@@ -135,12 +135,20 @@ class RigPlant:
         """The baseline with ``terms``.
 
         With all effects without states too, at their null, unless a term with states asks for a program of its own
-        anyway: then the smaller model is the sooner compiled.
+        anyway: then the smaller model is the sooner compiled. The rail's anchor is a state of all models or of none.
         """
         special = [name for name in terms if self.catalogue[name].states and name not in self.baseline]
+        wanted = {
+            name
+            for name, effect in self.catalogue.items()
+            if name in self.baseline or (not effect.states and (not special or name in terms))
+        }
+        grips = [name for name, effect in self.catalogue.items() if isinstance(effect, AbstractGrip)]
+        if not wanted.intersection(grips):
+            wanted.update(grips[:1])
         model = QuarterCar(damper_curve(self.rig))
         for name, effect in self.catalogue.items():
-            if name in self.baseline or (not effect.states and (not special or name in terms)):
+            if name in wanted:
                 model = model + effect
         for name in special:
             model = model + self.catalogue[name]
