@@ -58,6 +58,11 @@ class Bench:
         return table.with_values({name: null for each in absent for name, null in each.null.items()})
 
     @cached_property
+    def unknown(self) -> tuple[str, ...]:
+        """Parameters of which nothing is known beforehand: identified, and without a tolerance."""
+        return tuple(name for name in self.free if self.table[name].tolerance == 0.0)
+
+    @cached_property
     def excitation(self) -> Excitation:
         """The cam in all dwells, and a rigid link."""
         lift, angle = self.table.values_of(("cam_peak_to_peak", "psi_nominal"))

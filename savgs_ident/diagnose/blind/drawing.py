@@ -165,7 +165,7 @@ class Drawing:
             return columns
 
         start = np.concatenate([np.zeros(known), further])
-        reach = np.array([np.inf if name in self.bench.free else STANDS_OUT for name in self.hiding.names])
+        reach = np.array([np.inf if name in self.bench.unknown else STANDS_OUT for name in self.hiding.names])
         lower, upper = (-reach, reach) if beside is None else map(np.append, (-reach, reach), beside.bounds)
         return sigma_of(miss_at, columns_at, start, known, (lower, upper))
 
@@ -179,9 +179,9 @@ class Drawing:
     def _moved(self, x: NDArray[np.float64]) -> dict[str, float]:
         if not x[: len(self.hiding.names)].any():
             return dict(self.rig)
-        table, free = self.bench.table, self.bench.free
+        table = self.bench.table
         return dict(self.rig) | {
-            name: moved(table[name], self.rig.get(name, table[name].value), value, name in free)
+            name: moved(table[name], self.rig.get(name, table[name].value), value)
             for name, value in zip(self.hiding.names, x.tolist(), strict=False)
         }
 

@@ -1,7 +1,7 @@
 """Whether an effect can be seen at all: what calibration and tolerances can do, it must not be.
 
-A spring that is 3 % stiffer than its sheet says, at a tolerance of 1.5 %, is no missing effect, and a damper
-that is 10 % harder is identified anyway. What an effect changes is therefore held against the best that the
+A spring that is 3 % stiffer than its sheet says, at a tolerance of 1.5 %, is no missing effect, and a tyre with
+10 % more friction is identified anyway. What an effect changes is therefore held against the best that the
 model without it can do:
 
     sigma^2 = min_x  |(change - moved(x)) / noise|^2 + |x|^2
@@ -30,7 +30,7 @@ STEPS = 12
 SHARES = (1.0, 0.3, 0.1, 0.03)
 """Shares of a step that are tried."""
 
-SETTLED = 0.8
+SETTLED = 0.95
 """The search ends where a whole step leaves more than this of the square."""
 
 ENOUGH = 2.0
@@ -67,12 +67,12 @@ def noise_rows(bench: Bench) -> Real:
     return np.repeat(spread.ravel(), 2 * ORDERS)
 
 
-def moved(each: Parameter, value: float, x: float, free: bool) -> float:
+def moved(each: Parameter, value: float, x: float) -> float:
     """A parameter moved from ``value`` [its unit] by ``x`` of what is known of it beforehand, within its bounds.
 
     ``x`` is in standard deviations.
     """
-    there = value * np.exp(x) if free else value + each.tolerance * x
+    there = value + each.tolerance * x if each.tolerance > 0.0 else value * np.exp(x)
     return float(np.clip(there, each.lower, each.upper))
 
 
@@ -86,7 +86,7 @@ def hiding_at(
     names = (*bench.free, *known)
     slopes = np.asarray(harmonic_sensitivities(model, p, solution, names, ORDERS))
     noise = noise_rows(bench)
-    units = [float(p[name]) if name in bench.free else bench.table[name].tolerance for name in names]
+    units = [float(p[name]) if name in bench.unknown else bench.table[name].tolerance for name in names]
     columns = [rows_of(slope) / noise * unit for slope, unit in zip(slopes, units, strict=True)]
     return Hiding(noise, names, np.stack(columns, axis=1))
 

@@ -181,10 +181,11 @@ def _with_rate(signal: Signal, nodes: Nodes, solution: PeriodicSolution) -> Sign
 
 
 def _cam_waves(nodes: Nodes, solution: PeriodicSolution) -> list[Signal]:
-    """What a cam of another shape or lift would do."""
+    """What a cam of another shape or lift would do, and one that turns a moment earlier or later than is told."""
     turned = np.angle(np.asarray(solution.excitation.road))[:, 1][nodes.dwell]
-    angle = nodes.phase + turned
-    return [wave(order * angle) for order in (1, 2, 3) for wave in (np.cos, np.sin)]
+    angle, speed = nodes.phase + turned, nodes.omega / np.max(nodes.omega)
+    shapes = [wave(order * angle) for order in (1, 2, 3) for wave in (np.cos, np.sin)]
+    return [*shapes, speed * np.cos(angle), speed * np.sin(angle)]
 
 
 def _resonances(load: Signal, nodes: Nodes) -> list[Signal]:
