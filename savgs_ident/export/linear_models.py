@@ -14,6 +14,7 @@ from savgs_ident.control import linearisation, quarter_car_space
 from savgs_ident.control.linear_equivalent import Equivalent
 from savgs_ident.control.two_masses import nominal_equivalent, paper_masses
 from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.signals import check_rest
 from savgs_ident.model.effect import AbstractEffect, AbstractForce, AbstractGrip, AbstractRoadFault, Port
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import as_values
@@ -94,10 +95,12 @@ def equation_8(model: ExportedModel) -> LinearModel:
 def exact(model: ExportedModel) -> LinearModel:
     """The exact linearisation at rest, the link at its nominal angle, without friction.
 
-    Raises :class:`InputError` where the rig has none.
+    Raises :class:`InputError` where the rig has none, or finds no rest.
     """
     p, bare = as_values(model.table.as_dict()), without_friction(model.equations.model)
-    space = linearisation.linearise(bare, p, linearisation.resting(bare, p, p["psi_nominal"]))
+    at = linearisation.resting(bare, p, p["psi_nominal"])
+    check_rest(map(float, at.q), model)
+    space = linearisation.linearise(bare, p, at)
     internal = {f"{place}_{state.name}": state.unit for place, state in enumerate(bare.states)}
     about = "exact linearisation of the rig at rest, the link at its nominal angle, without friction"
     return _linear(about, space, internal)

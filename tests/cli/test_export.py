@@ -185,6 +185,17 @@ def test_a_covariance_that_is_none_is_code_2(invoke: Invoke) -> None:
     assert "model.toml: provenance.covariance.names[1] is 'nobody'" in done.stderr
 
 
+def test_a_rig_that_finds_no_rest_is_code_2_and_names_its_file(invoke: Invoke) -> None:
+    drawing = read_rig(RIG)
+    write_rig(replace(drawing, parameters=drawing.parameters.with_values({"k_sd": 2e3})), Path("soft.toml"))
+    done = invoke("export", "soft.toml", "--to", "casadi", "--quiet")
+    assert done.exit_code == 2
+    assert done.stderr.startswith(
+        "Error: soft.toml: the rig finds no rest with its link at the nominal 90 deg"
+    )
+    assert not list(Path("out/export").iterdir())
+
+
 @pytest.mark.parametrize("words", [(RIG,), (RIG, "--to", "json", "--samples", "0"), ("--to", "json")])
 def test_bad_usage_is_code_2(invoke: Invoke, words: tuple[object, ...]) -> None:
     done = invoke("export", *words)
