@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from jaxtyping import Array
 
 from savgs_ident.core.rig_form import KNOWN_UNITS
-from savgs_ident.effects.learned.forces import coefficients_at
+from savgs_ident.effects.learned.forces import coefficients_at, frictions_at
 from savgs_ident.effects.registry import CATALOGUE, EFFECTS, LEARNED
 from savgs_ident.model.effect import AbstractEffect, AbstractForce, Port, PortSignals
 from savgs_ident.model.values import Values, as_values
@@ -91,6 +91,17 @@ def test_each_of_its_numbers_weighs_the_function_that_its_words_say(effect: Abst
     for name, words in _words(effect).items():
         alone = {f"{own}{span}": value for span, value in SPANS.items()} | dict(effect.null) | {name: 1.0}
         assert _force(effect, as_values(alone), *at) == pytest.approx(LAWS[words](x, v, n), rel=1e-9), words
+
+
+@each_learned
+def test_its_frictions_are_those_that_are_steeper_at_rest_than_any_damping(effect: AbstractEffect) -> None:
+    steep = [
+        name
+        for name, words in _words(effect).items()
+        if (LAWS[words](0.7, 1e-4, 0.6) - LAWS[words](0.7, -1e-4, 0.6)) / 2e-4 > 2.0
+    ]
+    assert list(frictions_at(effect.port)) == steep
+    assert len(steep) in (5, 6)
 
 
 @each_learned
