@@ -47,9 +47,13 @@ def test_a_posterior_without_the_diagnosed_effect_is_told(identified: Rig, poste
     assert found.model.rig.provenance["notes"] == [*found.said, *found.doubts]
 
 
-def test_a_posterior_that_lies_elsewhere_is_told(rig: Rig, identified: Rig, posterior: Path) -> None:
+@pytest.mark.parametrize("count", [None, 1, 2])
+def test_a_posterior_that_lies_elsewhere_is_told(identified: Rig, posterior: Path, count: int | None) -> None:
+    """However few of its draws travel along."""
     moved = replace(identified, parameters=identified.parameters.with_values({"k_t": 2.0e5}))
-    (doubt,) = gather(moved, SIMTR, posterior=posterior).doubts
+    found = gather(moved, SIMTR, posterior=posterior, count=count)
+    assert found.model.samples["k_t"].size == (count or 200)
+    (doubt,) = found.doubts
     assert "lies elsewhere than the model: k_t is more than 6 standard deviations off" in doubt
 
 
