@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from savgs_ident.core.rig import Rig
 from savgs_ident.effects.registry import EFFECTS
-from savgs_ident.export.diagnosed import Diagnosed, with_diagnosis
+from savgs_ident.export.diagnosed import TOLD, Diagnosed, listed, with_diagnosis
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.model.effect import AbstractSensorFault
 from savgs_ident.posterior.draws import FAR, Draws, far_from_draws, read_draws, thin_draws
@@ -51,12 +51,23 @@ def gather(
         draws = read_draws(posterior, tuple(model.table))
         doubts += _doubts_of_draws(model, draws, found.added, posterior)
         model = replace(model, samples=thin_draws(draws, count))
-    said = (*found.said, *_sensors(model))
+    said = (*_other_model(rig, effects), *found.said, *_sensors(model))
     notes = [*said, *doubts]
     if notes:
         noted = replace(model.rig, provenance={**model.rig.provenance, "notes": notes})
         model = replace(model, rig=noted)
     return Gathered(model, said, tuple(doubts))
+
+
+def _other_model(rig: Rig, effects: tuple[str, ...]) -> tuple[str, ...]:
+    """Whether the rig file was identified with other effects than those asked for."""
+    known = rig.provenance.get("effects")
+    if not isinstance(known, list | tuple) or set(map(str, known)) == set(effects):
+        return ()
+    return (
+        f"The rig file was identified with {listed(known) or 'no friction'} and is taken with"
+        f" {listed(effects) or 'no friction'}: its numbers, and their covariance, are of that fit.",
+    )
 
 
 def _sensors(model: ExportedModel) -> tuple[str, ...]:
@@ -69,10 +80,24 @@ def _sensors(model: ExportedModel) -> tuple[str, ...]:
 
 
 def _doubts_of_fit(rig: Rig, found: Diagnosed) -> tuple[str, ...]:
-    # With added effects, the numbers are of another fit.
-    if found.added or rig.provenance.get("trusted", True):
+    if rig.provenance.get("trusted", True):
         return ()
-    return (f"The rig file's own fit is not to be trusted ({rig.provenance.get('status', 'no status')}).",)
+    moved = _moved_by_fit(rig)
+    left = [name for name in moved if name not in found.taken]
+    if moved and not left:  # The diagnosis fitted all of them anew.
+        return ()
+    doubt = f"The rig file's own fit is not to be trusted ({rig.provenance.get('status', 'no status')})"
+    if not found.added:
+        return (f"{doubt}.",)
+    names = f" ({', '.join(left[:TOLD])}{', ...' if len(left) > TOLD else ''})" if left else ""
+    return (f"{doubt}, and some of its numbers{names} are in the model still: the diagnosis has no others.",)
+
+
+def _moved_by_fit(rig: Rig) -> tuple[str, ...]:
+    """Names of the parameters that the fit of the rig file moved, tolerances included, as far as the file says."""
+    told = (rig.provenance.get(name) for name in ("free", "before"))
+    names = [str(name) for each in told if isinstance(each, list | tuple | Mapping) for name in each]
+    return tuple(dict.fromkeys(names))
 
 
 def _doubts_of_diagnosis(document: Mapping[str, object]) -> tuple[str, ...]:

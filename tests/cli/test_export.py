@@ -91,6 +91,15 @@ def test_a_drawing_is_exported_with_the_model_asked_for(invoke: Invoke) -> None:
     assert read_model_json("o/model.json").effects == ()
 
 
+def test_another_model_than_the_identified_one_is_told(invoke: Invoke) -> None:
+    done = invoke("export", _identified(), "--to", "json", "--model", "simqc", "--out", "o")
+    assert done.exit_code == 0, done.stderr
+    said = "identified with rail_coulomb and tyre_friction and is taken with no friction"
+    assert said in " ".join(done.stdout.split())
+    (told,) = json.loads(Path("o/export.json").read_text())["said"]
+    assert said in told
+
+
 def test_a_diagnosed_effect_joins_and_the_output_says_with_which_numbers(invoke: Invoke) -> None:
     done = invoke("export", _identified(), "--to", "json", "--diagnosis", _diagnosis(MOUNT), "--out", "o")
     assert done.exit_code == 0, done.stderr
