@@ -66,7 +66,7 @@ def _other_model(rig: Rig, effects: tuple[str, ...]) -> tuple[str, ...]:
         return ()
     return (
         f"The rig file was identified with {listed(known) or 'no friction'} and is taken with"
-        f" {listed(effects) or 'no friction'}: its numbers, and their covariance, are of that fit.",
+        f" {listed(effects) or 'no friction'}: what the model has of its numbers is of that fit.",
     )
 
 
