@@ -36,7 +36,8 @@ def export(
         typer.Option(
             "--diagnosis",
             metavar="FILE",
-            help="diagnosis.json: the effects that it names join the model, with the numbers of its fit.",
+            help="diagnosis.json: the effects that it names, or the force that it learned, join the model with "
+            "the numbers of its fit.",
         ),
     ] = None,
     model: Annotated[
@@ -51,8 +52,8 @@ def export(
 ) -> int:
     """Export an identified model: parameters with covariance, draws, linear models, equations.
 
-    The effects that a diagnosis names join the model; what it found and the catalogue does not have is no equation
-    and travels along as data.
+    The effects that a diagnosis names join the model, and so does the force that it learned for something unknown.
+    Where it learned none, what it found travels along as data and the equations are without it.
 
     Writes export.json (what was written, and where the numbers come from), and for json model.json, for mat
     model.mat, for python-control model-control.json, for casadi and c the functions and signals.json, for fmu

@@ -8,7 +8,7 @@ from typing import Any
 from savgs_ident.cli.console import Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
 from savgs_ident.cli.models import ModelName, effects_in, effects_of
-from savgs_ident.core.errors import InputError, SavgsIdentError
+from savgs_ident.core.errors import InputError, SavgsIdentError, blamed_on
 from savgs_ident.core.rig import Rig, read_rig
 from savgs_ident.export.diagnosis_document import REMEDY, read_diagnosis
 from savgs_ident.export.exported_model import ExportedModel
@@ -48,7 +48,9 @@ def run_export(job: Job, voice: Voice, out: Path) -> int:
     with voice.working() as progress:
         for name in job.formats:
             progress(f"writing {name}")
-            written[name] = _write(name, model, out)
+            # What names no file of its own is a fault of the rig's numbers.
+            with blamed_on(job.rig):
+                written[name] = _write(name, model, out)
     origin = model_origin(rig.name, job.rig, model.effects, job.command)
     record = export_record(gathered, written, origin)
     file = write_json(out / "export.json", record)

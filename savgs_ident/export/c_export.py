@@ -25,7 +25,11 @@ STEM = "savgs_model"
 
 
 def write_c(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
-    """Write savgs_model.c, savgs_model.h and signals.json, and all that is known about the model in model.json."""
+    """Write savgs_model.c, savgs_model.h and signals.json, and all that is known about the model in model.json.
+
+    Raises :class:`InputError` if one cannot be written, or the rig finds no rest.
+    """
+    record = signals_record(model)
     with scratch_folder() as scratch, contextlib.chdir(scratch):
         generator = CodeGenerator(STEM, {"with_header": True, "casadi_int": "long long int"})
         for function in casadi_functions(model).values():
@@ -33,5 +37,5 @@ def write_c(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
         generator.generate()
         sources = {name: Path(name).read_bytes() for name in (f"{STEM}.c", f"{STEM}.h")}
     files = [write_bytes(folder / name, source) for name, source in sources.items()]
-    signals = write_json_text(folder / "signals.json", signals_record(model))
+    signals = write_json_text(folder / "signals.json", record)
     return (*files, signals, *write_json(model, folder))

@@ -18,7 +18,11 @@ from savgs_ident.export.signals import signals_record
 
 
 def write_casadi(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
-    """Write rates, outputs and residual (.casadi), signals.json, and all that is known of the model in model.json."""
+    """Write rates, outputs and residual (.casadi), signals.json, and all that is known of the model in model.json.
+
+    Raises :class:`InputError` if one cannot be written, or the rig finds no rest.
+    """
+    record = signals_record(model)
     files = []
     for name, function in casadi_functions(model).items():
         # CasADi does not notice a disk that fills under it.
@@ -26,5 +30,5 @@ def write_casadi(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
             file = scratch / name
             function.save(str(file))
             files.append(write_bytes(folder / f"{name}.casadi", file.read_bytes()))
-    signals = write_json_text(folder / "signals.json", signals_record(model))
+    signals = write_json_text(folder / "signals.json", record)
     return (*files, signals, *write_json(model, folder))

@@ -9,7 +9,7 @@ Something unknown joins as the force that was learned at its port. Where nothing
 diagnosis travels along as data and the model stays.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from savgs_ident.core.rig import Rig
 from savgs_ident.effects.registry import EFFECTS, model_parameters
 
 TOLD = 6
-"""Most numbers of an effect that a sentence tells."""
+"""Most numbers that a sentence tells."""
 
 _OF_THE_FIT = ("covariance",)
 
@@ -32,12 +32,14 @@ class Diagnosed:
         effects: all in the model.
         added: those that the diagnosis added.
         said: what was done, a sentence each, for reports and files.
+        taken: names of the parameters whose numbers are those of the diagnosis.
     """
 
     rig: Rig
     effects: tuple[str, ...]
     added: tuple[str, ...]
     said: tuple[str, ...]
+    taken: tuple[str, ...] = ()
 
 
 def with_diagnosis(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> Diagnosed:
@@ -55,7 +57,7 @@ def with_diagnosis(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, A
     named = tuple(verdict["effects"])
     added = tuple(name for name in named if name not in effects)
     if not added:
-        said = f"{_listed(named)}, named by the diagnosis, is in the model already: the numbers are the rig file's."
+        said = f"{listed(named)}, named by the diagnosis, is in the model already: the numbers are the rig file's."
         return Diagnosed(rig, effects, (), (said,))
     fitted = _fitted(frozenset(named), diagnosis["which"])
     return _with_effects(rig, effects, added, diagnosis, fitted, diagnosis.get("identified", {}))
@@ -99,7 +101,7 @@ def _with_effects(
     table = model_parameters(rig, whole).with_values(values)
     own = [name for name in values if name not in fitted]
     said = [
-        f"{_listed(added)} joins the model as the diagnosis found it: "
+        f"{listed(added)} joins the model as the diagnosis found it: "
         + ", ".join(f"{name} = {value:.6g} {table[name].unit}" for name, value in list(fitted.items())[:TOLD])
         + (f", and {len(fitted) - TOLD} more." if len(fitted) > TOLD else ".")
     ]
@@ -117,7 +119,7 @@ def _with_effects(
     identified_rig = Rig(
         rig.name, table, rig.damper_velocity, rig.damper_force, _provenance(rig, whole, diagnosis)
     )
-    return Diagnosed(identified_rig, whole, added, tuple(said))
+    return Diagnosed(identified_rig, whole, added, tuple(said), tuple(values))
 
 
 def _fitted(effects: frozenset[str], candidates: list[Mapping[str, Any]]) -> dict[str, float]:
@@ -126,15 +128,15 @@ def _fitted(effects: frozenset[str], candidates: list[Mapping[str, Any]]) -> dic
         names = each.get("effects") or each["effect"].split(" + ")
         if frozenset(names) == effects and each["parameters"]:
             return {name: float(entry["value"]) for name, entry in each["parameters"].items()}
-    raise InputError(f"holds no fitted parameters of {_listed(sorted(effects))}")
+    raise InputError(f"holds no fitted parameters of {listed(sorted(effects))}")
 
 
 def _check_baseline(effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> None:
     baseline = diagnosis["baseline"].get("effects")
     if baseline is not None and set(baseline) != set(effects):
         raise InputError(
-            f"is of a model with {_listed(baseline) or 'no friction'}, not of one with"
-            f" {_listed(effects) or 'no friction'}",
+            f"is of a model with {listed(baseline) or 'no friction'}, not of one with"
+            f" {listed(effects) or 'no friction'}",
             remedy="export the rig file that was diagnosed, or choose its model with --model",
         )
 
@@ -148,5 +150,6 @@ def _provenance(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, Any]
     return found | ({"fit_before": before} if before else {})
 
 
-def _listed(names: tuple[str, ...] | list[str]) -> str:
-    return " and ".join(names)
+def listed(names: Iterable[object]) -> str:
+    """Names in a sentence."""
+    return " and ".join(map(str, names))

@@ -14,7 +14,6 @@ y but for the friction, whose load depends on the accelerations; from the affine
 enough.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import jax
@@ -151,9 +150,6 @@ def _motion(x: Array, y: Array) -> Motion:
 def _inputs(u: Array) -> Inputs:
     cam = Cam(u[4], u[5]) if u.shape[0] > len(INPUTS) else None
     return Inputs(Road(u[0], u[1]), Link(u[2], u[3]), cam)
-
-
-Function = Callable[..., Array]
 
 
 def equations_of(rig: Rig, effects: tuple[str, ...]) -> Equations:

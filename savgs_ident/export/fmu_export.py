@@ -33,13 +33,13 @@ _DESCRIPTION = "modelDescription.xml"
 def write_fmu(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
     """Write savgs_rig.fmu, for the platform on which this runs.
 
-    Raises :class:`InputError` without FMPy or without a C compiler.
+    Raises :class:`InputError` without FMPy, without a C compiler, or if the rig finds no rest.
     """
-    headers = _headers()
-    builder = _builder(model)
+    headers, starts = _headers(), _starts(model)
+    builder = _builder(model, starts)
     with scratch_folder() as scratch, contextlib.chdir(scratch):
         files = builder.export_fmu({"no_warning": True})
-        _conform(Path(_DESCRIPTION), _starts(model))
+        _conform(Path(_DESCRIPTION), starts)
         (knowledge,) = write_json(model, Path())
         try:
             compiled = builder.compile_fmu(files, {"include_dirs": [str(headers)]})
@@ -63,7 +63,7 @@ def _headers() -> Path:
     return Path(found.origin).parent / "c-code"
 
 
-def _builder(model: ExportedModel) -> ca.DaeBuilder:
+def _builder(model: ExportedModel, starts: Mapping[str, float]) -> ca.DaeBuilder:
     equations, table = model.equations, model.table
     builder = ca.DaeBuilder(NAME)
 
@@ -90,7 +90,7 @@ def _builder(model: ExportedModel) -> ca.DaeBuilder:
         builder.eq(builder.der(symbol), rates[place])
     for place, symbol in enumerate(y):
         builder.eq(symbol, outputs[place])
-    for name, value in _starts(model).items():
+    for name, value in starts.items():
         builder.set_start(name, value)
     return builder
 

@@ -1,7 +1,7 @@
 """The linear models that travel along: equation (8) of the paper, and the exact linearisation without friction.
 
 Both are taken at the nominal link angle. The exact one keeps what a diagnosis added as far as it is no friction: a
-mount that gives way is in it, with its state.
+mount that gives way is in it, with its state, and of a learned force the stiffness and the damping.
 """
 
 from dataclasses import dataclass
@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from savgs_ident.control import linearisation, quarter_car_space
 from savgs_ident.control.linear_equivalent import Equivalent
 from savgs_ident.control.two_masses import nominal_equivalent, paper_masses
+from savgs_ident.effects.learned.forces import AbstractLearned, frictions_at
 from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.signals import check_rest
 from savgs_ident.model.effect import AbstractEffect, AbstractForce, AbstractGrip, AbstractRoadFault, Port
 from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import as_values
+from savgs_ident.model.values import Values, as_values
 
 EQUIVALENT_UNITS = {"k_eq": "N/m", "c_eq": "N s/m", "alpha": "m/rad", "ratio": "1"}
 """Of the parts of the linear equivalent."""
@@ -65,7 +67,12 @@ class LinearModel:
 
 
 def is_friction(effect: AbstractEffect) -> bool:
-    """Whether an effect is dry friction, which a linearisation at rest would show as a spring or a stiff damper."""
+    """Whether an effect is dry friction, which a linearisation at rest would show as a spring or a stiff damper.
+
+    A learned force is not, though there may be some in it: see :func:`values_without_friction`.
+    """
+    if isinstance(effect, AbstractLearned):
+        return False
     scrubs = isinstance(effect, AbstractForce) and effect.port is Port.TYRE_LATERAL
     return isinstance(effect, AbstractGrip) or scrubs or any(state.slips for state in effect.states)
 
@@ -76,6 +83,13 @@ def without_friction(model: QuarterCar) -> QuarterCar:
         each for each in model.effects if not is_friction(each) and not isinstance(each, AbstractRoadFault)
     ]
     return QuarterCar(model.damper, tuple(kept))
+
+
+def values_without_friction(model: ExportedModel) -> Values:
+    """All parameters [SI], those that weigh the frictions within a learned force at zero."""
+    learned = [each for each in model.equations.model.effects if isinstance(each, AbstractLearned)]
+    frictions = [name for effect in learned for name in frictions_at(effect.port)]
+    return as_values(model.table.as_dict() | dict.fromkeys(frictions, 0.0))
 
 
 def equivalent_of(model: ExportedModel) -> Equivalent:
@@ -94,10 +108,12 @@ def equation_8(model: ExportedModel) -> LinearModel:
 def exact(model: ExportedModel) -> LinearModel:
     """The exact linearisation at rest, the link at its nominal angle, without friction.
 
-    Raises :class:`InputError` where the rig has none.
+    Raises :class:`InputError` where the rig has none, or finds no rest.
     """
-    p, bare = as_values(model.table.as_dict()), without_friction(model.equations.model)
-    space = linearisation.linearise(bare, p, linearisation.resting(bare, p, p["psi_nominal"]))
+    p, bare = values_without_friction(model), without_friction(model.equations.model)
+    at = linearisation.resting(bare, p, p["psi_nominal"])
+    check_rest(map(float, at.q), model)
+    space = linearisation.linearise(bare, p, at)
     internal = {f"{place}_{state.name}": state.unit for place, state in enumerate(bare.states)}
     about = "exact linearisation of the rig at rest, the link at its nominal angle, without friction"
     return _linear(about, space, internal)

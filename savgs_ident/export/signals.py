@@ -1,9 +1,11 @@
 """What stands in the vectors of exported equations: names, units, nominal values, as JSON."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from math import degrees, isfinite
 
 import jax.numpy as jnp
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.export.equations import Signal
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.model.equilibrium import static_equilibrium
@@ -11,10 +13,25 @@ from savgs_ident.model.values import as_values
 
 
 def resting_state(model: ExportedModel) -> list[float]:
-    """x [SI] at rest at the nominal link angle, the plate at its zero: where a simulation begins."""
+    """x [SI] at rest at the nominal link angle, the plate at its zero: where a simulation begins.
+
+    Raises :class:`InputError` if the rig finds no rest there.
+    """
     p = as_values(model.table.as_dict())
     rest = static_equilibrium(model.equations.model, p, p["psi_nominal"], jnp.zeros(()))
-    return [float(rest.q.z_s), float(rest.q.theta_LW), 0.0, 0.0, *(float(state) for state in rest.s)]
+    x = [float(rest.q.z_s), float(rest.q.theta_LW), 0.0, 0.0, *(float(state) for state in rest.s)]
+    check_rest(x, model)
+    return x
+
+
+def check_rest(found: Iterable[float], model: ExportedModel) -> None:
+    """Raise :class:`InputError` if what was ``found`` [SI] at the nominal link angle is no rest."""
+    if not all(isfinite(value) for value in found):
+        angle = degrees(model.table["psi_nominal"].value)
+        raise InputError(
+            f"the rig finds no rest with its link at the nominal {angle:.4g} deg",
+            remedy="mend its spring (k_sd, l_free), masses or hardpoints",
+        )
 
 
 def resting_inputs(model: ExportedModel) -> list[float]:
@@ -24,7 +41,10 @@ def resting_inputs(model: ExportedModel) -> list[float]:
 
 
 def signals_record(model: ExportedModel) -> dict[str, object]:
-    """Names and units of x, u, the outputs and p in their order, with values at rest and of the parameters."""
+    """Names and units of x, u, the outputs and p in their order, with values at rest and of the parameters.
+
+    Raises :class:`InputError` if the rig finds no rest.
+    """
     equations, table = model.equations, model.table
     return {
         "x": _told(equations.states, resting_state(model)),

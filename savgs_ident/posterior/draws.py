@@ -1,8 +1,9 @@
 """The draws of a posterior, read back from its file."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import prod
 from pathlib import Path
+from typing import TypeAlias
 
 import h5py
 import numpy as np
@@ -13,12 +14,16 @@ from savgs_ident.core.errors import InputError
 LARGEST = 2**28
 """Most bytes that all draws, or a piece of the file that has to be unpacked for them, may take in memory."""
 
+FAR = 6.0
+"""Standard deviations by which a parameter may be off the mean of its draws: its own posterior has it within 3."""
+
 REMEDY = "give the posterior.nc that `savgs-ident posterior` wrote for this model"
 
+Draws: TypeAlias = NDArray[np.float64]
+"""Of one parameter, (n,), SI."""
 
-def read_draws(
-    path: Path, names: Collection[str], count: int | None = None
-) -> dict[str, NDArray[np.float64]]:
+
+def read_draws(path: Path, names: Collection[str], count: int | None = None) -> dict[str, Draws]:
     """Draws by name, each (n,), SI, chains one after the other; of ``names``, those that the file holds.
 
     With a ``count``, at most so many, evenly spread over all. Raises :class:`InputError` if the file cannot be read
@@ -38,9 +43,28 @@ def read_draws(
     finite = all(values.dtype.kind == "f" and np.isfinite(values).all() for values in draws.values())
     if len(lengths) != 1 or 0 in lengths or not finite:
         raise InputError("holds no finite draws of the rig's parameters", source=path, remedy=REMEDY)
-    total = lengths.pop()
+    return thin_draws({name: values.astype(np.float64) for name, values in draws.items()}, count)
+
+
+def thin_draws(draws: Mapping[str, Draws], count: int | None) -> dict[str, Draws]:
+    """At most ``count`` draws of each parameter, evenly spread over all, each (n,), SI; all without a count."""
+    total = min((values.size for values in draws.values()), default=0)
     chosen = np.unique(np.linspace(0, total - 1, min(count or total, total)).astype(int))
-    return {name: values[chosen].astype(np.float64) for name, values in draws.items()}
+    return {name: values[chosen] for name, values in draws.items()}
+
+
+def far_from_draws(
+    values: Mapping[str, float], draws: Mapping[str, Draws], limit: float = FAR
+) -> tuple[str, ...]:
+    """Names of the ``values`` [SI] that are more than ``limit`` standard deviations [1] off the mean of their draws.
+
+    To be asked of all draws (n,), before they are thinned: few of them know no standard deviation, and one has none.
+    """
+    return tuple(
+        name
+        for name, each in draws.items()
+        if each.size > 1 and abs(values[name] - float(np.mean(each))) > limit * float(np.std(each))
+    )
 
 
 def _check_size(path: Path, held: Sequence[h5py.Dataset]) -> None:

@@ -91,6 +91,15 @@ def test_a_drawing_is_exported_with_the_model_asked_for(invoke: Invoke) -> None:
     assert read_model_json("o/model.json").effects == ()
 
 
+def test_another_model_than_the_identified_one_is_told(invoke: Invoke) -> None:
+    done = invoke("export", _identified(), "--to", "json", "--model", "simqc", "--out", "o")
+    assert done.exit_code == 0, done.stderr
+    said = "identified with rail_coulomb and tyre_friction and is taken with no friction"
+    assert said in " ".join(done.stdout.split())
+    (told,) = json.loads(Path("o/export.json").read_text())["said"]
+    assert said in told
+
+
 def test_a_diagnosed_effect_joins_and_the_output_says_with_which_numbers(invoke: Invoke) -> None:
     done = invoke("export", _identified(), "--to", "json", "--diagnosis", _diagnosis(MOUNT), "--out", "o")
     assert done.exit_code == 0, done.stderr
@@ -112,7 +121,7 @@ def test_a_diagnosed_effect_joins_and_the_output_says_with_which_numbers(invoke:
 def test_something_unknown_travels_along_as_data_and_that_is_said(invoke: Invoke) -> None:
     done = invoke("export", _identified(), "--to", "json", "--diagnosis", _diagnosis(UNKNOWN), "--out", "o")
     assert done.exit_code == 0
-    assert "is no equation: it travels along as data" in done.stdout
+    assert "travels along as data, the equations are without it" in " ".join(done.stdout.split())
     model = read_model_json("o/model.json")
     assert list(model.effects) == SIMTR
     assert model.diagnosis == UNKNOWN
@@ -185,6 +194,17 @@ def test_a_covariance_that_is_none_is_code_2(invoke: Invoke) -> None:
     assert "model.toml: provenance.covariance.names[1] is 'nobody'" in done.stderr
 
 
+def test_a_rig_that_finds_no_rest_is_code_2_and_names_its_file(invoke: Invoke) -> None:
+    drawing = read_rig(RIG)
+    write_rig(replace(drawing, parameters=drawing.parameters.with_values({"k_sd": 2e3})), Path("soft.toml"))
+    done = invoke("export", "soft.toml", "--to", "casadi", "--quiet")
+    assert done.exit_code == 2
+    assert done.stderr.startswith(
+        "Error: soft.toml: the rig finds no rest with its link at the nominal 90 deg"
+    )
+    assert not list(Path("out/export").iterdir())
+
+
 @pytest.mark.parametrize("words", [(RIG,), (RIG, "--to", "json", "--samples", "0"), ("--to", "json")])
 def test_bad_usage_is_code_2(invoke: Invoke, words: tuple[object, ...]) -> None:
     done = invoke("export", *words)
@@ -230,3 +250,8 @@ def test_the_help_names_every_format(invoke: Invoke) -> None:
     told = " ".join(invoke("export", "--help").output.split())
     for name in registry.EXPORTS:
         assert name in told
+
+
+def test_the_help_says_what_becomes_of_something_unknown(invoke: Invoke) -> None:
+    told = " ".join(invoke("export", "--help").output.split())
+    assert "so does the force that it learned for something unknown" in told

@@ -1,5 +1,7 @@
 """Learned forces: sums of known functions, nothing without coefficients, held at the edge of what was seen."""
 
+from collections.abc import Callable
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,13 +11,33 @@ from hypothesis import strategies as st
 from jaxtyping import Array
 
 from savgs_ident.core.rig_form import KNOWN_UNITS
-from savgs_ident.effects.learned.forces import OF_THE_LOAD, coefficients_at, functions, words_at
+from savgs_ident.effects.learned.forces import coefficients_at, frictions_at
 from savgs_ident.effects.registry import CATALOGUE, EFFECTS, LEARNED
-from savgs_ident.model.effect import AbstractEffect, AbstractForce, PortSignals
+from savgs_ident.model.effect import AbstractEffect, AbstractForce, Port, PortSignals
 from savgs_ident.model.values import Values, as_values
 from savgs_ident.symbolic.translate import to_casadi
 
 from .kinds import PORTS
+
+LAWS: dict[str, Callable[[float, float, float], float]] = {
+    "tanh(v/0.01)": lambda x, v, n: np.tanh(v / 0.01),
+    "tanh(v/0.1)": lambda x, v, n: np.tanh(v / 0.1),
+    "v": lambda x, v, n: v,
+    "v|v|": lambda x, v, n: v * abs(v),
+    "v^2": lambda x, v, n: v * v,
+    "x": lambda x, v, n: x,
+    "x^2": lambda x, v, n: x * x,
+    "x^3": lambda x, v, n: x * x * x,
+    "x tanh(v/0.01)": lambda x, v, n: x * np.tanh(v / 0.01),
+    "x v": lambda x, v, n: x * v,
+    "x^2 v": lambda x, v, n: x * x * v,
+    "tanh(v/0.01) exp(-(v/0.05)^2)": lambda x, v, n: np.tanh(v / 0.01) * np.exp(-v * v / 0.0025),
+    "tanh(v/0.01) exp(-(v/0.2)^2)": lambda x, v, n: np.tanh(v / 0.01) * np.exp(-v * v / 0.04),
+    "n tanh(v/0.01)": lambda x, v, n: n * np.tanh(v / 0.01),
+    "n v": lambda x, v, n: n * v,
+    "n": lambda x, v, n: n,
+}
+"""What the words for the functions say."""
 
 SPANS = {"middle": 0.4, "stroke": 0.03, "speed": 0.5, "carried": 8e3}
 
@@ -28,6 +50,12 @@ def _given(effect: AbstractEffect, coefficient: float) -> dict[str, float]:
     spans = {f"learned_{port.value}_{name}": value for name, value in SPANS.items()}
     names = coefficients_at(port)
     return spans | {name: coefficient * (1.0 + place) for place, name in enumerate(names)}
+
+
+def _words(effect: AbstractEffect) -> dict[str, str]:
+    """What is told of each coefficient, after the words that all have in common."""
+    told = {each.name: each.about for each in effect.parameters if each.name in effect.null}
+    return {name: about.removeprefix("learned force in proportion to ") for name, about in told.items()}
 
 
 def _force(effect: AbstractEffect, p: Values, displacement: float, velocity: float, load: float) -> float:
@@ -53,6 +81,30 @@ def test_it_is_nothing_at_its_null(effect: AbstractEffect) -> None:
 
 
 @each_learned
+def test_each_of_its_numbers_weighs_the_function_that_its_words_say(effect: AbstractEffect) -> None:
+    own = f"learned_{effect.port.value}_"
+    loaded = {Port.RAIL, Port.STRUT, Port.TYRE_LATERAL}
+    known = [words for words in LAWS if words[0] != "n" or effect.port in loaded]
+    assert sorted(_words(effect).values()) == sorted(known)
+    x, v, n = 0.7, -0.013, 0.6
+    at = (SPANS["middle"] + SPANS["stroke"] * x, SPANS["speed"] * v, SPANS["carried"] * n)
+    for name, words in _words(effect).items():
+        alone = {f"{own}{span}": value for span, value in SPANS.items()} | dict(effect.null) | {name: 1.0}
+        assert _force(effect, as_values(alone), *at) == pytest.approx(LAWS[words](x, v, n), rel=1e-9), words
+
+
+@each_learned
+def test_its_frictions_are_those_that_are_steeper_at_rest_than_any_damping(effect: AbstractEffect) -> None:
+    steep = [
+        name
+        for name, words in _words(effect).items()
+        if (LAWS[words](0.7, 1e-4, 0.6) - LAWS[words](0.7, -1e-4, 0.6)) / 2e-4 > 2.0
+    ]
+    assert list(frictions_at(effect.port)) == steep
+    assert len(steep) in (5, 6)
+
+
+@each_learned
 @given(
     x=st.floats(-0.99, 0.99), v=st.floats(-0.99, 0.99), n=st.floats(0.0, 0.99), beyond=st.floats(1.0, 50.0)
 )
@@ -60,11 +112,8 @@ def test_within_what_was_seen_it_is_the_sum_and_beyond_it_is_held(
     effect: AbstractEffect, x: float, v: float, n: float, beyond: float
 ) -> None:
     given_, p = _given(effect, 7.0), as_values(_given(effect, 7.0))
-    loaded = OF_THE_LOAD[0] in words_at(effect.port)
-    values = [float(each) for each in functions(*(jnp.asarray(each) for each in (x, v, n)))]
-    weights = [given_[name] for name in coefficients_at(effect.port)]
-    expected = sum(c * f for c, f in zip(weights, values, strict=False))
-    at = (SPANS["middle"] + SPANS["stroke"] * x, SPANS["speed"] * v, SPANS["carried"] * n if loaded else 0.0)
+    expected = sum(given_[name] * LAWS[words](x, v, n) for name, words in _words(effect).items())
+    at = (SPANS["middle"] + SPANS["stroke"] * x, SPANS["speed"] * v, SPANS["carried"] * n)
     assert _force(effect, p, *at) == pytest.approx(expected, rel=1e-7, abs=1e-7)
     edge = _force(effect, p, SPANS["middle"] + SPANS["stroke"], SPANS["speed"], SPANS["carried"])
     outside = (SPANS["middle"] + SPANS["stroke"] * beyond, SPANS["speed"] * beyond, SPANS["carried"] * beyond)

@@ -2,17 +2,28 @@
 
 from dataclasses import replace
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
+from jaxtyping import Array
 
 from savgs_ident.control.linearisation import linearise, resting
 from savgs_ident.control.quarter_car_space import quarter_car_space
 from savgs_ident.control.two_masses import paper_masses
 from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import CATALOGUE, MODELS, build_model
+from savgs_ident.effects.learned.forces import frictions_at
+from savgs_ident.effects.registry import EFFECTS, LEARNED, MODELS, build_model
 from savgs_ident.export.exported_model import ExportedModel
-from savgs_ident.export.linear_models import equation_8, exact, is_friction, without_friction
-from savgs_ident.model.values import as_values
+from savgs_ident.export.linear_models import (
+    equation_8,
+    exact,
+    is_friction,
+    values_without_friction,
+    without_friction,
+)
+from savgs_ident.model.effect import AbstractForce, Port, PortSignals
+from savgs_ident.model.values import Values, as_values
 
 DRY = {
     "rail_coulomb", "rail_preload", "rail_stribeck", "rail_asymmetry", "joint_friction", "strut_friction",
@@ -21,7 +32,7 @@ DRY = {
 
 
 def test_friction_is_what_holds_at_rest() -> None:
-    assert {name for name, effect in CATALOGUE.items() if is_friction(effect)} == DRY
+    assert {name for name, effect in EFFECTS.items() if is_friction(effect)} == DRY
 
 
 def test_both_are_those_of_the_control_stage(rig: Rig) -> None:
@@ -60,6 +71,57 @@ def test_a_mount_that_gives_way_is_in_the_exact_one(rig: Rig) -> None:
     assert softer[0] == pytest.approx(series[0], rel=0.1)
     stiff = exact(ExportedModel(rig, MODELS["simtr"])).response(np.array([1e-3]))
     assert float(np.real(stiff[1, 0, 0] / stiff[0, 0, 0])) == pytest.approx(_sag(rig, 0.0), rel=1e-4)
+
+
+def _with(rig: Rig, effect: str, numbers: dict[str, float]) -> ExportedModel:
+    """The rig with an effect of certain numbers [SI]."""
+    table = ExportedModel(rig, (effect,)).table.with_values(numbers)
+    return ExportedModel(replace(rig, parameters=table), (effect,))
+
+
+def _steepness(model: ExportedModel, effect: AbstractForce, p: Values) -> float:
+    """By how much a force [N] changes with the velocity over its port [m/s], nothing moving but a little."""
+
+    def force(velocity: Array) -> Array:
+        return effect.force(p, PortSignals(jnp.asarray(0.01), velocity, jnp.asarray(2e3)), jnp.zeros(0))
+
+    return abs(float(jax.grad(force)(jnp.zeros(()))))
+
+
+@pytest.mark.parametrize("name", LEARNED)
+def test_what_turns_round_in_a_learned_force_is_left_out(rig: Rig, name: str) -> None:
+    """Of coefficients of 100 N over 0.5 m/s, the dampings among them make 1e3 N s/m at most, the frictions 1e4."""
+    effect = LEARNED[name]
+    assert isinstance(effect, AbstractForce)
+    spans = {f"{name}_middle": 0.0, f"{name}_stroke": 0.03, f"{name}_speed": 0.5}
+    model = _with(rig, name, dict.fromkeys(effect.null, 100.0) | spans)
+    (kept,) = without_friction(model.equations.model).effects
+    assert kept.name == name
+    assert _steepness(model, effect, as_values(model.table.as_dict())) > 1e4
+    assert 200.0 < _steepness(model, effect, values_without_friction(model)) < 1e3
+
+
+DAMPING, SPEED = 150.0, 0.5
+"""A damping on the rail [N s/m], and the velocity at which it was learned [m/s]."""
+
+DAMPER = {
+    "learned_rail_speed": SPEED, "learned_rail_stroke": 0.03, "learned_rail_carried": 4e3,
+    "learned_rail_3": -DAMPING * SPEED,
+}  # fmt: skip
+RUBBING = DAMPER | dict.fromkeys(frictions_at(Port.RAIL), -300.0)
+
+
+def test_friction_that_was_learned_is_not_in_the_exact_one(rig: Rig) -> None:
+    found, wanted = (exact(_with(rig, "learned_rail", each)).space for each in (RUBBING, DAMPER))
+    assert all(np.array_equal(getattr(found, name), getattr(wanted, name)) for name in "ABCD")
+
+
+@pytest.mark.slow
+def test_a_learned_damping_is_the_damper_of_the_catalogue(rig: Rig) -> None:
+    found = exact(_with(rig, "learned_rail", RUBBING)).space
+    wanted = exact(_with(rig, "rail_viscous", {"rail_viscous_damping": DAMPING})).space
+    for name in "ABCD":
+        assert getattr(found, name) == pytest.approx(getattr(wanted, name), rel=1e-6, abs=1e-6)
 
 
 def test_the_cam_behind_its_encoder_is_not_linearised(rig: Rig) -> None:

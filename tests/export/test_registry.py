@@ -1,11 +1,14 @@
 """The contract of all formats: what is said to be written is written, whole, and nothing else."""
 
 import importlib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.rig import Rig
+from savgs_ident.effects.registry import MODELS
 from savgs_ident.export import registry
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.registry import EXPORTS
@@ -69,3 +72,16 @@ def test_a_package_that_is_not_there_stands_in_the_way_of_no_other_format(
     assert EXPORTS["json"].write(model, tmp_path)
     with pytest.raises(ImportError):
         EXPORTS["mat"].write(model, tmp_path)
+
+
+@pytest.mark.parametrize("name", [name for name in EXPORTS if name != "json"])
+def test_a_rig_that_finds_no_rest_is_refused_before_anything_is_written(
+    name: str, rig: Rig, tmp_path: Path
+) -> None:
+    # model.json alone says nothing of a rest.
+    soft = replace(rig, parameters=rig.parameters.with_values({"k_sd": 2e3}))
+    with pytest.raises(
+        InputError, match=r"no rest with its link at the nominal 90 deg\. Remedy: mend its spring"
+    ):
+        _write(name, ExportedModel(soft, MODELS["simtr"]), tmp_path)
+    assert not list(tmp_path.iterdir())

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.posterior.draws import read_draws
+from savgs_ident.posterior.draws import far_from_draws, read_draws
 
 CHAINS = np.arange(12.0).reshape(3, 4)
 
@@ -39,6 +39,20 @@ def test_draws_are_spread_evenly_and_stay_together(path: Path) -> None:
 
 def test_no_more_than_there_are(path: Path) -> None:
     assert read_draws(path, ("a",), 500)["a"].size == 12
+
+
+def test_a_value_is_far_that_is_six_deviations_off_the_mean() -> None:
+    draws = {"a": np.array([1.0, 3.0, 1.0, 3.0]), "b": np.array([1.0, 3.0, 1.0, 3.0])}
+    assert far_from_draws({"a": 7.9, "b": 8.1}, draws) == ("b",)
+    assert far_from_draws({"a": -4.1, "b": -3.9}, draws) == ("a",)
+    assert far_from_draws({"a": 4.1, "b": 2.0}, draws, 2.0) == ("a",)
+
+
+def test_a_single_draw_knows_nothing_and_draws_that_stand_still_know_all() -> None:
+    still = {"a": np.full(4, 0.1)}
+    assert far_from_draws({"a": 9.0}, {"a": np.array([0.1])}) == ()
+    assert far_from_draws({"a": 0.1}, still) == ()
+    assert far_from_draws({"a": 0.2}, still) == ("a",)
 
 
 @pytest.mark.parametrize(

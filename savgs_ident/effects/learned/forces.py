@@ -35,6 +35,12 @@ OF_THE_MOTION = (
 OF_THE_LOAD = ("n tanh(v/0.01)", "n v", "n")
 """Those that come on top at a port with a load."""
 
+FRICTIONS = (
+    "tanh(v/0.01)", "tanh(v/0.1)", "x tanh(v/0.01)", "tanh(v/0.01) exp(-(v/0.05)^2)", "tanh(v/0.01) exp(-(v/0.2)^2)",
+    "n tanh(v/0.01)",
+)  # fmt: skip
+"""Those of both that turn round with the velocity: how steep they are at rest is a width, not a damping."""
+
 SMALLEST = 1e-9
 """Least stroke [m], speed [m/s] and load [N] by which is divided."""
 
@@ -58,6 +64,12 @@ def coefficients_at(port: Port) -> tuple[str, ...]:
 def words_at(port: Port) -> tuple[str, ...]:
     """The functions at a port, in words."""
     return (*OF_THE_MOTION, *OF_THE_LOAD) if port in LOADED else OF_THE_MOTION
+
+
+def frictions_at(port: Port) -> tuple[str, ...]:
+    """Names of the c_k of the frictions at a port; with all of them at zero, what remains is smooth at rest."""
+    told = zip(coefficients_at(port), words_at(port), strict=True)
+    return tuple(name for name, words in told if words in FRICTIONS)
 
 
 def _parameters(port: Port) -> tuple[Parameter, ...]:
