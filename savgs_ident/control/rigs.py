@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.posterior.draws import read_draws
+from savgs_ident.posterior.draws import FAR, REMEDY, far_from_draws, read_draws, thin_draws
 
 SEED = 20170701
 """Of the draws: the same rigs every time."""
@@ -33,9 +33,18 @@ class Rigs:
 def rigs_from_posterior(table: ParameterTable, path: Path, count: int) -> Rigs:
     """``count`` rigs evenly spread over the draws of a ``posterior.nc``.
 
-    Raises :class:`InputError` if the file cannot be read or holds no draws of the rig's parameters.
+    Raises :class:`InputError` if the file cannot be read, holds no draws of the rig's parameters, or those of another
+    rig.
     """
-    draws = read_draws(path, tuple(table), count)
+    every = read_draws(path, tuple(table))
+    far = far_from_draws(table.as_dict(), every)
+    if far:
+        raise InputError(
+            f"is the posterior of another rig: {far[0]} of this one is more than {FAR:g} standard deviations off it",
+            source=path,
+            remedy=REMEDY,
+        )
+    draws = thin_draws(every, count)
     matrix = np.stack(list(draws.values()), axis=1)
     return _rigs(table, f"{len(matrix)} samples of {path}", tuple(draws), matrix)
 
@@ -92,8 +101,7 @@ def _covariance(
         raise wrong
     if not (np.diag(covariance) > 0.0).all():
         raise wrong
-    size = np.sqrt(np.abs(np.diag(covariance)))
-    size[size == 0.0] = 1.0
+    size = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(size, size)
     lopsided = np.max(np.abs(correlation - correlation.T))
     if lopsided > ROUNDING or np.min(np.linalg.eigvalsh(correlation)) < -ROUNDING:

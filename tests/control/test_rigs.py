@@ -102,6 +102,17 @@ def _posterior(path: Path, **draws: object) -> Path:
     return path
 
 
+def test_the_posterior_of_another_rig_is_refused_however_few_rigs_are_asked_for(
+    table: ParameterTable, tmp_path: Path
+) -> None:
+    near = np.random.default_rng(0).normal(table["m_s"].value, 2.0, (4, 50))
+    path = _posterior(tmp_path / "posterior.nc", m_s=near)
+    assert len(rigs_from_posterior(table, path, 1).values) == 1
+    for count in (1, 12):
+        with pytest.raises(InputError, match="posterior of another rig: m_s"):
+            rigs_from_posterior(table, _posterior(tmp_path / "other.nc", m_s=near + 14.0), count)
+
+
 def test_rigs_of_a_posterior_are_its_draws_evenly_spread(table: ParameterTable, tmp_path: Path) -> None:
     """Chain by draw, one chain after the other; what is no parameter is left out."""
     rng = np.random.default_rng(5)
