@@ -1,7 +1,8 @@
 """The reports made of sections in a real browser: on a phone, on a desk, and under attack."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -29,33 +30,37 @@ from .test_posterior_page import OPEN_ALL, OVERFLOWING, SIZES, SMALLEST_PICTURE_
 
 PICTURES = {"linear": 3, "design": 5, "loop": 4, "campaigns": 1, "attacked": 5, "attacked campaigns": 1}
 EFFECTS = MODELS["simtr"]
+Pages = Callable[[str], Path]
+LINEAR = pytest.param("linear", marks=pytest.mark.slow)
+"""Half a minute of linear studies for a page of the same sections as the others."""
+
+NAMES = (LINEAR, *(name for name in PICTURES if name != "linear"))
 START = 1_772_438_400.0
 SETTINGS = {"model": "simtr", "free": ["mu_r", "c_sd"], "max_frequency_hz": None}
 
 
-@pytest.fixture(scope="module")
-def results(rig: Rig) -> Iterator[tuple[LinearStudy, Design]]:
-    """The linear models of the shipped rig, and a controller for it."""
+def _linear(rig: Rig) -> LinearStudy:
+    """The linear models of the shipped rig."""
     table = model_parameters(rig, EFFECTS)
-    with with_kept_programs():
-        model, p = build_model(rig, EFFECTS), as_values(table.as_dict())
-        rigs = rigs_from_covariance(table, rig.provenance, 5)
-        yield (
-            study_linear(model, p, lambda _: None),
-            design_controller(model, p, rigs, DEFAULT_WEIGHTS, lambda _: None),
-        )
+    return study_linear(build_model(rig, EFFECTS), as_values(table.as_dict()), lambda _: None)
 
 
-@pytest.fixture(scope="module")
-def loop(rig: Rig) -> Iterator[tuple[LoopStudy, Values]]:
+def _design(rig: Rig) -> Design:
+    """A controller for it."""
+    table = model_parameters(rig, EFFECTS)
+    model, p = build_model(rig, EFFECTS), as_values(table.as_dict())
+    rigs = rigs_from_covariance(table, rig.provenance, 5)
+    return design_controller(model, p, rigs, DEFAULT_WEIGHTS, lambda _: None)
+
+
+def _loop(rig: Rig) -> tuple[LoopStudy, Values]:
     """A controller over a bump, on the shipped rig and on two others, with causes."""
     table = model_parameters(rig, EFFECTS)
-    with with_kept_programs():
-        model, p = build_model(rig, EFFECTS), as_values(table.as_dict())
-        controller = controller_for(model, p, DEFAULT_WEIGHTS)
-        rigs = rigs_from_covariance(table, rig.provenance, 2)
-        test = bump_test(DEFAULT_SPEED[LoopKind.bump])
-        yield study_loop(model, p, controller, test, lambda _: None, rigs, causes=True), p
+    model, p = build_model(rig, EFFECTS), as_values(table.as_dict())
+    controller = controller_for(model, p, DEFAULT_WEIGHTS)
+    rigs = rigs_from_covariance(table, rig.provenance, 2)
+    test = bump_test(DEFAULT_SPEED[LoopKind.bump])
+    return study_loop(model, p, controller, test, lambda _: None, rigs, causes=True), p
 
 
 def _campaigns(name: str) -> Study:
@@ -80,47 +85,52 @@ def _campaigns(name: str) -> Study:
 
 
 @pytest.fixture(scope="module")
-def pages(
-    results: tuple[LinearStudy, Design],
-    loop: tuple[LoopStudy, Values],
-    tmp_path_factory: pytest.TempPathFactory,
-) -> dict[str, Path]:
-    """The four reports, and two with an attack in every name, one of a controller that fails."""
-    study, design = results
+def pages(rig: Rig, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pages]:
+    """The four reports, and two with an attack in every name, one of a failed controller; each made when asked for."""
     origin = model_origin("gt_rear", "gt_rear.toml", EFFECTS, ("savgs-ident", "design", "gt_rear.toml"))
     bad = ModelOrigin(HOSTILE, HOSTILE, (HOSTILE,), ("savgs-ident", HOSTILE), {HOSTILE: HOSTILE})
-    failed = replace(
-        design,
-        digital_margins=replace(design.digital_margins, stable=False),
-        rigs=replace(design.rigs, source=HOSTILE),
-    )
-    texts = {
-        "linear": linear_html(study, origin),
-        "design": design_html(design, origin),
-        "loop": loop_html(*loop, origin, "designed here"),
-        "campaigns": campaigns_html(_campaigns("run"), SETTINGS, ("savgs-ident", "campaign", "recordings")),
-        "attacked": design_html(failed, bad),
-        "attacked campaigns": campaigns_html(_campaigns(HOSTILE), {"free": [HOSTILE]}, (HOSTILE,)),
+    design = cache(lambda: _design(rig))
+
+    def attacked() -> str:
+        unstable = replace(design().digital_margins, stable=False)
+        rigs = replace(design().rigs, source=HOSTILE)
+        return design_html(replace(design(), digital_margins=unstable, rigs=rigs), bad)
+
+    texts: dict[str, Callable[[], str]] = {
+        "linear": lambda: linear_html(_linear(rig), origin),
+        "design": lambda: design_html(design(), origin),
+        "loop": lambda: loop_html(*_loop(rig), origin, "designed here"),
+        "campaigns": lambda: campaigns_html(
+            _campaigns("run"), SETTINGS, ("savgs-ident", "campaign", "recordings")
+        ),
+        "attacked": attacked,
+        "attacked campaigns": lambda: campaigns_html(_campaigns(HOSTILE), {"free": [HOSTILE]}, (HOSTILE,)),
     }
     folder = tmp_path_factory.mktemp("sections")
-    for name, text in texts.items():
-        (folder / f"{name}.html").write_text(text, encoding="utf-8")
-    return {name: folder / f"{name}.html" for name in texts}
+
+    @cache
+    def page(name: str) -> Path:
+        path: Path = folder / f"{name}.html"
+        path.write_text(texts[name](), encoding="utf-8")
+        return path
+
+    with with_kept_programs():
+        yield page
 
 
-@pytest.mark.parametrize("name", PICTURES)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_page_asks_for_nothing_and_has_nothing_to_complain_about(
-    browser: Browser, pages: dict[str, Path], name: str
+    browser: Browser, pages: Pages, name: str
 ) -> None:
-    browser.open(pages[name])
+    browser.open(pages(name))
     console, asked = browser.heard()
     assert console == []
-    assert asked == [pages[name].as_uri()]
+    assert asked == [pages(name).as_uri()]
 
 
-@pytest.mark.parametrize("name", PICTURES)
-def test_every_picture_is_there_and_described(browser: Browser, pages: dict[str, Path], name: str) -> None:
-    browser.open(pages[name])
+@pytest.mark.parametrize("name", NAMES)
+def test_every_picture_is_there_and_described(browser: Browser, pages: Pages, name: str) -> None:
+    browser.open(pages(name))
     pictures = browser.ask("return [...document.images].map(i => [i.complete, i.naturalWidth, i.alt.length])")
     assert len(pictures) == PICTURES[name]
     for complete, width, described in pictures:
@@ -130,11 +140,9 @@ def test_every_picture_is_there_and_described(browser: Browser, pages: dict[str,
 
 
 @pytest.mark.parametrize("width", [390, 768, 1280])
-@pytest.mark.parametrize("name", PICTURES)
-def test_nothing_is_wider_than_the_window(
-    browser: Browser, pages: dict[str, Path], name: str, width: int
-) -> None:
-    browser.open(pages[name], width)
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_is_wider_than_the_window(browser: Browser, pages: Pages, name: str, width: int) -> None:
+    browser.open(pages(name), width)
     assert browser.ask("return innerWidth") == width
     page = "document.documentElement"
     assert browser.ask(f"return {page}.scrollWidth - {page}.clientWidth") == 0
@@ -142,11 +150,9 @@ def test_nothing_is_wider_than_the_window(
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-@pytest.mark.parametrize("name", ["linear", "design", "loop", "campaigns"])
-def test_all_text_is_large_enough_to_read(
-    browser: Browser, pages: dict[str, Path], name: str, width: int
-) -> None:
-    browser.open(pages[name], width)
+@pytest.mark.parametrize("name", [LINEAR, "design", "loop", "campaigns"])
+def test_all_text_is_large_enough_to_read(browser: Browser, pages: Pages, name: str, width: int) -> None:
+    browser.open(pages(name), width)
     sizes = browser.ask(SIZES)
     assert len(sizes) > 100
     assert [entry for entry in sizes if entry[0] < SMALLEST_TEXT] == []
@@ -158,11 +164,9 @@ def test_all_text_is_large_enough_to_read(
     assert max(scales) < 1.25
 
 
-@pytest.mark.parametrize("name", ["linear", "design"])
-def test_tables_fit_beside_their_headings_on_a_desk(
-    browser: Browser, pages: dict[str, Path], name: str
-) -> None:
-    browser.open(pages[name], 1280)
+@pytest.mark.parametrize("name", [LINEAR, "design"])
+def test_tables_fit_beside_their_headings_on_a_desk(browser: Browser, pages: Pages, name: str) -> None:
+    browser.open(pages(name), 1280)
     scrolling = (
         "return [...document.querySelectorAll('.box')].filter(b => b.scrollWidth > b.clientWidth).length"
     )
@@ -170,8 +174,8 @@ def test_tables_fit_beside_their_headings_on_a_desk(
 
 
 @pytest.mark.parametrize(("name", "times"), [("attacked", 8), ("attacked campaigns", 40)])
-def test_hostile_text_is_text(browser: Browser, pages: dict[str, Path], name: str, times: int) -> None:
-    browser.open(pages[name])
+def test_hostile_text_is_text(browser: Browser, pages: Pages, name: str, times: int) -> None:
+    browser.open(pages(name))
     browser.ask(OPEN_ALL)
     foreign = (
         "return document.querySelectorAll('script, b, iframe, object, embed, link:not([rel=icon])').length"
@@ -184,24 +188,22 @@ def test_hostile_text_is_text(browser: Browser, pages: dict[str, Path], name: st
     assert browser.ask("return document.body.innerText").count(SHOWN) >= times
 
 
-def test_a_hostile_title_is_text(browser: Browser, pages: dict[str, Path]) -> None:
-    browser.open(pages["attacked"])
+def test_a_hostile_title_is_text(browser: Browser, pages: Pages) -> None:
+    browser.open(pages("attacked"))
     assert SHOWN in browser.ask("return document.title")
 
 
-def test_the_first_thing_to_read_is_that_it_is_not_to_be_trusted(
-    browser: Browser, pages: dict[str, Path]
-) -> None:
-    browser.open(pages["attacked"], 390)
+def test_the_first_thing_to_read_is_that_it_is_not_to_be_trusted(browser: Browser, pages: Pages) -> None:
+    browser.open(pages("attacked"), 390)
     assert browser.ask("return document.body.innerText").startswith("Not to be trusted")
     assert browser.ask("return document.querySelector('.alarm').getBoundingClientRect().top") < 100.0
 
 
-@pytest.mark.parametrize("name", ["linear", "design", "campaigns"])
+@pytest.mark.parametrize("name", [LINEAR, "design", "campaigns"])
 def test_the_page_has_a_language_headings_in_order_and_links_that_lead_somewhere(
-    browser: Browser, pages: dict[str, Path], name: str
+    browser: Browser, pages: Pages, name: str
 ) -> None:
-    browser.open(pages[name])
+    browser.open(pages(name))
     assert browser.ask("return document.documentElement.lang") == "en"
     levels = browser.ask("return [...document.querySelectorAll('h1, h2, h3, h4')].map(h => +h.tagName[1])")
     assert levels[0] == 1

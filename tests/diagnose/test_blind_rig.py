@@ -112,6 +112,7 @@ def _present(drawing: Drawing, name: str, **parameters: float) -> Present:
     return Present(name, parameters, change_of(response, drawing.response), response)
 
 
+@pytest.mark.slow
 def test_twins_imitate_each_other(drawing: Drawing) -> None:
     gain = _present(drawing, "accel_gain", accel_gain_error=-0.1)
     tilt = _present(drawing, "accel_tilt", accel_tilt_versine=0.04)
