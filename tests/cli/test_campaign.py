@@ -169,10 +169,14 @@ def test_the_same_data_twice_is_noticed(tmp_path: Path) -> None:
     assert "second holds the same data as first: they count twice." in record_of(tmp_path / "out")["notes"]
 
 
-def test_one_campaign_has_no_trend(tmp_path: Path) -> None:
-    path = campaign_file(tmp_path / "only.csv", 1.0, MONDAY)
+@pytest.mark.parametrize("start", [MONDAY, None])
+def test_one_campaign_has_neither_trend_nor_order(start: float | None, tmp_path: Path) -> None:
+    path = campaign_file(tmp_path / "only.csv", 1.0, start)
     assert run(path, out=tmp_path / "out") == OK
-    assert record_of(tmp_path / "out")["trends"]["mu_r"]["slope"] is None
+    record = record_of(tmp_path / "out")
+    assert record["trends"]["mu_r"]["slope"] is None
+    assert record["notes"] == []
+    assert "<p></p>" not in (tmp_path / "out" / "campaign.html").read_text()
 
 
 @pytest.mark.parametrize(
