@@ -8,9 +8,11 @@ import hashlib
 import json
 import shutil
 import tempfile
-from collections.abc import Mapping
+import time
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,9 @@ FILES = ("fit.json", "model.toml")
 
 _SEAL = "done.json"
 _PART = ".part"
+
+_IN_USE_S = 60.0
+"""What was touched so lately [s] may be in use: it is written in a moment, and then moved to its place."""
 
 
 @dataclass(frozen=True)
@@ -125,13 +130,21 @@ def keep_result(folder: Path, result: Kept, origin: MadeFrom) -> None:
         shutil.rmtree(part, ignore_errors=True)
 
 
-def forget_parts(out: Path) -> None:
-    """Remove what runs that were killed have left half written in ``out``."""
+def forget_parts(out: Path, files: Sequence[str]) -> None:
+    """Remove what runs that were killed have left half written in ``out``: results, and ``files`` right there.
+
+    What may be somebody else's stays, and so does what another run may be writing at this moment.
+    """
     for part in out.glob(f".*{_PART}"):
         with suppress(OSError):
-            # A folder of somebody else's has other files in it; its own are those, or begun copies of them.
-            if all(each.name.strip(".").startswith((*FILES, _SEAL)) for each in part.iterdir()):
-                shutil.rmtree(part)
+            if time.time() - part.lstat().st_mtime < _IN_USE_S:
+                continue
+            if part.is_dir():
+                names = {each.name for each in part.iterdir()}
+                if names and names <= {*FILES, _SEAL}:
+                    shutil.rmtree(part)
+            elif any(fnmatch(part.name, f".{name}.????????{_PART}") for name in files):
+                part.unlink()
 
 
 def _digests(texts: list[bytes]) -> dict[str, str]:

@@ -83,7 +83,7 @@ def run_campaigns(job: ManyJob, work: Work, spread: Spread, voice: Voice, out: P
     settings = _settings(job.one, rig)
     found = find_campaigns(job.arguments, FILE_NAMES, without=out)
     prepare_folder(out)
-    forget_parts(out)
+    forget_parts(out, FILE_NAMES)
     with voice.working() as progress:
         ended, pending = _what_is_there(job.one.channels, found, rig, settings, out, progress)
         if pending:

@@ -1,5 +1,7 @@
 """Many campaigns: what is done is kept, what is not whole, not the same or not readable is not."""
 
+import os
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +14,18 @@ from savgs_ident.cli.guard import BAD_INPUT, OK
 from savgs_ident.fit.settings import FitSettings
 
 from .campaign_fakes import TALKING, campaign_file, job, never, read_number, rows_of, run
+
+
+def _part(path: Path, *names: str, age: float = 3600.0) -> Path:
+    """A folder with these files in it, or a file where there are none, that was left so long ago [s]."""
+    if names:
+        path.mkdir()
+        for name in names:
+            (path / name).write_text("half")
+    else:
+        path.write_text("half")
+    os.utime(path, 2 * (time.time() - age,))
+    return path
 
 
 def test_a_second_run_keeps_what_is_done_and_says_so(
@@ -41,8 +55,7 @@ def _unsealed(path: Path) -> None:
 def test_what_is_not_whole_is_done_anew(week: Path, tmp_path: Path, harm: Callable[[Path], None]) -> None:
     out, seen = tmp_path / "out", []
     run(week, out=out)
-    (out / ".run3.x.part").mkdir()
-    (out / ".run3.x.part" / "fit.json").write_text("half")
+    _part(out / ".run3.x.part", "fit.json")
     (out / "run3" / "mine.txt").write_text("not to be touched")
     harm(out / "run3")
 
@@ -55,6 +68,26 @@ def test_what_is_not_whole_is_done_anew(week: Path, tmp_path: Path, harm: Callab
     assert (out / "run3" / "mine.txt").exists()
     assert not list(out.glob(".*"))
     assert run(week, out=out, work=never) == OK
+
+
+def test_only_own_parts_that_nobody_writes_are_removed(week: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / ".empty.part").mkdir()
+    os.utime(out / ".empty.part", (0.0, 0.0))
+    others = {
+        out / ".empty.part",
+        _part(out / ".theirs.part"),
+        _part(out / ".campaign.json.backup.part"),
+        _part(out / ".run2.x.part", "fit.json", "mine.txt"),
+        _part(out / ".run3.x.part", "fit.json", "fit.json.mine"),
+        _part(out / ".run4.x.part", "fit.json", age=1.0),
+        _part(out / ".campaigns.csv.abcd1_23.part", age=1.0),
+    }
+    _part(out / ".run5.x.part", "fit.json", "done.json")
+    _part(out / ".campaign.json.abcd1_23.part")
+    run(week, out=out)
+    assert {*out.glob(".*")} == others
 
 
 def test_other_settings_another_rig_and_other_data_are_done_anew(
