@@ -8,7 +8,7 @@ from typing import Any
 
 from savgs_ident import __version__
 from savgs_ident.cli.campaign_files import FILE_NAMES, write_study
-from savgs_ident.cli.campaign_search import Found, find_campaigns, in_natural_order
+from savgs_ident.cli.campaign_search import Found, check_apart, find_campaigns, in_natural_order
 from savgs_ident.cli.campaign_store import (
     Kept,
     MadeFrom,
@@ -81,7 +81,8 @@ def run_campaigns(job: ManyJob, work: Work, spread: Spread, voice: Voice, out: P
     """
     rig = _content_of(job.one.rig)
     settings = _settings(job.one, rig)
-    found = find_campaigns(job.arguments, FILE_NAMES, without=out)
+    found = find_campaigns(job.arguments, FILE_NAMES)
+    check_apart(out, job.arguments, found, FILE_NAMES)
     prepare_folder(out)
     forget_parts(out, FILE_NAMES)
     with voice.working() as progress:

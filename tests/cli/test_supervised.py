@@ -10,7 +10,7 @@ from savgs_ident.cli.supervised import supervised
 
 
 def _started(monkeypatch: pytest.MonkeyPatch, whom: str) -> list[SpawnProcess]:
-    """The processes that will have been started; at its start, each has ``whom`` interrupted: itself or its parent."""
+    """The processes that will have been started; each has ``whom`` interrupted at its start, itself or its parent."""
     started: list[SpawnProcess] = []
     start = SpawnProcess.start
 
