@@ -71,14 +71,22 @@ def made_from(path: Path, channels: Path | None, rig: bytes, settings: Mapping[s
     Raises :class:`InputError` where there is none, :class:`OSError` where it cannot be read.
     """
     files = campaign_files(path)
-    used = channels or map_beside(path)
     return MadeFrom(
         digest_of(files),
         tuple(ascii(file.name) for file in files),
-        None if used is None else hashlib.sha256(used.read_bytes()).hexdigest(),
+        map_digest(path, channels),
         hashlib.sha256(rig).hexdigest(),
         settings,
     )
+
+
+def map_digest(path: Path, channels: Path | None) -> str | None:
+    """The digest of the map for the campaign at ``path``: ``channels``, or the one beside it; None if there is none.
+
+    Raises :class:`OSError` where it cannot be read.
+    """
+    used = channels or map_beside(path)
+    return None if used is None else hashlib.sha256(used.read_bytes()).hexdigest()
 
 
 def kept_result(folder: Path, digest: str) -> Kept | None:

@@ -165,7 +165,8 @@ def _task(job: ManyJob, pending: _Pending, rig: bytes) -> Task:
         # Workers of a cluster run in other folders.
         path, channels = path.absolute(), None if channels is None else channels.absolute()
     one = replace(job.one, campaign=path, channels=channels)
-    return Task(one, pending.found.source, rig, pending.origin.data_sha256)
+    origin = pending.origin
+    return Task(one, pending.found.source, rig, origin.data_sha256, origin.channels_sha256, __version__)
 
 
 def _conclude(pending: _Pending, outcome: Outcome | Lost, out: Path) -> _Ended:
