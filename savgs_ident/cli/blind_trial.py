@@ -20,10 +20,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from savgs_ident.cli.console import Progress
+from savgs_ident.cli.kept_trials import rig_marks
 from savgs_ident.cli.reading import first_sweep, read_response
 from savgs_ident.core.errors import InputError, blamed_on
 from savgs_ident.core.records import record_of
-from savgs_ident.core.rig import Rig, read_rig
+from savgs_ident.core.rig import Rig, parse_rig
 from savgs_ident.diagnose.blind.answer import Answer
 from savgs_ident.diagnose.blind.bench import Bench
 from savgs_ident.diagnose.blind.draw import Shares, draw_answer
@@ -56,7 +57,8 @@ class Plan:
     """What the trials of a run have in common.
 
     Attributes:
-        rig: file of the rig's sheet.
+        rig: file of the rig's sheet, by which it is called.
+        sheet: what was in it when the run began.
         seed: of everything that is drawn.
         shares: how often which kind of trial is drawn.
         every: so many dwells of the programme are left out between two.
@@ -64,6 +66,7 @@ class Plan:
     """
 
     rig: Path
+    sheet: bytes
     seed: int
     shares: tuple[float, float, float, float]
     every: int
@@ -73,6 +76,7 @@ class Plan:
         """What trials must have in common to be counted together, as JSON has it."""
         return {
             "rig": str(self.rig),
+            **rig_marks(self.sheet),
             "seed": self.seed,
             "shares": list(self.shares),
             "every": self.every,
@@ -85,7 +89,7 @@ class Plan:
         programme = Programme(
             dwells=DWELLS[(len(DWELLS) - 1) % self.every :: self.every], sweep=SWEEP if self.sweep else 0.0
         )
-        return Bench(read_rig(self.rig), settings.baseline, settings.free, programme)
+        return Bench(parse_rig(self.sheet, self.rig), settings.baseline, settings.free, programme)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from savgs_ident.cli.blind_workers import side_by_side
 from savgs_ident.cli.console import Progress, Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
 from savgs_ident.cli.kept_trials import begin_trials, keep_trial, known_trials, marks_in
-from savgs_ident.core.rig import default_rig_path, read_rig
+from savgs_ident.core.rig import default_rig_path, parse_rig, rig_content
 from savgs_ident.diagnose.blind.draw import Shares
 from savgs_ident.diagnose.blind.score import Score, score_from
 from savgs_ident.report.blind_figure import confusion_figure
@@ -42,11 +42,12 @@ class Job:
 def run_blind(job: Job, draw: Draw, diagnose: Diagnose, voice: Voice, out: Path) -> int:
     """Run the trials that are not there yet, write and tell what all say; the exit code."""
     Shares(*job.shares)
-    read_rig(job.rig or default_rig_path())
+    sheet = rig_content(job.rig or default_rig_path())
+    parse_rig(sheet, job.rig or default_rig_path())
     prepare_folder(out)
     use_persistent_cache()
     kept = out / "trials.jsonl"
-    plan = plan_of(job, kept)
+    plan = plan_of(job, sheet, kept)
     done = known_trials(kept, plan.marks(), score_from)
     if job.again or not done:
         done = []
@@ -68,13 +69,13 @@ def run_blind(job: Job, draw: Draw, diagnose: Diagnose, voice: Voice, out: Path)
     return NOT_TRUSTED
 
 
-def plan_of(job: Job, kept: Path) -> Plan:
-    """What the trials are, with the seed of an earlier run or a secret one if none was given."""
+def plan_of(job: Job, sheet: bytes, kept: Path) -> Plan:
+    """What the trials of the rig in ``sheet`` are, with the seed of an earlier run or a secret one if none was given."""
     seed = job.seed
     if seed is None:
         told = marks_in(kept).get("seed")
         seed = told if type(told) is int and told >= 0 else secrets.randbits(32)
-    return Plan(job.rig or default_rig_path(), seed, job.shares, job.every, job.sweep)
+    return Plan(job.rig or default_rig_path(), sheet, seed, job.shares, job.every, job.sweep)
 
 
 def _run(

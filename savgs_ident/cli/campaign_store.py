@@ -18,7 +18,7 @@ from typing import Any
 
 from savgs_ident.core.files import cannot_write
 from savgs_ident.recordings.epoch import unix_time
-from savgs_ident.recordings.read import campaign_files, digest_of, map_beside
+from savgs_ident.recordings.read import campaign_files, digest_of, map_digest
 from savgs_ident.report.files import to_json
 
 FILES = ("fit.json", "model.toml")
@@ -78,15 +78,6 @@ def made_from(path: Path, channels: Path | None, rig: bytes, settings: Mapping[s
         hashlib.sha256(rig).hexdigest(),
         settings,
     )
-
-
-def map_digest(path: Path, channels: Path | None) -> str | None:
-    """The digest of the map for the campaign at ``path``: ``channels``, or the one beside it; None if there is none.
-
-    Raises :class:`OSError` where it cannot be read.
-    """
-    used = channels or map_beside(path)
-    return None if used is None else hashlib.sha256(used.read_bytes()).hexdigest()
 
 
 def kept_result(folder: Path, digest: str) -> Kept | None:

@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 from threadpoolctl import threadpool_limits
 
 from savgs_ident import __version__
-from savgs_ident.cli.campaign_store import Kept, map_digest
+from savgs_ident.cli.campaign_store import Kept
 from savgs_ident.cli.console import Progress
 from savgs_ident.cli.identify import Job, fit_campaign, identified_rig
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import spelled_out
 from savgs_ident.core.rig import parse_rig, rig_text
+from savgs_ident.recordings.read import map_digest
 from savgs_ident.report.files import to_json
 from savgs_ident.report.fit_record import fit_record
 from savgs_ident.simulate.compilation import (

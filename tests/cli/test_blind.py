@@ -12,10 +12,12 @@ from typing import Any
 
 import pytest
 
+from savgs_ident.cli.blind_trial import Drawn
 from savgs_ident.cli.blinding import Job, run_blind
 from savgs_ident.cli.console import Voice
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.rig import default_rig_path
 
 from .blind_fakes import always_none, always_right, draw, job
 
@@ -109,6 +111,27 @@ def test_trials_of_other_settings_are_refused(tmp_path: Path, other: Job) -> Non
     for again in (False, True):
         with pytest.raises(InputError, match="trials of another"):
             run_blind(replace(other, again=again), _never, _never, SILENT, tmp_path)
+
+
+def test_trials_of_a_rig_that_was_edited_are_refused(tmp_path: Path) -> None:
+    mine, given = tmp_path / "mine.toml", default_rig_path().read_text()
+    mine.write_text(given)
+    run_blind(job(trials=1, rig=mine), draw, always_right, SILENT, tmp_path / "out")
+    mine.write_text(given.replace("value = 320.0", "value = 321.0"))
+    with pytest.raises(InputError, match="trials of another state of the rig file"):
+        run_blind(job(trials=2, rig=mine), _never, _never, SILENT, tmp_path / "out")
+
+
+def test_the_rig_is_the_one_that_was_there_when_the_run_began(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text(default_rig_path().read_text())
+
+    def edited(*given: Any) -> Drawn:
+        mine.write_text("edited")
+        return draw(*given)
+
+    code = run_blind(job(trials=2, rig=mine), edited, always_right, SILENT, tmp_path / "out")
+    assert (code, _record(tmp_path / "out")["trials"]) == (OK, 2)
 
 
 def test_a_seed_that_nobody_gave_is_another_one_each_time(tmp_path: Path) -> None:
