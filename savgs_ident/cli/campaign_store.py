@@ -12,11 +12,10 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
-from savgs_ident.core.files import cannot_write
+from savgs_ident.core.files import cannot_write, is_begun
 from savgs_ident.recordings.epoch import unix_time
 from savgs_ident.recordings.read import campaign_files, digest_of, map_digest
 from savgs_ident.report.files import to_json
@@ -142,7 +141,7 @@ def forget_parts(out: Path, files: Sequence[str]) -> None:
                 names = {each.name for each in part.iterdir()}
                 if names and names <= {*FILES, _SEAL}:
                     shutil.rmtree(part)
-            elif any(fnmatch(part.name, f".{name}.????????{_PART}") for name in files):
+            elif is_begun(part.name, files):
                 part.unlink()
 
 

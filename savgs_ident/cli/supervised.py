@@ -90,11 +90,11 @@ class _Worker(Generic[Task, Result]):
 
 
 def supervised(
-    work: Callable[[Task], Result], tasks: Sequence[Task], workers: int
+    work: Callable[[Task], Result], tasks: Sequence[Task], workers: int, each_does: int = TASKS
 ) -> Iterator[tuple[int, Result | Lost]]:
     """Numbers of tasks and what ``work``, defined at the top of a module, made of them; ``workers`` at a time.
 
-    A task whose process ends is begun again, :data:`ATTEMPTS` times at most. Work that raises ends its process.
+    A process makes room for a new one when it was given as many tasks as ``each_does``. A task whose process ends is begun again, :data:`ATTEMPTS` times at most. Work that raises ends its process.
     """
     waiting, begun = deque(range(len(tasks))), [0] * len(tasks)
     crew: list[_Worker[Task, Result]] = []
@@ -123,7 +123,7 @@ def supervised(
                         waiting.append(number)
                         continue
                 yield number, result
-                if one in crew and one.given >= TASKS:
+                if one in crew and one.given >= each_does:
                     crew.remove(one)
                     one.stop()
     finally:
