@@ -118,7 +118,7 @@ Diagnose = Callable[[Path, Rig, tuple[str, ...]], Mapping[str, Any]]
 
 
 def check_trial_folder(plan: Plan, out: Path, number: int) -> None:
-    """Raise :class:`InputError` if a trial is to be recorded in a folder that holds anything that is not a trial's."""
+    """Raise :class:`InputError` if a trial is to be recorded in a folder that holds what is not a trial's."""
     folder = _folder(out, number)
     if _is_recorded(folder, plan, number):
         return

@@ -94,7 +94,8 @@ def supervised(
 ) -> Iterator[tuple[int, Result | Lost]]:
     """Numbers of tasks and what ``work``, defined at the top of a module, made of them; ``workers`` at a time.
 
-    A process makes room for a new one when it was given as many tasks as ``each_does``. A task whose process ends is begun again, :data:`ATTEMPTS` times at most. Work that raises ends its process.
+    A process makes room for a new one when it was given as many tasks as ``each_does``. A task whose process ends is
+    begun again, :data:`ATTEMPTS` times at most. Work that raises ends its process.
     """
     waiting, begun = deque(range(len(tasks))), [0] * len(tasks)
     crew: list[_Worker[Task, Result]] = []

@@ -29,18 +29,13 @@ def test_what_a_killed_process_had_in_hand_is_done_again(tmp_path: Path) -> None
 
 
 def test_what_is_killed_each_time_is_told_when_the_others_are_done(tmp_path: Path) -> None:
-    found = []
-    with pytest.raises(
-        InputError, match="trial 3: its process was killed by signal 9, 3 times. Remedy: run again"
-    ):
+    found: list[int] = []
+    said = r"trial 3: its process was killed by signal 9, 3 times\. Remedy: run again"
+    with pytest.raises(InputError, match=said):
         found.extend(side_by_side(partial(doubled, tmp_path, 9), [3, 1, 2], 2))
-    assert found == []
-    with pytest.raises(InputError):
-        for each in side_by_side(partial(doubled, tmp_path, 9), [3, 1, 2], 2):
-            found.append(each)
     assert sorted(found) == [2, 4]
 
 
 def test_an_error_of_the_work_is_raised_here() -> None:
-    with pytest.raises(InputError, match="is no good. Remedy: take another."):
+    with pytest.raises(InputError, match=r"is no good\. Remedy: take another\."):
         list(side_by_side(refused, [1, 2], 2))
