@@ -123,7 +123,7 @@ def check_trial_folder(plan: Plan, out: Path, number: int) -> None:
     if _is_recorded(folder, plan, number):
         return
     campaign = folder / "campaign"
-    strange = [*_strange(folder, ("answer.json", "diagnosis.json"))]
+    strange = _strange(folder, ("answer.json", "diagnosis.json"))
     if campaign in strange and campaign.is_dir():
         strange.remove(campaign)
         strange += _strange(campaign, ("seal.json", FILE))
