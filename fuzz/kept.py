@@ -22,7 +22,7 @@ from savgs_ident.cli.blinding import plan_of
 from savgs_ident.cli.calibrating import trials_in
 from savgs_ident.cli.campaign_store import FILES, Kept, MadeFrom, keep_result, kept_result
 from savgs_ident.cli.kept_trials import known_trials
-from savgs_ident.core.rig import Rig, default_rig_path
+from savgs_ident.core.rig import Rig, default_rig_path, rig_content
 from savgs_ident.diagnose.blind.answer import Answer
 from savgs_ident.diagnose.blind.bench import Bench
 from savgs_ident.diagnose.blind.log import FILE
@@ -44,7 +44,7 @@ CASE = "case"
 MARKS: dict[str, object] = {"seed": 4, "campaign": "campaign.csv.gz", "every": 1}
 _MADE_FROM = MadeFrom("ab" * 32, ("campaign.csv.gz",), None, "cd" * 32, {"effects": ["rail_coulomb"]})
 _BLIND = BlindJob(3, None, 1, None, (20.0, 50.0, 15.0, 15.0), 1, False, False, ("savgs-ident", "blind"))
-_PLAN = Plan(default_rig_path(), 4, _BLIND.shares, 1, False)
+_PLAN = Plan(default_rig_path(), rig_content(default_rig_path()), 4, _BLIND.shares, 1, False)
 _NUMBER = 1
 
 
@@ -134,7 +134,7 @@ def read_result(path: Path) -> object:
 
 def read_blind(path: Path) -> object:
     """The marks of an earlier run, and the record of them."""
-    plan = plan_of(_BLIND, path)
+    plan = plan_of(_BLIND, _PLAN.sheet, path)
     found = known_trials(path, plan.marks(), score_from)
     return found, to_json(blind_record(found, plan.marks(), ())), _is_seed(plan.seed)
 

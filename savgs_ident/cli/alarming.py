@@ -9,10 +9,10 @@ from savgs_ident.cli.console import Progress, Voice, complain
 from savgs_ident.cli.diagnosing import Job as DiagnosisJob
 from savgs_ident.cli.diagnosing import baseline_of
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
-from savgs_ident.cli.kept_trials import begin_trials, completed, known_trials
+from savgs_ident.cli.kept_trials import begin_trials, campaign_marks, completed, known_trials, rig_marks
 from savgs_ident.cli.reading import read_response
 from savgs_ident.core.records import record_of
-from savgs_ident.core.rig import default_rig_path, read_rig
+from savgs_ident.core.rig import default_rig_path, parse_rig, rig_content
 from savgs_ident.diagnose.false_alarms import AlarmBench, NullDraw, alarm_bench
 from savgs_ident.report.false_alarms import alarms_figure, alarms_record, alarms_text
 from savgs_ident.report.files import prepare_folder, write_json
@@ -30,12 +30,23 @@ class Job:
     seed: int
     resume: bool
 
-    def marks(self) -> dict[str, object]:
-        """What draws must have in common to be counted together."""
+    @property
+    def rig(self) -> Path:
+        """The rig file."""
+        return self.diagnosis.rig or default_rig_path()
+
+    def marks(self, sheet: bytes) -> dict[str, object]:
+        """What draws must have in common to be counted together, with ``sheet`` in the rig file.
+
+        Raises :class:`InputError` where the campaign cannot be read.
+        """
+        campaign, channels = self.diagnosis.campaign, self.diagnosis.channels
         return {
-            "campaign": str(self.diagnosis.campaign),
-            "channels": str(self.diagnosis.channels),
-            "rig": str(self.diagnosis.rig or default_rig_path()),
+            "campaign": str(campaign),
+            "channels": str(channels),
+            **campaign_marks(campaign, channels),
+            "rig": str(self.rig),
+            **rig_marks(sheet),
             "model": self.diagnosis.model and self.diagnosis.model.value,
             "max_frequency": self.diagnosis.max_frequency,
             "orders": self.diagnosis.orders,
@@ -48,11 +59,13 @@ def count_false_alarms(job: Job, voice: Voice, out: Path) -> int:
     prepare_folder(out)
     use_persistent_cache()
     kept = out / "draws.jsonl"
-    done = draws_in(kept, job.marks()) if job.resume else []
+    sheet = rig_content(job.rig)
+    marks = job.marks(sheet)
+    done = draws_in(kept, marks) if job.resume else []
     with voice.working() as progress:
-        bench = _bench(job, progress)
+        bench = _bench(job, sheet, progress)
         if not done:
-            begin_trials(kept, job.marks())
+            begin_trials(kept, marks)
         draws = completed(kept, done, job.draws, bench.draw, progress)
         record = alarms_record(draws, bench.odds, job.diagnosis.command)
         files = [write_json(out / "false_alarms.json", record), kept]
@@ -70,9 +83,8 @@ def draws_in(kept: Path, marks: Mapping[str, object]) -> list[NullDraw]:
     return known_trials(kept, marks, partial(record_of, NullDraw))
 
 
-def _bench(job: Job, progress: Progress) -> AlarmBench:
+def _bench(job: Job, sheet: bytes, progress: Progress) -> AlarmBench:
     asked = job.diagnosis
-    source = asked.rig or default_rig_path()
-    rig, settings, values = baseline_of(read_rig(source), asked, source)
+    rig, settings, values = baseline_of(parse_rig(sheet, job.rig), asked, job.rig)
     _, measured = read_response(asked.campaign, asked.channels, asked.orders, asked.max_frequency, progress)
     return alarm_bench(measured, rig, settings, values, job.seed, progress)

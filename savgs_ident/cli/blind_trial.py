@@ -11,7 +11,7 @@ The seal is written last: a folder with a seal is whole, and its recordings serv
 
 import json
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -20,10 +20,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from savgs_ident.cli.console import Progress
+from savgs_ident.cli.kept_trials import rig_marks
 from savgs_ident.cli.reading import first_sweep, read_response
 from savgs_ident.core.errors import InputError, blamed_on
+from savgs_ident.core.files import is_begun
 from savgs_ident.core.records import record_of
-from savgs_ident.core.rig import Rig, read_rig
+from savgs_ident.core.rig import Rig, parse_rig
 from savgs_ident.diagnose.blind.answer import Answer
 from savgs_ident.diagnose.blind.bench import Bench
 from savgs_ident.diagnose.blind.draw import Shares, draw_answer
@@ -56,7 +58,8 @@ class Plan:
     """What the trials of a run have in common.
 
     Attributes:
-        rig: file of the rig's sheet.
+        rig: file of the rig's sheet, by which it is called.
+        sheet: what was in it when the run began.
         seed: of everything that is drawn.
         shares: how often which kind of trial is drawn.
         every: so many dwells of the programme are left out between two.
@@ -64,6 +67,7 @@ class Plan:
     """
 
     rig: Path
+    sheet: bytes
     seed: int
     shares: tuple[float, float, float, float]
     every: int
@@ -73,6 +77,7 @@ class Plan:
         """What trials must have in common to be counted together, as JSON has it."""
         return {
             "rig": str(self.rig),
+            **rig_marks(self.sheet),
             "seed": self.seed,
             "shares": list(self.shares),
             "every": self.every,
@@ -85,7 +90,7 @@ class Plan:
         programme = Programme(
             dwells=DWELLS[(len(DWELLS) - 1) % self.every :: self.every], sweep=SWEEP if self.sweep else 0.0
         )
-        return Bench(read_rig(self.rig), settings.baseline, settings.free, programme)
+        return Bench(parse_rig(self.sheet, self.rig), settings.baseline, settings.free, programme)
 
 
 @dataclass(frozen=True)
@@ -112,12 +117,32 @@ Diagnose = Callable[[Path, Rig, tuple[str, ...]], Mapping[str, Any]]
 """From a campaign's folder, the rig's sheet and effects to leave out to the object of ``diagnosis.json``."""
 
 
+def check_trial_folder(plan: Plan, out: Path, number: int) -> None:
+    """Raise :class:`InputError` if a trial is to be recorded in a folder that holds what is not a trial's."""
+    folder = _folder(out, number)
+    if _is_recorded(folder, plan, number):
+        return
+    campaign = folder / "campaign"
+    strange = _strange(folder, ("answer.json", "diagnosis.json"))
+    if campaign in strange and campaign.is_dir():
+        strange.remove(campaign)
+        strange += _strange(campaign, ("seal.json", FILE))
+    if strange:
+        raise InputError(
+            f"holds {strange[0].relative_to(folder)}, which is not of a trial",
+            source=folder,
+            remedy="name another --out DIR, or move the folder away",
+        )
+
+
 def run_trial(plan: Plan, draw: Draw, diagnose: Diagnose, out: Path, number: int) -> Score:
     """The marks of a trial: drawn and recorded unless its folder holds that already, diagnosed, opened."""
-    folder = prepare_folder(out / f"trial_{number:04d}")
+    folder = prepare_folder(_folder(out, number))
     bench = plan.bench()
     if not _is_recorded(folder, plan, number):
-        _record(folder, plan, draw(plan, bench, number), number)
+        drawn = draw(plan, bench, number)
+        check_trial_folder(plan, out, number)
+        _record(folder, plan, drawn, number)
     campaign = folder / "campaign"
     found = _diagnosed(diagnose, campaign, bench.rig, _handed_over(folder).without)
     write_json(folder / "diagnosis.json", found)
@@ -141,7 +166,10 @@ def diagnose_folder(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping
 def _diagnosed(diagnose: Diagnose, folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
     try:
         return diagnose(folder, rig, without)
-    except (InputError, ArithmeticError, ValueError) as error:
+    except OSError:
+        # A disk that is full says nothing of the diagnosis.
+        raise
+    except Exception as error:
         # A diagnosis that breaks is one that is not right; the other trials go on.
         return failed(f"{type(error).__name__}: {error}")
 
@@ -167,7 +195,7 @@ def draw_and_record(plan: Plan, bench: Bench, number: int) -> Drawn:
 
 
 def _record(folder: Path, plan: Plan, drawn: Drawn, number: int) -> None:
-    """Write the campaign, the answer, and last the seal."""
+    """Write the campaign, the answer, and last the seal, in the place of what is there."""
     shutil.rmtree(folder)
     campaign = prepare_folder(folder / "campaign")
     write_campaign(drawn.recordings, campaign)
@@ -187,6 +215,18 @@ def _is_recorded(folder: Path, plan: Plan, number: int) -> bool:
         return False
     told = _read(folder / "answer.json", lambda record: (record.get("trial"), record.get("settings")))
     return told == (number, plan.marks())
+
+
+def _folder(out: Path, number: int) -> Path:
+    return out / f"trial_{number:04d}"
+
+
+def _strange(folder: Path, names: Sequence[str]) -> list[Path]:
+    """What is in a folder besides files with these names, whole or begun; nothing where there is no folder."""
+    found = sorted(folder.iterdir()) if folder.is_dir() else []
+    return [
+        each for each in found if not (each.is_file() and (each.name in names or is_begun(each.name, names)))
+    ]
 
 
 def _handed_over(folder: Path) -> HandedOver:

@@ -1,22 +1,23 @@
-"""Work in processes side by side that end with the program, however it ends."""
+"""Trials in processes side by side that end with the program, however it ends."""
 
-import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
 from typing import TypeVar
 
-from savgs_ident.cli.worker_process import end_with_parent
+from savgs_ident.cli.supervised import Lost, supervised
+from savgs_ident.core.errors import InputError
 
 Result = TypeVar("Result")
 
 TASKS = 6
-"""Tasks of a process before all make room for new ones: compiled programs would fill the memory in time."""
+"""Trials of a process before it makes room for a new one: compiled programs would fill the memory in time."""
 
 
 def side_by_side(work: Callable[[int], Result], numbers: Sequence[int], jobs: int) -> Iterator[Result]:
     """The results of ``work``, defined at the top of a module, as they come; ``jobs`` at a time.
 
-    One at a time is done in this process. Where the work ends early, so do the processes.
+    One at a time is done in this process. An error of the work is raised here and ends the others. Raises
+    :class:`InputError` in the end, when the others are done, for what was given up because its process was killed.
     """
     if jobs == 1 or len(numbers) < 2:
         from savgs_ident.simulate.compilation import make_room_for_programs
@@ -25,33 +26,28 @@ def side_by_side(work: Callable[[int], Result], numbers: Sequence[int], jobs: in
             make_room_for_programs()
             yield work(number)
         return
-    for first in range(0, len(numbers), TASKS * jobs):
-        yield from _batch(work, numbers[first : first + TASKS * jobs], jobs)
+    lost: list[tuple[int, Lost]] = []
+    for place, result in supervised(partial(_attempt, work), numbers, min(jobs, len(numbers)), TASKS):
+        if isinstance(result, Lost):
+            lost.append((numbers[place], result))
+        elif isinstance(result, Exception):
+            raise result
+        else:
+            yield result
+    for number, result in lost:
+        raise InputError(
+            result.reason,
+            source=f"trial {number}",
+            remedy="run again with fewer --jobs, which take less memory: it goes on where it was",
+        )
 
 
-def _batch(work: Callable[[int], Result], numbers: Sequence[int], jobs: int) -> Iterator[Result]:
-    """The same in processes of their own."""
-    # Forked processes would share the threads of JAX.
-    context = multiprocessing.get_context("spawn")
-    before = set(multiprocessing.active_children())
-    with ProcessPoolExecutor(min(jobs, len(numbers)), context, _prepare) as pool:
-        waiting = [pool.submit(work, number) for number in numbers]
-        finished = False
-        try:
-            for each in as_completed(waiting):
-                yield each.result()
-            finished = True
-        finally:
-            if not finished:
-                for each in waiting:
-                    each.cancel()
-                for child in set(multiprocessing.active_children()) - before:
-                    child.terminate()
-
-
-def _prepare() -> None:
-    """Make a new process keep its programs, and end with the one that started it."""
+def _attempt(work: Callable[[int], Result], number: int) -> Result | Exception:
+    """The result of the work, or the error with which it ended."""
     from savgs_ident.simulate.compilation import use_persistent_cache
 
     use_persistent_cache()
-    end_with_parent()
+    try:
+        return work(number)
+    except Exception as error:
+        return error

@@ -6,12 +6,12 @@ from pathlib import Path
 
 from savgs_ident.cli.console import Progress, Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
-from savgs_ident.cli.kept_trials import begin_trials, completed, known_trials
+from savgs_ident.cli.kept_trials import begin_trials, campaign_marks, completed, known_trials, rig_marks
 from savgs_ident.cli.models import effects_in, identified_in, rig_before
 from savgs_ident.cli.reading import read_response
 from savgs_ident.cli.selection import every_so_many
 from savgs_ident.core.records import record_of
-from savgs_ident.core.rig import Rig, read_rig
+from savgs_ident.core.rig import Rig, parse_rig, rig_content
 from savgs_ident.posterior.calibration import RANKED, Trial, calibrator
 from savgs_ident.posterior.result import Sampler
 from savgs_ident.posterior.sample import Question
@@ -40,11 +40,17 @@ class Job:
     resume: bool
     command: Sequence[str]
 
-    def marks(self) -> dict[str, object]:
-        """What trials must have in common to be counted together."""
+    def marks(self, content: bytes) -> dict[str, object]:
+        """What trials must have in common to be counted together, with ``content`` in the model's rig file.
+
+        Raises :class:`InputError` where the campaign cannot be read.
+        """
         return {
             "model": str(self.model),
+            **rig_marks(content),
             "campaign": str(self.campaign),
+            "channels": str(self.channels),
+            **campaign_marks(self.campaign, self.channels),
             "sampler": self.sampler,
             "every": self.every,
             "seed": self.seed,
@@ -56,10 +62,12 @@ def calibrate_by_trials(job: Job, voice: Voice, out: Path) -> int:
     prepare_folder(out)
     use_persistent_cache()
     kept = out / "trials.jsonl"
-    done = trials_in(kept, job.marks()) if job.resume else []
+    content = rig_content(job.model)
+    rig = parse_rig(content, job.model)
+    marks = job.marks(content)
+    done = trials_in(kept, marks) if job.resume else []
     with voice.working() as progress:
-        rig = read_rig(job.model)
-        trials = _run(job, rig, kept, done, progress)
+        trials = _run(job, rig, kept, marks, done, progress)
         first = identified_in(rig, effects_in(rig, job.model), job.model)[0]
         ranked = next((each.rank for each in trials if each.rank), {})
         names = sorted(ranked, key=lambda name: name not in first)
@@ -90,7 +98,9 @@ def trials_in(kept: Path, marks: Mapping[str, object]) -> list[Trial]:
     return known_trials(kept, marks, trial)
 
 
-def _run(job: Job, rig: Rig, kept: Path, done: list[Trial], progress: Progress) -> list[Trial]:
+def _run(
+    job: Job, rig: Rig, kept: Path, marks: Mapping[str, object], done: list[Trial], progress: Progress
+) -> list[Trial]:
     effects = effects_in(rig, job.model)
     _, response = read_response(job.campaign, job.channels, SamplingSettings.orders, None, progress)
     measured = every_so_many(response, job.every)
@@ -101,5 +111,5 @@ def _run(job: Job, rig: Rig, kept: Path, done: list[Trial], progress: Progress) 
     work = calibrator(question, settings)
     # Not before all else is known to be well: what an earlier run left is gone then.
     if not done:
-        begin_trials(kept, job.marks())
+        begin_trials(kept, marks)
     return completed(kept, done, job.trials, work.trial, progress)

@@ -74,7 +74,8 @@ def campaign(
     was identified before from the same data, rig and settings, its result is kept: a run that was stopped goes on
     where it was when it is started again.
 
-    On a Dask cluster (install the extra `cluster`) the workers must see the recordings under the same paths.
+    On a Dask cluster (install the extra `cluster`) the workers must have the same version of this package and see the
+    recordings under the same paths.
 
     Writes fit.json and model.toml in a folder a campaign, campaigns.csv and campaigns.parquet (a row a campaign),
     campaign.json (with the trends), campaign.png, campaign.pdf and campaign.html.

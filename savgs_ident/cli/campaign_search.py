@@ -5,6 +5,8 @@ A file is a campaign. A folder is one too, or holds several: a campaign in each 
 - its files together are one campaign if any is named after a test (``dwell_2.35Hz.csv``, ``standstill.csv``);
 - otherwise each file is a campaign of its own.
 
+The table that an earlier run wrote is none, and results are not written where recordings are.
+
 Names are made of the file's or folder's own, of characters that every file system takes:
 
 >>> safe_name("../../etc/pass wd"), safe_name("Run 7"), safe_name("..")
@@ -28,6 +30,9 @@ from savgs_ident.recordings.readers import READERS, is_campaign_file
 LONGEST_NAME = 80
 """Most bytes of a name, so that there is room for what makes it unique, and for the names of its files."""
 
+_RECORD, _TABLE = "campaign.json", "campaigns.csv"
+"""What an earlier run has left together."""
+
 _RESERVED = ("con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(10)))
 """Names that are devices on Windows."""
 
@@ -45,19 +50,16 @@ class Found:
         return spelled_out(self.path)
 
 
-def find_campaigns(
-    arguments: Sequence[Path], taken: Iterable[str] = (), without: Path | None = None
-) -> tuple[Found, ...]:
+def find_campaigns(arguments: Sequence[Path], taken: Iterable[str] = ()) -> tuple[Found, ...]:
     """The campaigns, each once, in the order of their names; runs 2 and 10 in the order of their numbers.
 
-    ``taken`` are names that may not be given away, ``without`` is a folder that is not looked into. Raises
-    :class:`InputError` for an argument that does not exist or holds no campaign.
+    ``taken`` are names that may not be given away. Raises :class:`InputError` for an argument that does not exist or
+    holds no campaign.
     """
-    own = None if without is None else without.resolve()
     paths: dict[Path, Path] = {}
     for argument in arguments:
         try:
-            for path in _campaigns_at(argument, own):
+            for path in _campaigns_at(argument):
                 paths.setdefault(path.resolve(), path)
         except OSError as error:
             raise InputError(
@@ -68,6 +70,22 @@ def find_campaigns(
     names = _unique_names(list(paths), frozenset(taken))
     found = [Found(path, name) for path, name in zip(paths.values(), names, strict=True)]
     return tuple(sorted(found, key=lambda each: in_natural_order(each.name)))
+
+
+def check_apart(out: Path, arguments: Sequence[Path], found: Sequence[Found], files: Sequence[str]) -> None:
+    """Raise :class:`InputError` if results would get among or over recordings.
+
+    They are written to ``files`` in the folder ``out``, and to a folder in it for each that was ``found`` at the
+    ``arguments``.
+    """
+    read = {os.path.realpath(path) for path in (*arguments, *(each.path for each in found))}
+    for written in (out, *(out / name for name in files), *(out / each.name for each in found)):
+        if os.path.realpath(written) in read:
+            raise InputError(
+                "is where recordings are read, and results would be written there",
+                source=written,
+                remedy="name another folder: --out DIR",
+            )
 
 
 def in_natural_order(name: str) -> tuple[tuple[int, int | str], ...]:
@@ -84,7 +102,7 @@ def safe_name(text: str) -> str:
     return kept if kept and kept.split(".")[0].casefold() not in _RESERVED else f"campaign_{kept}".rstrip("_")
 
 
-def _campaigns_at(argument: Path, own: Path | None) -> list[Path]:
+def _campaigns_at(argument: Path) -> list[Path]:
     if argument.is_file():
         return [argument]
     if not argument.exists():
@@ -93,7 +111,7 @@ def _campaigns_at(argument: Path, own: Path | None) -> list[Path]:
         raise InputError("is neither a file nor a folder", source=argument, remedy="give a CSV or MCAP file")
     found = _campaigns_in(argument)
     for folder in sorted(argument.iterdir()):
-        if folder.is_dir() and not folder.name.startswith(".") and folder.resolve() != own and _files(folder):
+        if folder.is_dir() and not folder.name.startswith(".") and _files(folder):
             found.append(folder)
     if not found:
         raise InputError(
@@ -113,8 +131,12 @@ def _campaigns_in(folder: Path) -> list[Path]:
 
 
 def _files(folder: Path) -> list[Path]:
+    """The recordings right in a folder; the table that an earlier run wrote is none."""
+    own = _TABLE if (folder / _RECORD).is_file() else None
     return sorted(
-        each for each in folder.iterdir() if not each.name.startswith(".") and is_campaign_file(each)
+        each
+        for each in folder.iterdir()
+        if each.name != own and not each.name.startswith(".") and is_campaign_file(each)
     )
 
 

@@ -8,15 +8,16 @@ import hashlib
 import json
 import shutil
 import tempfile
-from collections.abc import Mapping
+import time
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from savgs_ident.core.files import cannot_write
+from savgs_ident.core.files import cannot_write, is_begun
 from savgs_ident.recordings.epoch import unix_time
-from savgs_ident.recordings.read import campaign_files, digest_of, map_beside
+from savgs_ident.recordings.read import campaign_files, digest_of, map_digest
 from savgs_ident.report.files import to_json
 
 FILES = ("fit.json", "model.toml")
@@ -24,6 +25,9 @@ FILES = ("fit.json", "model.toml")
 
 _SEAL = "done.json"
 _PART = ".part"
+
+_IN_USE_S = 60.0
+"""What was touched so lately [s] may be in use: it is written in a moment, and then moved to its place."""
 
 
 @dataclass(frozen=True)
@@ -66,11 +70,10 @@ def made_from(path: Path, channels: Path | None, rig: bytes, settings: Mapping[s
     Raises :class:`InputError` where there is none, :class:`OSError` where it cannot be read.
     """
     files = campaign_files(path)
-    used = channels or map_beside(path)
     return MadeFrom(
         digest_of(files),
         tuple(ascii(file.name) for file in files),
-        None if used is None else hashlib.sha256(used.read_bytes()).hexdigest(),
+        map_digest(path, channels),
         hashlib.sha256(rig).hexdigest(),
         settings,
     )
@@ -125,13 +128,21 @@ def keep_result(folder: Path, result: Kept, origin: MadeFrom) -> None:
         shutil.rmtree(part, ignore_errors=True)
 
 
-def forget_parts(out: Path) -> None:
-    """Remove what runs that were killed have left half written in ``out``."""
+def forget_parts(out: Path, files: Sequence[str]) -> None:
+    """Remove what runs that were killed have left half written in ``out``: results, and ``files`` right there.
+
+    What may be somebody else's stays, and so does what another run may be writing at this moment.
+    """
     for part in out.glob(f".*{_PART}"):
         with suppress(OSError):
-            # A folder of somebody else's has other files in it; its own are those, or begun copies of them.
-            if all(each.name.strip(".").startswith((*FILES, _SEAL)) for each in part.iterdir()):
-                shutil.rmtree(part)
+            if time.time() - part.lstat().st_mtime < _IN_USE_S:
+                continue
+            if part.is_dir():
+                names = {each.name for each in part.iterdir()}
+                if names and names <= {*FILES, _SEAL}:
+                    shutil.rmtree(part)
+            elif is_begun(part.name, files):
+                part.unlink()
 
 
 def _digests(texts: list[bytes]) -> dict[str, str]:

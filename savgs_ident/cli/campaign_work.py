@@ -4,12 +4,14 @@ from dataclasses import dataclass, replace
 
 from threadpoolctl import threadpool_limits
 
+from savgs_ident import __version__
 from savgs_ident.cli.campaign_store import Kept
 from savgs_ident.cli.console import Progress
 from savgs_ident.cli.identify import Job, fit_campaign, identified_rig
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import spelled_out
 from savgs_ident.core.rig import parse_rig, rig_text
+from savgs_ident.recordings.read import map_digest
 from savgs_ident.report.files import to_json
 from savgs_ident.report.fit_record import fit_record
 from savgs_ident.simulate.compilation import (
@@ -28,12 +30,16 @@ class Task:
         source: what to call the campaign.
         rig: content of the rig file when the run began; its path in ``job`` is only its name.
         data_sha256: digest of the recordings when the run began.
+        channels_sha256: the same of the map of their channels, None if there was none.
+        version: of this package where the run began.
     """
 
     job: Job
     source: str
     rig: bytes
     data_sha256: str
+    channels_sha256: str | None
+    version: str
 
 
 @dataclass(frozen=True)
@@ -71,12 +77,24 @@ def one_line(text: object) -> str:
 
 
 def _identified(task: Task) -> Kept:
+    if task.version != __version__:
+        raise InputError(
+            f"a worker has version {__version__} of savgs-ident, the run began with {task.version}",
+            source=task.source,
+            remedy="install the same version for every worker",
+        )
     campaign, fit = fit_campaign(task.job, parse_rig(task.rig, task.job.rig), Progress(None, None))
     if campaign.sha256 != task.data_sha256:
         raise InputError(
             "is not what it was when the run began",
             source=task.source,
             remedy="let the recording end, and run again",
+        )
+    if map_digest(task.job.campaign, task.job.channels) != task.channels_sha256:
+        raise InputError(
+            "the map of its channels is not what it was when the run began",
+            source=task.source,
+            remedy="run again",
         )
     record = fit_record(fit, (*campaign.warnings, *fit.measured.warnings))
     named = replace(campaign, source=task.source)

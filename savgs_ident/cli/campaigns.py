@@ -8,7 +8,7 @@ from typing import Any
 
 from savgs_ident import __version__
 from savgs_ident.cli.campaign_files import FILE_NAMES, write_study
-from savgs_ident.cli.campaign_search import Found, find_campaigns, in_natural_order
+from savgs_ident.cli.campaign_search import Found, check_apart, find_campaigns, in_natural_order
 from savgs_ident.cli.campaign_store import (
     Kept,
     MadeFrom,
@@ -26,7 +26,7 @@ from savgs_ident.cli.identify import Job
 from savgs_ident.cli.models import effects_of, free_parameters, rig_before
 from savgs_ident.cli.supervised import Lost, supervised
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.rig import parse_rig
+from savgs_ident.core.rig import parse_rig, rig_content
 from savgs_ident.effects.registry import model_parameters
 from savgs_ident.recordings.channel_map import read_channel_map
 from savgs_ident.report.campaigns_study import CampaignRow, RowStatus, row_of, study_campaigns
@@ -79,11 +79,13 @@ def run_campaigns(job: ManyJob, work: Work, spread: Spread, voice: Voice, out: P
     ``work`` makes the result of a task and ``spread`` does it on all, see :func:`spread_of`. Raises
     :class:`InputError` for what concerns all campaigns: an argument, the rig, the settings, the folder, the cluster.
     """
-    rig = _content_of(job.one.rig)
+    # As it is now: a change during the run concerns no campaign.
+    rig = rig_content(job.one.rig)
     settings = _settings(job.one, rig)
-    found = find_campaigns(job.arguments, FILE_NAMES, without=out)
+    found = find_campaigns(job.arguments, FILE_NAMES)
+    check_apart(out, job.arguments, found, FILE_NAMES)
     prepare_folder(out)
-    forget_parts(out)
+    forget_parts(out, FILE_NAMES)
     with voice.working() as progress:
         ended, pending = _what_is_there(job.one.channels, found, rig, settings, out, progress)
         if pending:
@@ -97,16 +99,6 @@ def run_campaigns(job: ManyJob, work: Work, spread: Spread, voice: Voice, out: P
     voice.show(campaigns_text(study), plain("Written: " + ", ".join(map(str, files))))
     voice.hand_over(record)
     return _code(ended, alarm(study))
-
-
-def _content_of(rig: Path) -> bytes:
-    """The rig file as it is now: a change during the run concerns no campaign."""
-    try:
-        return rig.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"cannot be read: {error.strerror}", source=rig, remedy="name an existing rig file"
-        ) from error
 
 
 def _settings(one: Job, content: bytes) -> dict[str, Any]:
@@ -164,7 +156,8 @@ def _task(job: ManyJob, pending: _Pending, rig: bytes) -> Task:
         # Workers of a cluster run in other folders.
         path, channels = path.absolute(), None if channels is None else channels.absolute()
     one = replace(job.one, campaign=path, channels=channels)
-    return Task(one, pending.found.source, rig, pending.origin.data_sha256)
+    origin = pending.origin
+    return Task(one, pending.found.source, rig, origin.data_sha256, origin.channels_sha256, __version__)
 
 
 def _conclude(pending: _Pending, outcome: Outcome | Lost, out: Path) -> _Ended:

@@ -1,7 +1,7 @@
 """Work on a Dask cluster: its scheduler gives tasks to workers, and those of a worker that dies to another one.
 
-The workers run this package, see the recordings under the same paths, and hand the results back: they need no folder
-to write to.
+The workers run the same version of this package, see the recordings under the same paths, and hand the results back:
+they need no folder to write to.
 """
 
 import asyncio

@@ -1,5 +1,10 @@
-"""Trials kept in a file as soon as they are there: one JSON line that says of what, then one a trial."""
+"""Trials kept in a file as soon as they are there: one JSON line that says of what, then one a trial.
 
+What a run reads is told by what is in it, not only by where it is: files are edited, and trials of two rigs are not
+to be counted together.
+"""
+
+import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
@@ -9,12 +14,48 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from savgs_ident.cli.console import Progress
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import write_bytes
+from savgs_ident.recordings.read import campaign_files, digest_of, map_digest
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Trial = TypeVar("Trial")
 Made = TypeVar("Made", bound="DataclassInstance")
+
+
+_STATES = {
+    "rig_sha256": "state of the rig file",
+    "campaign_sha256": "state of the campaign",
+    "campaign_files": "names of the campaign's files",
+    "channels_sha256": "state of the channel map",
+}
+"""Marks of what is read, in words."""
+
+
+def rig_marks(content: bytes) -> dict[str, object]:
+    """What marks trials made from a rig file with this content."""
+    return {"rig_sha256": hashlib.sha256(content).hexdigest()}
+
+
+def campaign_marks(path: Path, channels: Path | None) -> dict[str, object]:
+    """What marks trials made from the campaign at ``path`` and the map of its channels, as they are now.
+
+    Raises :class:`InputError` where they cannot be read.
+    """
+    try:
+        files = campaign_files(path)
+        return {
+            "campaign_sha256": digest_of(files),
+            # Tests may be named after them.
+            "campaign_files": [ascii(file.name) for file in files],
+            "channels_sha256": map_digest(path, channels),
+        }
+    except OSError as error:
+        raise InputError(
+            f"cannot be read: {error.strerror or error}",
+            source=error.filename or path,
+            remedy="check the path and its permissions",
+        ) from error
 
 
 def marks_in(kept: Path) -> dict[str, Any]:
@@ -46,12 +87,7 @@ def known_trials(
     if not of:
         return []
     if of != marks:
-        unlike = sorted(name for name in {*of, *marks} if of.get(name) != marks.get(name))
-        raise InputError(
-            f"holds trials of another {', '.join(unlike)}",
-            source=kept,
-            remedy="name another --out DIR, or remove the file",
-        )
+        raise InputError(_unlike(of, marks), source=kept, remedy="name another --out DIR, or remove the file")
     lines = kept.read_text().split("\n")[1:-1]
     try:
         found = [trial(json.loads(line)) for line in lines]
@@ -82,6 +118,15 @@ def completed(
         trials.append(make(number))
         keep_trial(kept, asdict(trials[-1]))
     return trials[:count]
+
+
+def _unlike(of: Mapping[str, object], marks: Mapping[str, object]) -> str:
+    """What speaks against counting trials with the marks ``of`` together with those with ``marks``."""
+    unknown = sorted(_STATES.get(name, name) for name in marks if name not in of)
+    if unknown:
+        return f"holds trials of an earlier version, which did not note the {', '.join(unknown)}"
+    unlike = sorted(_STATES.get(name, name) for name in of if name not in marks or of[name] != marks[name])
+    return f"holds trials of another {', '.join(unlike)}"
 
 
 def _write(kept: Path, lines: list[str]) -> None:

@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Generic, TypeVar
@@ -49,8 +50,7 @@ class _Worker(Generic[Task, Result]):
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.process: SpawnProcess = context.Process(target=_serve, args=(theirs,))
-        with _interrupts_held_back():
-            self.process.start()
+        self.process.start()
         # With its own end closed here, the death of the process is the end of what can be read.
         theirs.close()
         self._send(work)
@@ -90,18 +90,21 @@ class _Worker(Generic[Task, Result]):
 
 
 def supervised(
-    work: Callable[[Task], Result], tasks: Sequence[Task], workers: int
+    work: Callable[[Task], Result], tasks: Sequence[Task], workers: int, each_does: int = TASKS
 ) -> Iterator[tuple[int, Result | Lost]]:
     """Numbers of tasks and what ``work``, defined at the top of a module, made of them; ``workers`` at a time.
 
-    A task whose process ends is begun again, :data:`ATTEMPTS` times at most. Work that raises ends its process.
+    A process makes room for a new one when it was given as many tasks as ``each_does``. A task whose process ends is
+    begun again, :data:`ATTEMPTS` times at most. Work that raises ends its process.
     """
     waiting, begun = deque(range(len(tasks))), [0] * len(tasks)
     crew: list[_Worker[Task, Result]] = []
     try:
         while waiting or any(each.number is not None for each in crew):
             while waiting and len(crew) < workers:
-                crew.append(_Worker(work))
+                # An interrupt in between would leave a process that nobody ends.
+                with _interrupts_held_back():
+                    crew.append(_Worker(work))
             for each in crew:
                 if each.number is None and waiting:
                     each.give(waiting[0], tasks[waiting[0]])
@@ -121,7 +124,7 @@ def supervised(
                         waiting.append(number)
                         continue
                 yield number, result
-                if one in crew and one.given >= TASKS:
+                if one in crew and one.given >= each_does:
                     crew.remove(one)
                     one.stop()
     finally:
@@ -144,12 +147,31 @@ def _serve(connection: "Connection[object, object]") -> None:
 
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
-    """Start processes that Ctrl-C does not reach, not even while they start: this one ends them then."""
+    """Start processes that Ctrl-C does not reach, not even while they start; this one has it afterwards."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    held: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: held.append(number))
+    try:
+        with _blocked_for_new_processes():
+            yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if held:
+            signal.raise_signal(signal.SIGINT)
+
+
+@contextmanager
+def _blocked_for_new_processes() -> Iterator[None]:
+    """New processes inherit what is blocked, but no handler."""
+    if sys.platform == "win32":
+        yield
+        return
+    # Begun by the first process, it would end the blocking before that one has inherited it.
+    resource_tracker.ensure_running()
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)

@@ -6,8 +6,10 @@ Whoever stops a command, or runs out of disk, keeps what was finished and finds 
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from fnmatch import fnmatchcase
+from glob import escape
 from pathlib import Path
 
 from savgs_ident.core.errors import InputError
@@ -16,10 +18,13 @@ LEAST_ROOM = 32 * 2**20
 """Space that a temporary folder has to offer [byte]."""
 
 
+_PART = ".part"
+
+
 def write_bytes(path: Path, content: bytes) -> Path:
     """Write a file whole or not at all; raises :class:`InputError` if it cannot be written."""
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=_PART)
     except OSError as error:
         raise cannot_write(path, error) from error
     part = Path(name)
@@ -33,6 +38,11 @@ def write_bytes(path: Path, content: bytes) -> Path:
     finally:
         part.unlink(missing_ok=True)
     return path
+
+
+def is_begun(name: str, of: Iterable[str]) -> bool:
+    """Whether a file with this ``name`` is what :func:`write_bytes` had begun of a file ``of`` one of these names."""
+    return any(fnmatchcase(name, f".{escape(each)}.????????{_PART}") for each in of)
 
 
 @contextmanager

@@ -88,13 +88,17 @@ def read_rig(path: str | Path) -> Rig:
     Raises :class:`InputError`, with file, key, what is wrong and the remedy, for anything that is not a
     complete rig file of the known form.
     """
+    return parse_rig(rig_content(path), path)
+
+
+def rig_content(path: str | Path) -> bytes:
+    """What is in a rig file now, for :func:`parse_rig`; raises :class:`InputError` if it cannot be read."""
     try:
-        content = Path(path).read_bytes()
+        return Path(path).read_bytes()
     except OSError as error:
         raise InputError(
             f"cannot be read: {error.strerror}", source=path, remedy="name an existing rig file"
         ) from error
-    return parse_rig(content, path)
 
 
 def parse_rig(content: bytes, source: object) -> Rig:

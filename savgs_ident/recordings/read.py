@@ -107,6 +107,15 @@ def digest_of(files: Sequence[Path]) -> str:
     return digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
 
 
+def map_digest(path: Path, channels: Path | None) -> str | None:
+    """The digest of the map for the campaign at ``path``: ``channels``, or the one beside it; None if there is none.
+
+    Raises :class:`OSError` where it cannot be read.
+    """
+    used = channels or map_beside(path)
+    return None if used is None else digest_of([used])
+
+
 def _check_unique(files: Sequence[Path], readings: Sequence[Reading]) -> None:
     """The same test in two files is one recording in two formats, or two afternoons: not one campaign."""
     owner: dict[str, Path] = {}

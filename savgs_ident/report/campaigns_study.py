@@ -201,7 +201,9 @@ def _why_not(record: Mapping[str, Any]) -> str:
 def _order_notes(by_time: bool, starts: Sequence[float], read: Sequence[object]) -> tuple[str, ...]:
     if by_time:
         return ("The order is that of the start times in the recordings.",)
-    if len(starts) == len(read) > 1:
+    if len(read) < 2:
+        return ()
+    if len(starts) == len(read):
         return ("All recordings began at the same time: the order is that of their names.",)
     if starts:
         return (

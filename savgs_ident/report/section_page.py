@@ -71,7 +71,7 @@ class SectionPage:
         kind: what sort of report it is, above the sentence.
         title: of the window.
         sentence: what was found.
-        intro: a paragraph on what was done.
+        intro: a paragraph on what was done; empty for none.
         alarm: why the numbers are not to be trusted; empty if they are.
         facts: the numbers at a glance.
         sections: the evidence, in the order to be read.

@@ -5,7 +5,27 @@ from pathlib import Path
 
 import pytest
 
+from savgs_ident.cli.alarming import Job, draws_in
+from savgs_ident.cli.diagnosing import Job as DiagnosisJob
+from savgs_ident.core.errors import InputError
+
 DRAWS = ("false-alarms", "--orders", "3", "--quiet", "--out", "o")
+
+
+@pytest.mark.parametrize("edited", ["rig file", "campaign", "channel map"])
+def test_draws_from_files_that_were_edited_are_refused(edited: str, tmp_path: Path) -> None:
+    files = {name: tmp_path / name for name in ("rig file", "campaign", "channel map")}
+    for path in files.values():
+        path.write_text("as it was")
+    asked = DiagnosisJob(
+        files["campaign"], files["channel map"], files["rig file"], None, (), None, 3, ("savgs-ident",)
+    )
+    job, kept = Job(asked, 10, 1, resume=True), tmp_path / "draws.jsonl"
+    kept.write_text(json.dumps(job.marks(job.rig.read_bytes())) + "\n")
+    assert draws_in(kept, job.marks(job.rig.read_bytes())) == []
+    files[edited].write_text("as it is")
+    with pytest.raises(InputError, match=f"holds trials of another state of the {edited}. Remedy"):
+        draws_in(kept, job.marks(job.rig.read_bytes()))
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,10 +13,12 @@ from typing import Any
 
 import pytest
 
+from savgs_ident.cli.blind_trial import Drawn
 from savgs_ident.cli.blinding import Job, run_blind
 from savgs_ident.cli.console import Voice
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.rig import default_rig_path
 
 from .blind_fakes import always_none, always_right, draw, job
 
@@ -41,6 +44,7 @@ def test_a_run_that_goes_on_equals_one_that_was_never_stopped(tmp_path: Path) ->
     begun = tmp_path / "parts" / "trial_0004" / "campaign"
     begun.mkdir(parents=True)
     (begun / "campaign.csv.gz").write_bytes(b"half")
+    (begun / ".seal.json.abcd1_23.part").write_bytes(b"half")
     assert run_blind(job(), draw, always_right, SILENT, tmp_path / "parts") == OK
     assert _record(tmp_path / "parts") == _record(tmp_path / "whole")
     assert (tmp_path / "parts/blind.html").read_bytes() == (tmp_path / "whole/blind.html").read_bytes()
@@ -94,13 +98,59 @@ def test_recordings_that_were_changed_are_noticed(tmp_path: Path) -> None:
         run_blind(job(trials=1, again=True), _never, always_none, SILENT, tmp_path)
 
 
-def test_a_diagnosis_that_ends_with_an_error_counts_as_wrong(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["mine.txt", "campaign/run.csv", "campaign/seal.json/mine", ".git/config"])
+def test_a_folder_that_is_not_a_trials_is_not_removed(name: str, tmp_path: Path) -> None:
+    for each in ("trial_0002/campaign/campaign.csv.gz", f"trial_0002/{name}"):
+        (tmp_path / each).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / each).write_text("mine")
+    top = name.removesuffix("/mine")
+    with pytest.raises(
+        InputError, match=f"trial_0002: holds {re.escape(top.removesuffix('/config'))}, which is"
+    ):
+        run_blind(job(trials=2), _never, _never, SILENT, tmp_path)
+    assert (tmp_path / "trial_0002" / name).read_text() == "mine"
+
+
+def test_notes_beside_a_recorded_trial_are_left_and_hinder_nobody(tmp_path: Path) -> None:
+    run_blind(job(trials=1), draw, always_right, SILENT, tmp_path)
+    notes = tmp_path / "trial_0001" / "notes.txt"
+    notes.write_text("mine")
+    assert run_blind(job(trials=1, again=True), _never, always_right, SILENT, tmp_path) == OK
+    assert notes.read_text() == "mine"
+
+
+def test_what_is_put_into_a_trials_folder_during_the_run_is_not_removed(tmp_path: Path) -> None:
+    mine = tmp_path / "trial_0001" / "mine.txt"
+
+    def disturbed(*given: Any) -> Drawn:
+        mine.write_text("mine")
+        return draw(*given)
+
+    with pytest.raises(InputError, match=r"holds mine\.txt, which is not of a trial"):
+        run_blind(job(trials=1), disturbed, _never, SILENT, tmp_path)
+    assert mine.read_text() == "mine"
+
+
+@pytest.mark.parametrize("error", [InputError("no good"), RuntimeError("no good"), KeyError("no good")])
+def test_a_diagnosis_that_ends_with_an_error_counts_as_wrong(error: Exception, tmp_path: Path) -> None:
     def broken(*_: object) -> Any:
-        raise InputError("cannot be diagnosed")
+        raise error
 
     assert run_blind(job(trials=1), draw, broken, SILENT, tmp_path) == NOT_TRUSTED
     (score,) = _record(tmp_path)["scores"]
     assert (score["verdict"], score["named_right"], score["located_right"]) == ("failed", False, False)
+    told = json.loads((tmp_path / "trial_0001" / "diagnosis.json").read_text())
+    assert told["verdict"]["sentence"].startswith(f"{type(error).__name__}: ")
+    assert "no good" in told["verdict"]["sentence"]
+
+
+def test_a_disk_that_is_full_is_no_mark_of_a_diagnosis(tmp_path: Path) -> None:
+    def full(*_: object) -> Any:
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(OSError, match="No space left"):
+        run_blind(job(trials=1), draw, full, SILENT, tmp_path)
+    assert run_blind(job(trials=1), _never, always_right, SILENT, tmp_path) == OK
 
 
 @pytest.mark.parametrize("other", [job(seed=5), job(every=2), job(shares=(1.0, 1.0, 0.0, 0.0))])
@@ -109,6 +159,27 @@ def test_trials_of_other_settings_are_refused(tmp_path: Path, other: Job) -> Non
     for again in (False, True):
         with pytest.raises(InputError, match="trials of another"):
             run_blind(replace(other, again=again), _never, _never, SILENT, tmp_path)
+
+
+def test_trials_of_a_rig_that_was_edited_are_refused(tmp_path: Path) -> None:
+    mine, given = tmp_path / "mine.toml", default_rig_path().read_text()
+    mine.write_text(given)
+    run_blind(job(trials=1, rig=mine), draw, always_right, SILENT, tmp_path / "out")
+    mine.write_text(given.replace("value = 320.0", "value = 321.0"))
+    with pytest.raises(InputError, match="trials of another state of the rig file"):
+        run_blind(job(trials=2, rig=mine), _never, _never, SILENT, tmp_path / "out")
+
+
+def test_the_rig_is_the_one_that_was_there_when_the_run_began(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text(default_rig_path().read_text())
+
+    def edited(*given: Any) -> Drawn:
+        mine.write_text("edited")
+        return draw(*given)
+
+    code = run_blind(job(trials=2, rig=mine), edited, always_right, SILENT, tmp_path / "out")
+    assert (code, _record(tmp_path / "out")["trials"]) == (OK, 2)
 
 
 def test_a_seed_that_nobody_gave_is_another_one_each_time(tmp_path: Path) -> None:

@@ -1,7 +1,8 @@
 """Trials of a calibration on disk: kept, continued, refused; and what is made of them."""
 
 import json
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,19 @@ def _trial(fields: dict[str, Any]) -> Trial:
     return Trial(**fields)
 
 
-def _job(seed: int = 1) -> Job:
-    return Job(Path("model.toml"), Path("campaign.csv"), None, 10, "emcee", 3, seed, True, ("savgs-ident",))
+MODEL = b"as it was"
+
+
+def _job(campaign: Path, **changes: Any) -> Job:
+    job = Job(Path("model.toml"), campaign, None, 10, "emcee", 3, 1, True, ("savgs-ident",))
+    return replace(job, **changes)
+
+
+@pytest.fixture
+def campaign(tmp_path: Path) -> Path:
+    """A file to take trials from."""
+    (tmp_path / "campaign.csv").write_text("as it was")
+    return tmp_path / "campaign.csv"
 
 
 def _trials(count: int, share: float, seed: int) -> list[Trial]:
@@ -43,30 +55,69 @@ def _trials(count: int, share: float, seed: int) -> list[Trial]:
 
 
 def _written(path: Path, job: Job, trials: list[Trial]) -> None:
-    lines = [json.dumps(job.marks()), *(json.dumps(asdict(trial)) for trial in trials)]
+    lines = [json.dumps(job.marks(MODEL)), *(json.dumps(asdict(trial)) for trial in trials)]
     path.write_text("\n".join(lines) + "\n")
 
 
-def test_whole_trials_are_kept_and_a_line_that_was_cut_off_is_not(tmp_path: Path) -> None:
-    kept, trials = tmp_path / "trials.jsonl", _trials(5, 0.95, 1)
-    _written(kept, _job(), trials)
+def test_whole_trials_are_kept_and_a_line_that_was_cut_off_is_not(tmp_path: Path, campaign: Path) -> None:
+    kept, trials, marks = tmp_path / "trials.jsonl", _trials(5, 0.95, 1), _job(campaign).marks(MODEL)
+    _written(kept, _job(campaign), trials)
     kept.write_text(kept.read_text()[:-20])
-    assert known_trials(kept, _job().marks(), _trial) == trials[:4]
-    assert known_trials(kept, _job().marks(), _trial) == trials[:4]
+    assert known_trials(kept, marks, _trial) == trials[:4]
+    assert known_trials(kept, marks, _trial) == trials[:4]
 
 
-def test_trials_of_another_seed_are_refused(tmp_path: Path) -> None:
+def _edited(campaign: Path) -> tuple[Job, bytes]:
+    campaign.write_text("as it is")
+    return _job(campaign), MODEL
+
+
+def _mapped(campaign: Path) -> tuple[Job, bytes]:
+    (campaign.parent / "channels.toml").write_text("")
+    return _job(campaign), MODEL
+
+
+OTHERS: dict[str, Callable[[Path], tuple[Job, bytes]]] = {
+    "seed": lambda campaign: (_job(campaign, seed=2), MODEL),
+    "channels, state of the channel map": lambda campaign: (_job(campaign, channels=campaign), MODEL),
+    "state of the rig file": lambda campaign: (_job(campaign), b"as it is"),
+    "state of the campaign": _edited,
+    "state of the channel map": _mapped,
+}
+
+
+@pytest.mark.parametrize("other", OTHERS)
+def test_trials_of_something_else_are_refused(other: str, tmp_path: Path, campaign: Path) -> None:
     kept = tmp_path / "trials.jsonl"
-    _written(kept, _job(), _trials(2, 0.95, 1))
-    with pytest.raises(InputError, match="trials of another seed"):
-        known_trials(kept, _job(seed=2).marks(), _trial)
+    _written(kept, _job(campaign), _trials(2, 0.95, 1))
+    job, model = OTHERS[other](campaign)
+    with pytest.raises(InputError, match=f"holds trials of another {other}. Remedy"):
+        known_trials(kept, job.marks(model), _trial)
 
 
-def test_what_is_no_list_of_trials_is_refused(tmp_path: Path) -> None:
+def test_trials_of_a_version_that_noted_less_are_refused_with_the_reason(
+    tmp_path: Path, campaign: Path
+) -> None:
+    kept = tmp_path / "trials.jsonl"
+    marks = _job(campaign).marks(MODEL)
+    kept.write_text(json.dumps({name: each for name, each in marks.items() if "sha256" not in name}) + "\n")
+    said = (
+        "an earlier version, which did not note the state of the campaign, state of the channel map, state of"
+    )
+    with pytest.raises(InputError, match=said):
+        known_trials(kept, marks, _trial)
+
+
+def test_a_campaign_that_is_not_there_has_no_marks(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none\.csv: does not exist"):
+        _job(tmp_path / "none.csv").marks(MODEL)
+
+
+def test_what_is_no_list_of_trials_is_refused(tmp_path: Path, campaign: Path) -> None:
     kept = tmp_path / "trials.jsonl"
     kept.write_text("nonsense\n")
     with pytest.raises(InputError, match="no list of trials"):
-        known_trials(kept, _job().marks(), _trial)
+        known_trials(kept, _job(campaign).marks(MODEL), _trial)
 
 
 def test_a_right_sampler_is_found_right_and_a_bold_one_is_not() -> None:

@@ -14,6 +14,7 @@ import pytest
 from savgs_ident.cli.campaign_search import LONGEST_NAME, find_campaigns, safe_name
 from savgs_ident.cli.campaign_store import FILES
 from savgs_ident.cli.guard import BAD_INPUT, NOT_TRUSTED, OK
+from savgs_ident.core.errors import InputError
 
 from .campaign_fakes import MONDAY, STDERR, TALKING, campaign_file, never, record_of, rows_of, run
 
@@ -147,12 +148,10 @@ def test_names_are_unique_and_every_file_system_takes_them(tmp_path: Path) -> No
 def test_files_named_after_tests_are_one_campaign_others_one_each(tmp_path: Path) -> None:
     for name in (
         "a/dwell_2.0Hz.csv", "a/standstill.csv", "b/rig.csv", "b/other.mcap", "b/sub/more.csv.gz",
-        "b/.hidden/x.csv", "b/empty/readme.md", "b/out/campaigns.csv",
+        "b/.hidden/x.csv", "b/empty/readme.md", "b/out/campaigns.csv", "b/out/campaign.json",
     ):  # fmt: skip
         campaign_file(tmp_path / name, 1.0)
-    found = find_campaigns(
-        [tmp_path / "a", tmp_path / "b", tmp_path / "b" / "rig.csv"], (), tmp_path / "b" / "out"
-    )
+    found = find_campaigns([tmp_path / "a", tmp_path / "b", tmp_path / "b" / "rig.csv"])
     assert [str(each.path.relative_to(tmp_path)) for each in found] == [
         "a",
         "b/other.mcap",
@@ -162,6 +161,37 @@ def test_files_named_after_tests_are_one_campaign_others_one_each(tmp_path: Path
     assert [each.name for each in find_campaigns([tmp_path / "b" / "sub" / "more.csv.gz"])] == ["more"]
 
 
+def test_results_among_the_recordings_are_not_read_as_recordings(week: Path, tmp_path: Path) -> None:
+    for name in ("first", "second", "first"):
+        assert run(week, out=week / name) == OK
+        assert len(rows_of(week / name)) == 8
+    # As an earlier version took it.
+    for result in (week / "first").glob("campaign*.*"):
+        result.rename(week / result.name)
+    assert len(find_campaigns([week])) == 8
+
+
+@pytest.mark.parametrize(
+    ("arguments", "out"),
+    [
+        (("data",), "data"),
+        (("data",), "data/../data"),
+        (("data",), "data/b"),
+        (("data/b",), "data"),
+        (("data/campaigns.csv",), "data"),
+    ],
+)
+def test_results_do_not_get_among_the_recordings(
+    arguments: tuple[str, ...], out: str, tmp_path: Path
+) -> None:
+    for name in ("a.csv", "campaigns.csv", "b/dwell_2.0Hz.csv", "b/fit.json", "b/model.toml"):
+        campaign_file(tmp_path / "data" / name, 1.0)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    with pytest.raises(InputError, match=r"is where recordings are read.*Remedy: name another folder: --out"):
+        run(*(tmp_path / each for each in arguments), out=tmp_path / out, work=never)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
 def test_the_same_data_twice_is_noticed(tmp_path: Path) -> None:
     for name in ("first", "second"):
         campaign_file(tmp_path / "data" / f"{name}.csv", 1.0)
@@ -169,10 +199,14 @@ def test_the_same_data_twice_is_noticed(tmp_path: Path) -> None:
     assert "second holds the same data as first: they count twice." in record_of(tmp_path / "out")["notes"]
 
 
-def test_one_campaign_has_no_trend(tmp_path: Path) -> None:
-    path = campaign_file(tmp_path / "only.csv", 1.0, MONDAY)
+@pytest.mark.parametrize("start", [MONDAY, None])
+def test_one_campaign_has_neither_trend_nor_order(start: float | None, tmp_path: Path) -> None:
+    path = campaign_file(tmp_path / "only.csv", 1.0, start)
     assert run(path, out=tmp_path / "out") == OK
-    assert record_of(tmp_path / "out")["trends"]["mu_r"]["slope"] is None
+    record = record_of(tmp_path / "out")
+    assert record["trends"]["mu_r"]["slope"] is None
+    assert record["notes"] == []
+    assert "<p></p>" not in (tmp_path / "out" / "campaign.html").read_text()
 
 
 @pytest.mark.parametrize(
@@ -184,7 +218,7 @@ def test_one_campaign_has_no_trend(tmp_path: Path) -> None:
         (("data", "--free", "magic"), "there is no parameter 'magic'"),
         (("data", "--rig", "none.toml"), "none.toml: cannot be read"),
         (("data", "--channels", "none.toml"), "none.toml"),
-        (("data", "--out", "data/a.csv"), "cannot be written"),
+        (("data", "--out", "data/a.csv"), "data/a.csv: is where recordings are read"),
         (("data", "--workers", "0"), "Invalid value for '--workers'"),
         (("data", "--scheduler", "tcp://127.0.0.1:1"), "the Dask scheduler at tcp://127.0.0.1:1 does not answer"),
     ],

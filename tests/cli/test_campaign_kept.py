@@ -1,5 +1,7 @@
 """Many campaigns: what is done is kept, what is not whole, not the same or not readable is not."""
 
+import os
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -7,11 +9,30 @@ from typing import Any
 
 import pytest
 
+from savgs_ident import __version__
 from savgs_ident.cli.campaign_work import identify_one
 from savgs_ident.cli.guard import BAD_INPUT, OK
 from savgs_ident.fit.settings import FitSettings
 
 from .campaign_fakes import TALKING, campaign_file, job, never, read_number, rows_of, run
+
+QUICK: dict[str, Any] = {
+    "free": ("c_sd",),
+    "max_frequency": 1.5,
+    "settings": FitSettings(orders=3, fixed_tolerances=True),
+}
+
+
+def _part(path: Path, *names: str, age: float = 3600.0) -> Path:
+    """A folder with these files in it, or a file where there are none, that was left so long ago [s]."""
+    if names:
+        path.mkdir()
+        for name in names:
+            (path / name).write_text("half")
+    else:
+        path.write_text("half")
+    os.utime(path, 2 * (time.time() - age,))
+    return path
 
 
 def test_a_second_run_keeps_what_is_done_and_says_so(
@@ -41,8 +62,7 @@ def _unsealed(path: Path) -> None:
 def test_what_is_not_whole_is_done_anew(week: Path, tmp_path: Path, harm: Callable[[Path], None]) -> None:
     out, seen = tmp_path / "out", []
     run(week, out=out)
-    (out / ".run3.x.part").mkdir()
-    (out / ".run3.x.part" / "fit.json").write_text("half")
+    _part(out / ".run3.x.part", "fit.json")
     (out / "run3" / "mine.txt").write_text("not to be touched")
     harm(out / "run3")
 
@@ -55,6 +75,26 @@ def test_what_is_not_whole_is_done_anew(week: Path, tmp_path: Path, harm: Callab
     assert (out / "run3" / "mine.txt").exists()
     assert not list(out.glob(".*"))
     assert run(week, out=out, work=never) == OK
+
+
+def test_only_own_parts_that_nobody_writes_are_removed(week: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / ".empty.part").mkdir()
+    os.utime(out / ".empty.part", (0.0, 0.0))
+    others = {
+        out / ".empty.part",
+        _part(out / ".theirs.part"),
+        _part(out / ".campaign.json.backup.part"),
+        _part(out / ".run2.x.part", "fit.json", "mine.txt"),
+        _part(out / ".run3.x.part", "fit.json", "fit.json.mine"),
+        _part(out / ".run4.x.part", "fit.json", age=1.0),
+        _part(out / ".campaigns.csv.abcd1_23.part", age=1.0),
+    }
+    _part(out / ".run5.x.part", "fit.json", "done.json")
+    _part(out / ".campaign.json.abcd1_23.part")
+    run(week, out=out)
+    assert {*out.glob(".*")} == others
 
 
 def test_other_settings_another_rig_and_other_data_are_done_anew(
@@ -101,19 +141,43 @@ def test_a_campaign_that_cannot_be_read_is_a_failure_in_one_line(tmp_path: Path)
     assert str(path) in seen[0].reason
 
 
-def test_data_that_changed_during_the_run_are_not_kept(short_campaign: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"data_sha256": "0" * 64}, "is not what it was when the run began"),
+        ({"channels_sha256": "0" * 64}, "the map of its channels is not what it was when the run began"),
+        ({"version": "0.0"}, f"a worker has version {__version__} of savgs-ident, the run began with 0.0"),
+    ],
+)
+def test_what_changed_during_the_run_is_not_kept(
+    short_campaign: Path, tmp_path: Path, change: dict[str, str], said: str
+) -> None:
     def late(task: Any) -> Any:
-        return identify_one(replace(task, data_sha256="0" * 64))
+        return identify_one(replace(task, **change))
 
-    words = {
-        "free": ("c_sd",),
-        "max_frequency": 1.5,
-        "settings": FitSettings(orders=3, fixed_tolerances=True),
-    }
+    out = tmp_path / "out"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("savgs_ident.cli.identify.fit_least_squares", lambda *args, **kwargs: None)
-        assert run(short_campaign, out=tmp_path / "out", work=late, **words) == BAD_INPUT
-    assert "is not what it was when the run began" in rows_of(tmp_path / "out")[0]["reason"]
+        assert run(short_campaign, out=out, work=late, **QUICK) == BAD_INPUT
+    assert said in rows_of(out)[0]["reason"]
+    assert not list(out.glob("*/done.json"))
+
+
+def test_a_map_that_is_put_beside_the_recordings_during_the_run_is_noticed(
+    short_campaign: Path, tmp_path: Path
+) -> None:
+    data = tmp_path / "data" / "short.csv"
+    data.parent.mkdir()
+    data.symlink_to(short_campaign)
+
+    def late(task: Any) -> Any:
+        (data.parent / "channels.toml").write_text("")
+        return identify_one(task)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("savgs_ident.cli.identify.fit_least_squares", lambda *args, **kwargs: None)
+        assert run(data, out=tmp_path / "out", work=late, **QUICK) == BAD_INPUT
+    assert "the map of its channels is not what it was" in rows_of(tmp_path / "out")[0]["reason"]
 
 
 def test_ctrl_c_is_code_130_and_keeps_what_is_done(
