@@ -86,7 +86,7 @@ def _campaigns(name: str) -> Study:
 
 @pytest.fixture(scope="module")
 def pages(rig: Rig, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pages]:
-    """The four reports, and two with an attack in every name, one of a failed controller; each made when asked for."""
+    """The four reports, and two with an attack in every name, one of a failed controller; made when asked for."""
     origin = model_origin("gt_rear", "gt_rear.toml", EFFECTS, ("savgs-ident", "design", "gt_rear.toml"))
     bad = ModelOrigin(HOSTILE, HOSTILE, (HOSTILE,), ("savgs-ident", HOSTILE), {HOSTILE: HOSTILE})
     design = cache(lambda: _design(rig))
