@@ -86,7 +86,8 @@ def closed_loop(
     Writes closed-loop.json, closed-loop.csv (signals), closed-loop.html and pictures: signals over time, failures,
     other rigs, causes.
 
-    Exit code 1 if the loop is not stable, here or on another rig that the data allow.
+    Exit code 1 if the loop or the passive rig is not stable, here or on another rig that the data allow, or the law
+    ceased to believe the link angle.
 
     Example: savgs-ident closed-loop out/fit/model.toml --test sweep --rigs 5
     """
