@@ -6,7 +6,7 @@ from pathlib import Path
 
 from savgs_ident.cli.console import Progress, Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
-from savgs_ident.cli.models import ModelName, effects_in, effects_of
+from savgs_ident.cli.models import ModelName, rig_and_effects
 from savgs_ident.control.closed_loop.programme import (
     DEFAULT_SPEED,
     LoopKind,
@@ -22,7 +22,6 @@ from savgs_ident.control.design import controller_for
 from savgs_ident.control.rigs import Rigs, rigs_from_covariance, rigs_from_posterior
 from savgs_ident.control.weights import DEFAULT_WEIGHTS
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.core.rig import read_rig
 from savgs_ident.effects.registry import build_model, model_parameters
 from savgs_ident.model.quarter_car import QuarterCar
 from savgs_ident.model.values import Values, as_values
@@ -59,8 +58,7 @@ def close_loop(job: Job, voice: Voice, out: Path) -> int:
     """Run the study, write closed-loop.json, .csv, .html and pictures to ``out``, and tell; the exit code."""
     prepare_folder(out)
     use_persistent_cache()
-    rig = read_rig(job.rig)
-    effects = effects_in(rig, job.rig) if job.model is None else effects_of(job.model)
+    rig, effects = rig_and_effects(job.rig, job.model)
     table = model_parameters(rig, effects)
     model, p = build_model(rig, effects), as_values(table.as_dict())
     rigs = _rigs(job, table, rig.provenance)

@@ -61,8 +61,8 @@ def design(
     Writes design.json, controller.json (the sampled controller), design.html (the report), and as .png and .pdf
     gamma, loop, ride, robustness and regularisation.
 
-    Exit code 1 if gamma is not confirmed, or the loop is not stable with the controller as it is used, when sampled or
-    on one of the rigs.
+    Exit code 1 if gamma is not confirmed, or the loop is not stable with the controller as it is used, when sampled
+    or on one of the rigs.
 
     Example: savgs-ident design out/fit/model.toml --posterior out/posterior/posterior.nc
     """

@@ -5,13 +5,13 @@ from pathlib import Path
 
 from savgs_ident.cli.console import Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
-from savgs_ident.cli.models import ModelName, effects_in, effects_of
+from savgs_ident.cli.models import ModelName, rig_and_effects
 from savgs_ident.control.controller_file import controller_record
 from savgs_ident.control.design import design_controller
 from savgs_ident.control.rigs import Rigs, rigs_from_covariance, rigs_from_posterior
 from savgs_ident.control.weights import DEFAULT_WEIGHTS, read_weights
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.core.rig import Rig, read_rig
+from savgs_ident.core.rig import Rig
 from savgs_ident.effects.registry import build_model, model_parameters
 from savgs_ident.model.values import as_values
 from savgs_ident.report.design_figures import design_figures
@@ -43,8 +43,7 @@ class Job:
 def run_design(job: Job, voice: Voice, out: Path) -> int:
     """Design, write the files to ``out``, and tell; the exit code."""
     prepare_folder(out)
-    rig = read_rig(job.rig)
-    effects = effects_in(rig, job.rig) if job.model is None else effects_of(job.model)
+    rig, effects = rig_and_effects(job.rig, job.model)
     weights = DEFAULT_WEIGHTS if job.weights is None else read_weights(job.weights)
     table = model_parameters(rig, effects)
     others = _rigs(job, rig, table)

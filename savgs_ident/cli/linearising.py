@@ -5,9 +5,8 @@ from pathlib import Path
 
 from savgs_ident.cli.console import Voice, complain
 from savgs_ident.cli.guard import NOT_TRUSTED, OK
-from savgs_ident.cli.models import ModelName, effects_in, effects_of
+from savgs_ident.cli.models import ModelName, rig_and_effects
 from savgs_ident.control.linear_study import study_linear
-from savgs_ident.core.rig import read_rig
 from savgs_ident.effects.registry import build_model, model_parameters
 from savgs_ident.model.values import as_values
 from savgs_ident.report.files import prepare_folder, write_bytes, write_json
@@ -34,8 +33,7 @@ class Job:
 def run_linearisation(job: Job, voice: Voice, out: Path) -> int:
     """Linearise, write the files to ``out``, and tell; the exit code."""
     prepare_folder(out)
-    rig = read_rig(job.rig)
-    effects = effects_in(rig, job.rig) if job.model is None else effects_of(job.model)
+    rig, effects = rig_and_effects(job.rig, job.model)
     use_persistent_cache()
     with voice.working() as progress:
         p = as_values(model_parameters(rig, effects).as_dict())

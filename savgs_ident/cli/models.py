@@ -2,10 +2,12 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from savgs_ident.cli.console import complain
 from savgs_ident.core.errors import InputError, blamed_on
 
 if TYPE_CHECKING:
@@ -63,6 +65,21 @@ def effects_in(rig: "Rig", source: object) -> tuple[str, ...]:
         # What these effects bring along must go with what the file has.
         model_parameters(rig, found)
     return found
+
+
+def rig_and_effects(path: Path, model: ModelName | None) -> tuple["Rig", tuple[str, ...]]:
+    """The rig of a file with its effects, or those of ``model``; one line on standard error if its fit is doubtful.
+
+    Raises :class:`InputError` if the file cannot be read or what it says of effects is no list of known ones.
+    """
+    from savgs_ident.core.rig import read_rig
+
+    rig = read_rig(path)
+    if not rig.provenance.get("trusted", True):
+        complain(
+            f"Warning: {path}: its own fit is not to be trusted ({rig.provenance.get('status', 'no status')})."
+        )
+    return rig, effects_in(rig, path) if model is None else effects_of(model)
 
 
 def free_parameters(wanted: Sequence[str], model: ModelName, known: "ParameterTable") -> tuple[str, ...]:

@@ -46,9 +46,8 @@ def simulate(
 
     Example: savgs-ident simulate out/fit/model.toml --frequency 1 2 2.35
     """
-    from savgs_ident.cli.models import effects_in, effects_of
+    from savgs_ident.cli.models import rig_and_effects
     from savgs_ident.cli.simulating import simulate_responses, simulate_sweep
-    from savgs_ident.core.rig import read_rig
     from savgs_ident.report.files import prepare_folder
     from savgs_ident.simulate.compilation import use_persistent_cache
 
@@ -59,8 +58,7 @@ def simulate(
             raise typer.BadParameter(f"--frequency {value:g}: give a frequency above 0 Hz")
     voice = Voice(json, quiet)
     prepare_folder(out)
-    rig = read_rig(model_file)
-    effects = effects_in(rig, model_file) if model is None else effects_of(model)
+    rig, effects = rig_and_effects(model_file, model)
     use_persistent_cache()
     if sweep:
         trusted = simulate_sweep(rig, effects, voice, out)
