@@ -31,7 +31,7 @@ def test_what_could_not_be_solved_is_told_and_not_counted() -> None:
     text = alarms_text(record)
     assert "Of 40 campaigns like this one with nothing missing (1 more could not be solved)" in text
     assert "at most 7.2 %" in text
-    assert "those of this campaign 812.0; an alarm is given from 10 on" in text
+    assert "those of this campaign 812.0; an alarm is given from 4 on" in text
 
 
 def test_nothing_solved_is_nothing_shown() -> None:
