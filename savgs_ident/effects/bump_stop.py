@@ -24,7 +24,7 @@ class BumpStop(AbstractForce):
     port: ClassVar[Port] = Port.STRUT
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "bump_stop_stiffness", 2e4, "N/m", lower=0.0, upper=1e7, about="stiffness of the bump stop"
+            "bump_stop_stiffness", 2e5, "N/m", lower=0.0, upper=1e7, about="stiffness of the bump stop"
         ),
         Parameter(
             "bump_stop_gap",
