@@ -81,7 +81,9 @@ def test_what_calibration_or_a_tolerance_can_do_does_not_stand_out(drawing: Draw
         assert drawing.sigma(response) < 2.5, name
 
 
-def test_a_damper_stands_out_by_its_ratio_to_its_tolerance_beside_another_effect_too(drawing: Drawing) -> None:
+def test_a_damper_stands_out_by_its_ratio_to_its_tolerance_beside_another_effect_too(
+    drawing: Drawing,
+) -> None:
     """Far softer, known to 8 %: on the way to it no other tolerance is to be broken, and no bound left."""
     mass = _present(drawing, "unsprung_mass", unsprung_mass_change=38.0)
     both = {**drawing.rig, **mass.parameters, "damper_scale_change": -0.4}
