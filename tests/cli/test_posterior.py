@@ -117,6 +117,7 @@ def test_a_chain_is_continued_only_with_what_it_was_begun_with(
     assert (sampled[0] / "chain-emcee.h5").read_bytes() == kept
 
 
+@pytest.mark.slow
 def test_a_run_out_of_time_is_not_to_be_trusted(
     model: Path,
     short_campaign: Path,

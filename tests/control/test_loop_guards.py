@@ -45,6 +45,7 @@ def test_a_step_follows_the_fastest_decay(rig: Rig, period: float, effect: str |
     assert steps_within(build_model(rig, names), period) == steps
 
 
+@pytest.mark.slow
 def test_a_slow_controller_is_followed_as_closely(friction: QuarterCar, numbers: Values) -> None:
     """At 100 Hz, ten steps from sample to sample; in one step a sliding bristle would grow without bound."""
     slow = loop_around(numbers, controller_for(friction, numbers, DEFAULT_WEIGHTS, 100.0))
