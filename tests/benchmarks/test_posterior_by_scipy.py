@@ -36,6 +36,7 @@ def test_only_the_dwells_asked_for_are_kept() -> None:
     assert len(campaign.of_kind("standstill")) == 1
 
 
+@pytest.mark.slow
 def test_scipy_integrates_the_recorded_dwell_that_the_package_solves(task: Task) -> None:
     """Somewhere in the posterior's neighbourhood, road and link as recorded, within what counts as the same."""
     problem, dwell = task.problem, 1

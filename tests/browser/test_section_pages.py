@@ -31,10 +31,10 @@ from .test_posterior_page import OPEN_ALL, OVERFLOWING, SIZES, SMALLEST_PICTURE_
 PICTURES = {"linear": 3, "design": 5, "loop": 4, "campaigns": 1, "attacked": 5, "attacked campaigns": 1}
 EFFECTS = MODELS["simtr"]
 Pages = Callable[[str], Path]
-LINEAR = pytest.param("linear", marks=pytest.mark.slow)
-"""Half a minute of linear studies for a page of the same sections as the others."""
+LINEAR, LOOP = (pytest.param(name, marks=pytest.mark.slow) for name in ("linear", "loop"))
+"""Half a minute of studies each, for pages of the same sections as the others."""
 
-NAMES = (LINEAR, *(name for name in PICTURES if name != "linear"))
+NAMES = (LINEAR, LOOP, *(name for name in PICTURES if name not in ("linear", "loop")))
 START = 1_772_438_400.0
 SETTINGS = {"model": "simtr", "free": ["mu_r", "c_sd"], "max_frequency_hz": None}
 
@@ -150,7 +150,7 @@ def test_nothing_is_wider_than_the_window(browser: Browser, pages: Pages, name: 
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-@pytest.mark.parametrize("name", [LINEAR, "design", "loop", "campaigns"])
+@pytest.mark.parametrize("name", [LINEAR, LOOP, "design", "campaigns"])
 def test_all_text_is_large_enough_to_read(browser: Browser, pages: Pages, name: str, width: int) -> None:
     browser.open(pages(name), width)
     sizes = browser.ask(SIZES)
