@@ -29,6 +29,7 @@ from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.diagnose.rig.seats import SEATS
 from savgs_ident.diagnose.settings import DiagnosisSettings
 from savgs_ident.diagnose.verdict import (
+    CONFUSED,
     LEFT,
     Change,
     Strained,
@@ -92,6 +93,15 @@ class Judged:
     def place(self) -> Attribution:
         """Where a law of something unknown would most probably sit."""
         return max(self.places, key=lambda each: each.evidence)
+
+    @property
+    def beside(self) -> tuple[str, ...]:
+        """Ports at which it may sit as well, the most probable first."""
+        if self.seat != self.place.name:
+            return ()
+        near = [each for each in self.places if each.evidence > self.place.evidence - CONFUSED]
+        near = sorted(near, key=lambda each: -each.evidence)
+        return tuple(each.name for each in near if each is not self.place)
 
     @property
     def seat(self) -> str:

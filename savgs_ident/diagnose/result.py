@@ -23,6 +23,7 @@ class Verdict:
         ports: where they act; for an unknown one, the port that explains it best.
         confusable_with: effects that this campaign cannot tell from those named.
         sentence: the verdict in one sentence.
+        confusable_ports: of something unknown, ports that this campaign cannot tell from the one named.
     """
 
     kind: Kind
@@ -30,6 +31,7 @@ class Verdict:
     ports: tuple[str, ...]
     confusable_with: tuple[str, ...]
     sentence: str
+    confusable_ports: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

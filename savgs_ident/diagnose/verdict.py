@@ -45,7 +45,7 @@ LEFT = 0.05
 """Share of the baseline's excess misfit that named effects may leave; beyond it something else is missing."""
 
 CONFUSED = 5.0
-"""Log odds within which two hypotheses cannot be told apart."""
+"""Log odds within which two hypotheses cannot be told apart, nor two ports."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,12 @@ def verdict_of(judged: Judged, rivals: tuple[str, ...], gap: Shrink) -> Verdict:
             f"shrinks from {_percent(gap.recalibrated)} recalibrated to {_percent(gap.after)} of the response; "
             f"the noise is {_percent(gap.floor)}."
         )
-        return Verdict(kind, (), (judged.seat,), (), sentence + _nearest(judged))
+        sentence += _nearest(judged)
+        if judged.beside:
+            sentence += (
+                f" This campaign cannot tell the port {judged.seat} from {' or '.join(judged.beside)}."
+            )
+        return Verdict(kind, (), (judged.seat,), (), sentence, judged.beside)
     one = len(chosen.effects) == 1
     ports = tuple(dict.fromkeys(CATALOGUE[name].port.value for name in chosen.effects))
     names = " and ".join(chosen.effects)

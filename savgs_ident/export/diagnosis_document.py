@@ -60,6 +60,8 @@ def _check_verdict(place: Place) -> None:
     fields["ports"].names()
     fields["confusable_with"].names()
     fields["sentence"].text()
+    if "confusable_ports" in fields:
+        fields["confusable_ports"].names()
 
 
 def _check_candidate(place: Place) -> None:

@@ -16,6 +16,7 @@ RATE_WORDS: Mapping[str, str] = {
     "intervals_hold": "95 % intervals that hold the truth",
     "share_closed_90": "Nine tenths of the gap closed, where all is named",
     "named_exactly": "Effect named, and not one that does the same",
+    "located_exactly": "Located, and at no port that explains it as well",
 }
 """What each rate counts."""
 

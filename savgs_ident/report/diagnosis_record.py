@@ -26,6 +26,7 @@ def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
             "ports": diagnosis.verdict.ports,
             "confusable_with": diagnosis.verdict.confusable_with,
             "sentence": diagnosis.verdict.sentence,
+            "confusable_ports": diagnosis.verdict.confusable_ports,
         },
         "where": _where(diagnosis),
         "which": [_candidate(each) for each in diagnosis.candidates],

@@ -27,8 +27,8 @@ def answer(kind: Drawn, *effects: str, number: int = 1, **parameters: float) -> 
 def diagnosis(kind: str, *effects: str, **more: Any) -> dict[str, Any]:
     """A ``diagnosis.json``, as far as marks depend on it.
 
-    ``ports`` are by default those of the effects; ``like`` are those that look alike, ``intervals`` low and high by
-    parameter, ``closed`` is the share of the gap.
+    ``ports`` are by default those of the effects; ``like`` are those that look alike, ``beside`` ports that do,
+    ``intervals`` low and high by parameter, ``closed`` is the share of the gap.
     """
     ports = more.get("ports", list(dict.fromkeys(CATALOGUE[name].port.value for name in effects)))
     parameters = {
@@ -42,6 +42,7 @@ def diagnosis(kind: str, *effects: str, **more: Any) -> dict[str, Any]:
             "ports": ports,
             "confusable_with": list(more.get("like", ())),
             "sentence": "",
+            "confusable_ports": list(more.get("beside", ())),
         },
         "which": [
             {"effect": "none", "effects": [], "parameters": {}},

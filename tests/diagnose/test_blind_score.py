@@ -95,6 +95,11 @@ def test_an_effect_that_the_catalogue_lacks() -> None:
     assert (there.unknown_recognised, there.located_right) == (True, True)
     elsewhere = score_of(GONE, diagnosis("unknown", ports=["rail"]))
     assert (elsewhere.unknown_recognised, elsewhere.located_right) == (True, False)
+    told = score_of(GONE, diagnosis("unknown", ports=["rail"], beside=["sensor.sprung_accel"]))
+    assert (told.located_right, told.located_exactly) == (True, False)
+    untold = score_of(GONE, diagnosis("unknown", ports=["rail"], beside=["strut"]))
+    assert (untold.located_right, untold.located_exactly) == (False, False)
+    assert (there.located_exactly, elsewhere.located_exactly) == (True, False)
     named = score_of(GONE, diagnosis("effect", "accel_gain"))
     assert (named.unknown_recognised, named.located_right) == (False, True)
 

@@ -12,7 +12,8 @@ from savgs_ident.diagnose.engine.prediction import MULTIPLES, Term
 from savgs_ident.diagnose.rig.columns import impose, marched_effect, node_loads
 from savgs_ident.diagnose.rig.coordinates import baseline_coordinate
 from savgs_ident.diagnose.rig.loops import strut_force
-from savgs_ident.diagnose.rig.places import free_signal, nodes_of, places_of
+from savgs_ident.diagnose.rig.nodes import nodes_of
+from savgs_ident.diagnose.rig.places import free_signal, places_of
 from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.effects.registry import CATALOGUE
 from savgs_ident.simulate.periodic import PeriodicSolution

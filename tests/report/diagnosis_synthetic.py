@@ -147,7 +147,12 @@ def hostile(diagnosis: Diagnosis, text: str) -> Diagnosis:
         effects=(text,),
         rig=table,
         verdict=replace(
-            diagnosis.verdict, effects=(text,), ports=("rail", text), confusable_with=(text,), sentence=text
+            diagnosis.verdict,
+            effects=(text,),
+            ports=("rail", text),
+            confusable_with=(text,),
+            sentence=text,
+            confusable_ports=(text,),
         ),
         ports=(*diagnosis.ports, PortShare(text, 0.3, 0.4)),
         map=(*diagnosis.map, MapCell(text, 2.0, 1, 3.0, 4.0)),

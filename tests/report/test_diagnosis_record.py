@@ -31,7 +31,14 @@ MAYBE = (int, float, type(None))
 CONTRACT: dict[str, object] = {
     "schema": int,
     "baseline": {"model": str, "parameters": {"mu_r": NUMBER, "c_sd": NUMBER}},
-    "verdict": {"kind": str, "effects": [str], "ports": [str], "confusable_with": [str], "sentence": str},
+    "verdict": {
+        "kind": str,
+        "effects": [str],
+        "ports": [str],
+        "confusable_with": [str],
+        "sentence": str,
+        "confusable_ports": [str],
+    },
     "where": {
         "ports": [{"port": str, "share": NUMBER}],
         "map": [

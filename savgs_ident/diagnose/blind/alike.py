@@ -25,7 +25,7 @@ from savgs_ident.posterior.scales import Scales
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 
-SIMILAR = 0.4
+SIMILAR = 0.6
 """Share of its distance from the baseline that an effect keeps, to first order, from one that may do the same."""
 
 Real = NDArray[np.float64]

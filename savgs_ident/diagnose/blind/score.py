@@ -2,7 +2,8 @@
 
 An effect counts as named by its own name. Where the draw found that another effect does the same to the campaign,
 so that nobody can tell which it is, naming that one counts too, if the verdict says that it cannot tell the two
-apart. Marks that do not apply to a kind of trial are None.
+apart. The port of something unknown counts as found, too, where the verdict says that it cannot tell it from the one
+that it names. Marks that do not apply to a kind of trial are None.
 """
 
 from collections.abc import Mapping
@@ -49,6 +50,7 @@ class Score:
         named_exactly: the drawn effect and no other is named; of the same.
         located_right: the verdict's ports are those of the drawn effects, or of what does the same and is said to;
             of trials with any effect.
+        located_exactly: the verdict's ports are those of the drawn effects; of the same.
         false_alarm: something is named, or said to be unknown; of trials with nothing.
         unknown_recognised: the verdict is unknown; of trials whose effect is not in the catalogue.
         both_named: both drawn effects and no other are named; of trials with two.
@@ -67,6 +69,7 @@ class Score:
     named_right: bool | None
     named_exactly: bool | None
     located_right: bool | None
+    located_exactly: bool | None
     false_alarm: bool | None
     unknown_recognised: bool | None
     both_named: bool | None
@@ -82,6 +85,7 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any]) -> Score:
     right = set(said) == true and len(said) == len(true)
     alike = len(said) == 1 and said[0] in answer.imitators and true <= {*verdict["confusable_with"]}
     here = set(verdict["ports"]) == set(answer.ports) and verdict["kind"] != "none"
+    beside = verdict["kind"] == "unknown" and set(answer.ports) <= {*verdict["confusable_ports"]}
     kind = answer.kind
     return Score(
         number=answer.number,
@@ -92,7 +96,8 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any]) -> Score:
         said=said,
         named_right=right or alike if kind == "effect" else None,
         named_exactly=right if kind == "effect" else None,
-        located_right=here or alike if kind != "none" else None,
+        located_right=here or alike or beside if kind != "none" else None,
+        located_exactly=here if kind != "none" else None,
         false_alarm=verdict["kind"] not in ("none", FAILED) if kind == "none" else None,
         unknown_recognised=verdict["kind"] == "unknown" if kind == "unknown" else None,
         both_named=right if kind == "two" else None,
@@ -114,7 +119,14 @@ def score_from(record: Mapping[str, Any]) -> Score:
 
 def failed(why: str) -> dict[str, Any]:
     """What stands for the ``diagnosis.json`` of a diagnosis that ended with an error."""
-    verdict = {"kind": FAILED, "effects": [], "ports": [], "confusable_with": [], "sentence": why}
+    verdict = {
+        "kind": FAILED,
+        "effects": [],
+        "ports": [],
+        "confusable_with": [],
+        "sentence": why,
+        "confusable_ports": [],
+    }
     return {"verdict": verdict, "which": [], "shrink": {"share_closed": None}, "wall_s": 0.0}
 
 

@@ -77,6 +77,7 @@ def rates_of(scores: Sequence[Score]) -> dict[str, Rate]:
         "intervals_hold": _rate(held, least=0.90, most=0.99),
         "share_closed_90": _rate([share is not None and share >= 0.9 for share in closed]),
         "named_exactly": _rate([score.named_exactly for score in scores]),
+        "located_exactly": _rate([score.located_exactly for score in scores]),
     }
 
 
