@@ -155,6 +155,7 @@ def test_rates_count_only_the_trials_that_they_are_about() -> None:
         "intervals_hold": (1, 1),
         "share_closed_90": (1, 2),
         "named_exactly": (1, 3),
+        "located_exactly": (5, 7),
     }
 
 

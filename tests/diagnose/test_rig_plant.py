@@ -172,6 +172,27 @@ def test_every_port_is_a_place_and_explains_what_acts_there(
         assert left(elsewhere) > 0.5, effect
 
 
+@pytest.mark.parametrize(
+    ("effect", "port"),
+    [
+        ("cam_scale", "road"),
+        ("rail_viscous", "rail"),
+        ("bushing_stiffness", "suspension"),
+        ("deflection_delay", "sensor.susp_deflection"),
+    ],
+)
+def test_what_is_simple_has_a_law_of_one_function_at_its_port(
+    plant_and_data: Case, start: PeriodicSolution, effect: str, port: str
+) -> None:
+    plant, data = plant_and_data
+    (place,) = (each for each in places_of(plant, (), plant.values({}), start) if each.name == port)
+    (columns,) = plant.columns((), {}, start, [_term(plant, effect)])
+    change = columns[0][:, 0] / data.reach
+    laws = [each.columns[:, 0] / data.reach for each in place.laws if each.columns.shape[1] == 1]
+    alike = [abs(law @ change) / np.linalg.norm(law) for law in laws if np.any(law)]
+    assert max(alike) > 0.9999 * np.linalg.norm(change)
+
+
 def test_a_free_signal_is_the_sum_of_its_harmonics(start: PeriodicSolution) -> None:
     nodes = nodes_of(start)
     coefficients = np.zeros(18)
