@@ -16,14 +16,16 @@ from savgs_ident.model.road import cam_road
 from savgs_ident.model.values import Values, as_values
 from savgs_ident.simulate.excitation import cam_excitation
 from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, simulate_periodic
 from savgs_ident.simulate.transient import simulate_transient
 
 from ..relaxed import with_kept_programs
 from .kinds import PORTS, effects_of
 
 LIFT, LINK, HERTZ = 0.0275, np.pi / 2.0, 2.35
-PERIODS, SAMPLES, ORDERS = 10, 512, 9
+PERIODS, SAMPLES, ORDERS = 30, 512, 9
+SAME_NODES = PeriodicSettings(adaptations=0)
+"""Nodes that do not follow a search which has more unknowns, at their null though they are."""
 
 OF_ALL_KINDS = (
     *MODELS["simtr"],
@@ -55,9 +57,11 @@ def _at_null(p: Values, names: Iterable[str]) -> Values:
     }
 
 
-def _periodic(model: QuarterCar, p: Values) -> tuple[PeriodicSolution, NDArray[np.complex128]]:
+def _periodic(
+    model: QuarterCar, p: Values, settings: PeriodicSettings | None = None
+) -> tuple[PeriodicSolution, NDArray[np.complex128]]:
     """The dwell's solution, and its harmonics 1..ORDERS, (2, ORDERS)."""
-    solution = simulate_periodic(model, p, cam_excitation([HERTZ], LIFT, LINK))
+    solution = simulate_periodic(model, p, cam_excitation([HERTZ], LIFT, LINK), settings)
     assert all(status.ok for status in solution.status())
     return solution, np.asarray(harmonics(model, p, solution, ORDERS))[0, :, 1:]
 
@@ -104,8 +108,9 @@ def test_each_effect_ends_in_its_periodic_motion(effect: AbstractEffect, rig: Ri
 def test_the_whole_catalogue_at_its_null_is_simtr(rig: Rig) -> None:
     """Every yield is nought all along."""
     model, p = _bench(rig, CATALOGUE)
-    solution, found = _periodic(model, _at_null(p, set(CATALOGUE) - set(MODELS["simtr"])))
-    assert _differ(found, _periodic(*_bench(rig, ()))[1]) < 1e-9
+    at_null = _at_null(p, set(CATALOGUE) - set(MODELS["simtr"]))
+    solution, found = _periodic(model, at_null, SAME_NODES)
+    assert _differ(found, _periodic(*_bench(rig, ()), SAME_NODES)[1]) < 1e-9
     given = [effect for effect in CATALOGUE.values() if isinstance(effect, AbstractSeries)]
     yields = {state.name for effect in given for state in effect.states}
     for place, state in enumerate(model.states):
