@@ -98,7 +98,9 @@ def _diagnose(
     )
     linear = held_out_by_law(case.search, judged.place.held_out)
     held = {**held, **last, "unknown": linear if law is None else law.held}
-    found = _assemble(case, judged, named, law, held, measured, options, tell)
+    # Before what is named was settled: its rivals were not.
+    rivals = rivals_of(list(first.weighed), first.chosen)
+    found = _assemble(case, judged, rivals, named, law, held, measured, options, tell)
     return replace(found, sweep=swept, next_tests=tests, wall_s=time.perf_counter() - began)
 
 
@@ -141,6 +143,7 @@ def _held_out(case: Case, modes: Sequence[Mode], tell: Tell) -> dict[str, HeldOu
 def _assemble(
     case: Case,
     judged: Judged,
+    rivals: tuple[str, ...],
     named: Mode | None,
     law: LearnedLaw | None,
     held: dict[str, HeldOut],
@@ -158,7 +161,6 @@ def _assemble(
     )
     together, by_channel = shrinks(data, rows)
     confusable = confusable_of(judged.findings)
-    rivals = rivals_of(list(judged.weighed), judged.chosen)
     verdict = verdict_of(judged, rivals, together)
     shares = probabilities(list(judged.weighed))
     fitted = after.prediction.rows

@@ -214,11 +214,22 @@ def kind_of(weighed: list[Weighed], change: Change, left: float) -> tuple[Kind, 
 
 
 def rivals_of(weighed: list[Weighed], chosen: Weighed) -> tuple[str, ...]:
-    """Effects that cannot be told from those of the chosen hypothesis: one of them in place of one of these."""
+    """Effects that cannot be told from those of the chosen hypothesis: one of them in place of one of these.
+
+    A hypothesis that is much less probable beforehand only is one of them: that is not what the campaign tells.
+    """
     near = [
         each.effects
         for each in weighed
-        if len(each.effects) == len(chosen.effects) and each.weight > chosen.weight - CONFUSED
+        if len(each.effects) == len(chosen.effects)
+        and (each.weight > chosen.weight - CONFUSED or _fits_as_well(each, chosen))
     ]
     others = (tuple(name for name in effects if name not in chosen.effects) for effects in near)
     return tuple(dict.fromkeys(names[0] for names in others if len(names) == 1))
+
+
+def _fits_as_well(each: Weighed, chosen: Weighed) -> bool:
+    """Whether the data alone, without what is known beforehand, do not tell a hypothesis from the chosen one."""
+    if each.mode is None or chosen.mode is None:
+        return False
+    return each.mode.misfit.value > chosen.mode.misfit.value - CONFUSED

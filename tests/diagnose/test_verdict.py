@@ -30,7 +30,7 @@ from savgs_ident.diagnose.verdict import (
     weigh,
 )
 
-FITTED = cast(Mode, SimpleNamespace())
+FITTED = cast(Mode, SimpleNamespace(misfit=SimpleNamespace(value=-np.inf)))
 
 
 def _weighed(weights: Mapping[str, float], scored: tuple[str, ...] = ()) -> list[Weighed]:
@@ -108,6 +108,16 @@ def test_rivals_of_a_pair_stand_in_for_one_of_its_members() -> None:
         "accel_tilt": 98.0,
     }
     weighed = _weighed(weights)
+    assert rivals_of(weighed, weighed[0]) == ("accel_tilt",)
+
+
+def test_what_only_the_prior_speaks_against_is_a_rival() -> None:
+    """A sensor that leans by 30 degrees reads as one of less gain does; nobody mounts one like that."""
+    effects = {"accel_gain": (100.0, -50.0), "accel_tilt": (60.0, -50.5), "accel_lag": (40.0, -120.0)}
+    weighed = [
+        Weighed(name, (name,), weight, cast(Mode, SimpleNamespace(misfit=SimpleNamespace(value=fit))))
+        for name, (weight, fit) in effects.items()
+    ]
     assert rivals_of(weighed, weighed[0]) == ("accel_tilt",)
 
 
