@@ -203,10 +203,10 @@ def _lines(marks: dict[str, Any], trials: list[Any]) -> Original:
 
 
 def _score(kind: Any, *effects: str) -> Score:
-    one = kind == "effect"
+    one, there = kind == "effect", True if effects else None
     return Score(
-        1, kind, effects, tuple(0.1 for _ in effects), kind, effects if one else (), one or None, one or None,
-        True if effects else None, False if kind == "none" else None, True if kind == "unknown" else None, None, 0.9,
+        1, kind, effects, tuple(0.1 for _ in effects), kind, effects if one else (), one or None, one or None, there,
+        there, False if kind == "none" else None, True if kind == "unknown" else None, None, 0.9,
         {"accel_lag_time": Interval(0.01, 0.009, 0.011)} if one else {}, 60.0,
     )  # fmt: skip
 

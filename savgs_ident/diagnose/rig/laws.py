@@ -28,15 +28,20 @@ INSTANTS = 256
 SIMPLE = 0.1
 """Probability of a family's simple laws, to that of any other: most that is so simple is in the catalogue."""
 
-FRICTION, DAMPING, STIFFNESS = (OF_THE_MOTION.index(words) for words in ("tanh(v/0.01)", "v", "x"))
-LOADED_FRICTION = len(OF_THE_MOTION) + OF_THE_LOAD.index("n tanh(v/0.01)")
+_FRICTION, _DAMPING, _STIFFNESS = (OF_THE_MOTION.index(words) for words in ("tanh(v/0.01)", "v", "x"))
+_LOADED_FRICTION = len(OF_THE_MOTION) + OF_THE_LOAD.index("n tanh(v/0.01)")
 
 GAIN_AND_RATE = (0, 1)
-"""Those of :func:`filters_of` that do so little that they are a law together."""
+"""Places of the plain filters among those of :func:`filters_of`: a gain, and the rate, which is a small delay."""
 
 
 class Family(NamedTuple):
-    """Functions of what a place sees, (P,) each, and the places of the plain ones among them."""
+    """Functions of what a place sees at P nodes.
+
+    Attributes:
+        functions: q of them [1, or the unit of what they are made of], (P,) each.
+        plain: places among them of those that make a simple law together.
+    """
 
     functions: list[Signal]
     plain: tuple[int, ...] = ()
@@ -45,7 +50,7 @@ class Family(NamedTuple):
 def laws_of(columns: NDArray[np.float64], plain: tuple[int, ...] = ()) -> tuple[Law, ...]:
     """The laws of a family: any sum of its functions, each of them alone, and the plain ones together.
 
-    The functions change the rows by ``columns`` [unit of the row], (m, q).
+    The functions change the rows by ``columns`` [unit of the row], (m, q); ``plain`` are places among the q.
     """
     alone = [columns[:, [place]] for place in range(columns.shape[1])]
     shares = [SIMPLE / len(alone)] * len(alone)
@@ -56,16 +61,22 @@ def laws_of(columns: NDArray[np.float64], plain: tuple[int, ...] = ()) -> tuple[
 
 
 def of_a_force(displacement: Signal, velocity: Signal, load: Signal, solution: PeriodicSolution) -> Family:
-    """Forces as functions of displacement [m], velocity [m/s] and load [N], and those of contacts that give."""
+    """Forces as functions of what a port sees, and those of contacts that give.
+
+    Displacement [m], velocity [m/s] and load [N] are those at the nodes of ``solution``, (P,) each.
+    """
     found = _motion_laws(displacement, velocity, load)
-    plain = [FRICTION, DAMPING, STIFFNESS, *([LOADED_FRICTION] if np.any(load) else [])]
+    plain = [_FRICTION, _DAMPING, _STIFFNESS, *([_LOADED_FRICTION] if np.any(load) else [])]
     held = [_stop(displacement, width, solution) for width in STRETCHES]
     return Family([*found, *held], (*plain, *range(len(found), len(found) + len(held))))
 
 
 def of_what_gives(beyond: Signal, rate: Signal) -> Family:
-    """Ways by which something gives under a load beyond its rest [N or N m], and its rate."""
-    return Family(_motion_laws(beyond, rate, np.zeros_like(beyond)), (STIFFNESS, DAMPING))
+    """Ways by which something gives under a load, as functions of this and of its rate.
+
+    ``beyond`` is the load less that at rest [N or N m], ``rate`` its rate [N/s or N m/s], (P,) each.
+    """
+    return Family(_motion_laws(beyond, rate, np.zeros_like(beyond)), (_STIFFNESS, _DAMPING))
 
 
 def of_the_cam(nodes: Nodes, solution: PeriodicSolution) -> Family:
@@ -77,20 +88,27 @@ def of_the_cam(nodes: Nodes, solution: PeriodicSolution) -> Family:
 
 
 def of_the_frame(load: Signal, nodes: Nodes) -> Family:
-    """A frame that gives under a load, and what a mode of it would make of the load, slightly damped."""
+    """A frame that gives under a load [N] at the nodes, (P,), and what slightly damped modes would make of it."""
     modes = [_resonance(load, natural, nodes) for natural in RESONANCES]
     return Family([load, *modes])
 
 
 def filters_of(omega: Signal) -> list[NDArray[np.complex128]]:
-    """Linear filters of a reading at angular frequencies [rad/s], (dwells, orders): gain, rate, its rate, lags."""
+    """Linear filters of a reading [1]: gain, rate, rate of the rate, lags.
+
+    Filters and angular frequencies ``omega`` [rad/s] are (dwells, orders) each.
+    """
     rate = 1j * omega / 20.0
     lags = [corner / (corner + 1j * omega) for corner in (20.0, 60.0, 180.0)]
     return [np.asarray(each, np.complex128) for each in (np.ones_like(rate), rate, rate**2, *lags)]
 
 
 def of_a_reading(reading: NDArray[np.complex128], omega: Signal) -> list[NDArray[np.complex128]]:
-    """Harmonics of functions of a reading and its rate, from its harmonics; both (dwells, orders), rad/s."""
+    """Harmonics [1] of functions of a reading and its rate.
+
+    They, the harmonics of the ``reading`` [its unit] and the angular frequencies ``omega`` [rad/s] are
+    (dwells, orders) each.
+    """
     orders = reading.shape[1]
     turn = np.exp(2j * np.pi * np.outer(np.arange(orders), np.arange(INSTANTS)) / INSTANTS)
     along, rate = (np.real(each[:, 1:] @ turn[1:]) for each in (reading, 1j * omega * reading))
