@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +29,12 @@ from savgs_ident.diagnose.rig.places import places_of
 from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.diagnose.rig.seats import SEATS
 from savgs_ident.diagnose.settings import DiagnosisSettings
+from savgs_ident.diagnose.sittings import Sitting, at_and_elsewhere, by_place, sittings_of
 from savgs_ident.diagnose.verdict import (
     CONFUSED,
     LEFT,
+    LEFT_BY_ANOTHER_LAW,
+    PRIOR_UNKNOWN,
     Change,
     Strained,
     Unknown,
@@ -39,6 +43,8 @@ from savgs_ident.diagnose.verdict import (
     kind_of,
     most_strained,
     of_material_parts,
+    prior_of,
+    reweighed,
     unknown_of,
     weigh,
 )
@@ -77,6 +83,8 @@ class Judged:
         chosen: the hypothesis that it rests on.
         left: share of the baseline's excess misfit that the heaviest hypothesis leaves.
         settled: whether the parameters of what is named are free of what finitely many nodes cost.
+        besides: what a law at each port would explain beside the best single effect, where that was asked.
+        another_law: whether the named effect acts by another law than the catalogue's.
     """
 
     findings: Findings
@@ -88,20 +96,27 @@ class Judged:
     chosen: Weighed
     left: float
     settled: bool = True
+    besides: tuple[Sitting, ...] = ()
+    another_law: bool = False
+
+    @property
+    def sittings(self) -> tuple[Sitting, ...]:
+        """Laws at all ports, alone and beside the best single effect."""
+        return (*sittings_of(self.places), *self.besides)
 
     @property
     def place(self) -> Attribution:
         """Where a law of something unknown would most probably sit."""
-        return max(self.places, key=lambda each: each.evidence)
+        first = next(iter(by_place(self.sittings)))
+        return next(each for each in self.places if each.name == first)
 
     @property
     def beside(self) -> tuple[str, ...]:
         """Ports at which it may sit as well, the most probable first."""
         if self.seat != self.place.name:
             return ()
-        near = [each for each in self.places if each.evidence > self.place.evidence - CONFUSED]
-        near = sorted(near, key=lambda each: -each.evidence)
-        return tuple(each.name for each in near if each is not self.place)
+        (_, most), *others = by_place(self.sittings).items()
+        return tuple(name for name, weight in others if weight > most - CONFUSED)
 
     @property
     def seat(self) -> str:
@@ -164,7 +179,29 @@ def judge(case: Case, tell: Tell) -> Judged:
     unknown = unknown_of(findings, alone, besides, strained.weight)
     weighed = weigh(findings, unknown)
     kind, chosen = kind_of(weighed, _change_without(case, best, best.terms), left)
-    return Judged(findings, tuple(places), tuple(weighed), unknown, strained, kind, chosen, left)
+    found = Judged(findings, tuple(places), tuple(weighed), unknown, strained, kind, chosen, left)
+    return found if kind != "unknown" or unknown.reason == "strain" else _looked_at_closer(case, found, tell)
+
+
+def _looked_at_closer(case: Case, judged: Judged, tell: Tell) -> Judged:
+    """Something unknown, seen beside an effect that does nearly the same, if there is one.
+
+    It may sit elsewhere than it seems without it, or only be that effect by another law.
+    """
+    singles = [mode for mode in judged.findings.modes if len(mode.terms) == 1]
+    best = max(singles, key=lambda mode: mode.evidence, default=case.base)
+    left, change = left_over(case.search, case.base, best), _change_without(case, best, best.terms)
+    if not best.terms or left > LEFT_BY_ANOTHER_LAW or not change.matters:
+        return judged
+    tell(f"what {best.terms[0]} leaves")
+    prior = prior_of(best.terms, len(judged.findings.scores))
+    closer = replace(judged, besides=sittings_of(_attributed(case, best), best.terms, prior))
+    own, elsewhere = at_and_elsewhere(closer.sittings, CATALOGUE[best.terms[0]].port.value)
+    if own < elsewhere + CONFUSED:
+        return closer
+    weighed = reweighed(judged.weighed, best, own + log(PRIOR_UNKNOWN), elsewhere + log(PRIOR_UNKNOWN))
+    chosen = next(each for each in weighed if each.mode is best)
+    return replace(closer, weighed=tuple(weighed), kind="effect", chosen=chosen, left=left, another_law=True)
 
 
 def _rest(case: Case, findings: Findings, tell: Tell) -> tuple[Findings, float]:

@@ -24,6 +24,7 @@ class Verdict:
         confusable_with: effects that this campaign cannot tell from those named.
         sentence: the verdict in one sentence.
         confusable_ports: of something unknown, ports that this campaign cannot tell from the one named.
+        another_law: whether what is named acts by another law than the catalogue's.
     """
 
     kind: Kind
@@ -32,6 +33,7 @@ class Verdict:
     confusable_with: tuple[str, ...]
     sentence: str
     confusable_ports: tuple[str, ...] = ()
+    another_law: bool = False
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,9 @@ Two formulations of the same rig differ by up to 0.03 %.
 LEFT = 0.05
 """Share of the baseline's excess misfit that named effects may leave; beyond it something else is missing."""
 
+LEFT_BY_ANOTHER_LAW = 0.1
+"""The same of one effect whose law is another than the catalogue's, if what it leaves sits at its own port."""
+
 CONFUSED = 5.0
 """Log odds within which two hypotheses cannot be told apart, nor two ports."""
 
@@ -173,6 +176,19 @@ def weigh(findings: Findings, unknown: Unknown) -> list[Weighed]:
         )
         for score in findings.scores
         if (score.term.name,) not in fitted
+    ]
+    return sorted(found, key=lambda each: -each.weight)
+
+
+def reweighed(weighed: Sequence[Weighed], mode: Mode, own: float, unknown: float) -> list[Weighed]:
+    """All hypotheses by falling weight, with another log weight of the one fitted by ``mode`` and of "unknown"."""
+    found = [
+        replace(each, weight=own)
+        if each.mode is mode
+        else replace(each, weight=unknown)
+        if each.name == "unknown"
+        else each
+        for each in weighed
     ]
     return sorted(found, key=lambda each: -each.weight)
 

@@ -41,10 +41,15 @@ def verdict_of(judged: Judged, rivals: tuple[str, ...], gap: Shrink) -> Verdict:
         f"recalibrated ({_percent(gap.before)} as given) to {_percent(gap.after)} of the response; the noise is "
         f"{_percent(gap.floor)}."
     )
+    if judged.another_law:
+        sentence += (
+            f" It acts by another law than the catalogue's, which leaves {_left(judged.left)} of the misfit beyond "
+            f"the noise; what explains the rest sits at the port '{ports[0]}', too."
+        )
     if rivals:
         which = "it" if one else "one of them"
         sentence += f" This campaign cannot tell {which} from {' or '.join(rivals)}."
-    return Verdict(kind, chosen.effects, ports, rivals, sentence)
+    return Verdict(kind, chosen.effects, ports, rivals, sentence, another_law=judged.another_law)
 
 
 def _doubted(odds: float) -> str:
@@ -73,8 +78,11 @@ def _nearest(judged: Judged) -> str:
     effects = " and ".join(heaviest(judged.findings).terms)
     if not effects:
         return ""
-    left = "all" if judged.left >= 0.995 else f"{100.0 * judged.left:.2g} %"
-    return f" The nearest in the catalogue, {effects}, leaves {left} of the misfit beyond the noise."
+    return f" The nearest in the catalogue, {effects}, leaves {_left(judged.left)} of the misfit beyond the noise."
+
+
+def _left(share: float) -> str:
+    return "all" if share >= 0.995 else f"{100.0 * share:.2g} %"
 
 
 def warnings_of(case: Case, after: Mode, judged: Judged, gap: Shrink) -> tuple[str, ...]:

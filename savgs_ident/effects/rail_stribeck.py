@@ -21,7 +21,7 @@ class RailStribeck(AbstractGrip):
     name: ClassVar[str] = "rail_stribeck"
     port: ClassVar[Port] = Port.RAIL
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("stribeck_rise", 0.1, "1", lower=-0.9, upper=5.0, about="rise of rail friction at rest"),
+        Parameter("stribeck_rise", 0.1, "1", lower=0.0, upper=5.0, about="rise of rail friction at rest"),
         Parameter(
             "stribeck_velocity", 0.08, "m/s", lower=2e-3, upper=1.0, about="Stribeck velocity of the rail"
         ),

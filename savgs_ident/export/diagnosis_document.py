@@ -62,6 +62,8 @@ def _check_verdict(place: Place) -> None:
     fields["sentence"].text()
     if "confusable_ports" in fields:
         fields["confusable_ports"].names()
+    if "another_law" in fields and not isinstance(fields["another_law"].value, bool):
+        raise fields["another_law"].wrong("true or false")
 
 
 def _check_candidate(place: Place) -> None:

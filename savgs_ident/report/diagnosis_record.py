@@ -27,6 +27,7 @@ def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
             "confusable_with": diagnosis.verdict.confusable_with,
             "sentence": diagnosis.verdict.sentence,
             "confusable_ports": diagnosis.verdict.confusable_ports,
+            "another_law": diagnosis.verdict.another_law,
         },
         "where": _where(diagnosis),
         "which": [_candidate(each) for each in diagnosis.candidates],

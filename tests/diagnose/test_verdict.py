@@ -25,6 +25,7 @@ from savgs_ident.diagnose.verdict import (
     odds_of,
     of_material_parts,
     probabilities,
+    reweighed,
     rivals_of,
     unknown_of,
     weigh,
@@ -198,3 +199,20 @@ def test_a_law_is_a_trace_only_if_it_does_next_to_nothing_in_every_test() -> Non
     assert Change(0.00035, 0.019).is_trace
     assert not Change(0.00045, 0.0).is_trace
     assert not Change(0.0, 0.021).is_trace
+
+
+def test_a_hypothesis_that_is_weighed_anew_takes_its_place_and_leaves_the_others() -> None:
+    first = _weighed({"none": 0.0, "unknown": 600.0, "rail_viscous": 500.0, "spring_rate": 300.0})
+    mine: Any = SimpleNamespace(misfit=SimpleNamespace(value=-np.inf))
+    marked = [
+        Weighed(each.name, each.effects, each.weight, mine) if each.name == "rail_viscous" else each
+        for each in first
+    ]
+    again = reweighed(marked, mine, 590.0, 400.0)
+    assert [(each.name, each.weight) for each in again] == [
+        ("rail_viscous", 590.0),
+        ("unknown", 400.0),
+        ("spring_rate", 300.0),
+        ("none", 0.0),
+    ]
+    assert kind_of(again, Change(0.05, 0.05), LEFT / 2.0)[0] == "effect"

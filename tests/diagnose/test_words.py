@@ -42,6 +42,7 @@ def _judged(kind: Any, reason: Reason, weights: dict[str, float], **more: Any) -
         chosen=next(each for each in ranked if each.name == kind),
         left=0.08,
         settled=more.get("settled", True),
+        another_law=more.get("another_law", False),
     )
 
 
@@ -68,6 +69,18 @@ def test_a_tolerance_that_does_not_hold_is_named(weights: dict[str, float], star
         f"{start} k_t 4.2 tolerances below its sheet, which shows at the port 'tyre_radial'."
     )
     assert verdict.ports == ("tyre_radial",)
+
+
+@pytest.mark.parametrize("another_law", [False, True])
+def test_an_effect_by_another_law_is_said_to_be_one(another_law: bool) -> None:
+    weights = {"none": 0.0, "unknown": 100.0, "rail_stribeck": 900.0}
+    judged = _judged("rail_stribeck", "law", weights, another_law=another_law)
+    verdict = verdict_of(replace(judged, kind="effect"), (), GAP)
+    told = "acts by another law than the catalogue's, which leaves 8 % of the misfit beyond the noise"
+    assert (told in verdict.sentence) is another_law
+    assert ("at the port 'rail', too" in verdict.sentence) is another_law
+    assert verdict.another_law is another_law
+    assert verdict.effects == ("rail_stribeck",)
 
 
 @pytest.mark.parametrize(

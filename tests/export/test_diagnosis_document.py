@@ -35,6 +35,10 @@ FAULTS: dict[str, tuple[object, str]] = {
         MOUNT | {"verdict": MOUNT["verdict"] | {"effects": ["magic"]}},
         "effects[0] is 'magic'",
     ),
+    "a law that is a text": (
+        MOUNT | {"verdict": MOUNT["verdict"] | {"another_law": "yes"}},
+        "another_law is 'yes'",
+    ),
     "values as texts": (MOUNT | {"identified": {"k_t": "soft"}}, "identified.k_t is 'soft'"),
     "a value that is null": (
         MOUNT | {"which": [{"effect": "x", "parameters": {"a": {"value": None, "unit": "m"}}}]},

@@ -23,7 +23,9 @@ def has_form(value: object, form: object) -> bool:
         )
     if isinstance(form, list):
         return isinstance(value, list) and all(has_form(entry, form[0]) for entry in value)
-    return isinstance(value, form) and not isinstance(value, bool)  # type: ignore[arg-type]  # A type or several.
+    if isinstance(value, bool):
+        return form is bool
+    return isinstance(value, form)  # type: ignore[arg-type]  # A type or several.
 
 
 NUMBER = (int, float)
@@ -38,6 +40,7 @@ CONTRACT: dict[str, object] = {
         "confusable_with": [str],
         "sentence": str,
         "confusable_ports": [str],
+        "another_law": bool,
     },
     "where": {
         "ports": [{"port": str, "share": NUMBER}],

@@ -22,6 +22,9 @@ STRETCHES = (1e-4, 1e-3)
 RESONANCES = (3.0, 4.0, 5.4, 7.3, 9.8, 13.0, 18.0, 24.0, 33.0, 50.0)
 """Natural frequencies [Hz] of what the frame may do."""
 
+WAVES = (4, 5, 6, 7, 8, 9)
+"""Orders of what may be wavy on a cam, beyond those of its shape."""
+
 INSTANTS = 256
 """Instants of a period at which a law of a sensor's reading is evaluated."""
 
@@ -85,6 +88,12 @@ def of_the_cam(nodes: Nodes, solution: PeriodicSolution) -> Family:
     angle, speed = nodes.phase + turned, nodes.omega / np.max(nodes.omega)
     shapes = [wave(order * angle) for order in (1, 2, 3) for wave in (np.cos, np.sin)]
     return Family([*shapes, speed * np.cos(angle), speed * np.sin(angle)], (0, 1))
+
+
+def of_a_wavy_cam(nodes: Nodes, solution: PeriodicSolution) -> Family:
+    """Waves [1] on a cam that are shorter than those of a wrong shape."""
+    turned = np.angle(np.asarray(solution.excitation.road))[:, 1][nodes.dwell]
+    return Family([wave(order * (nodes.phase + turned)) for order in WAVES for wave in (np.cos, np.sin)])
 
 
 def of_the_frame(load: Signal, nodes: Nodes) -> Family:

@@ -20,6 +20,7 @@ from savgs_ident.diagnose.rig.laws import (
     laws_of,
     of_a_force,
     of_a_reading,
+    of_a_wavy_cam,
     of_the_cam,
     of_the_frame,
     of_what_gives,
@@ -78,7 +79,7 @@ def places_of(plant: RigPlant, terms: tuple[str, ...], p: Values, solution: Peri
         beyond = np.asarray(carried[carrier].beyond_rest)
         families = [of_what_gives(beyond, rate_of(beyond, nodes, solution))]
         if port is Port.ROAD:
-            families.append(of_the_cam(nodes, solution))
+            families += [of_the_cam(nodes, solution), of_a_wavy_cam(nodes, solution)]
         if port is Port.FRAME:
             families = [of_the_frame(beyond, nodes)]
         told[port.value] = [ways(each, field) for each in families]
