@@ -29,7 +29,7 @@ from savgs_ident.diagnose.rig.places import places_of
 from savgs_ident.diagnose.rig.plant import RigPlant
 from savgs_ident.diagnose.rig.seats import SEATS
 from savgs_ident.diagnose.settings import DiagnosisSettings
-from savgs_ident.diagnose.sittings import Sitting, at_and_elsewhere, by_place, sittings_of
+from savgs_ident.diagnose.sittings import Sitting, at_and_elsewhere, by_place, may_be_imitated, sittings_of
 from savgs_ident.diagnose.verdict import (
     CONFUSED,
     LEFT,
@@ -194,9 +194,11 @@ def _looked_at_closer(case: Case, judged: Judged, tell: Tell) -> Judged:
     if not best.terms or left > LEFT_BY_ANOTHER_LAW or not change.matters:
         return judged
     tell(f"what {best.terms[0]} leaves")
-    prior = prior_of(best.terms, len(judged.findings.scores))
-    closer = replace(judged, besides=sittings_of(_attributed(case, best), best.terms, prior))
-    own, elsewhere = at_and_elsewhere(closer.sittings, CATALOGUE[best.terms[0]].port.value)
+    prior, port = prior_of(best.terms, len(judged.findings.scores)), CATALOGUE[best.terms[0]].port.value
+    names = {port, *may_be_imitated(judged.places, case.base.evidence)}
+    places = [each for each in _attributed(case, best) if each.name in names]
+    closer = replace(judged, besides=sittings_of(places, best.terms, prior))
+    own, elsewhere = at_and_elsewhere(closer.sittings, port)
     if own < elsewhere + CONFUSED:
         return closer
     weighed = reweighed(judged.weighed, best, own + log(PRIOR_UNKNOWN), elsewhere + log(PRIOR_UNKNOWN))

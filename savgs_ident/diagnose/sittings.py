@@ -14,6 +14,9 @@ import numpy as np
 
 from savgs_ident.diagnose.engine.attribution import Attribution
 
+ALONE = 0.5
+"""Share of the best place's gain in log evidence that a law alone has where an effect may stand in for it."""
+
 
 class Sitting(NamedTuple):
     """A law at a place beside the effects of a hypothesis, none or more.
@@ -31,6 +34,16 @@ def sittings_of(
 ) -> tuple[Sitting, ...]:
     """What is explained at places beside effects of this log prior."""
     return tuple(Sitting(effects, each.name, each.evidence + prior) for each in places)
+
+
+def may_be_imitated(places: Sequence[Attribution], without: float) -> frozenset[str]:
+    """Names of the places at which something unknown may sit that an effect elsewhere only imitates.
+
+    A law there explains alone much of what one does anywhere; ``without`` is the log evidence of the model without
+    a law. What explains little but beside the effect is not what this one stands in for.
+    """
+    most = max(each.evidence for each in places) - without
+    return frozenset(each.name for each in places if each.evidence - without >= ALONE * most)
 
 
 def by_place(sittings: Sequence[Sitting]) -> Mapping[str, float]:

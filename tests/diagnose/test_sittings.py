@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from savgs_ident.diagnose.engine.attribution import Attribution, anywhere
-from savgs_ident.diagnose.sittings import Sitting, at_and_elsewhere, by_place, sittings_of
+from savgs_ident.diagnose.sittings import (
+    ALONE,
+    Sitting,
+    at_and_elsewhere,
+    by_place,
+    may_be_imitated,
+    sittings_of,
+)
 
 
 def _places(**evidence: float) -> tuple[Attribution, ...]:
@@ -39,3 +46,11 @@ def test_a_place_that_nothing_sits_at_has_no_weight() -> None:
     here, elsewhere = at_and_elsewhere((Sitting((), "rail", 3.0),), "strut")
     assert here == -np.inf
     assert elsewhere == pytest.approx(3.0)
+
+
+def test_an_effect_stands_in_only_for_what_explains_much_alone() -> None:
+    places = _places(strut=-3169.0, suspension=-3284.0, link=-3600.0)
+    without = -3665.0
+    assert ALONE * (3665.0 - 3169.0) < 3665.0 - 3284.0
+    assert may_be_imitated(places, without) == {"strut", "suspension"}
+    assert may_be_imitated(places, -3170.0) == {"strut"}
