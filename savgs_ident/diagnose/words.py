@@ -108,7 +108,8 @@ def warnings_of(case: Case, after: Mode, judged: Judged, gap: Shrink) -> tuple[s
     if kind in ("effect", "several") and left > IMPERFECT:
         found.append(
             f"The named effects leave {100.0 * left:.1f} % of the baseline's excess misfit: their laws are not quite "
-            "those of the rig, or something small is missing besides."
+            "those of the rig, or something small is missing besides. The intervals of their parameters are those of "
+            "the noise alone."
         )
     return tuple(dict.fromkeys(found))
 
