@@ -197,7 +197,7 @@ def _looked_at_closer(case: Case, judged: Judged, tell: Tell) -> Judged:
     prior, port = prior_of(best.terms, len(judged.findings.scores)), CATALOGUE[best.terms[0]].port.value
     names = {port, *may_be_imitated(judged.places, case.base.evidence)}
     places = [each for each in _attributed(case, best) if each.name in names]
-    closer = replace(judged, besides=sittings_of(places, best.terms, prior))
+    closer = replace(judged, besides=sittings_of(places, prior))
     own, elsewhere = at_and_elsewhere(closer.sittings, port)
     if own < elsewhere + CONFUSED:
         return closer

@@ -19,21 +19,15 @@ ALONE = 0.5
 
 
 class Sitting(NamedTuple):
-    """A law at a place beside the effects of a hypothesis, none or more.
+    """A law at a place, alone or beside effects: ``weight`` is its log evidence and the log prior of the effects."""
 
-    ``weight`` is its log evidence and the log prior of the effects.
-    """
-
-    effects: tuple[str, ...]
     place: str
     weight: float
 
 
-def sittings_of(
-    places: Sequence[Attribution], effects: tuple[str, ...] = (), prior: float = 0.0
-) -> tuple[Sitting, ...]:
-    """What is explained at places beside effects of this log prior."""
-    return tuple(Sitting(effects, each.name, each.evidence + prior) for each in places)
+def sittings_of(places: Sequence[Attribution], prior: float = 0.0) -> tuple[Sitting, ...]:
+    """What is explained at places, beside effects of this log prior if there are any."""
+    return tuple(Sitting(each.name, each.evidence + prior) for each in places)
 
 
 def may_be_imitated(places: Sequence[Attribution], without: float) -> frozenset[str]:

@@ -40,48 +40,43 @@ from savgs_ident.simulate.periodic import simulate_periodic
 from .conftest import Measure
 
 
-class ExponentialStribeck(AbstractGrip):
-    """The rise falls off exponentially, not as a bell."""
+class Unlisted(AbstractEffect):
+    """An effect that no catalogue has, without parameters or states."""
 
-    name: ClassVar[str] = "exponential_stribeck"
-    port: ClassVar[Port] = Port.RAIL
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     null: ClassVar[Mapping[str, float]] = {}
     states: ClassVar[tuple[InternalState, ...]] = ()
     symptom: ClassVar[str] = ""
     reference: ClassVar[str] = ""
+
+
+class ExponentialStribeck(Unlisted, AbstractGrip):
+    """The rise falls off exponentially, not as a bell."""
+
+    name: ClassVar[str] = "exponential_stribeck"
+    port: ClassVar[Port] = Port.RAIL
 
     def grip(self, p: Values, signals: PortSignals) -> Grip:
         share = 0.25 * p["mu_r"] * jnp.exp(-jnp.abs(signals.velocity) / 0.08) * signals.load
         return Grip(share, share)
 
 
-class SecondOrderLag(AbstractSensorFault):
+class SecondOrderLag(Unlisted, AbstractSensorFault):
     """The accelerometer lags by a filter of second order, not of first."""
 
     name: ClassVar[str] = "second_order_lag"
     port: ClassVar[Port] = Port.SENSOR_SPRUNG_ACCEL
-    parameters: ClassVar[tuple[Parameter, ...]] = ()
-    null: ClassVar[Mapping[str, float]] = {}
-    states: ClassVar[tuple[InternalState, ...]] = ()
-    symptom: ClassVar[str] = ""
-    reference: ClassVar[str] = ""
 
     def transfer(self, p: Values, frequency: Float[Array, " f"]) -> Complex[Array, " f"]:
         s = 2j * jnp.pi * frequency * 0.008
         return 1.0 / (1.0 + 1.4 * s + s**2)
 
 
-class WavyCam(AbstractRoadFault):
+class WavyCam(Unlisted, AbstractRoadFault):
     """A wave of fourth order on the cam, where the catalogue has a second and a third."""
 
     name: ClassVar[str] = "wavy_cam"
     port: ClassVar[Port] = Port.ROAD
-    parameters: ClassVar[tuple[Parameter, ...]] = ()
-    null: ClassVar[Mapping[str, float]] = {}
-    states: ClassVar[tuple[InternalState, ...]] = ()
-    symptom: ClassVar[str] = ""
-    reference: ClassVar[str] = ""
 
     def shift(self, p: Values, road: Road, cam: Cam) -> Road:
         return Road(1e-4 * jnp.cos(4.0 * cam.angle), -4e-4 * jnp.sin(4.0 * cam.angle) * cam.speed)

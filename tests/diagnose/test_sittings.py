@@ -21,7 +21,7 @@ def _places(**evidence: float) -> tuple[Attribution, ...]:
 
 def test_a_place_weighs_by_all_that_may_be_there() -> None:
     alone = sittings_of(_places(rail=-10.0, strut=-12.0))
-    beside = sittings_of(_places(rail=-9.0, strut=-5.0), ("joint_friction",), -4.0)
+    beside = sittings_of(_places(rail=-9.0, strut=-5.0), -4.0)
     weights = by_place((*alone, *beside))
     assert list(weights) == ["strut", "rail"]
     assert weights["strut"] == pytest.approx(np.log(np.exp(-12.0) + np.exp(-9.0)))
@@ -31,7 +31,7 @@ def test_a_place_weighs_by_all_that_may_be_there() -> None:
 def test_a_stand_in_shows_where_what_it_leaves_sits() -> None:
     alone = sittings_of(_places(suspension=-940.0, strut=-988.0))
     assert next(iter(by_place(alone))) == "suspension"
-    beside = sittings_of(_places(suspension=-834.0, strut=-644.0), ("joint_friction",), -4.4)
+    beside = sittings_of(_places(suspension=-834.0, strut=-644.0), -4.4)
     assert next(iter(by_place((*alone, *beside)))) == "strut"
 
 
@@ -43,7 +43,7 @@ def test_a_place_and_all_others_are_what_a_law_anywhere_is() -> None:
 
 
 def test_a_place_that_nothing_sits_at_has_no_weight() -> None:
-    here, elsewhere = at_and_elsewhere((Sitting((), "rail", 3.0),), "strut")
+    here, elsewhere = at_and_elsewhere((Sitting("rail", 3.0),), "strut")
     assert here == -np.inf
     assert elsewhere == pytest.approx(3.0)
 

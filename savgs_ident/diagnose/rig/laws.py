@@ -84,16 +84,19 @@ def of_what_gives(beyond: Signal, rate: Signal) -> Family:
 
 def of_the_cam(nodes: Nodes, solution: PeriodicSolution) -> Family:
     """What a cam of another shape or lift would do, and one that turns a moment earlier or later than is told."""
-    turned = np.angle(np.asarray(solution.excitation.road))[:, 1][nodes.dwell]
-    angle, speed = nodes.phase + turned, nodes.omega / np.max(nodes.omega)
+    angle, speed = _cam_angle(nodes, solution), nodes.omega / np.max(nodes.omega)
     shapes = [wave(order * angle) for order in (1, 2, 3) for wave in (np.cos, np.sin)]
     return Family([*shapes, speed * np.cos(angle), speed * np.sin(angle)], (0, 1))
 
 
 def of_a_wavy_cam(nodes: Nodes, solution: PeriodicSolution) -> Family:
     """Waves [1] on a cam that are shorter than those of a wrong shape."""
-    turned = np.angle(np.asarray(solution.excitation.road))[:, 1][nodes.dwell]
-    return Family([wave(order * (nodes.phase + turned)) for order in WAVES for wave in (np.cos, np.sin)])
+    angle = _cam_angle(nodes, solution)
+    return Family([wave(order * angle) for order in WAVES for wave in (np.cos, np.sin)])
+
+
+def _cam_angle(nodes: Nodes, solution: PeriodicSolution) -> Signal:
+    return np.asarray(nodes.phase + np.angle(np.asarray(solution.excitation.road))[:, 1][nodes.dwell])
 
 
 def of_the_frame(load: Signal, nodes: Nodes) -> Family:
