@@ -1,7 +1,7 @@
 # Needs python3 (3.11 or newer, with venv) and make; everything else goes into .venv.
 #   make demo        the main job on the shipped recordings
-#   make test        lint, types, import contracts, tests
-#   make test-slow   the tests that take minutes
+#   make test        lint, types, import contracts, tests: at most five minutes on two cores
+#   make test-all    the same with every test: processes, browsers, notebooks, documents, FMUs, long simulations
 #   make bench       the benchmark table
 #   make docs        the guide and the reference, in build/docs
 #   make fuzz        every loader on damaged files, counted in docs/fuzzing.md
@@ -9,12 +9,12 @@
 # Another interpreter: make demo PYTHON=python3.12. Options for pytest: make test PYTEST_ARGS="-k rig".
 
 PYTHON ?= python3
-PYTEST_ARGS ?= -n auto --dist loadscope
+PYTEST_ARGS ?= -n auto
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-.PHONY: demo test lint test-slow bench docs fuzz clean
+.PHONY: demo test lint test-all bench docs fuzz clean
 
 demo: $(VENV)/.installed
 	$(BIN)/savgs-ident demo
@@ -28,8 +28,8 @@ lint: $(VENV)/.installed-test
 	$(BIN)/mypy savgs_ident
 	$(BIN)/lint-imports
 
-test-slow: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
+test-all: lint
+	HYPOTHESIS_PROFILE=thorough $(BIN)/python -m pytest -m "" $(PYTEST_ARGS)
 
 bench: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks

@@ -25,14 +25,15 @@ from numpy.typing import NDArray
 
 from benchmarks.outcome import Outcome, Tell
 from benchmarks.task import ORDERS, TOLERANCE_PERCENT, Harmonics, Task, errors_percent
-from savgs_ident.effects.rail_coulomb import RailCoulomb
-from savgs_ident.model.bristle import Presliding, bristle
-from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.effect import PortSignals
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.kinematics import suspension_travel
-from savgs_ident.model.strut import Link
-from savgs_ident.model.tyre import Road
+from savgs_ident.effects.base import PortSignals
+from savgs_ident.effects.bristle import Presliding, bristle
+from savgs_ident.plants.base import Motion
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.inputs import Inputs
+from savgs_ident.plants.quarter_car.kinematics import suspension_travel
+from savgs_ident.plants.quarter_car.strut import Link
+from savgs_ident.plants.quarter_car.tyre import Road
 
 LADDER = (40, 60, 80)
 """Orders that are tried, in turn."""
@@ -90,16 +91,16 @@ def measure(task: Task, reference: Harmonics, tell: Tell) -> Outcome:
 
 def compile_force(task: Task) -> Callable[..., Array]:
     """The two equations of motion at n samples of a period, (n, 2), from coordinates and derivatives (n,)."""
-    model, values, curves, rail = task.model, task.values, task.curves, RailCoulomb()
+    model, values, curves, rail = task.model, task.values, task.curves, CATALOGUE["rail_coulomb"]
     stick = Presliding(values["k_pre"], values["c_pre"])
 
     def anchors(height: Array, speed: Array, load: Array, step: Array) -> Float[Array, " n"]:
         def march(anchor: Array, now: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-            sliding = PortSignals(*now)
-            grip = rail.grip(values, sliding)
+            sliding = PortSignals(*now, jnp.zeros_like(now[0]))
+            limit = rail.friction_limit(values, sliding)
 
             def balance(moved: Array) -> Array:
-                return (moved - anchor) / step - bristle(stick, sliding, grip, moved).rate
+                return (moved - anchor) / step - bristle(stick, sliding, limit, moved).rate
 
             # The rate is piecewise linear in the anchor: two Newton steps are exact.
             moved = anchor

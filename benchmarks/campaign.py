@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from benchmarks.task import ORDERS
-from savgs_ident.core.rig import default_campaign_path
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import default_campaign_path
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import Campaign, Recording
-from savgs_ident.responses.estimate import estimate_response
+from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.measured import MODELLED_CHANNELS
+from savgs_ident.simulate.excitation import recorded_names
 
 
 def read_dwells(dwells_hz: Sequence[float]) -> Campaign:
@@ -24,4 +25,4 @@ def read_dwells(dwells_hz: Sequence[float]) -> Campaign:
 
 def response_of(campaign: Campaign) -> HarmonicResponse:
     """Its response, as the commands estimate it."""
-    return estimate_response(campaign.only(MODELLED_CHANNELS), ORDERS)
+    return estimate_response(campaign.only(recorded_names(QuarterCar)), ORDERS)

@@ -12,7 +12,7 @@ import pandas as pd
 
 from benchmarks.outcome import Outcome, Tell
 from benchmarks.processes import Ran, run_process
-from savgs_ident.core.rig import default_campaign_path
+from savgs_ident.plants.quarter_car.rig import default_campaign_path
 
 COUNT = 32
 """Campaigns."""

@@ -25,11 +25,11 @@ from savgs_ident.control.closed_loop.run import (
 )
 from savgs_ident.control.closed_loop.study import loop_around
 from savgs_ident.control.design import controller_for
-from savgs_ident.control.weights import DEFAULT_WEIGHTS
-from savgs_ident.core.rig import default_rig_path, read_rig
-from savgs_ident.effects.registry import MODELS, build_model, model_parameters
-from savgs_ident.model.values import as_values
-from savgs_ident.simulate.compilation import use_persistent_cache
+from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS
+from savgs_ident.core.values import as_values
+from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
+from savgs_ident.simulate.program_cache import use_persistent_cache
 
 SECONDS = 4.0
 """Length of the run that scipy does, too [s]."""

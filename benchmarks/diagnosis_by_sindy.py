@@ -17,13 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.outcome import Outcome, Tell
-from savgs_ident.cli.blind_workers import side_by_side
-from savgs_ident.core.rig import Rig, default_rig_path, read_rig
-from savgs_ident.diagnose.judgement import recalibrate
-from savgs_ident.diagnose.settings import DiagnosisSettings
+from savgs_ident.diagnosis.model_selection import recalibrate
+from savgs_ident.diagnosis.quarter_car import quarter_car_problem
+from savgs_ident.diagnosis.result import DiagnosisSettings
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig
 from savgs_ident.recordings.read import read_campaign
-from savgs_ident.responses.estimate import estimate_response
-from savgs_ident.simulate.measured import MODELLED_CHANNELS
+from savgs_ident.responses.dwells import estimate_response
+from savgs_ident.simulate.excitation import recorded_names
+from savgs_ident.validation.trials import side_by_side
 
 THRESHOLDS = tuple(np.geomspace(2.0, 200.0, 41).tolist())
 """Thresholds tried for the peer, in standard deviations of a coefficient."""
@@ -149,7 +151,7 @@ def read_trial(folder: Path, rig: Rig) -> Trial:
     answer = json.loads((folder / "answer.json").read_text())["answer"]
     verdict = json.loads((folder / "diagnosis.json").read_text())["verdict"]
     campaign = read_campaign(folder / "campaign")
-    measured = estimate_response(campaign.only(MODELLED_CHANNELS), DiagnosisSettings().orders)
+    measured = estimate_response(campaign.only(recorded_names(QuarterCar)), DiagnosisSettings().orders)
     names, library, residual = regression_of(measured, rig)
     return Trial(
         kind=answer["kind"],
@@ -163,10 +165,11 @@ def read_trial(folder: Path, rig: Rig) -> Trial:
 
 def regression_of(measured: Any, rig: Rig) -> tuple[tuple[str, ...], Real, Real]:
     """Names, library and residual of a measured response, calibration projected out."""
-    case = recalibrate(measured, rig, DiagnosisSettings(), {}, lambda line: None)
-    base, terms = case.base, case.plant.candidates
-    weight = 1.0 / np.sqrt(case.data.variance)
-    columns = case.plant.columns((), base.values, base.prediction.near, terms)
+    plant, data = quarter_car_problem(measured, rig, DiagnosisSettings())
+    problem = recalibrate(plant, data, {}, lambda line: None)
+    base, terms = problem.base, problem.plant.candidates
+    weight = 1.0 / np.sqrt(problem.data.variance)
+    columns = problem.plant.columns((), base.values, base.prediction.warm_start, terms)
     named = _columns(dict(zip((term.name for term in terms), columns, strict=True)))
     # The prior of what calibration may do counts as further rows.
     prior = np.eye(base.x.size)
@@ -177,7 +180,7 @@ def regression_of(measured: Any, rig: Rig) -> tuple[tuple[str, ...], Real, Real]
         whole = np.concatenate([rows, tail])
         return np.asarray(whole - basis @ (basis.T @ whole))
 
-    residual = apart(case.search.residual(base.prediction) * weight, -base.x)
+    residual = apart(problem.search.residual(base.prediction) * weight, -base.x)
     nothing = np.zeros((base.x.size, len(named)))
     library = apart(np.stack([each for _, each in named], axis=1) * weight[:, None], nothing)
     size = np.linalg.norm(library, axis=0)

@@ -7,8 +7,8 @@ from typing import get_args
 
 from benchmarks.outcome import Outcome, Tell
 from benchmarks.processes import Ran, run_process
-from savgs_ident.core.rig import default_campaign_path
-from savgs_ident.posterior.result import Sampler
+from savgs_ident.inference.result import Sampler
+from savgs_ident.plants.quarter_car.rig import default_campaign_path
 
 CLI = ("-m", "savgs_ident.cli")
 

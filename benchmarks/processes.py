@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from benchmarks.outcome import Outcome, Tell
 from benchmarks.write_long_mcap import write_long_mcap
-from savgs_ident.core.rig import default_campaign_path
+from savgs_ident.plants.quarter_car.rig import default_campaign_path
 
 RATE_HZ = 1000.0
 

@@ -21,14 +21,14 @@ from benchmarks.by_scipy import SETTLING_S, integrate_dwell
 from benchmarks.motion import driven_rates, settling_periods
 from benchmarks.outcome import Tell
 from benchmarks.posterior_problem import PosteriorProblem
-from savgs_ident.fit.problem import Problem
-from savgs_ident.model.equilibrium import static_equilibrium
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.section import SectionCurves, section_curves
-from savgs_ident.model.strut import Link
-from savgs_ident.model.tyre import Road
-from savgs_ident.model.values import Values
-from savgs_ident.simulate.excitation import Excitation
+from savgs_ident.core.values import Values
+from savgs_ident.inference.problem import Problem
+from savgs_ident.plants.base import Excitation
+from savgs_ident.plants.quarter_car.dynamics import SectionCurves, section_curves
+from savgs_ident.plants.quarter_car.equilibrium import static_equilibrium
+from savgs_ident.plants.quarter_car.inputs import Inputs
+from savgs_ident.plants.quarter_car.strut import Link
+from savgs_ident.plants.quarter_car.tyre import Road
 
 SEED = 2
 
@@ -79,7 +79,11 @@ class ScipyDwells:
     def _dwell(self, values: Values, curves: SectionCurves, dwell: int) -> Dwell:
         omega = 2.0 * jnp.pi * self.excitation.frequency[dwell]
         return Dwell(
-            values, curves, omega, _parts(self.excitation.road[dwell]), _parts(self.excitation.link[dwell])
+            values,
+            curves,
+            omega,
+            _parts(self.excitation.harmonics["road_height"][dwell]),
+            _parts(self.excitation.harmonics["link_angle"][dwell]),
         )
 
 

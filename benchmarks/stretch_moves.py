@@ -18,8 +18,8 @@ from jaxtyping import Array, Float
 
 from benchmarks.outcome import Tell
 from benchmarks.posterior_problem import PosteriorProblem
-from savgs_ident.core.free_vector import FreeVector
-from savgs_ident.posterior.surrogate import Surrogate
+from savgs_ident.core.transforms import FreeVector
+from savgs_ident.inference.surrogate import Surrogate
 
 LONG_ENOUGH = 50.0
 """Autocorrelation times that a run must last, as emcee asks for."""

@@ -130,10 +130,10 @@ def _attributes(lines: list[str]) -> dict[str, list[str]]:
     return entries
 
 
-def _section(lines: list[str]) -> list[str]:
-    if "Attributes:" not in lines:
+def _section(lines: list[str], heading: str = "Attributes:") -> list[str]:
+    if heading not in lines:
         return []
-    rest = lines[lines.index("Attributes:") + 1 :]
+    rest = lines[lines.index(heading) + 1 :]
     end = next((at for at, line in enumerate(rest) if line and not line.startswith(" ")), len(rest))
     return rest[:end]
 
@@ -144,6 +144,20 @@ def without_attributes(lines: list[str]) -> list[str]:
         return lines
     at = lines.index("Attributes:")
     return [*lines[:at], *lines[at + 1 + len(_section(lines)) :], ""]
+
+
+def with_arguments(lines: list[str]) -> list[str]:
+    """A docstring whose section ``Args`` is a list of fields, one an argument."""
+    if "Args:" not in lines:
+        return lines
+    at = lines.index("Args:")
+    section = _section(lines, "Args:")
+    out = [*lines[:at]]
+    for line in section:
+        begins = line.startswith("    ") and not line.startswith("     ") and ": " in line
+        name, _, told = line.strip().partition(": ")
+        out.append(f":param {name}: {told}" if begins else f"    {line.strip()}" if line.strip() else "")
+    return [*out, "", *lines[at + 1 + len(section) :]]
 
 
 def fields_of(name: str, lines: list[str]) -> list[str]:

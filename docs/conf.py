@@ -1,9 +1,14 @@
 """How the documentation is built: ``make docs``."""
 
+import importlib
 import sys
 from pathlib import Path
 
 import savgs_ident
+
+# The public calls of these names stand before the rooms, which have a page each.
+for _room in ("fit", "simulate", "export"):
+    vars(savgs_ident)[_room] = importlib.import_module(f"savgs_ident.{_room}")
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -5,7 +5,7 @@ Names of other packages are plain text; a name of this one that leads nowhere, i
 
 from typing import Any
 
-from as_written import as_text, fields_of, is_defined, signature_of, without_attributes
+from as_written import as_text, fields_of, is_defined, signature_of, with_arguments, without_attributes
 from docutils import nodes
 from sphinx import addnodes
 from sphinx.application import Sphinx
@@ -24,12 +24,13 @@ def _prepare(_app: Sphinx, what: str, name: str, _object: Any, _options: Any, li
     if what == "class":
         lines[:] = [*as_text(without_attributes(lines)), *fields_of(name, lines)]
     else:
-        lines[:] = as_text(lines)
+        lines[:] = as_text(with_arguments(lines))
 
 
 def _skip(_app: Sphinx, what: str, _name: str, member: Any, _skip: bool, _options: Any) -> bool | None:
-    """Leave out what the class lists itself."""
-    return True if what == "class" and not (callable(member) and not isinstance(member, property)) else None
+    """Leave out what the class lists itself: all that is not a method."""
+    is_method = callable(member) and not isinstance(member, property | type)
+    return True if what == "class" and not is_method else None
 
 
 def _ends(env: BuildEnvironment) -> dict[str, set[str]]:

@@ -15,30 +15,25 @@ from emcee.backends import HDFBackend
 
 from fuzz.loader import Original
 from fuzz.recordings import packed_table
-from savgs_ident.cli.alarming import draws_in
-from savgs_ident.cli.blind_trial import Drawn, Plan, run_trial
-from savgs_ident.cli.blinding import Job as BlindJob
-from savgs_ident.cli.blinding import plan_of
-from savgs_ident.cli.calibrating import trials_in
-from savgs_ident.cli.campaign_store import FILES, Kept, MadeFrom, keep_result, kept_result
-from savgs_ident.cli.kept_trials import known_trials
-from savgs_ident.core.rig import Rig, default_rig_path, rig_content
-from savgs_ident.diagnose.blind.answer import Answer
-from savgs_ident.diagnose.blind.bench import Bench
-from savgs_ident.diagnose.blind.log import FILE
-from savgs_ident.diagnose.blind.score import Interval, Score, score_from
-from savgs_ident.diagnose.blind.seal import Envelope, sealed
-from savgs_ident.diagnose.false_alarms import NullDraw
-from savgs_ident.posterior import nuts_sampler
-from savgs_ident.posterior.calibration import Trial
-from savgs_ident.posterior.keep import new_keep, open_keep
+from savgs_ident.campaigns.store import FILES, Kept, MadeFrom, keep_result, kept_result
+from savgs_ident.campaigns.study import row_of, study_campaigns
+from savgs_ident.core.output import to_json
+from savgs_ident.inference.samplers import nuts as nuts_sampler
+from savgs_ident.inference.samplers.chains import new_checkpoint, open_checkpoint
+from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, rig_content
 from savgs_ident.recordings.read import read_campaign
-from savgs_ident.report.blind_record import blind_record
-from savgs_ident.report.calibration import calibration_record
-from savgs_ident.report.campaigns_record import campaigns_columns, campaigns_record
-from savgs_ident.report.campaigns_study import row_of, study_campaigns
-from savgs_ident.report.false_alarms import alarms_record
-from savgs_ident.report.files import to_json
+from savgs_ident.report.campaigns.record import campaigns_columns, campaigns_record
+from savgs_ident.report.validation.blind import blind_record
+from savgs_ident.report.validation.calibration import alarms_record, calibration_record
+from savgs_ident.validation.blind import Job as BlindJob
+from savgs_ident.validation.blind import plan_of
+from savgs_ident.validation.blind_record import FILE, Answer, Envelope, sealed
+from savgs_ident.validation.blind_score import Interval, Score, score_from
+from savgs_ident.validation.blind_trial import Drawn, Plan, run_trial
+from savgs_ident.validation.calibration import Trial, trial_reader
+from savgs_ident.validation.false_alarms import NullDraw, read_draw
+from savgs_ident.validation.trials import known_trials
+from savgs_ident.validation.virtual_rig import Bench
 
 CASE = "case"
 MARKS: dict[str, object] = {"seed": 4, "campaign": "campaign.csv.gz", "every": 1}
@@ -98,11 +93,11 @@ def blind_answer() -> Original:
 def nuts_chain() -> Original:
     """A chain of NUTS."""
     random = np.random.default_rng(3)
-    state = nuts_sampler._State(
-        random.standard_normal((6, 4, 5)), -random.random((6, 4)), random.random((6, 4)),
-        random.standard_normal((4, 5)), np.array(0.3), np.array(0),
+    state = nuts_sampler.State(
+        random.standard_normal((6, 4, 5)), -random.random((6, 4)), random.random((6, 4)) < 0.8,
+        random.random((6, 4)), random.standard_normal((4, 5)), -random.random((2, 4)), np.array(0.3), np.array(0),
     )  # fmt: skip
-    return _chain(lambda path: nuts_sampler._save(path, state))
+    return _chain(lambda path: nuts_sampler.save_state(path, state))
 
 
 def emcee_chain() -> Original:
@@ -141,13 +136,13 @@ def read_blind(path: Path) -> object:
 
 def read_draws(path: Path) -> object:
     """The draws of an earlier run, and the record of them."""
-    found = draws_in(path, MARKS)
+    found = known_trials(path, MARKS, read_draw)
     return found, to_json(alarms_record(found, 3.0, ()))
 
 
 def read_trials(path: Path) -> object:
     """The trials of an earlier run, and the record of them."""
-    found = trials_in(path, MARKS)
+    found = known_trials(path, MARKS, trial_reader())
     names = sorted(next((each.rank for each in found if each.rank), {}))
     return found, to_json(calibration_record(found, names, ()))
 
@@ -167,14 +162,14 @@ def read_blind_answer(path: Path) -> object:
 
 def read_nuts_chain(path: Path) -> object:
     """The state that NUTS goes on from."""
-    keep = open_keep(path, CASE)
+    keep = open_checkpoint(path, CASE)
     with keep.scratch() as scratch:
-        return nuts_sampler._load(scratch), keep.counts
+        return nuts_sampler.load_state(scratch), keep.counts
 
 
 def read_emcee_chain(path: Path) -> object:
     """The state that emcee goes on from, and its chain."""
-    keep = open_keep(path, CASE)
+    keep = open_checkpoint(path, CASE)
     with keep.scratch() as scratch:
         backend = HDFBackend(str(scratch))
         last = backend.get_last_sample()
@@ -259,5 +254,5 @@ def _chain(write: Callable[[Path], None]) -> Original:
     with TemporaryDirectory() as folder:
         scratch, path = Path(folder) / "scratch.h5", Path(folder) / "chain.h5"
         write(scratch)
-        new_keep(path, CASE).publish(scratch, (48, 1))
+        new_checkpoint(path, CASE).publish(scratch, (48, 1))
         return Original((path.read_bytes(),))

@@ -14,22 +14,22 @@ import jax.numpy as jnp
 import numpy as np
 
 from fuzz.loader import Original
-from savgs_ident.cli.exporting import Job, gathered_for
-from savgs_ident.cli.models import ModelName, effects_in, effects_of, identified_in, rig_before
-from savgs_ident.control.alpha_map import AlphaMap
-from savgs_ident.control.controller_file import DigitalController, controller_record, read_controller
+from savgs_ident.control.design import DigitalController, controller_record, read_controller
+from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS, read_weights
+from savgs_ident.control.linear_equivalent import AlphaMap
 from savgs_ident.control.rigs import rigs_from_covariance, rigs_from_posterior
-from savgs_ident.control.weights import DEFAULT_WEIGHTS, read_weights
-from savgs_ident.core.rig import Rig, default_rig_path, read_rig, rig_text
-from savgs_ident.effects.registry import model_parameters
+from savgs_ident.export.document import json_text
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.json_export import model_record, read_model_json, write_json
-from savgs_ident.export.json_text import json_text
 from savgs_ident.export.linear_models import LINEAR
+from savgs_ident.export.public import gathered, model_to_export
 from savgs_ident.export.python_control_export import KIND, SCHEMA, load_python_control, resting_point
+from savgs_ident.plants.quarter_car.catalogue import MODELS, model_parameters
+from savgs_ident.plants.quarter_car.model import load_model
+from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig, rig_text
 
 ESTIMATED = ("mu_r", "mu_t", "ydot_Hth", "c_sd", "k_t")
-EFFECTS = effects_of(ModelName.simtr)
+EFFECTS = MODELS["simtr"]
 MOUNT = ("mount_compliance", "mount_damping")
 DRAWS = 6
 
@@ -107,13 +107,11 @@ def read_drawing(path: Path) -> object:
 
 def read_identified(path: Path) -> object:
     """The rig with all that commands take from its provenance: effects, parameters, priors, rigs to try."""
-    rig = read_rig(path)
-    effects = effects_in(rig, path)
-    free, values = identified_in(rig, effects, path)
-    before = rig_before(rig, effects, path)
-    rigs = rigs_from_covariance(model_parameters(rig, effects), rig.provenance, DRAWS, path)
+    model = load_model(path)
+    rig, before, (free, values) = model.rig, model.before.rig, model.identified
+    rigs = rigs_from_covariance(model.table, rig.provenance, DRAWS, path)
     # The provenance itself travels along as it is.
-    return replace(rig, provenance={}), replace(before, provenance={}), effects, free, values, rigs
+    return replace(rig, provenance={}), replace(before, provenance={}), model.effects, free, values, rigs
 
 
 def read_weights_file(path: Path) -> object:
@@ -146,9 +144,8 @@ def read_python_control(path: Path) -> object:
 
 def read_diagnosis_file(path: Path) -> object:
     """The diagnosis, and the model with what it names, as an export has it."""
-    job = Job(default_rig_path(), (), None, DRAWS, path, None, ())
-    gathered = gathered_for(job, _shipped())
-    return gathered.model.rig.parameters, gathered.model.effects, gathered.said, gathered.doubts
+    found = gathered(model_to_export(default_rig_path(), None, path), None, DRAWS, path)
+    return found.model.rig.parameters, found.model.effects, found.said, found.doubts
 
 
 def identified_rig() -> Rig:

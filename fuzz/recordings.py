@@ -13,9 +13,9 @@ from scipy.io import savemat
 from fuzz.cdr import IMU, JOINTS, imu_message, joint_message, number_message, text_message
 from fuzz.loader import Original
 from fuzz.mcap_files import Message, Topic, mcap_bytes
-from savgs_ident.diagnose.positioner.recording import read_positioner
-from savgs_ident.model.road import read_road
-from savgs_ident.recordings.channel_map import read_channel_map
+from savgs_ident.diagnosis.positioner.recording import read_positioner
+from savgs_ident.plants.quarter_car.road import read_road
+from savgs_ident.recordings.channels import read_channel_map
 from savgs_ident.recordings.read import read_campaign
 
 START_NS = 1_763_715_600_000_000_000

@@ -7,48 +7,48 @@ from fuzz import kept, models, recordings
 from fuzz.loader import Form, Loader
 
 _CSV = (
-    "recordings.csv_reader.read_csv", "recordings.csv_table.CsvTable._parse", "recordings.csv_header._cells",
+    "recordings.csv.read_csv", "recordings.csv_table.CsvTable._parse", "recordings.csv_table._cells",
 )  # fmt: skip
 _JSON_MCAP = (
-    "recordings.json_decoder.JsonDecoder._parse", "recordings.json_decoder._schema_units",
-    "recordings.events._from_json", "recordings.mcap_records.McapRecords._decompress",
+    "recordings.json_messages.JsonDecoder._parse", "recordings.json_messages._schema_units",
+    "recordings.mcap_timing._from_json", "recordings.mcap_records.McapRecords._decompress",
 )  # fmt: skip
 _CDR_MCAP = (
-    "recordings.events._cdr_string", "recordings.cdr_layout._Walk._length",
-    "recordings.mcap_records.McapRecords._undo",
+    "recordings.mcap_timing._cdr_string", "recordings.cdr._LayoutWalk._length",
+    "recordings.mcap_records.McapRecords._unpack_chunk",
 )  # fmt: skip
 _MATLAB = tuple(
-    f"diagnose.positioner.mat_file.{name}" for name in ("_unpacked", "_arrays", "_element", "_header")
+    f"diagnosis.positioner.recording.{name}" for name in ("_unpacked", "_arrays", "_element", "_header")
 )
-_RESULT = ("cli.campaign_store.kept_result", "cli.campaign_store.Kept.record")
-_TRIALS = ("cli.kept_trials.marks_in", "cli.kept_trials.known_trials")
-_BLIND = ("cli.blind_trial._read",)
-_EXPORT = ("export.place.read_document",)
+_RESULT = ("campaigns.store.kept_result", "campaigns.store.Kept.record")
+_TRIALS = ("validation.trials.marks_in", "validation.trials.known_trials")
+_BLIND = ("validation.blind_trial._read",)
+_EXPORT = ("export.document.read_document",)
 
 _LOADERS = (
     Loader("csv", "campaign as a table", "campaign.csv", Form.table, recordings.table, recordings.read_table, _CSV),
     Loader("csv-gz", "campaign as a table, gzipped", "campaign.csv.gz", Form.packed_table, recordings.packed_table,
-           recordings.read_table, ("recordings.text_blocks.TextBlocks._inflated",)),
+           recordings.read_table, ("recordings.csv_table.TextBlocks._inflated",)),
     Loader("mcap-json", "campaign in MCAP, JSON", "campaign.mcap", Form.mcap, recordings.json_mcap,
            recordings.read_table, _JSON_MCAP),
     Loader("mcap-cdr", "campaign in MCAP, ROS 2 CDR", "campaign.mcap", Form.mcap, recordings.cdr_mcap,
            recordings.read_table, _CDR_MCAP),
     Loader("channels", "channels.toml, and the campaign that it maps", "channels.toml", Form.toml,
-           recordings.channel_map, recordings.read_map, ("recordings.channel_map.read_channel_map",)),
+           recordings.channel_map, recordings.read_map, ("recordings.channels.read_channel_map",)),
     Loader("road", "road as a table", "road.csv", Form.table, recordings.road, recordings.read_road_file,
-           ("model.road.read_road",)),
+           ("plants.quarter_car.road.read_road",)),
     Loader("positioner", "recording of the positioner", "run.mat", Form.matlab, recordings.positioner,
            recordings.read_positioner_file, _MATLAB),
     Loader("rig", "drawing of a rig", "rig.toml", Form.toml, models.drawing, models.read_drawing,
-           ("core.rig._load",)),
+           ("plants.quarter_car.rig._load",)),
     Loader("model", "identified model.toml, with its provenance", "model.toml", Form.toml, models.identified,
-           models.read_identified, ("core.rig._load",)),
+           models.read_identified, ("plants.quarter_car.rig._load",)),
     Loader("weights", "weights.toml of a design", "weights.toml", Form.toml, models.weights,
-           models.read_weights_file, ("control.weights.read_weights",)),
+           models.read_weights_file, ("control.generalised_plant.read_weights",)),
     Loader("controller", "controller.json", "controller.json", Form.json, models.controller,
-           models.read_controller_file, ("control.controller_file.read_controller",)),
+           models.read_controller_file, ("control.design.read_controller",)),
     Loader("posterior", "draws in posterior.nc", "posterior.nc", Form.hdf5, models.posterior,
-           models.read_posterior, ("posterior.draws.read_draws",)),
+           models.read_posterior, ("inference.draws.read_draws",)),
     Loader("model-json", "exported model.json", "model.json", Form.json, models.exported, models.read_exported,
            _EXPORT),
     Loader("python-control", "exported model-control.json", "model-control.json", Form.json,
@@ -70,9 +70,9 @@ _LOADERS = (
     Loader("blind-answer", "answer.json of a blind trial", "trial_0001/answer.json", Form.json,
            kept.blind_answer, kept.read_blind_answer, _BLIND),
     Loader("chain-nuts", "kept chain of NUTS", "chain.h5", Form.hdf5, kept.nuts_chain, kept.read_nuts_chain,
-           ("posterior.keep.open_keep", "posterior.nuts_sampler._load")),
+           ("inference.samplers.chains.open_checkpoint", "inference.samplers.nuts.load_state")),
     Loader("chain-emcee", "kept chain of emcee", "chain.h5", Form.hdf5, kept.emcee_chain, kept.read_emcee_chain,
-           ("posterior.keep.open_keep",)),
+           ("inference.samplers.chains.open_checkpoint",)),
 )  # fmt: skip
 
 LOADERS: Mapping[str, Loader] = MappingProxyType({each.name: each for each in _LOADERS})

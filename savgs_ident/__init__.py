@@ -1,7 +1,228 @@
 """System identification and sim-to-real diagnosis for a quarter-car suspension rig.
 
-The stages are sub-packages, one a folder, and imports run one way:
-``cli > report > fit > simulate > effects > model > responses > recordings > core``.
+    import savgs_ident as si
+
+    campaign = si.load_campaign("campaign.csv.gz")
+    model = si.QuarterCar(si.load_rig()) + "rail_coulomb" + "tyre_friction"
+    fit = si.fit(model, campaign)
+    print(fit["mu_r"].value, fit.trusted)
+
+What is listed here is the public interface, for the rig and for plants of your own (:class:`PlantModel`); every
+command of ``savgs-ident`` is one call of it. Results print, show themselves in a notebook, and write JSON, HTML and
+all files of the command (:class:`Result`). Names are loaded when they are used first: ``import savgs_ident`` itself
+loads nothing.
 """
 
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING
+
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from savgs_ident.campaigns.run import run_campaigns
+    from savgs_ident.campaigns.study import CampaignStudy
+    from savgs_ident.control.closed_loop.study import LoopStudy
+    from savgs_ident.control.design import Design, DigitalController
+    from savgs_ident.control.linear_study import LinearStudy
+    from savgs_ident.control.public import close_loop, design, linearise
+    from savgs_ident.core.errors import InputError
+    from savgs_ident.core.parameter import Parameter, ParameterTable
+    from savgs_ident.core.presentation import Result
+    from savgs_ident.diagnosis.public import diagnose
+    from savgs_ident.diagnosis.result import Diagnosis
+    from savgs_ident.effects.base import Number, Port, PortKind, PortSignals
+    from savgs_ident.effects.effect import Effect
+    from savgs_ident.effects.generic import generic_effects
+    from savgs_ident.export.public import Exported, export
+    from savgs_ident.fit.comparison import Comparison, compare
+    from savgs_ident.fit.public import demo, fit
+    from savgs_ident.fit.result import Fit
+    from savgs_ident.fit.sampling import sample
+    from savgs_ident.inference.result import Posterior
+    from savgs_ident.plants.axis import Axis
+    from savgs_ident.plants.base import AbstractPlant, Channel, Coordinate, Input
+    from savgs_ident.plants.model import PlantModel
+    from savgs_ident.plants.quarter_car.model import RigModel as QuarterCar
+    from savgs_ident.plants.quarter_car.model import load_model, load_rig
+    from savgs_ident.plants.quarter_car.rig import Rig, default_campaign_path
+    from savgs_ident.plants.two_mass import TwoMass
+    from savgs_ident.recordings.read import read_campaign as load_campaign
+    from savgs_ident.recordings.recording import Campaign
+    from savgs_ident.report.public import plot_bode
+    from savgs_ident.responses.harmonic_response import HarmonicResponse
+    from savgs_ident.responses.summary import CampaignSummary, inspect
+    from savgs_ident.simulate.frequency_response import SimulatedResponse, SimulatedSweep
+    from savgs_ident.simulate.public import DWELLS, simulate, simulate_dwells, simulate_sweep
+    from savgs_ident.validation.blind import BlindStudy, blind
+    from savgs_ident.validation.calibration import CalibrationStudy, calibrate
+    from savgs_ident.validation.false_alarms import AlarmStudy, false_alarms
+    from savgs_ident.validation.public import draw_truth, simulate_campaign, write_campaign
+
+_PLACES = {
+    # What there is to work on.
+    "load_rig": "plants.quarter_car.model",
+    "load_model": "plants.quarter_car.model",
+    "load_campaign": "recordings.read:read_campaign",
+    "default_campaign_path": "plants.quarter_car.rig",
+    "QuarterCar": "plants.quarter_car.model:RigModel",
+    # Plants of your own.
+    "AbstractPlant": "plants.base",
+    "Axis": "plants.axis",
+    "Channel": "plants.base",
+    "Coordinate": "plants.base",
+    "Effect": "effects.effect",
+    "Input": "plants.base",
+    "Number": "effects.base",
+    "Parameter": "core.parameter",
+    "ParameterTable": "core.parameter",
+    "PlantModel": "plants.model",
+    "Port": "effects.base",
+    "PortKind": "effects.base",
+    "PortSignals": "effects.base",
+    "TwoMass": "plants.two_mass",
+    "generic_effects": "effects.generic",
+    # What is done with it, a command each.
+    "demo": "fit.public",
+    "inspect": "responses.summary",
+    "fit": "fit.public",
+    "compare": "fit.comparison",
+    "simulate": "simulate.public",
+    "simulate_sweep": "simulate.public",
+    "sample": "fit.sampling",
+    "calibrate": "validation.calibration",
+    "diagnose": "diagnosis.public",
+    "false_alarms": "validation.false_alarms",
+    "blind": "validation.blind",
+    "linearise": "control.public",
+    "design": "control.public",
+    "close_loop": "control.public",
+    "export": "export.public",
+    "run_campaigns": "campaigns.run",
+    "plot_bode": "report.public",
+    # Campaigns of rigs whose truth is known.
+    "DWELLS": "simulate.public",
+    "draw_truth": "validation.public",
+    "simulate_campaign": "validation.public",
+    "write_campaign": "validation.public",
+    "simulate_dwells": "simulate.public",
+    # What comes out.
+    "Result": "core.presentation",
+    "AlarmStudy": "validation.false_alarms",
+    "BlindStudy": "validation.blind",
+    "CalibrationStudy": "validation.calibration",
+    "CampaignStudy": "campaigns.study",
+    "Campaign": "recordings.recording",
+    "CampaignSummary": "responses.summary",
+    "Comparison": "fit.comparison",
+    "Design": "control.design",
+    "Diagnosis": "diagnosis.result",
+    "DigitalController": "control.design",
+    "Exported": "export.public",
+    "Fit": "fit.result",
+    "HarmonicResponse": "responses.harmonic_response",
+    "InputError": "core.errors",
+    "LinearStudy": "control.linear_study",
+    "LoopStudy": "control.closed_loop.study",
+    "Posterior": "inference.result",
+    "Rig": "plants.quarter_car.rig",
+    "SimulatedResponse": "simulate.frequency_response",
+    "SimulatedSweep": "simulate.frequency_response",
+}
+"""Where each public name is defined, with the name that it has there if that is another one."""
+
+__all__ = [
+    "DWELLS",
+    "AbstractPlant",
+    "AlarmStudy",
+    "Axis",
+    "BlindStudy",
+    "CalibrationStudy",
+    "Campaign",
+    "CampaignStudy",
+    "CampaignSummary",
+    "Channel",
+    "Comparison",
+    "Coordinate",
+    "Design",
+    "Diagnosis",
+    "DigitalController",
+    "Effect",
+    "Exported",
+    "Fit",
+    "HarmonicResponse",
+    "Input",
+    "InputError",
+    "LinearStudy",
+    "LoopStudy",
+    "Number",
+    "Parameter",
+    "ParameterTable",
+    "PlantModel",
+    "Port",
+    "PortKind",
+    "PortSignals",
+    "Posterior",
+    "QuarterCar",
+    "Result",
+    "Rig",
+    "SimulatedResponse",
+    "SimulatedSweep",
+    "TwoMass",
+    "blind",
+    "calibrate",
+    "close_loop",
+    "compare",
+    "default_campaign_path",
+    "demo",
+    "design",
+    "diagnose",
+    "draw_truth",
+    "export",
+    "false_alarms",
+    "fit",
+    "generic_effects",
+    "inspect",
+    "linearise",
+    "load_campaign",
+    "load_model",
+    "load_rig",
+    "plot_bode",
+    "run_campaigns",
+    "sample",
+    "simulate",
+    "simulate_campaign",
+    "simulate_dwells",
+    "simulate_sweep",
+    "write_campaign",
+]
+
+
+def __getattr__(name: str) -> object:
+    """The public ``name``, loaded now and kept (PEP 562)."""
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, _, inner = _PLACES[name].partition(":")
+    found = getattr(import_module(f"{__name__}.{module}"), inner or name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]
+
+
+class _Package(ModuleType):
+    """This package, in which ``fit``, ``simulate`` and ``export`` are calls.
+
+    There are rooms of the same name. When one is loaded, the import system puts it in its parent as an attribute,
+    which would hide the call; the room itself is found by ``from savgs_ident.fit.result import ...`` as ever.
+    """
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name in _PLACES and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

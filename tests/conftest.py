@@ -6,7 +6,9 @@ ranks, no silent promotion of dtypes. Warnings are errors (pyproject.toml).
 
 import json
 import os
+import shutil
 import signal
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,8 +16,10 @@ from typing import Any
 import pytest
 from hypothesis import settings
 from threadpoolctl import threadpool_limits
+from xdist.remote import Producer
+from xdist.scheduler import LoadScopeScheduling
 
-from savgs_ident.core.rig import Rig, default_campaign_path, default_rig_path, read_rig
+from savgs_ident.plants.quarter_car.rig import Rig, default_campaign_path, default_rig_path, read_rig
 
 # Matrices are small here: threads of the linear algebra would only take the cores from the other tests.
 threadpool_limits(1, "blas")
@@ -24,10 +28,13 @@ os.environ["JAX_ENABLE_X64"] = "1"
 os.environ["JAX_NUMPY_RANK_PROMOTION"] = "raise"
 os.environ["JAX_NUMPY_DTYPE_PROMOTION"] = "strict"
 
-# The first example of a test compiles; a deadline would time the compiler. CI has a profile of its own.
-settings.register_profile("unhurried", deadline=None)
-if "CI" not in os.environ:
-    settings.load_profile("unhurried")
+# The first example of a test compiles; a deadline would time the compiler. No database: examples that failed are
+# printed, and nothing is written into the working folder.
+settings.register_profile(
+    "fast", max_examples=20, deadline=None, database=None, print_blob=True, derandomize=True
+)
+settings.register_profile("thorough", max_examples=100, deadline=None, database=None, print_blob=True)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fast"))
 
 # A shell that runs the tests in its background ignores Ctrl-C, and so would the programs that the tests interrupt.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
@@ -37,11 +44,36 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 SHARED = REPOSITORY.parent / "shared" / "data"
 
 
-def pytest_configure() -> None:
-    """Have the compiler as users have it, twice as fast: later than here, the first program may be compiled."""
-    from savgs_ident.simulate.compilation import spare_the_compiler
+SCRATCH = ("SAVGS_IDENT_CACHE", "XDG_CACHE_HOME", "MPLCONFIGDIR", "HYPOTHESIS_STORAGE_DIRECTORY")
+"""Variables that name folders of caches; all processes of a run share one that is removed in the end."""
+
+SHARING = ("control", "diagnosis", "export", "fit", "inference", "simulate")
+"""Folders whose tests share expensive fixtures and compiled programs: one process takes all of a folder."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Nothing is cached outside temporary folders; and the compiler is set up before the first program."""
+    if not hasattr(config, "workerinput"):
+        folder = Path(tempfile.mkdtemp(prefix="savgs-ident-tests-"))
+        config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
+        os.environ.update({name: str(folder / name.lower()) for name in SCRATCH})
+    from savgs_ident.simulate.program_cache import spare_the_compiler
 
     spare_the_compiler()
+
+
+class _Rooms(LoadScopeScheduling):
+    """One process takes all tests of a module, or of a folder where these share what is expensive."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        path = Path(nodeid.partition("::")[0])
+        return path.parts[1] if path.parts[0] == "tests" and path.parts[1] in SHARING else str(path)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadScopeScheduling:
+    """Where tests run in several processes, spread them by room."""
+    return _Rooms(config, log)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -58,7 +90,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 def room_for_programs() -> Iterator[None]:
     """Thousands of tests in a process compile more than it can hold."""
     yield
-    from savgs_ident.simulate.compilation import make_room_for_programs
+    from savgs_ident.simulate.program_cache import make_room_for_programs
 
     make_room_for_programs()
 

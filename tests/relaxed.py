@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import jax
 from jax.experimental.compilation_cache import compilation_cache
 
-from savgs_ident.simulate.compilation import use_persistent_cache
+from savgs_ident.simulate.program_cache import use_persistent_cache
 
 _RELAXED = {"jax_numpy_dtype_promotion": "standard", "jax_numpy_rank_promotion": "allow"}
 

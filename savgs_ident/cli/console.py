@@ -1,59 +1,45 @@
-"""What a command says, and where: results to standard output, everything else to standard error.
+"""What a command says, where, and how it ends.
 
-With ``--json`` standard output carries the JSON object and nothing else; with ``--quiet`` the tables and the
-progress are left out, errors and the reason for a mistrusted result are not.
+Results go to standard output, everything else to standard error. With ``--json`` standard output carries the JSON
+object and nothing else; with ``--quiet`` the tables and the progress are left out, errors and the reason for a
+mistrusted result are not.
+
+A command ends with 0 ok; 1 ran, but the result is not to be trusted; 2 bad input or usage; 130 stopped by Ctrl-C; and
+with a sentence instead of a traceback.
+
+Standard output and standard error are taken as they may be: closed, full, left by their reader, without Unicode. No
+run ends, and no exit code changes, because nobody listens: what cannot be said is left unsaid. Only a full disk under
+standard output is an error, for what is missing there is a part of the result.
 """
 
+import io
+import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, ParamSpec, TextIO
 
+import typer
 from rich.console import Console, RenderableType
 from rich.status import Status
-from rich.text import Text
 
-from savgs_ident.report.files import json_bytes
-from savgs_ident.report.terminal import plain
+from savgs_ident.core.errors import InputError
+from savgs_ident.report.text import plain
 
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
-@dataclass(frozen=True)
-class Voice:
-    """How a command speaks: ``json`` instead of tables, ``quiet`` without progress and tables."""
+    from savgs_ident.core.presentation import Result
 
-    json: bool
-    quiet: bool
+OK = 0
+NOT_TRUSTED = 1
+BAD_INPUT = 2
+INTERRUPTED = 130
 
-    def show(self, *parts: RenderableType) -> None:
-        """Print tables and sentences for people to standard output."""
-        if self.json or self.quiet:
-            return
-        console = Console(highlight=False, soft_wrap=not sys.stdout.isatty())
-        with console.capture() as captured:
-            for part in parts:
-                console.print(part)
-        sys.stdout.write(captured.get())
-        sys.stdout.flush()
-
-    def hand_over(self, record: object) -> None:
-        """Print the result as JSON to standard output, if that was asked for."""
-        if self.json:
-            # JSON is UTF-8 whatever the terminal speaks, byte for byte what is in the file.
-            sys.stdout.flush()
-            sys.stdout.buffer.write(json_bytes(record))
-            sys.stdout.buffer.flush()
-
-    @contextmanager
-    def working(self) -> Iterator["Progress"]:
-        """A progress line on standard error for as long as the work takes."""
-        console = Console(stderr=True, highlight=False)
-        if self.quiet:
-            yield Progress(None, None)
-        elif console.is_terminal:
-            with console.status(plain("starting")) as status:
-                yield Progress(console, status)
-        else:
-            yield Progress(console, None)
+Arguments = ParamSpec("Arguments")
 
 
 @dataclass(frozen=True)
@@ -70,29 +56,142 @@ class Progress:
         elif self.console is not None:
             self.console.print(_line(message), soft_wrap=True)
 
-    def fraction(self, message: str) -> "FractionTold":
-        """A listener for fractions done, 0 to 1, that says ``message`` with a percentage."""
-        return FractionTold(self, message)
+    def fraction(self, message: str) -> Callable[[float], None]:
+        """A listener for fractions done, 0 to 1, that says ``message`` with a percentage.
+
+        Without a terminal nothing is said, for the message has been.
+        """
+
+        def tell(done: float) -> None:
+            if self.status is not None:
+                self(f"{message} ({100.0 * done:.0f} %)")
+
+        return tell
 
 
 @dataclass(frozen=True)
-class FractionTold:
-    """Says a message with the percentage done; without a terminal, the message is left to the first call."""
+class Reporter:
+    """How a command speaks: ``json`` instead of tables, ``quiet`` without progress and tables."""
 
-    progress: Progress
-    message: str
+    json: bool
+    quiet: bool
 
-    def __call__(self, fraction: float) -> None:
-        """Take note that a ``fraction`` of the work [1] is done."""
-        if self.progress.status is not None:
-            self.progress(f"{self.message} ({100.0 * fraction:.0f} %)")
+    def show(self, *parts: RenderableType) -> None:
+        """Print tables and sentences for people to standard output."""
+        if self.json or self.quiet:
+            return
+        console = Console(highlight=False, soft_wrap=not sys.stdout.isatty())
+        with console.capture() as captured:
+            for part in parts:
+                console.print(part)
+        sys.stdout.write(captured.get())
+        sys.stdout.flush()
+
+    def conclude(self, result: "Result", files: Sequence[Path]) -> int:
+        """Show a result and the files that were written, or print its JSON; the exit code."""
+        self.show_result(result, files)
+        if not result.doubts:
+            return OK
+        print_error(f"Not to be trusted: {' '.join(result.doubts)}")
+        return NOT_TRUSTED
+
+    def show_result(self, result: "Result", files: Sequence[Path]) -> None:
+        """Show a result and the files that were written, or print its JSON."""
+        if not (self.json or self.quiet):
+            self.show(result.rendered(), plain("Written: " + ", ".join(str(file) for file in files)))
+        if self.json:
+            # JSON is UTF-8 whatever the terminal speaks, byte for byte what is in the file.
+            sys.stdout.flush()
+            sys.stdout.buffer.write(result.json_bytes())
+            sys.stdout.buffer.flush()
+
+    @contextmanager
+    def working(self) -> Iterator[Progress]:
+        """A progress line on standard error for as long as the work takes."""
+        console = Console(stderr=True, highlight=False)
+        if self.quiet:
+            yield Progress(None, None)
+        elif console.is_terminal:
+            with console.status(plain("starting")) as status:
+                yield Progress(console, status)
+        else:
+            yield Progress(console, None)
 
 
-def complain(message: str) -> None:
+def print_error(message: str) -> None:
     """One line to standard error, whatever was asked for."""
     Console(stderr=True, highlight=False).print(_line(message), soft_wrap=True)
 
 
-def _line(message: str) -> Text:
-    """``message`` in one line, whatever is in the names that it tells."""
+def ends_with_code(command: Callable[Arguments, int]) -> Callable[Arguments, None]:
+    """The command, whose returned code becomes the exit code and whose expected errors become one line."""
+
+    @wraps(command)
+    def guarded(*args: Arguments.args, **kwargs: Arguments.kwargs) -> None:
+        raise typer.Exit(_code_of(lambda: command(*args, **kwargs)))
+
+    return guarded
+
+
+def refused(error: OSError) -> int:
+    """Say what the system refused, in one line; the exit code."""
+    place = f"{error.filename}: " if error.filename else ""
+    print_error(
+        f"Error: {place}{error.strerror or error}. Remedy: check the path, its permissions, the disk."
+    )
+    return BAD_INPUT
+
+
+def mend_streams() -> None:
+    """Make standard output and standard error of this process take whatever is written to them."""
+    sys.stdout = _mended(sys.stdout, 1, needed=True)
+    sys.stderr = _mended(sys.stderr, 2, needed=False)
+
+
+def _code_of(work: Callable[[], int]) -> int:
+    try:
+        return work()
+    except KeyboardInterrupt:
+        print_error("Stopped by Ctrl-C; files that were finished are kept.")
+        return INTERRUPTED
+    except InputError as error:
+        print_error(f"Error: {error}")
+        return BAD_INPUT
+    except OSError as error:
+        return refused(error)
+
+
+def _line(message: str) -> RenderableType:
+    """``message`` in one line, whatever is in the names that it holds."""
     return plain(message.replace("\n", "\\n"))
+
+
+class _Outlet(io.FileIO):
+    """The bytes of a stream; after the first that it does not take, all others go nowhere."""
+
+    def __init__(self, number: int, needed: bool) -> None:
+        super().__init__(number, "wb", closefd=False)
+        self._needed, self._deaf = needed, False
+
+    def write(self, content: "ReadableBuffer") -> int:
+        """Write, as far as anybody takes it."""
+        if not self._deaf:
+            try:
+                return super().write(content)
+            except OSError as error:
+                self._deaf = True
+                if self._needed and not isinstance(error, BrokenPipeError):
+                    raise OSError(error.errno, error.strerror, "standard output") from error
+        return memoryview(content).nbytes
+
+
+def _mended(stream: TextIO | None, number: int, needed: bool) -> TextIO:
+    if stream is None:  # Closed by whoever started the program.
+        number, encoding = os.open(os.devnull, os.O_WRONLY), "utf-8"
+    else:
+        encoding = stream.encoding
+        if stream.isatty() and isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+            return stream
+    outlet = io.BufferedWriter(_Outlet(number, needed))
+    return io.TextIOWrapper(outlet, encoding, "backslashreplace", line_buffering=True)

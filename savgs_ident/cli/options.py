@@ -1,9 +1,37 @@
-"""Arguments and options that several commands share."""
+"""Arguments and options that several commands share, and what they mean.
 
+Options that take several values at once are written ``--free mu_r c_sd`` for ``--free mu_r --free c_sd``.
+"""
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from savgs_ident.cli.console import Progress, print_error
+from savgs_ident.core.errors import InputError
+
+if TYPE_CHECKING:
+    from savgs_ident import Campaign, QuarterCar
+
+
+class ModelName(StrEnum):
+    """The paper's models."""
+
+    simqc = "simqc"
+    simtr = "simtr"
+
+
+class SamplerName(StrEnum):
+    """The samplers there are."""
+
+    emcee = "emcee"
+    nuts = "nuts"
+
 
 CampaignArgument = Annotated[
     Path,
@@ -21,5 +49,155 @@ ChannelsOption = Annotated[
     Path | None,
     typer.Option("--channels", metavar="FILE", help="channels.toml that says which column or topic is what."),
 ]
+RigOption = Annotated[
+    Path | None,
+    typer.Option("--rig", metavar="RIG", help="Rig file to start from; the shipped one by default."),
+]
+ModelOption = Annotated[
+    ModelName, typer.Option("--model", help="simtr: with rail and tyre friction; simqc: without.")
+]
+BaselineOption = Annotated[
+    ModelName | None,
+    typer.Option(
+        "--model",
+        help="simtr: with rail and tyre friction, the default for a drawing; simqc: without. "
+        "A model.toml brings its own.",
+    ),
+]
+EffectsOption = Annotated[
+    ModelName | None,
+    typer.Option("--model", help="simtr or simqc; by default what the file was identified with."),
+]
+FreeOption = Annotated[
+    list[str] | None,
+    typer.Option("--free", metavar="NAME ...", help="Parameters to identify instead of the paper's four."),
+]
+FixedTolerancesOption = Annotated[
+    bool, typer.Option("--fixed-tolerances", help="Hold what is known to a tolerance at its value.")
+]
+MaxFrequencyOption = Annotated[
+    float | None, typer.Option("--max-frequency", metavar="HZ", help="Leave out faster dwells.")
+]
+OrdersOption = Annotated[int, typer.Option("--orders", min=1, help="Highest harmonic order to compare.")]
+FitOrdersOption = Annotated[int, typer.Option("--orders", min=1, help="Highest harmonic order to fit.")]
+SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Of all random numbers.")]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="ADDRESS", help="Dask cluster to work on instead of this machine."),
+]
+JobsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--jobs", min=1, help="Trials at a time; one for each core if not given.", show_default=False
+    ),
+]
+OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress and no tables.")]
+
+
+def command_line() -> tuple[str, ...]:
+    """The command as it was typed."""
+    return ("savgs-ident", *sys.argv[1:])
+
+
+def cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def read_campaign(path: Path, channels: Path | None, progress: Progress) -> "Campaign":
+    """The campaign of a file or folder; raises :class:`InputError` for one that cannot be read."""
+    import savgs_ident as si
+
+    progress(f"reading {path}")
+    return si.load_campaign(path, channels, progress=progress.fraction(f"reading {path}"))
+
+
+def effects_of(model: ModelName | None) -> tuple[str, ...] | None:
+    """The effects that make a model; None for None."""
+    from savgs_ident.plants.quarter_car.catalogue import MODELS
+
+    return None if model is None else MODELS[model.value]
+
+
+def read_model(path: Path | None, model: ModelName | None) -> "QuarterCar":
+    """The model of a rig file, or of the shipped one; one line on standard error if its own fit is doubtful.
+
+    Raises :class:`InputError` if the file cannot be read or what it says of effects is no list of known ones.
+    """
+    import savgs_ident as si
+
+    found = si.load_model(path, effects_of(model))
+    provenance = found.rig.provenance
+    if not provenance.get("trusted", True):
+        status = provenance.get("status", "no status")
+        print_error(f"Warning: {path}: its own fit is not to be trusted ({status}).")
+    return found
+
+
+def read_baseline(path: Path | None, model: ModelName | None) -> "QuarterCar":
+    """The baseline of a diagnosis: a drawing with the effects of ``model``, or an identified rig with its own.
+
+    Raises :class:`InputError` for an identified rig of another model than was asked for.
+    """
+    import savgs_ident as si
+    from savgs_ident.plants.quarter_car.model import model_of
+
+    rig = si.load_rig(path)
+    if "effects" not in rig.provenance:
+        return si.QuarterCar(rig, effects_of(model or ModelName.simtr) or ())
+    found = model_of(rig)
+    if model is not None and set(effects_of(model) or ()) != set(found.effects):
+        raise InputError(
+            f"was identified with {', '.join(found.effects) or 'no friction'}, which is not {model.value}",
+            source=rig.source,
+            remedy="leave --model out, or give the drawing that the rig was identified from",
+        )
+    return found
+
+
+def _is_name(word: str) -> bool:
+    return word.isidentifier() and not Path(word).exists()
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_format(word: str) -> bool:
+    return word[:1] != "-" and word.replace("-", "_").isidentifier() and not Path(word).exists()
+
+
+SEVERAL: dict[str, Callable[[str], bool]] = {
+    "--free": _is_name,
+    "--without": _is_name,
+    "--frequency": _is_number,
+    "--to": _is_format,
+}
+"""The options, and what a further value of each looks like; a word that does not is an argument."""
+
+
+def spread_values(words: Sequence[str]) -> list[str]:
+    """The command line with the option repeated before each of its further values.
+
+    >>> spread_values(["fit", "--free", "mu_r", "c_sd", "--quiet", "run.csv"])
+    ['fit', '--free', 'mu_r', '--free', 'c_sd', '--quiet', 'run.csv']
+    """
+    out: list[str] = []
+    option, first = "", False
+    for word in words:
+        if word in SEVERAL:
+            option, first = word, True
+        elif option and first and not word.startswith("--"):
+            first = False
+        elif option and not first and SEVERAL[option](word):
+            out.append(option)
+        else:
+            option = ""
+        out.append(word)
+    return out

@@ -1,17 +1,19 @@
-"""Describing functions: the friction and the damper of a motion as the linear elements that they are at its size.
+"""Describing functions: friction and damper as linear elements that depend on the amplitude of the motion.
 
 In a steady motion on the cam, the first harmonic of an element's force over that of its velocity is a complex gain
 
     N(f, A) = F_1 / V_1 = -(c + k / (i w)),
 
-a damping c [N s/m] and a stiffness k [N/m] that hold at this frequency and amplitude. The rig with these in place of
-its rail, its damper and its tyre's friction is linear; a control design that is to work at the amplitude of the test,
-and not only at vanishing ones, starts from it.
+a damping c [N s/m] and a stiffness k [N/m] that are valid at this frequency and amplitude. The rig with these in
+place of the friction of its rail, its damper and the friction of its tyre is linear; a control design for the
+amplitude of the test starts from it.
 
     solution = simulate_periodic(model, p, cam_excitation(frequency, 0.0275, np.pi / 2))
     described = describe(model, p, solution)
     described.damping, described.stiffness                  # (D, 3): rail, strut, tyre_lateral
     quasi_linear_response(model, p, described)              # complex (D, 2), per metre of road
+
+The first harmonics of the nonlinear rig, at any amplitude of the cam, are :func:`first_harmonic`.
 """
 
 from typing import NamedTuple
@@ -25,25 +27,28 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from savgs_ident.control.linearisation import OperatingPoint, resting
-from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.inputs import Inputs, nothing_imposed
-from savgs_ident.model.kinematics import suspension_travel
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.strut import Link
-from savgs_ident.model.tyre import Road
-from savgs_ident.model.values import Values
-from savgs_ident.simulate.harmonics import analyse
-from savgs_ident.simulate.imposed import loads_at_nodes
-from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.values import Values
+from savgs_ident.plants.base import Motion
+from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.inputs import Inputs
+from savgs_ident.plants.quarter_car.kinematics import suspension_travel
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.road import cam_excitation
+from savgs_ident.plants.quarter_car.strut import Link
+from savgs_ident.plants.quarter_car.tyre import Road
+from savgs_ident.simulate.collocation import Trajectory
+from savgs_ident.simulate.harmonics import analyse, harmonics
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, simulate_periodic, solve_on_mesh
+from savgs_ident.simulate.sensitivity import loads_at_nodes
 
 ELEMENTS = ("rail", "strut", "tyre_lateral")
-"""Ports of the elements that are described: the rail's friction, the damper, the tyre's lateral friction."""
-
+"""Ports of the elements: friction of the rail, damper, lateral friction of the tyre."""
 OUTPUTS = ("sprung_accel", "susp_deflection")
 """[m/s^2], [m]."""
 
 
-class Described(NamedTuple):
+class DescribingFunctions(NamedTuple):
     """Gains of the elements in D motions.
 
     Attributes:
@@ -73,11 +78,11 @@ def _first_harmonics(model: QuarterCar, p: Values, solution: PeriodicSolution) -
     return analyse(forces, solution.mesh, 1)[:, :, 1], analyse(velocities, solution.mesh, 1)[:, :, 1]
 
 
-def describe(model: QuarterCar, p: Values, solution: PeriodicSolution) -> Described:
-    """The gains in periodic motions that were found; zero where an element does not move."""
+def describe(model: QuarterCar, p: Values, solution: PeriodicSolution) -> DescribingFunctions:
+    """The gains in converged periodic motions; zero where an element does not move."""
     force, velocity = (np.asarray(each) for each in _first_harmonics(model, p, solution))
     gain = np.divide(force, velocity, out=np.zeros_like(force), where=velocity != 0.0)
-    return Described(np.asarray(solution.excitation.frequency), gain)
+    return DescribingFunctions(np.asarray(solution.excitation.frequency), gain)
 
 
 class _Bare(NamedTuple):
@@ -100,15 +105,17 @@ def _bare_slopes(model: QuarterCar, p: Values, at: OperatingPoint) -> _Bare:
     zero = jnp.zeros(())
 
     def everything(q: Array, qd: Array, qdd: Array, road: Array, forces: Array) -> tuple[Array, Array, Array]:
-        given = nothing_imposed(zero)._replace(rail=forces[0], strut=forces[1], tyre_lateral=forces[2])
+        given = {"rail": forces[0], "strut": forces[1], "tyre_lateral": forces[2]}
         inputs = Inputs(Road(road[0], road[1]), Link(at.link.angle, zero), None, given)
         motion = Motion(Coordinates(q[0], q[1]), Coordinates(qd[0], qd[1]), Coordinates(qdd[0], qdd[1]))
         none = jnp.zeros(0)
         loads = bare.loads(undamped, motion, none, none, inputs)
-        seen = jnp.stack([rig["accel_gain"] * qdd[0], rig["deflection_gain"] * suspension_travel(rig, q[1])])
+        readings = jnp.stack(
+            [rig["accel_gain"] * qdd[0], rig["deflection_gain"] * suspension_travel(rig, q[1])]
+        )
         return (
             bare.residual(undamped, motion, none, none, inputs),
-            seen,
+            readings,
             jnp.stack([loads.ports[port].velocity for port in ELEMENTS]),
         )
 
@@ -124,7 +131,9 @@ def _bare(model: QuarterCar, p: Values) -> _Bare:
     return jax.tree.map(np.asarray, _bare_slopes(model, p, at))
 
 
-def quasi_linear_response(model: QuarterCar, p: Values, described: Described) -> NDArray[np.complex128]:
+def quasi_linear_response(
+    model: QuarterCar, p: Values, described: DescribingFunctions
+) -> NDArray[np.complex128]:
     """Response (D, 2) of the rig with the described elements, :data:`OUTPUTS` per metre of road [unit/m]."""
     rig = _bare(model, p)
     position, velocity, acceleration, road, force = rig.residual
@@ -160,3 +169,52 @@ def quasi_linear_space(
     return control.ss(
         a, b, c, d, states=states, inputs=("road_velocity",), outputs=OUTPUTS, name="quasi_linear"
     )
+
+
+_CONTINUED_FROM = 1e-4
+"""Peak to peak of the cam [m] from which smaller motions are continued: the static equilibrium may be millimetres off
+the drawing's, which is far for a motion of micrometres."""
+Complex = NDArray[np.complex128]
+
+
+def motions_on_cam(
+    model: QuarterCar, p: Values, frequency: NDArray[np.float64], peak_to_peak: float
+) -> PeriodicSolution:
+    """Periodic motions on a cam of height ``peak_to_peak`` [m] at frequencies [Hz], (D,).
+
+    Raises :class:`InputError` where one did not converge.
+    """
+    nominal = float(p["psi_nominal"])
+    size = max(peak_to_peak, _CONTINUED_FROM)
+    solution = simulate_periodic(model, p, cam_excitation(frequency, size, nominal))
+    if peak_to_peak < size:
+        excitation = cam_excitation(frequency, peak_to_peak, nominal)
+        start = _shrunk(solution, peak_to_peak / size)
+        limit = PeriodicSettings.iterations
+        solution = solve_on_mesh(model, p, excitation, solution.mesh, start, limit)
+    lost = [f"{at:g}" for at, status in zip(frequency, solution.status(), strict=True) if not status.ok]
+    if lost:
+        raise InputError(
+            f"the periodic motion was not found at {', '.join(lost)} Hz", remedy="check the rig's numbers"
+        )
+    return solution
+
+
+def first_harmonic(model: QuarterCar, p: Values, solution: PeriodicSolution, peak_to_peak: float) -> Complex:
+    """First harmonics of the channels per metre of road [unit/m], (D, 2), for a cam of ``peak_to_peak`` [m]."""
+    found = harmonics(model, p, solution, 1)[:, :, 1] / (peak_to_peak / 2.0)
+    return np.asarray(found, np.complex128)
+
+
+def _shrunk(solution: PeriodicSolution, share: float) -> Trajectory:
+    """The motions scaled by ``share`` about their means."""
+    layout, weight = solution.mesh.layout, np.asarray(solution.mesh.weight)
+
+    def shrunk(values: Array) -> Array:
+        rows = np.asarray(values)
+        total = np.add.reduceat(weight, layout.starts)
+        means = np.add.reduceat(rows * weight, layout.starts, axis=1) / total
+        mean = means[:, np.asarray(layout.dwell)]
+        return jnp.asarray(mean + share * (rows - mean))
+
+    return Trajectory(*(shrunk(part) for part in solution.trajectory))

@@ -1,48 +1,82 @@
-"""The design as a whole: from an identified rig to a controller that runs, and the evidence for it."""
+"""The design as a whole: from an identified rig to a controller that runs, with the evidence for it.
 
-from collections.abc import Callable
-from dataclasses import dataclass
+:func:`design_controller` synthesises, checks and discretises a controller and tries it on other rigs.
+:func:`controller_record` and :func:`read_controller` are the controller as a file: everything that a computer
+needs to run it, with units, as JSON.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import ClassVar
 
 import control
+import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 
-from savgs_ident.control.alpha_map import alpha_map
-from savgs_ident.control.controller_file import DigitalController
-from savgs_ident.control.digital import RATE, discretise, reduce_order, sampled_plant
-from savgs_ident.control.generalised_plant import design_loop, driven_loop, generalised_plant
-from savgs_ident.control.margins import Margins, margins_of
-from savgs_ident.control.quarter_car_space import TwoMasses, quarter_car_space
+from savgs_ident.control.generalised_plant import (
+    COMMAND,
+    MEASUREMENTS,
+    design_loop,
+    driven_loop,
+    generalised_plant,
+)
+from savgs_ident.control.linear_equivalent import (
+    AlphaMap,
+    TwoMasses,
+    alpha_map,
+    paper_masses,
+    quarter_car_space,
+)
+from savgs_ident.control.margins import Margins, Robustness, assess_robustness, compute_margins
 from savgs_ident.control.rigs import Rigs
-from savgs_ident.control.robustness import Robustness, examine
-from savgs_ident.control.synthesis import Synthesis, synthesise_hinf
-from savgs_ident.control.two_masses import paper_masses
+from savgs_ident.control.synthesis import (
+    RATE,
+    Synthesis,
+    discretise,
+    reduce_order,
+    sampled_plant,
+    synthesise_hinf,
+)
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values, as_values
+from savgs_ident.core.presentation import Result
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.plant import QuarterCar
 
 REGULARISATION = ("noise_accel", "noise_deflection", "noise_position", "drift")
-"""The weights that keep the problem regular."""
-
+"""The weights that regularise the problem."""
 FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0)
-"""By how much they are changed to show what they do."""
-
-
-def controller_for(
-    model: QuarterCar, p: Values, weights: ParameterTable, rate: float = RATE
-) -> DigitalController:
-    """The sampled H-infinity controller of a rig, sampled at ``rate`` [Hz], without the evidence.
-
-    Raises as :func:`design_controller` does.
-    """
-    space = quarter_car_space(paper_masses(model, p))
-    synthesis = synthesise_hinf(generalised_plant(space, float(p["motor_reference_bandwidth"]), weights))
-    return DigitalController(discretise(synthesis.controller, rate), alpha_map(model, p))
+"""Factors on them that show their effect [1]."""
+SCHEMA = 1
+MEASUREMENT_UNITS = ("m/s^2", "m", "m")
+COMMAND_UNIT = "m/s"
 
 
 @dataclass(frozen=True)
-class Regularised:
-    """What a regularising weight does: the design with it times ``factor``; no gamma where there is no design.
+class DigitalController:
+    """A sampled controller with its map from the equivalent actuator to the link.
+
+    Attributes:
+        space: discrete, from measurements (acceleration, deflection, z_lin) to the command (velocity of z_lin).
+        alpha: map from the command to a velocity of the link.
+    """
+
+    space: control.StateSpace
+    alpha: AlphaMap
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [1/s]."""
+        return 1.0 / float(self.space.dt)
+
+
+@dataclass(frozen=True)
+class RegularisationEffect:
+    """The effect of a regularising weight: the design with it times ``factor``; NaN where there is none.
 
     ``factor`` and ``gamma_least`` have no dimension [1], ``fastest_pole`` is in [rad/s].
     """
@@ -55,22 +89,24 @@ class Regularised:
 
 
 @dataclass(frozen=True)
-class Design:
-    """A controller with the evidence.
+class Design(Result):
+    """A controller with the checks of it.
 
     Attributes:
-        masses: the numbers of eq. (8) that it was made for.
+        masses: the parameters of eq. (8) of the design.
         bandwidth: of the actuator [Hz].
         weights: the weights.
         synthesis: the H-infinity controller, gamma and its check.
         controller: continuous, as it is used: that of the synthesis, or one of lower order.
         margins: of that controller.
         digital: the same, sampled.
-        digital_margins: of the sampled controller on the sampled rig, with the sample that the computer needs.
-        rigs: what it was tried on.
-        robustness: how it did.
-        regularisation: what the regularising weights do.
+        digital_margins: of the sampled controller on the sampled rig, with a delay of one sample for the computation.
+        rigs: the rigs of the robustness check.
+        robustness: the results there.
+        regularisation: the effect of the regularising weights.
     """
+
+    presenter: ClassVar[str] = "DESIGN"
 
     masses: TwoMasses
     bandwidth: float
@@ -82,7 +118,8 @@ class Design:
     digital_margins: Margins
     rigs: Rigs
     robustness: Robustness
-    regularisation: tuple[Regularised, ...]
+    regularisation: tuple[RegularisationEffect, ...]
+    model: RigModel | None = field(default=None, kw_only=True)
 
     @property
     def plant(self) -> control.StateSpace:
@@ -91,7 +128,7 @@ class Design:
 
     @property
     def sampled_plant(self) -> control.StateSpace:
-        """From command to measurements as the computer meets it: sampled, held, and a sample late."""
+        """From command to measurements for the computer: sampled, held, delayed by a sample."""
         return sampled_plant(self.plant, self.digital.rate)
 
     @property
@@ -111,7 +148,7 @@ class Design:
 
     @property
     def trusted(self) -> bool:
-        """Whether gamma was confirmed, and the loop is stable, sampled too, and on every rig."""
+        """Whether gamma was confirmed, and the loop is stable, also sampled and on every rig."""
         both = self.margins.stable and self.digital_margins.stable
         return self.synthesis.holds and both and self.robustness.stable
 
@@ -125,7 +162,7 @@ def design_controller(
     order: int | None = None,
     rate: float = RATE,
 ) -> Design:
-    """The H-infinity controller of a rig, checked on ``rigs``; of ``order`` states if that is given.
+    """The H-infinity controller of a rig, checked on ``rigs``; reduced to ``order`` states if given.
 
     ``rate`` [1/s] is that of the computer. Raises :class:`InputError` where the weights admit no controller or the
     order is not possible.
@@ -137,20 +174,20 @@ def design_controller(
     controller = synthesis.controller if order is None else reduce_order(synthesis.controller, order)
     plant = design_loop(space, bandwidth)
     sampled = discretise(controller, rate)
-    progress(f"trying it on {len(rigs.values)} rigs")
-    robustness = examine(
+    progress(f"robustness on {len(rigs.values)} rigs")
+    robustness = assess_robustness(
         controller, (paper_masses(model, as_values(each)) for each in rigs.values), bandwidth, weights
     )
-    progress("what the regularising weights do")
+    progress("effect of the regularising weights")
     return Design(
         masses,
         bandwidth,
         weights,
         synthesis,
         controller,
-        margins_of(plant, controller),
+        compute_margins(plant, controller),
         DigitalController(sampled, alpha_map(model, p)),
-        margins_of(sampled_plant(plant, rate), sampled),
+        compute_margins(sampled_plant(plant, rate), sampled),
         rigs,
         robustness,
         tuple(
@@ -163,12 +200,92 @@ def design_controller(
 
 def _regularised(
     space: control.StateSpace, bandwidth: float, weights: ParameterTable, name: str, factor: float
-) -> Regularised:
+) -> RegularisationEffect:
     changed = weights.with_values({name: factor * weights[name].value})
     try:
         found = synthesise_hinf(generalised_plant(space, bandwidth, changed))
     except InputError:
-        return Regularised(name, factor, float("nan"), float("nan"), float("nan"))
+        return RegularisationEffect(name, factor, float("nan"), float("nan"), float("nan"))
     fastest = float(np.max(np.abs(found.controller.poles())))
-    phase = margins_of(design_loop(space, bandwidth), found.controller).phase_deg
-    return Regularised(name, factor, found.gamma_least, fastest, phase)
+    phase = compute_margins(design_loop(space, bandwidth), found.controller).phase_deg
+    return RegularisationEffect(name, factor, found.gamma_least, fastest, phase)
+
+
+def controller_for(
+    model: QuarterCar, p: Values, weights: ParameterTable, rate: float = RATE
+) -> DigitalController:
+    """The sampled H-infinity controller of a rig, sampled at ``rate`` [Hz], without the checks.
+
+    Raises as :func:`design_controller` does.
+    """
+    space = quarter_car_space(paper_masses(model, p))
+    synthesis = synthesise_hinf(generalised_plant(space, float(p["motor_reference_bandwidth"]), weights))
+    return DigitalController(discretise(synthesis.controller, rate), alpha_map(model, p))
+
+
+def controller_record(controller: DigitalController) -> dict[str, object]:
+    """The controller as values of JSON: x[k+1] = A x[k] + B y[k], u[k] = C x[k] + D y[k]."""
+    space, alpha = controller.space, controller.alpha
+    return {
+        "schema": SCHEMA,
+        "law": "x[k+1] = A x[k] + B y[k], u[k] = C x[k] + D y[k], thetadot_SL = u / alpha(theta_SL)",
+        "rate_hz": controller.rate,
+        "measurements": dict(zip(MEASUREMENTS, MEASUREMENT_UNITS, strict=True)),
+        "command": {COMMAND: COMMAND_UNIT},
+        "A": space.A.tolist(),
+        "B": space.B.tolist(),
+        "C": space.C.tolist(),
+        "D": space.D.tolist(),
+        "alpha_m_per_rad": {
+            "nominal_angle_rad": float(alpha.nominal),
+            "powers_of_angle_from_nominal": np.asarray(alpha.coefficients).tolist(),
+        },
+    }
+
+
+def read_controller(path: Path) -> DigitalController:
+    """Read the controller from a file that ``design`` wrote.
+
+    Raises :class:`InputError` if it cannot be read or contains no controller.
+    """
+    remedy = "give the controller.json that `savgs-ident design` wrote"
+    try:
+        document = json.loads(path.read_bytes())
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", source=path, remedy=remedy) from error
+    except (ValueError, RecursionError) as error:
+        raise InputError("is not JSON", source=path, remedy=remedy) from error
+    try:
+        return _controller(document)
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise InputError(f"holds no controller: {error}", source=path, remedy=remedy) from error
+
+
+def _controller(document: Mapping[str, object]) -> DigitalController:
+    if document["schema"] != SCHEMA or isinstance(document["schema"], bool):
+        raise ValueError(f"its schema is {document['schema']!r}, not {SCHEMA}")
+    a, b, c, d = (_numbers(document[name]) for name in "ABCD")
+    rate, alpha = document["rate_hz"], document["alpha_m_per_rad"]
+    if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < np.inf:
+        raise ValueError("rate_hz is no positive number")
+    if 1.0 / rate == np.inf:
+        raise ValueError("rate_hz is too small")
+    if not isinstance(alpha, dict):
+        raise TypeError("alpha_m_per_rad is no table")
+    powers = _numbers(alpha["powers_of_angle_from_nominal"])
+    nominal = _numbers(alpha["nominal_angle_rad"])
+    order = len(a)
+    shapes = (a.shape, b.shape, c.shape, d.shape, nominal.shape)
+    if shapes != ((order, order), (order, 3), (1, order), (1, 3), ()) or powers.ndim != 1 or not powers.size:
+        raise ValueError("its matrices do not fit together")
+    if not all(np.isfinite(each).all() for each in (a, b, c, d, powers, nominal)):
+        raise ValueError("a number is not finite")
+    space = control.ss(a, b, c, d, 1.0 / rate, inputs=MEASUREMENTS, outputs=[COMMAND], name="controller")
+    return DigitalController(space, AlphaMap(jnp.asarray(nominal), jnp.asarray(powers)))
+
+
+def _numbers(value: object) -> NDArray[np.float64]:
+    found = np.array(value)
+    if found.dtype.kind not in "if":
+        raise TypeError("what should be numbers is something else")
+    return found.astype(np.float64)

@@ -1,59 +1,92 @@
 """The linear models of a rig side by side, and against the nonlinear one.
 
-Three questions, one record each: how k_eq, c_eq and alpha change with the link angle and how well constants and
-parabolas stand for them (Fig. 7); how far equation (8) and the exact linearisation are from the nonlinear rig at
-small motions, and why; how far the rig with describing functions is from it at the size of the test.
+Three questions, one record each: how k_eq, c_eq and alpha change with the link angle, and how well constants and
+parabolas approximate them (Fig. 7); how far equation (8) and the exact linearisation are from the nonlinear rig at
+small motions, and why; how far the rig with describing functions is from it at the amplitude of the test.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
+from numpy.polynomial import Polynomial
+from numpy.typing import ArrayLike, NDArray
 
-from savgs_ident.control.approximation import Approximation, approximate
-from savgs_ident.control.describing_function import Described, describe, quasi_linear_response
-from savgs_ident.control.first_harmonic import first_harmonic, motions_on_cam
-from savgs_ident.control.linear_equivalent import Equivalent, equivalents, resting_angles
-from savgs_ident.control.linearisation import linearise, resting
-from savgs_ident.control.quarter_car_space import TwoMasses, quarter_car_space
-from savgs_ident.control.two_masses import (
+from savgs_ident.control.describing_function import (
+    DescribingFunctions,
+    describe,
+    first_harmonic,
+    motions_on_cam,
+    quasi_linear_response,
+)
+from savgs_ident.control.linear_equivalent import (
+    Equivalent,
+    TwoMasses,
+    equivalents,
     nominal_equivalent,
     paper_masses,
+    quarter_car_space,
+    resting_angles,
     with_damper_at_rest,
     with_distributed_masses,
 )
+from savgs_ident.control.linearisation import linearise, resting
 from savgs_ident.core.errors import InputError
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values
+from savgs_ident.core.presentation import Result
+from savgs_ident.core.values import Values
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.plant import QuarterCar
 
 CHANNELS = ("sprung_accel", "susp_deflection")
 """[m/s^2] and [m], per metre of road."""
-
 LINK_DEG = np.linspace(0.0, 180.0, 181)
 """Link angles of the curves [deg]."""
-
 WISHBONE_DEG = np.linspace(-10.0, 10.0, 21)
 """Wishbone angles of the surfaces [deg]."""
-
 WORKING_DEG = (40.0, 140.0)
-"""Where the link works in a closed loop [deg]: the parabola is fitted there, too."""
-
+"""Working range of the link in a closed loop [deg], where a second parabola is fitted."""
 SMALL = 2e-6
-"""Peak to peak of a small cam [m]: at 0.1 mm the curvature of the damper alone is worth 1.6 %."""
-
+"""Peak to peak of a small cam [m]; at 0.1 mm the curvature of the damper alone causes 1.6 %."""
 FREQUENCY = np.geomspace(0.5, 10.0, 41)
 """Frequencies of the small motions [Hz]."""
-
 TEST_FREQUENCY = np.array([0.5, 1.0, 1.5, 1.75, 2.0, 2.2, 2.35, 2.5, 2.75, 3.0, 3.5, 4.0, 5.0, 6.0])
 """Frequencies of the motions at the size of the test [Hz]."""
-
 EXACT = 0.01
-"""How far the exact linearisation may be from the nonlinear rig at small motions, relatively [1]."""
-
+"""Largest relative error of the exact linearisation at small motions [1]."""
 Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Approximation:
+    """A polynomial in the link angle, with its residual.
+
+    Attributes:
+        coefficients: powers of the link angle [rad], constant first, in the quantity's unit.
+        rms: root mean square of the residual over the greatest magnitude of the quantity [1].
+        largest: the largest residual over the same magnitude [1].
+    """
+
+    coefficients: tuple[float, ...]
+    rms: float
+    largest: float
+
+    def __call__(self, angle: ArrayLike) -> NDArray[np.float64]:
+        """The approximated quantity at link angles [rad], any shape; the result has the same."""
+        return np.asarray(Polynomial(self.coefficients)(np.asarray(angle, dtype=np.float64)))
+
+
+def approximate(angle: NDArray[np.float64], values: NDArray[np.float64], degree: int) -> Approximation:
+    """The least-squares polynomial of a ``degree`` through ``values`` (n,) at link angles (n,) [rad]."""
+    polynomial = Polynomial.fit(angle, values, degree).convert()
+    residual = np.abs(values - polynomial(angle)) / np.max(np.abs(values))
+    return Approximation(
+        tuple(float(c) for c in polynomial.coef),
+        float(np.sqrt(np.mean(residual**2))),
+        float(np.max(residual)),
+    )
 
 
 @dataclass(frozen=True)
@@ -62,11 +95,11 @@ class EquivalentStudy:
 
     Attributes:
         link_deg: link angles [deg], (n,).
-        wishbone_deg: where the wishbone rests there [deg], (n,).
+        wishbone_deg: static equilibrium of the wishbone there [deg], (n,).
         resting: the equivalent along them, each (n,).
         surface: the equivalent over link angles and :data:`WISHBONE_DEG`, each (n, m).
         nominal: the equivalent in the nominal state.
-        approximations: by name of what is approximated and by what.
+        approximations: by the name of the quantity and of the approximation.
     """
 
     link_deg: NDArray[np.float64]
@@ -84,8 +117,8 @@ class SmallMotions:
     Attributes:
         frequency: [Hz], (F,).
         nonlinear: the nonlinear rig without friction.
-        models: the linear ones by name, in the order in which simplifications are undone.
-        masses: the numbers behind those with two masses.
+        models: the linear models by name, each with one simplification less.
+        masses: the parameters of those with two masses.
         slow_link: suspension deflection per z_lin of a link that turns slowly [1], by the exact linearisation; 1 in
             equation (8).
     """
@@ -113,7 +146,7 @@ class CamMotions:
 
     nonlinear: Complex
     quasi_linear: Complex
-    described: Described
+    described: DescribingFunctions
 
     @property
     def error(self) -> float:
@@ -122,17 +155,32 @@ class CamMotions:
 
 
 @dataclass(frozen=True)
-class LinearStudy:
-    """All three; ``at_test`` is None for a rig without friction."""
+class LinearStudy(Result):
+    """All three studies; ``at_test`` is None for a rig without friction."""
+
+    presenter: ClassVar[str] = "LINEAR_STUDY"
 
     equivalents: EquivalentStudy
     small: SmallMotions
     at_test: CamMotions | None
+    model: RigModel | None = field(default=None, kw_only=True)
 
     @property
     def trusted(self) -> bool:
-        """Whether the exact linearisation is the nonlinear rig at small motions, as it must be."""
+        """Whether the exact linearisation agrees with the nonlinear rig at small motions, as it must."""
         return self.small.error("exact linearisation") <= EXACT
+
+
+def study_linear(model: QuarterCar, p: Values, progress: Callable[[str], None]) -> LinearStudy:
+    """All three studies. Raises :class:`InputError` where the rig has no static equilibrium or no periodic motion."""
+    progress("linear equivalent over the link angle")
+    over_angles = study_equivalents(model, p)
+    progress("small motions: equation (8), exact linearisation, nonlinear rig")
+    small = study_small_motions(model, p)
+    if not model.effects:
+        return LinearStudy(over_angles, small, None)
+    progress("motions of the test: describing functions, nonlinear rig")
+    return LinearStudy(over_angles, small, study_test_motions(model, p))
 
 
 def study_equivalents(model: QuarterCar, p: Values) -> EquivalentStudy:
@@ -205,15 +253,3 @@ def study_test_motions(model: QuarterCar, p: Values) -> CamMotions:
     motions = motions_on_cam(model, p, TEST_FREQUENCY, cam)
     described, nonlinear = describe(model, p, motions), first_harmonic(model, p, motions, cam)
     return CamMotions(nonlinear, quasi_linear_response(model, p, described), described)
-
-
-def study_linear(model: QuarterCar, p: Values, progress: Callable[[str], None]) -> LinearStudy:
-    """All of it. Raises :class:`InputError` where the rig finds no rest or no periodic motion."""
-    progress("linear equivalent over the link angle")
-    over_angles = study_equivalents(model, p)
-    progress("small motions: equation (8), exact linearisation, nonlinear rig")
-    small = study_small_motions(model, p)
-    if not model.effects:
-        return LinearStudy(over_angles, small, None)
-    progress("motions of the test: describing functions, nonlinear rig")
-    return LinearStudy(over_angles, small, study_test_motions(model, p))

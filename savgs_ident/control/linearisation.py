@@ -1,7 +1,7 @@
-"""Exact linearisation of the rig at any state: what the nonlinear model does for small departures from there.
+"""Exact linearisation of the rig at any state: the behaviour of the nonlinear model for small departures from it.
 
-The implicit residual r(q, qd, qdd, s, sd, input) = 0 is differentiated in all its arguments at once, and solved for
-the accelerations and the rates of the internal states:
+The implicit residual r(q, qd, qdd, s, sd, input) = 0 is differentiated with respect to all its arguments at once, and
+solved for the accelerations and the rates of the internal states:
 
     [dqdd; dsd] = -(dr/d[qdd, sd])^-1 (dr/dq dq + dr/dqd dqd + dr/ds ds + dr/dinput dinput).
 
@@ -9,7 +9,7 @@ the accelerations and the rates of the internal states:
     space = linearise(model, p, at)                 # python-control, named signals
     space["sprung_accel", "road_velocity"]
 
-At a state where a friction sticks, this is the rig with its bristle as a spring: the linearisation of a motion is
+At a state where a friction sticks, this is the rig with its bristle as a spring. The linearisation of a motion is
 :mod:`savgs_ident.control.describing_function`.
 """
 
@@ -24,24 +24,23 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.equilibrium import static_equilibrium
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.kinematics import suspension_travel
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.strut import Link
-from savgs_ident.model.tyre import Road
-from savgs_ident.model.values import Values
-from savgs_ident.simulate.rates import solve_rates
+from savgs_ident.core.values import Values
+from savgs_ident.plants.base import Motion
+from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.equilibrium import static_equilibrium
+from savgs_ident.plants.quarter_car.inputs import Inputs
+from savgs_ident.plants.quarter_car.kinematics import suspension_travel
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.strut import Link
+from savgs_ident.plants.quarter_car.tyre import Road
+from savgs_ident.simulate.transient import solve_rates
 
 INPUTS = ("road_velocity", "link_velocity")
 """[m/s], [rad/s]."""
-
 OUTPUTS = (
     "sprung_accel", "susp_deflection", "tyre_deflection", "tyre_load", "link_torque", "link_angle",
 )  # fmt: skip
 """[m/s^2], [m], [m], [N], torque of the strut on the link towards greater angles [N m], [rad]."""
-
 _RIGID = ("sprung_position", "wishbone_angle", "sprung_velocity", "wishbone_velocity")
 
 
@@ -57,7 +56,7 @@ class OperatingPoint(NamedTuple):
 
 def resting(model: QuarterCar, p: Values, link_angle: Float[Array, ""] | float) -> OperatingPoint:
     """The rig at rest with the link at an angle [rad]."""
-    # As an array: a number would be another program to compile for every angle.
+    # As an array: a Python number would be compiled into the program, one for every angle.
     return _resting(model, p, jnp.asarray(link_angle, jnp.float64))
 
 
@@ -100,7 +99,7 @@ def _outputs(model: QuarterCar, p: Values, motion: Motion, s: Array, sd: Array, 
 
 @eqx.filter_jit
 def slopes(model: QuarterCar, p: Values, at: OperatingPoint) -> Slopes:
-    """All derivatives at a state; NaN where the model has none."""
+    """All derivatives at a state; NaN where the model is not defined."""
     count = len(model.states)
     rates = solve_rates(model, p, at.q, at.qd, at.s, Inputs(at.road, at.link))
     x = jnp.concatenate([jnp.stack([*at.q, *at.qd]), at.s])
@@ -122,7 +121,8 @@ def linearise(model: QuarterCar, p: Values, at: OperatingPoint) -> control.State
     """The rig near a state, with named signals: :data:`INPUTS`, :data:`OUTPUTS`.
 
     States are the coordinates and their rates, the internal states of the effects, the road's height [m] and the
-    link's angle [rad]. Raises :class:`InputError` where the rig has no linearisation: at a state that it cannot take.
+    link's angle [rad]. Raises :class:`InputError` at a state outside the travel of the rig, where there is no
+    linearisation.
     """
     found: Slopes = jax.tree.map(np.asarray, slopes(model, p, at))
     if not all(np.isfinite(part).all() for part in found):
@@ -133,7 +133,7 @@ def linearise(model: QuarterCar, p: Values, at: OperatingPoint) -> control.State
     n = found.residual_x.shape[1]
     solve = partial(np.linalg.solve, -found.residual_y)
     y_x, y_u = solve(found.residual_x), solve(found.residual_u)
-    # Heights and angles are integrals of the inputs, so they are states, too.
+    # Heights and angles are integrals of the inputs, so they are states too.
     a, b = np.zeros((n + 2, n + 2)), np.zeros((n + 2, 2))
     a[0, 2] = a[1, 3] = 1.0
     a[2:n, :n], a[2:n, n:], b[2:n] = y_x, y_u[:, ::2], y_u[:, 1::2]

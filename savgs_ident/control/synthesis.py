@@ -1,10 +1,11 @@
-"""H-infinity synthesis, and the check of what it promises.
+"""H-infinity synthesis, the check of its result, and the controller as a computer runs it.
 
-The least gamma is found first, by bisection with every step verified on the loop that it closes; the controller is
-the central one at a gamma 2 % above it. At the least gamma itself
-the Riccati equations are as good as singular and poles of the controller run off, which no computer follows.
-The check is independent of the synthesis: the largest singular value of the closed loop over frequency, refined
-around its peaks, may not pass gamma.
+The least gamma is found by bisection, every step verified on the loop that it closes; the controller is the
+central one at a gamma 2 % above the least. At the least gamma itself the Riccati equations are nearly singular
+and poles of the controller diverge, which no computer could follow. The check is independent of the synthesis:
+the largest singular value of the closed loop over frequency, refined around its peaks, must not exceed gamma.
+
+For the computer the controller is discretised, its command is held, and its order is reduced where that is asked for.
 """
 
 from dataclasses import dataclass
@@ -22,31 +23,27 @@ from savgs_ident.core.errors import InputError
 
 SLACK = 1.02
 """Gamma of the controller over the least one."""
-
 LOWER, UPPER = 1e-3, 1e4
-"""Where the least gamma is looked for [1]."""
-
+"""Search range of the least gamma [1]."""
 PRECISION = 1e-3
 """Relative precision of the least gamma."""
-
-HELD = 1e-6
-"""By how much, relatively, rounding may carry a closed loop beyond its gamma."""
-
+GAMMA_TOLERANCE = 1e-6
+"""Relative tolerance of the bound gamma for rounding [1]."""
 GRID = np.logspace(-4.0, 4.0, 2001)
 """Frequencies at which closed loops are examined [Hz]."""
 
 
 @dataclass(frozen=True)
 class Synthesis:
-    """A controller and how good it is.
+    """A controller with the bound it reaches.
 
     Attributes:
         controller: continuous, from :data:`MEASUREMENTS` to :data:`COMMAND`.
-        gamma: bound that it was made for [1].
-        gamma_least: the least bound that any controller reaches [1].
+        gamma: bound of the synthesis [1].
+        gamma_least: the least bound of any controller [1].
         closed: the closed loop from disturbances to penalties.
         peak: the largest singular value of the closed loop [1], found by sweeping the frequency.
-        peak_frequency: where [Hz].
+        peak_frequency: its frequency [Hz].
     """
 
     controller: control.StateSpace
@@ -60,7 +57,7 @@ class Synthesis:
     def holds(self) -> bool:
         """Whether the closed loop is stable and the sweep confirms gamma."""
         stable = bool(np.all(self.closed.poles().real < 0.0))
-        return stable and self.peak <= self.gamma * (1.0 + HELD)
+        return stable and self.peak <= self.gamma * (1.0 + GAMMA_TOLERANCE)
 
 
 def synthesise_hinf(plant: control.StateSpace) -> Synthesis:
@@ -93,12 +90,12 @@ def synthesise_hinf(plant: control.StateSpace) -> Synthesis:
 
 
 def _controller(plant: control.StateSpace, gamma: float) -> control.StateSpace | None:
-    """The central controller for ``gamma``; None if there is none, or the loop that it closes does not hold it.
+    """The central controller for ``gamma``; None if there is none, or the closed loop exceeds ``gamma``.
 
-    Signals are taken in the units in which D12 and D21 have size one, and the states are balanced: with noises of
-    0.1 mm beside weights of 50 s/m the equations would lose half of their digits.
+    Signals are scaled so that D12 and D21 have size one, and the states are balanced: with noises of 0.1 mm beside
+    weights of 50 s/m the equations would lose half of their digits.
     """
-    seen, penalties = len(MEASUREMENTS), plant.noutputs - len(MEASUREMENTS)
+    measured, penalties = len(MEASUREMENTS), plant.noutputs - len(MEASUREMENTS)
     noise = np.linalg.norm(plant.D[penalties:, :-1], axis=1)
     weight = np.linalg.norm(plant.D[:penalties, -1])
     if not (np.all(noise > 0.0) and weight > 0.0):
@@ -111,7 +108,7 @@ def _controller(plant: control.StateSpace, gamma: float) -> control.StateSpace |
     d = plant.D * rows[:, None] * columns
     try:
         a_k, b_k, c_k, d_k, _ = slycot.sb10fd(
-            plant.nstates, plant.ninputs, plant.noutputs, 1, seen, gamma, balanced, b, c, d
+            plant.nstates, plant.ninputs, plant.noutputs, 1, measured, gamma, balanced, b, c, d
         )
     except SlycotError:
         return None
@@ -126,11 +123,11 @@ def _controller(plant: control.StateSpace, gamma: float) -> control.StateSpace |
     )
     closed = plant.lft(found)
     stable = bool(np.all(closed.poles().real < 0.0))
-    return found if stable and control.linfnorm(closed)[0] <= gamma * (1.0 + HELD) else None
+    return found if stable and control.linfnorm(closed)[0] <= gamma * (1.0 + GAMMA_TOLERANCE) else None
 
 
 def largest_gain(system: control.StateSpace) -> tuple[float, float]:
-    """Largest singular value over frequency, and the frequency [Hz] of it: a fine sweep, then its highest peaks."""
+    """Largest singular value over frequency, and its frequency [Hz]: a fine sweep, refined at the highest peaks."""
 
     def gain(log_frequency: float) -> float:
         value = np.atleast_2d(system(2j * np.pi * 10.0**log_frequency, squeeze=False))
@@ -153,3 +150,55 @@ def singular_values(system: control.StateSpace, frequency: NDArray[np.float64]) 
     """Singular values (F, min(outputs, inputs)) at frequencies [Hz], the largest first."""
     response = np.moveaxis(system(2j * np.pi * frequency, squeeze=False), -1, 0)
     return np.linalg.svd(response, compute_uv=False)
+
+
+RATE = 1000.0
+"""Default rate of the controller [1/s]."""
+
+
+def discretise(controller: control.StateSpace, rate: float = RATE) -> control.StateSpace:
+    """The controller by the bilinear rule at ``rate`` [1/s]; it keeps stability and maps zero frequency exactly."""
+    sampled = control.sample_system(controller, 1.0 / rate, method="bilinear")
+    return control.ss(
+        sampled.A,
+        sampled.B,
+        sampled.C,
+        sampled.D,
+        1.0 / rate,
+        inputs=controller.input_labels,
+        outputs=controller.output_labels,
+        name=controller.name,
+    )
+
+
+def sampled_plant(plant: control.StateSpace, rate: float) -> control.StateSpace:
+    """The plant of a computer of ``rate`` [1/s]: its command is held, and acts one sample after the measurement."""
+    held = control.sample_system(plant, 1.0 / rate, method="zoh")
+    delay = control.ss(0.0, 1.0, 1.0, 0.0, 1.0 / rate)
+    found = held * delay
+    found.update_names(inputs=held.input_labels, outputs=held.output_labels)
+    return found
+
+
+def reduce_order(controller: control.StateSpace, order: int) -> control.StateSpace:
+    """The controller with ``order`` states, by balanced truncation with its static gain kept.
+
+    Raises :class:`InputError` if ``order`` is not between 1 and the present order, or the controller is unstable.
+    """
+    if not 1 <= order <= controller.nstates:
+        raise InputError(
+            f"a controller of order {controller.nstates} cannot be reduced to {order}",
+            remedy=f"choose an order between 1 and {controller.nstates}",
+        )
+    if np.any(controller.poles().real >= 0.0):
+        raise InputError("the controller itself is unstable and cannot be reduced", remedy="keep its order")
+    reduced = control.balred(controller, order, method="matchdc")
+    return control.ss(
+        reduced.A,
+        reduced.B,
+        reduced.C,
+        reduced.D,
+        inputs=controller.input_labels,
+        outputs=controller.output_labels,
+        name=controller.name,
+    )

@@ -1,7 +1,7 @@
-"""Errors and warnings that say what is wrong, where, and what to do about it.
+"""Errors and warnings with the problem, its place, and a remedy.
 
-An :class:`InputError` ends a command with exit code 2; a :class:`DataWarning` travels along with the
-data it concerns, so that every report can show it.
+An :class:`InputError` ends a command with exit code 2; a :class:`DataWarning` is stored with the data it concerns,
+so that every report can show it.
 
     >>> remedy = "name it in channels.toml"
     >>> print(InputError("column 'sprung_accel' is missing", source="run7.csv", remedy=remedy))
@@ -14,23 +14,23 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 _LONGEST = {"name": 100, "what": 400, "remedy": 2000}
-"""Characters of each part that a message shows: names and values come from files that may be anything."""
+"""Characters of each part that a message shows: names and values come from arbitrary files."""
 
 
 def one_line(text: str, most: int) -> str:
-    """``text`` as at most so many characters of one line: control characters spelled out, the middle left out."""
+    """``text`` as one line of at most ``most`` characters: control characters escaped, the middle left out."""
     if len(text) > most:
         text = f"{text[: most - 40]} ... {text[-35:]}"
     if text.isprintable():
         return text
-    return "".join(_spelled(char) if _is_control(char) else char for char in text)
+    return "".join(_escaped(char) if _is_control(char) else char for char in text)
 
 
 def _is_control(char: str) -> bool:
     return unicodedata.category(char) in ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
 
 
-def _spelled(char: str) -> str:
+def _escaped(char: str) -> str:
     return char.encode("unicode_escape").decode()
 
 
@@ -70,7 +70,7 @@ class InputError(SavgsIdentError):
 
 @contextmanager
 def blamed_on(source: object) -> Iterator[None]:
-    """An :class:`InputError` from within that names no file is one of ``source``."""
+    """Add ``source`` to an :class:`InputError` raised within that names no file."""
     try:
         yield
     except InputError as error:
@@ -88,7 +88,7 @@ def blamed_on(source: object) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class DataWarning:
-    """Something in the data that a careful reader would want to know, with a stable ``code``.
+    """A finding about the data that the reader of a report should know, with a stable ``code``.
 
     ``code`` is a short name such as ``clipped_sensor``; the other fields are those of :class:`InputError`,
     ``time`` [s].

@@ -1,28 +1,39 @@
-"""Files whole or not at all: written beside their place and then moved there.
+"""Atomic writing of files, and strict reading of records.
 
-Whoever stops a command, or runs out of disk, keeps what was finished and finds no half of a file.
+:func:`write_bytes` writes a temporary file beside the target and then renames it, so that an interrupted command or
+a full disk leaves finished files only. :func:`record_of` reads a dataclass back from the JSON object that
+``dataclasses.asdict`` made of it, checked against the annotations of the dataclass.
+
+>>> from savgs_ident.core.errors import DataWarning
+>>> record_of(DataWarning, {"code": "clipped", "what": "is clipped", "time": 1}).time
+1
+>>> record_of(DataWarning, {"code": "clipped", "what": 3})
+Traceback (most recent call last):
+ValueError: what is a whole number, not a text
 """
 
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import MISSING, fields, is_dataclass
 from fnmatch import fnmatchcase
 from glob import escape
+from math import isfinite
 from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from savgs_ident.core.errors import InputError
 
-LEAST_ROOM = 32 * 2**20
-"""Space that a temporary folder has to offer [byte]."""
-
-
+_LEAST_FREE_SPACE = 32 * 2**20
+"""Free space that a temporary folder must have [byte]."""
 _PART = ".part"
 
 
 def write_bytes(path: Path, content: bytes) -> Path:
-    """Write a file whole or not at all; raises :class:`InputError` if it cannot be written."""
+    """Write a file atomically: whole or not at all. Raises :class:`InputError` if it cannot be written."""
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=_PART)
     except OSError as error:
@@ -41,18 +52,18 @@ def write_bytes(path: Path, content: bytes) -> Path:
 
 
 def is_begun(name: str, of: Iterable[str]) -> bool:
-    """Whether a file with this ``name`` is what :func:`write_bytes` had begun of a file ``of`` one of these names."""
+    """Whether ``name`` is the temporary file of an interrupted :func:`write_bytes` of one of the names ``of``."""
     return any(fnmatchcase(name, f".{escape(each)}.????????{_PART}") for each in of)
 
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """A temporary folder with room for what libraries write to files only, and cannot be trusted to fail at.
+    """A temporary folder with free space, for libraries that write to files only and do not survive a full disk.
 
-    HDF5 takes the process down where a disk fills under it. Raises :class:`InputError` if there is no room.
+    HDF5 ends the process where the disk fills. Raises :class:`InputError` if there is no free space.
     """
     with tempfile.TemporaryDirectory(prefix="savgs-ident-") as name:
-        if shutil.disk_usage(name).free < LEAST_ROOM:
+        if shutil.disk_usage(name).free < _LEAST_FREE_SPACE:
             raise InputError(
                 "the disk is full",
                 source=tempfile.gettempdir(),
@@ -62,14 +73,97 @@ def scratch_folder() -> Iterator[Path]:
 
 
 def spelled_out(text: object) -> str:
-    r"""``text`` as every file can hold it; a byte of a file name that is no text becomes ``\udcff`` or the like."""
+    r"""``text`` as UTF-8 can encode it; an undecodable byte of a file name becomes ``\udcff`` or the like."""
     return str(text).encode("utf-8", "backslashreplace").decode()
 
 
 def cannot_write(path: Path, error: OSError) -> InputError:
-    """The error for a file or folder that refuses."""
+    """The error for a file or folder that cannot be written."""
     return InputError(
         f"cannot be written: {error.strerror or error}",
         source=path,
         remedy="choose a writable folder with space left: --out DIR",
     )
+
+
+Record = TypeVar("Record")
+
+
+def record_of(kind: type[Record], found: object) -> Record:
+    """A record of this ``kind`` from a JSON object; a list becomes a tuple where the record has one.
+
+    Raises ``ValueError`` for a field that is missing, not known, or not of its type; numbers must be finite.
+    """
+    record: Record = _record(kind, found, "")
+    return record
+
+
+def _record(kind: Any, found: object, where: str) -> Any:
+    table = _of_type(found, Mapping, where, "a table")
+    prefix = f"{where}." if where else ""
+    hints, known = get_type_hints(kind), {each.name: each for each in fields(kind)}
+    for name in table:
+        if name not in known:
+            raise ValueError(f"{prefix}{name!r:.40} is not known")
+    for name, each in known.items():
+        if name not in table and each.default is MISSING and each.default_factory is MISSING:
+            raise ValueError(f"{prefix}{name} is missing")
+    return kind(**{name: _value(hints[name], each, f"{prefix}{name}") for name, each in table.items()})
+
+
+def _value(hint: Any, found: object, where: str) -> Any:
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        return _one_of(inner, found, where)
+    if origin is Literal:
+        if not isinstance(found, str) or found not in inner:
+            raise _wrong(found, where, "one of: " + ", ".join(inner))
+        return found
+    if origin is tuple or origin is Sequence:
+        entries = _of_type(found, list, where, "a list")
+        return tuple(_value(inner[0], each, f"{where}[{place}]") for place, each in enumerate(entries))
+    if origin in (dict, Mapping):
+        entries = _of_type(found, Mapping, where, "a table")
+        return {name: _value(inner[1], each, f"{where}.{name:.40}") for name, each in entries.items()}
+    return _record(hint, found, where) if is_dataclass(hint) else _plain(hint, found, where)
+
+
+def _one_of(hints: tuple[Any, ...], found: object, where: str) -> Any:
+    """The value of an optional field: null, or a value of its type."""
+    if found is None and NoneType in hints:
+        return None
+    (hint,) = (each for each in hints if each is not NoneType)
+    return _value(hint, found, where)
+
+
+def _plain(hint: type, found: object, where: str) -> object:
+    if hint is float:
+        return _number(found, where)
+    if hint is int and isinstance(found, bool):
+        raise _wrong(found, where, "a whole number")
+    return _of_type(found, hint, where, {bool: "true or false", int: "a whole number", str: "a text"}[hint])
+
+
+def _number(found: object, where: str) -> float:
+    if isinstance(found, bool) or not isinstance(found, int | float):
+        raise _wrong(found, where, "a number")
+    try:
+        finite = isfinite(found)
+    except OverflowError:
+        finite = False
+    if not finite:
+        raise _wrong(found, where, "a finite number")
+    # A whole number stays one, so that a record that is written again is identical.
+    return found
+
+
+def _of_type(found: object, kind: type, where: str, expected: str) -> Any:
+    if not isinstance(found, kind):
+        raise _wrong(found, where, expected)
+    return found
+
+
+def _wrong(found: object, where: str, expected: str) -> ValueError:
+    # Long lists, deep ones and numbers of thousands of digits are not shown.
+    shown = {list: "a list", dict: "a table", int: "a whole number"}.get(type(found), f"{found!r:.60}")
+    return ValueError(f"{where or 'the record'} is {shown}, not {expected}")

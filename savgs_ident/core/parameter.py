@@ -1,4 +1,4 @@
-"""Parameters are values; unit, bounds, tolerance and source live beside them as metadata.
+"""Physical parameters: values in SI, with unit, bounds, tolerance and source as metadata.
 
 >>> m_s = Parameter("m_s", 320.0, "kg", tolerance=1.6, lower=0.0)
 >>> table = ParameterTable((m_s,))
@@ -20,8 +20,8 @@ class Parameter:
     """One physical parameter in SI.
 
     ``tolerance`` is the standard deviation with which the value is known beforehand [``unit``]; 0 means
-    exact or, for a parameter that is to be identified, that nothing is known beforehand but its bounds.
-    ``source`` says where the number comes from, ``about`` what it is.
+    exact or, for a parameter that is to be identified, that only its bounds are known beforehand.
+    ``source`` is where the number comes from, ``about`` what it describes.
     """
 
     name: str
@@ -78,7 +78,7 @@ class ParameterTable(Mapping[str, Parameter]):
         return tuple(self[name].value for name in names)
 
     def as_dict(self) -> dict[str, float]:
-        """Name to value, in SI: what the model takes."""
+        """Name to value, in SI: the argument of a model."""
         return {entry.name: entry.value for entry in self.entries}
 
     def with_values(self, values: Mapping[str, float]) -> "ParameterTable":
@@ -100,3 +100,19 @@ class ParameterTable(Mapping[str, Parameter]):
 
     def __add__(self, other: "ParameterTable") -> "ParameterTable":
         return ParameterTable(self.entries + other.entries)
+
+
+def merge_parameters(first: ParameterTable, *others: ParameterTable) -> ParameterTable:
+    """``first`` and whatever ``others`` (the parameters of effects) add to it; the earlier entry always wins.
+
+    Raises :class:`InputError` if a name means another unit in two tables.
+    """
+    merged = {entry.name: entry for entry in first.entries}
+    for entry in (entry for table in others for entry in table.entries):
+        known = merged.setdefault(entry.name, entry)
+        if known.unit != entry.unit:
+            raise InputError(
+                f"parameter '{entry.name}' is given in '{known.unit}' and in '{entry.unit}'",
+                remedy="give one of the two another name",
+            )
+    return ParameterTable(tuple(merged.values()))

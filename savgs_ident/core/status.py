@@ -1,14 +1,15 @@
-"""Outcomes of solvers as values, each with a sentence that says what to do.
+"""Outcomes of solvers as values, each with a sentence of advice.
 
 >>> Status.CONVERGED.ok, Status.NOT_IDENTIFIABLE.ok
 (True, False)
 """
 
+from collections.abc import Iterable
 from enum import Enum
 
 
 class Status(Enum):
-    """How a computation ended; ``value`` is advice for the reader of a report."""
+    """How a computation ended; ``value`` is the advice to the reader of a report."""
 
     CONVERGED = "converged"
     MAX_ITERATIONS = "stopped at the iteration limit before converging: raise the limit or start nearer"
@@ -18,10 +19,19 @@ class Status(Enum):
 
     @property
     def ok(self) -> bool:
-        """Whether the result may be trusted as it is."""
+        """Whether the result may be trusted."""
         return self is Status.CONVERGED
 
     @property
     def advice(self) -> str:
         """The outcome in a sentence."""
         return self.value
+
+
+def joint_status(statuses: Iterable[Status]) -> Status:
+    """How computations ended that are needed together: the first outcome that is not to be trusted, if there is one.
+
+    >>> joint_status([Status.CONVERGED, Status.STALLED]).name
+    'STALLED'
+    """
+    return next((each for each in statuses if not each.ok), Status.CONVERGED)

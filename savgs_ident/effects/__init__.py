@@ -1,1 +1,1 @@
-"""The catalogue: one unmodelled effect, one file, collected in :mod:`savgs_ident.effects.registry`."""
+"""Effects: laws that are written once, for any port of the right kind, of any plant."""

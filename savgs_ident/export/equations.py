@@ -1,83 +1,53 @@
-"""The rig's equations as functions of plain vectors, for every export that carries equations.
+"""The equations of a plant as functions of plain vectors, for every export that carries equations.
 
     residual(x, y, u, p) = 0        implicit, as the model is written
     rates(x, u, p)       = dx/dt    explicit: the residual solved for the accelerations
     outputs(x, u, p)                what is measured, and loads
 
-    x   z_s, theta_LW, their rates, internal states of the effects
-    y   accelerations of both coordinates, rates of the internal states
-    u   road height and velocity, link angle and velocity; cam angle and speed where an effect follows the cam
-    p   all parameters, so that each can be changed in what was exported
+    x   coordinates, their rates, internal states of the effects
+    y   accelerations of the coordinates, rates of the internal states
+    u   value and rate of every input; angle and speed of the periodic test where an effect follows them
+    p   all parameters, so that each can be changed in the export
 
-The residual is solved by a fixed number of Newton steps, written out: no other tool has to know how. It is affine in
-y but for the friction, whose load depends on the accelerations; from the affine solution two or three steps are
-enough.
+The residual is solved by a fixed number of unrolled Newton steps, so that other tools need no solver. It is
+affine in y except for the friction, whose load depends on the accelerations; from the affine solution two or
+three steps suffice.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import build_model, model_parameters
-from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.effect import AbstractRoadFault, Cam
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.kinematics import suspension_travel
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.small_root import solve_dense
-from savgs_ident.model.strut import Link
-from savgs_ident.model.tyre import Road
+from savgs_ident.core.small_root import solve_dense
+from savgs_ident.effects.base import AbstractInputLaw, Fundamental, InputSignal
+from savgs_ident.plants.base import AbstractPlant, Motion
 
 NEWTON_STEPS = 5
-"""Newton steps from zero accelerations: twice what motions of the rig need."""
+"""Newton steps from zero accelerations: twice as many as motions of the rig need."""
 
 
 @dataclass(frozen=True)
 class Signal:
-    """A component of a vector: ``name``, ``unit``, what it is."""
+    """A component of a vector: ``name``, ``unit`` and description."""
 
     name: str
     unit: str
     about: str
 
 
-COORDINATES = (
-    Signal("z_s", "m", "height of the sprung mass, up positive"),
-    Signal("theta_LW", "rad", "angle of the lower wishbone from the drawing"),
-    Signal("z_s_dot", "m/s", "velocity of the sprung mass"),
-    Signal("theta_LW_dot", "rad/s", "angular velocity of the lower wishbone"),
-)
-
-INPUTS = (
-    Signal("road_height", "m", "height of the plate, up positive"),
-    Signal("road_velocity", "m/s", "velocity of the plate"),
-    Signal("link_angle", "rad", "angle of the single link"),
-    Signal("link_velocity", "rad/s", "angular velocity of the single link"),
-)
-
-CAM_INPUTS = (
-    Signal("cam_angle", "rad", "angle of the cam behind the plate"),
+FUNDAMENTAL_INPUTS = (
+    Signal("cam_angle", "rad", "angle of the periodic test, 0 where the first input's first order peaks"),
     Signal("cam_speed", "rad/s", "its speed"),
-)
-
-OUTPUTS = (
-    Signal(
-        "sprung_accel", "m/s^2", "acceleration of the sprung mass, as its sensor shows it but for dynamics"
-    ),
-    Signal("susp_deflection", "m", "suspension deflection from the drawing, bump positive, likewise"),
-    Signal("tyre_load", "N", "vertical load of the tyre"),
-    Signal("rail_force", "N", "friction of the railway on the sprung mass, up positive"),
-    Signal("strut_force", "N", "force with which the strut pushes apart"),
-    Signal("link_torque", "N m", "torque of the strut on the link towards greater angles"),
 )
 
 
 @dataclass(frozen=True)
 class Equations:
-    """A model's equations with the names of everything.
+    """A model's equations with the names of all components.
 
     Attributes:
         model: the model.
@@ -87,18 +57,17 @@ class Equations:
         outputs: of the results.
     """
 
-    model: QuarterCar
+    model: AbstractPlant
     parameters: tuple[str, ...]
     states: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
-    outputs: tuple[Signal, ...] = OUTPUTS
+    outputs: tuple[Signal, ...]
 
     def residual(
         self, x: Float[Array, " x"], y: Float[Array, " y"], u: Float[Array, " u"], p: Float[Array, " p"]
     ) -> Float[Array, " y"]:
         """Forces [N], moments [N m] and states out of balance."""
-        motion, inputs = _motion(x, y), _inputs(u)
-        return self.model.residual(self._values(p), motion, x[4:], y[2:], inputs)
+        return self.model.residual(self._values(p), *self._at(x, y), self._inputs(u))
 
     def accelerations(
         self, x: Float[Array, " x"], u: Float[Array, " u"], p: Float[Array, " p"]
@@ -108,7 +77,7 @@ class Equations:
         def balance(y: Array) -> Array:
             return self.residual(x, y, u, p)
 
-        y = jnp.zeros(x.shape[0] - 2)
+        y = jnp.zeros(x.shape[0] - len(self.model.coordinates))
         for _ in range(NEWTON_STEPS):
             value, slope = jax.linearize(balance, y)
             columns = [slope(unit) for unit in jnp.unstack(jnp.eye(y.shape[0]))]
@@ -119,46 +88,58 @@ class Equations:
         self, x: Float[Array, " x"], u: Float[Array, " u"], p: Float[Array, " p"]
     ) -> Float[Array, " x"]:
         """dx/dt, all in SI."""
-        return jnp.concatenate([x[2:4], self.accelerations(x, u, p)])
+        n = len(self.model.coordinates)
+        return jnp.concatenate([x[n : 2 * n], self.accelerations(x, u, p)])
 
     def read(self, x: Float[Array, " x"], u: Float[Array, " u"], p: Float[Array, " p"]) -> Float[Array, " o"]:
-        """The outputs, all in SI."""
-        values, y, inputs = self._values(p), self.accelerations(x, u, p), _inputs(u)
-        motion = _motion(x, y)
-        loads = self.model.loads(values, motion, x[4:], y[2:], inputs)
-        rig = self.model.effective(values)
-        travel = suspension_travel(rig, x[1])
-        return jnp.stack(
-            [
-                rig["accel_gain"] * y[0],
-                rig["deflection_gain"] * travel,
-                loads.vertical,
-                loads.rail,
-                loads.strut,
-                loads.link_torque,
-            ]
-        )
+        """The outputs, all in SI: what the sensors show but for their dynamics, then what the plant offers beside."""
+        values, inputs = self._values(p), self._inputs(u)
+        at = self._at(x, self.accelerations(x, u, p))
+        loads = self.model.loads(values, *at, inputs)
+        return jnp.stack([*self.model.read(values, *at, inputs), *self.model.read_outputs(loads)])
+
+    def _at(self, x: Array, y: Array) -> tuple[Motion, Array, Array]:
+        """The motion, the internal states and their rates."""
+        n, pack = len(self.model.coordinates), self.model.coordinate_type
+        parts = (x[:n], x[n : 2 * n], y[:n])
+        return Motion(*(pack(*jnp.unstack(part)) for part in parts)), x[2 * n :], y[n:]
+
+    def _inputs(self, u: Array) -> Any:
+        own = 2 * len(self.model.inputs)
+        signals = tuple(InputSignal(u[i], u[i + 1]) for i in range(0, own, 2))
+        fundamental = Fundamental(u[own], u[own + 1]) if u.shape[0] > own else None
+        return self.model.drive(signals, fundamental)
 
     def _values(self, p: Array) -> dict[str, Array]:
         return dict(zip(self.parameters, jnp.unstack(p), strict=True))
 
 
-def _motion(x: Array, y: Array) -> Motion:
-    return Motion(Coordinates(x[0], x[1]), Coordinates(x[2], x[3]), Coordinates(y[0], y[1]))
-
-
-def _inputs(u: Array) -> Inputs:
-    cam = Cam(u[4], u[5]) if u.shape[0] > len(INPUTS) else None
-    return Inputs(Road(u[0], u[1]), Link(u[2], u[3]), cam)
-
-
-def equations_of(rig: Rig, effects: tuple[str, ...]) -> Equations:
-    """The equations of a rig with the named effects."""
-    model = build_model(rig, effects)
-    states = tuple(
+def build_equations(model: AbstractPlant, parameters: Iterable[str]) -> Equations:
+    """The equations of a plant with its effects; ``parameters`` are the names of all numbers that it takes."""
+    coordinates = [Signal(each.name, each.unit, each.about) for each in model.coordinates]
+    rates = [
+        Signal(f"{each.name}_dot", f"{each.unit}/s", f"rate of: {each.about}") for each in model.coordinates
+    ]
+    states = [
         Signal(f"state_{place}_{state.name}", state.unit, f"internal state: {state.name}")
         for place, state in enumerate(model.states)
+    ]
+    inputs: list[Signal] = []
+    for each in model.inputs:
+        inputs.append(Signal(each.name, each.unit, each.details or each.about))
+        rate = each.rate_name or f"{each.name}_rate"
+        inputs.append(Signal(rate, f"{each.unit}/s", f"rate of: {each.details or each.about}"))
+    if any(isinstance(effect.law, AbstractInputLaw) for effect in model.effects):
+        inputs += FUNDAMENTAL_INPUTS
+    readings = [
+        Signal(each.name, each.unit, f"{each.about}, as its sensor shows it but for dynamics")
+        for each in model.channels
+    ]
+    beside = [Signal(each.name, each.unit, each.about) for each in model.outputs]
+    return Equations(
+        model,
+        tuple(parameters),
+        (*coordinates, *rates, *states),
+        tuple(inputs),
+        (*readings, *beside),
     )
-    follows = any(isinstance(effect, AbstractRoadFault) for effect in model.effects)
-    inputs = (*INPUTS, *CAM_INPUTS) if follows else INPUTS
-    return Equations(model, tuple(model_parameters(rig, effects)), (*COORDINATES, *states), inputs)

@@ -1,46 +1,81 @@
-"""FMU: model exchange after FMI 3.0, compiled here, for any simulator that knows the standard.
+"""FMU: model exchange after FMI 3.0, compiled here, for any simulator that implements the standard.
 
 CasADi's DaeBuilder writes the C code from the same functions as the other exports. Every parameter is tunable, every
-variable has its unit and description; a simulation begins at rest. The headers of the standard come with FMPy, which
-is installed by the extra ``fmu``.
+variable has its unit and description; a simulation starts at rest. The headers of the standard come with FMPy, which
+is installed by the extra ``fmu``. FMI defines units by exponents of the SI's base units:
+
+>>> base_units("N s/m")
+{'kg': 1, 's': -1}
 """
 
 import contextlib
+import re
 import xml.etree.ElementTree as ET
+from collections import Counter
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from types import MappingProxyType
 
 import casadi as ca
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import scratch_folder, write_bytes
-from savgs_ident.export.casadi_functions import casadi_functions
-from savgs_ident.export.exported_model import ExportedModel
-from savgs_ident.export.fmi_units import base_units
+from savgs_ident.export.exported_model import ExportedModel, casadi_functions, resting_inputs, resting_state
 from savgs_ident.export.json_export import write_json
-from savgs_ident.export.signals import resting_inputs, resting_state
+
+BASE = ("kg", "m", "s", "A", "rad")
+"""Base units of FMI that a rig uses."""
+
+_DERIVED: Mapping[str, Mapping[str, int]] = MappingProxyType(
+    {
+        "N": {"kg": 1, "m": 1, "s": -2},
+        "Pa": {"kg": 1, "m": -1, "s": -2},
+        "J": {"kg": 1, "m": 2, "s": -2},
+        "W": {"kg": 1, "m": 2, "s": -3},
+        "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
+        "ohm": {"kg": 1, "m": 2, "s": -3, "A": -2},
+        "H": {"kg": 1, "m": 2, "s": -2, "A": -2},
+        "Wb": {"kg": 1, "m": 2, "s": -2, "A": -1},
+        "Hz": {"s": -1},
+    }
+)
+
+_PART = re.compile(r"([A-Za-z]+)(?:\^(\d+))?")
+
+
+def base_units(unit: str) -> dict[str, int]:
+    """Exponents of the base units in a unit of a rig file; empty for "1". An unknown unit is a KeyError."""
+    total: Counter[str] = Counter()
+    above, _, below = unit.partition("/")
+    for side, sign in ((above, 1), (below, -1)):
+        for symbol, power in _PART.findall(side):
+            parts = {symbol: 1} if symbol in BASE else _DERIVED[symbol]
+            for base, exponent in parts.items():
+                total[base] += sign * exponent * int(power or 1)
+    return {base: total[base] for base in BASE if total[base]}
+
 
 NAME = "savgs_rig"
 """The model identifier."""
 
 EXTRA = "extra/savgs_ident"
-"""Where in the archive model.json stands, with the covariance, the draws and the diagnosis."""
+"""The folder of model.json in the archive, with the covariance, the draws and the diagnosis."""
 
 _DESCRIPTION = "modelDescription.xml"
 
 
 def write_fmu(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
-    """Write savgs_rig.fmu, for the platform on which this runs.
+    """Write savgs_rig.fmu, for the platform of this machine.
 
-    Raises :class:`InputError` without FMPy, without a C compiler, or if the rig finds no rest.
+    Raises :class:`InputError` without FMPy, without a C compiler, or if the rig has no static equilibrium.
     """
     headers, starts = _headers(), _starts(model)
     builder = _builder(model, starts)
     with scratch_folder() as scratch, contextlib.chdir(scratch):
         files = builder.export_fmu({"no_warning": True})
         _conform(Path(_DESCRIPTION), starts)
-        (knowledge,) = write_json(model, Path())
+        (document,) = write_json(model, Path())
         try:
             compiled = builder.compile_fmu(files, {"include_dirs": [str(headers)]})
         except RuntimeError as error:
@@ -48,7 +83,7 @@ def write_fmu(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
                 "the FMU could not be compiled", source="--to fmu", remedy="install a C compiler (gcc)"
             ) from error
         packed = Path(
-            builder.pack_fmu({**compiled, knowledge.name: f"{EXTRA}/{knowledge.name}"}, {})
+            builder.pack_fmu({**compiled, document.name: f"{EXTRA}/{document.name}"}, {})
         ).read_bytes()
     return (write_bytes(folder / f"{NAME}.fmu", packed),)
 
@@ -96,7 +131,7 @@ def _builder(model: ExportedModel, starts: Mapping[str, float]) -> ca.DaeBuilder
 
 
 def _starts(model: ExportedModel) -> dict[str, float]:
-    """Values at the start by name: the parameters, and the rig at rest."""
+    """Start values by name: the parameters, and the rig at rest."""
     equations, starts = model.equations, model.table.as_dict()
     for signals, values in (
         (equations.inputs, resting_inputs(model)),
@@ -107,10 +142,10 @@ def _starts(model: ExportedModel) -> dict[str, float]:
 
 
 def _conform(description: Path, starts: Mapping[str, float]) -> None:
-    """What the standard wants beyond what DaeBuilder writes.
+    """Add what the standard requires and DaeBuilder does not write.
 
-    Units are defined before the variables; names are free text, for DaeBuilder makes some that are no structured
-    names. And values at the start keep all their digits, where it writes six.
+    Units are defined before the variables; names are declared as flat, because DaeBuilder generates some that are not
+    structured names. Start values keep all their digits, where it writes six.
     """
     tree = ET.parse(description)
     root = tree.getroot()

@@ -1,30 +1,59 @@
-"""What is known about a model, brought together before it is exported.
+"""Collect what is known about a model before it is exported: rig file, posterior, diagnosis.
 
-Rig file, posterior and diagnosis may come from different runs. What they say of each other is checked here, and told:
-``said`` are sentences on where the numbers come from, ``doubts`` on why they are not to be trusted.
+The three may come from different runs. What they say about each other is checked here and reported: ``said`` are
+sentences on the origin of the numbers, ``doubts`` are reasons not to trust them.
+
+A diagnosis is the ``diagnosis.json`` that ``savgs-ident diagnose`` wrote. What an export needs of it is checked
+when it is read; the rest is carried along unchanged. Effects that its verdict names are added to the model,
+together with all numbers of the fit in which they were found: numbers that were fitted without an effect
+compensate for its absence (a soft tyre for a soft mount) and do not belong to the model with it. So
+``identified`` of the diagnosis replaces the numbers of the rig file, and the covariance of the earlier fit is
+dropped. Something unknown is added as the force that was learned at its port. Where no force could be learned,
+the diagnosis is carried along as data and the model is not changed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import EFFECTS
-from savgs_ident.export.diagnosed import TOLD, Diagnosed, listed, with_diagnosis
+from savgs_ident.core.errors import InputError
+from savgs_ident.effects.base import AbstractSensorLaw
+from savgs_ident.export.document import JsonValue, read_document
 from savgs_ident.export.exported_model import ExportedModel
-from savgs_ident.model.effect import AbstractSensorFault
-from savgs_ident.posterior.draws import FAR, Draws, far_from_draws, read_draws, thin_draws
+from savgs_ident.inference.draws import (
+    FAR,
+    Draws,
+    DrawSource,
+    far_from_draws,
+    read_draws,
+    source_name,
+    thin_draws,
+)
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, EFFECTS, LEARNED, model_parameters
+from savgs_ident.plants.quarter_car.rig import Rig
+
+DIAGNOSIS_SCHEMA = 1
+"""The schema of the diagnoses that can be read."""
+VERDICT_KINDS = ("none", "effect", "several", "unknown")
+"""The kinds of verdicts."""
+DIAGNOSIS_REMEDY = "give the diagnosis.json that `savgs-ident diagnose` wrote"
+_DIAGNOSIS_KEYS = ("schema", "baseline", "verdict", "where", "which", "shrink", "next_test")
+_VERDICT_KEYS = ("kind", "effects", "ports", "confusable_with", "sentence")
+LISTED = 6
+"""Most numbers that a sentence lists."""
+_OF_THE_FIT = ("covariance",)
 
 
 @dataclass(frozen=True)
 class Gathered:
-    """A model on its way out, with what a reader must know about it.
+    """A model to be exported, with what a reader must know about it.
 
     Attributes:
         model: the model.
-        said: where its numbers come from, a sentence each.
-        doubts: why it is not to be trusted, a sentence each; none if it is.
+        said: the origin of its numbers, a sentence each.
+        doubts: reasons not to trust it, a sentence each; empty if there are none.
     """
 
     model: ExportedModel
@@ -32,16 +61,35 @@ class Gathered:
     doubts: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Diagnosed:
+    """A model after a diagnosis.
+
+    Attributes:
+        rig: with the numbers of the diagnosis, where effects were added.
+        effects: all in the model.
+        added: those that the diagnosis added.
+        said: what was done, a sentence each, for reports and files.
+        taken: names of the parameters whose numbers come from the diagnosis.
+    """
+
+    rig: Rig
+    effects: tuple[str, ...]
+    added: tuple[str, ...]
+    said: tuple[str, ...]
+    taken: tuple[str, ...] = ()
+
+
 def gather(
     rig: Rig,
     effects: tuple[str, ...],
     diagnosis: Mapping[str, object] = MappingProxyType({}),
-    posterior: Path | None = None,
+    posterior: DrawSource | None = None,
     count: int | None = None,
 ) -> Gathered:
     """The model of a rig with ``effects``, what a ``diagnosis`` adds to it, and ``count`` draws of its posterior.
 
-    Sentences and doubts stand in the provenance of the model's rig, too, as ``notes``, so that they travel along.
+    The sentences are also the ``notes`` in the provenance of the model's rig, so that they are part of the files.
     Raises :class:`InputError` for a diagnosis of another model or draws that cannot be used.
     """
     found = with_diagnosis(rig, effects, diagnosis) if diagnosis else Diagnosed(rig, effects, (), ())
@@ -71,11 +119,11 @@ def _other_model(rig: Rig, effects: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _sensors(model: ExportedModel) -> tuple[str, ...]:
-    """What the equations leave out of the readings."""
+    """The sensor effects that the equations leave out."""
     return tuple(
         f"{name} is an error of a sensor, not of the rig: the outputs of the equations are without it."
         for name in model.effects
-        if isinstance(EFFECTS[name], AbstractSensorFault)
+        if isinstance(EFFECTS[name].law, AbstractSensorLaw)
     )
 
 
@@ -89,14 +137,17 @@ def _doubts_of_fit(rig: Rig, found: Diagnosed) -> tuple[str, ...]:
     doubt = f"The rig file's own fit is not to be trusted ({rig.provenance.get('status', 'no status')})"
     if not found.added:
         return (f"{doubt}.",)
-    names = f" ({', '.join(left[:TOLD])}{', ...' if len(left) > TOLD else ''})" if left else ""
+    names = f" ({', '.join(left[:LISTED])}{', ...' if len(left) > LISTED else ''})" if left else ""
     return (f"{doubt}, and some of its numbers{names} are in the model still: the diagnosis has no others.",)
 
 
 def _moved_by_fit(rig: Rig) -> tuple[str, ...]:
-    """Names of the parameters that the fit of the rig file moved, tolerances included, as far as the file says."""
-    told = (rig.provenance.get(name) for name in ("free", "before"))
-    names = [str(name) for each in told if isinstance(each, list | tuple | Mapping) for name in each]
+    """Names of the parameters that the fit of the rig file moved, as far as the file records them.
+
+    Those that were held by a tolerance are included.
+    """
+    recorded = (rig.provenance.get(name) for name in ("free", "before"))
+    names = [str(name) for each in recorded if isinstance(each, list | tuple | Mapping) for name in each]
     return tuple(dict.fromkeys(names))
 
 
@@ -105,7 +156,7 @@ def _doubts_of_diagnosis(document: Mapping[str, object]) -> tuple[str, ...]:
 
 
 def _doubts_of_draws(
-    model: ExportedModel, draws: Mapping[str, Draws], added: tuple[str, ...], path: Path
+    model: ExportedModel, draws: Mapping[str, Draws], added: tuple[str, ...], path: DrawSource
 ) -> list[str]:
     """Whether the draws, all of them, are those of this model."""
     own = [entry.name for name in added for entry in EFFECTS[name].parameters]
@@ -113,13 +164,196 @@ def _doubts_of_draws(
     doubts = []
     if lacking:
         doubts.append(
-            f"{path} is the posterior of a model without {' and '.join(added)}: it has no draws of "
+            f"{source_name(path)} is the posterior of a model without {' and '.join(added)}: it has no draws of "
             f"{', '.join(lacking)}, and its other draws are not those of the exported model."
         )
     far = far_from_draws(model.table.as_dict(), draws)
     if far:
         doubts.append(
-            f"{path} lies elsewhere than the model: {', '.join(far[:4])} {'is' if len(far) == 1 else 'are'} more "
-            f"than {FAR:g} standard deviations off its draws."
+            f"{source_name(path)} lies elsewhere than the model: {', '.join(far[:4])}"
+            f" {'is' if len(far) == 1 else 'are'} more than {FAR:g} standard deviations off its draws."
         )
     return doubts
+
+
+def with_diagnosis(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> Diagnosed:
+    """The model of ``effects`` with what the diagnosis names; see the module.
+
+    ``diagnosis`` is the document of :func:`read_diagnosis`. Raises
+    :class:`InputError` if it is one of another model, or lacks a number that its effects need.
+    """
+    verdict = diagnosis["verdict"]
+    if verdict["kind"] == "none":
+        said = "The diagnosis finds nothing missing: the numbers are those of the rig file."
+        return Diagnosed(rig, effects, (), (said,))
+    if verdict["kind"] == "unknown":
+        return _with_unknown(rig, effects, diagnosis)
+    named = tuple(verdict["effects"])
+    added = tuple(name for name in named if name not in effects)
+    if not added:
+        said = f"{listed(named)}, named by the diagnosis, is in the model already: the numbers are the rig file's."
+        return Diagnosed(rig, effects, (), (said,))
+    fitted = _fitted(frozenset(named), diagnosis["which"])
+    return _with_effects(rig, effects, added, diagnosis, fitted, diagnosis.get("identified", {}))
+
+
+def _with_unknown(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> Diagnosed:
+    """The model with the force that was learned for something unknown, if one was."""
+    ports, learned = diagnosis["verdict"]["ports"], diagnosis.get("learned")
+    if learned is None:
+        said = (
+            f"The diagnosis finds something that the catalogue does not have (at {', '.join(ports) or 'no port'}) and"
+            " that no force there explains: it travels along as data, the equations are without it and the numbers"
+            " those of the rig file."
+        )
+        return Diagnosed(rig, effects, (), (said,))
+    if learned["effect"] in effects:
+        return Diagnosed(
+            rig, effects, (), (f"{learned['effect']}, learned before, is in the model already.",)
+        )
+    fitted = {name: float(entry["value"]) for name, entry in learned["parameters"].items()}
+    found = _with_effects(rig, effects, (learned["effect"],), diagnosis, fitted, learned["identified"])
+    held = "It is held at the edge of the motion in the campaign: beyond, it is a guess."
+    return replace(found, said=(*found.said, held))
+
+
+def _with_effects(
+    rig: Rig,
+    effects: tuple[str, ...],
+    added: tuple[str, ...],
+    diagnosis: Mapping[str, Any],
+    fitted: Mapping[str, float],
+    identified: Mapping[str, float],
+) -> Diagnosed:
+    """The model with ``added`` effects: their own numbers ``fitted``, and all ``identified`` along with them [SI]."""
+    _check_baseline(effects, diagnosis)
+    whole = (*effects, *added)
+    values = {**identified, **fitted}
+    for name in (each.name for effect in added for each in EFFECTS[effect].parameters):
+        if name not in values and name not in rig.parameters:
+            raise InputError(f"gives no value for '{name}', a parameter of what it names")
+    table = model_parameters(rig, whole).with_values(values)
+    own = [name for name in values if name not in fitted]
+    said = [
+        f"{listed(added)} joins the model as the diagnosis found it: "
+        + ", ".join(
+            f"{name} = {value:.6g} {table[name].unit}" for name, value in list(fitted.items())[:LISTED]
+        )
+        + (f", and {len(fitted) - LISTED} more." if len(fitted) > LISTED else ".")
+    ]
+    if own:
+        said.append(
+            f"{len(own)} more numbers ({', '.join(own[:4])}, ...) are those that the diagnosis fitted along with it; "
+            "all others are those of the rig file."
+        )
+    else:
+        said.append(
+            "The diagnosis does not say what else it fitted: all other numbers are those of the rig file."
+        )
+    if "covariance" in rig.provenance:
+        said.append("The covariance of the rig file is of the fit without it and is left out.")
+    identified_rig = Rig(
+        rig.name, table, rig.damper_velocity, rig.damper_force, _provenance(rig, whole, diagnosis)
+    )
+    return Diagnosed(identified_rig, whole, added, tuple(said), tuple(values))
+
+
+def _fitted(effects: frozenset[str], candidates: list[Mapping[str, Any]]) -> dict[str, float]:
+    """The parameters of the hypothesis that the verdict names."""
+    for each in candidates:
+        names = each.get("effects") or each["effect"].split(" + ")
+        if frozenset(names) == effects and each["parameters"]:
+            return {name: float(entry["value"]) for name, entry in each["parameters"].items()}
+    raise InputError(f"holds no fitted parameters of {listed(sorted(effects))}")
+
+
+def _check_baseline(effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> None:
+    baseline = diagnosis["baseline"].get("effects")
+    if baseline is not None and set(baseline) != set(effects):
+        raise InputError(
+            f"is of a model with {listed(baseline) or 'no friction'}, not of one with"
+            f" {listed(effects) or 'no friction'}",
+            remedy="export the rig file that was diagnosed, or choose its model with --model",
+        )
+
+
+def _provenance(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> dict[str, object]:
+    """The origin of the numbers: the diagnosis, and the provenance of the earlier fit."""
+    origin = diagnosis.get("provenance", {})
+    found: dict[str, object] = {"effects": list(effects), "from": "diagnosis"}
+    found |= {name: origin[name] for name in ("data", "data_sha256", "model", "versions") if name in origin}
+    before = {name: value for name, value in rig.provenance.items() if name not in _OF_THE_FIT}
+    return found | ({"fit_before": before} if before else {})
+
+
+def listed(names: Iterable[object]) -> str:
+    """Names in a sentence."""
+    return " and ".join(map(str, names))
+
+
+def read_diagnosis(path: Path) -> dict[str, object]:
+    """The whole document. Raises :class:`InputError` for a file that cannot be read or is no diagnosis."""
+    return read_document(path, DIAGNOSIS_REMEDY, parse_diagnosis)
+
+
+def parse_diagnosis(place: JsonValue) -> dict[str, object]:
+    """The document at a place. Raises :class:`InputError` for what is no diagnosis."""
+    fields = place.table(_DIAGNOSIS_KEYS, free=True)
+    schema = fields["schema"]
+    if schema.value != DIAGNOSIS_SCHEMA or isinstance(schema.value, bool):
+        raise schema.wrong(f"the schema {DIAGNOSIS_SCHEMA}")
+    baseline = fields["baseline"].table(("model", "parameters"), free=True)
+    baseline["model"].text()
+    _numbers(baseline["parameters"])
+    if "effects" in baseline:
+        baseline["effects"].names(tuple(EFFECTS))
+    _check_verdict(fields["verdict"])
+    for candidate in fields["which"].items():
+        _check_candidate(candidate)
+    if "identified" in fields:
+        _numbers(fields["identified"])
+    if "learned" in fields and fields["learned"].value is not None:
+        _check_learned(fields["learned"])
+    if "converged" in fields and not isinstance(fields["converged"].value, bool):
+        raise fields["converged"].wrong("true or false")
+    if "provenance" in fields:
+        fields["provenance"].entries()
+    return dict(_as_table(place))
+
+
+def _check_verdict(place: JsonValue) -> None:
+    fields = place.table(_VERDICT_KEYS, free=True)
+    kind = fields["kind"].text(VERDICT_KINDS)
+    named = fields["effects"].names(tuple(CATALOGUE))
+    if (kind in ("effect", "several")) != bool(named):
+        raise fields["effects"].wrong(f"what belongs to a verdict of the kind '{kind}'")
+    fields["ports"].names()
+    fields["confusable_with"].names()
+    fields["sentence"].text()
+    if "confusable_ports" in fields:
+        fields["confusable_ports"].names()
+    if "another_law" in fields and not isinstance(fields["another_law"].value, bool):
+        raise fields["another_law"].wrong("true or false")
+
+
+def _check_candidate(place: JsonValue) -> None:
+    fields = place.table(("effect", "parameters"), free=True)
+    fields["effect"].text()
+    for entry in fields["parameters"].entries().values():
+        entry.table(("value", "unit"), free=True)["value"].number()
+
+
+def _check_learned(place: JsonValue) -> None:
+    fields = place.table(("effect", "parameters", "identified"), free=True)
+    fields["effect"].text(tuple(LEARNED))
+    for entry in fields["parameters"].entries().values():
+        entry.table(("value", "unit"), free=True)["value"].number()
+    _numbers(fields["identified"])
+
+
+def _numbers(place: JsonValue) -> dict[str, float]:
+    return {name: entry.number() for name, entry in place.entries().items()}
+
+
+def _as_table(place: JsonValue) -> Mapping[str, object]:
+    return {name: entry.value for name, entry in place.entries().items()}

@@ -5,7 +5,7 @@
     model.parameters.k_t.value                          % SI, the unit beside it
     model.frequency_responses.exact(1, 1, :)            % outputs x inputs x frequencies
 
-Nested texts (a diagnosis, the provenance) are JSON: jsondecode(model.diagnosis).
+Nested records (a diagnosis, the provenance) are JSON: jsondecode(model.diagnosis).
 """
 
 import io
@@ -17,18 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import savemat
 
-from savgs_ident.control.first_harmonic import first_harmonic, motions_on_cam
+from savgs_ident.control.describing_function import first_harmonic, motions_on_cam
 from savgs_ident.control.linear_study import CHANNELS, FREQUENCY, TEST_FREQUENCY
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import write_bytes
+from savgs_ident.core.values import as_values
+from savgs_ident.export.document import as_plain, json_text
 from savgs_ident.export.exported_model import ExportedModel
-from savgs_ident.export.json_text import as_plain, json_text
+from savgs_ident.export.json_export import covariance_record, provenance_record
 from savgs_ident.export.linear_models import LinearModel, linear_models
-from savgs_ident.export.rig_document import covariance_record, provenance_record
-from savgs_ident.model.values import as_values
 
 NAME = "model.mat"
-"""The file."""
+"""The name of the file."""
 
 LONGEST_NAME = 63
 """Characters of a name in MATLAB."""
@@ -39,7 +39,7 @@ KEYWORDS = frozenset(
         "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
     }
 )  # fmt: skip
-"""Names that MATLAB keeps for itself."""
+"""Reserved words of MATLAB."""
 
 _HEAD = b"MATLAB 5.0 MAT-file, written by savgs_ident"
 _HEAD_BYTES = 116
@@ -48,12 +48,12 @@ _HEAD_BYTES = 116
 def write_mat(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
     """Write model.mat.
 
-    Raises :class:`InputError` if it cannot be written, a parameter's name is none to MATLAB, or the rig finds no rest
-    or no motion on the cam.
+    Raises :class:`InputError` if it cannot be written, a parameter's name is invalid in MATLAB, or the rig has no
+    static equilibrium or no motion on the cam.
     """
     stream = io.BytesIO()
     savemat(stream, mat_record(model), long_field_names=True, do_compression=True, oned_as="column")
-    # Its own head says when it was written: the same model is to give the same bytes.
+    # SciPy's header contains the date; the same model must give the same bytes.
     content = _HEAD.ljust(_HEAD_BYTES) + stream.getvalue()[_HEAD_BYTES:]
     return (write_bytes(folder / NAME, content),)
 
@@ -61,7 +61,7 @@ def write_mat(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
 def mat_record(model: ExportedModel) -> dict[str, object]:
     """The variables of the file: numbers as arrays, lists of names as cells."""
     rig, equations = model.rig, model.equations
-    covariance_record(model)  # Refuses what is none.
+    covariance_record(model)  # Raises for an invalid one.
     names, covariance = model.covariance
     parameters = {
         _field(entry.name): {"value": entry.value, "unit": entry.unit, "about": entry.about}
@@ -94,7 +94,7 @@ def mat_record(model: ExportedModel) -> dict[str, object]:
 
 def _on_cam(model: ExportedModel) -> dict[str, object]:
     """First harmonics of the nonlinear rig on the cam of the test, per metre of road, all effects included."""
-    nonlinear, p = model.equations.model, as_values(model.table.as_dict())
+    nonlinear, p = model.plant, as_values(model.table.as_dict())
     cam = model.table["cam_peak_to_peak"].value
     motions = motions_on_cam(nonlinear, p, TEST_FREQUENCY, cam)
     return {
@@ -122,7 +122,7 @@ def _space(linear: LinearModel) -> dict[str, object]:
 
 
 def _field(name: str) -> str:
-    """The name itself, if MATLAB can have it."""
+    """The name, if it is valid in MATLAB."""
     usual = name.isascii() and name.isidentifier() and not name.startswith("_")
     if usual and len(name) <= LONGEST_NAME and name not in KEYWORDS:
         return name

@@ -20,22 +20,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.document import JsonValue, read_document, write_json_text
+from savgs_ident.export.exported_model import ExportedModel, resting_inputs, resting_state
 from savgs_ident.export.json_export import model_record, parse_model
-from savgs_ident.export.json_text import write_json_text
-from savgs_ident.export.linear_models import LINEAR, linear_models
-from savgs_ident.export.place import Place, read_document
-from savgs_ident.export.signals import resting_inputs, resting_state
-from savgs_ident.export.state_space_document import parse_space, space_record
+from savgs_ident.export.linear_models import LINEAR, linear_models, parse_space, space_record
 
 SCHEMA = 1
-"""The number of the form; a file with another one is refused."""
+"""The version of the file; another one is refused."""
 
 KIND = "savgs_ident python-control"
-"""What says that a file is one of these."""
+"""Identifies the file."""
 
 NAME = "model-control.json"
-"""The file."""
+"""The name of the file."""
 
 NONLINEAR = "nonlinear"
 """The name of the system with all effects."""
@@ -51,7 +48,7 @@ Vector = NDArray[np.float64]
 def write_python_control(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
     """Write model-control.json.
 
-    Raises :class:`InputError` if it cannot be written, or the rig finds no rest.
+    Raises :class:`InputError` if it cannot be written, or the rig has no static equilibrium.
     """
     record = {
         "schema": SCHEMA,
@@ -66,13 +63,13 @@ def write_python_control(model: ExportedModel, folder: Path) -> tuple[Path, ...]
 def load_python_control(path: str | Path) -> dict[str, System]:
     """The systems by name, signals named: those in the file's ``state_spaces``, and ``nonlinear``.
 
-    Raises :class:`InputError`, with file, place and remedy, for what is no such file.
+    Raises :class:`InputError`, with file, place and remedy, for any other file.
     """
     return read_document(Path(path), REMEDY, _systems)
 
 
 def resting_point(path: str | Path) -> tuple[Vector, Vector]:
-    """States and inputs of ``nonlinear`` at rest, the link at its nominal angle: where a simulation begins.
+    """States and inputs of ``nonlinear`` at rest, the link at its nominal angle: the initial state of a simulation.
 
     Raises as :func:`load_python_control` does. States are (n,), inputs (k,), both SI.
     """
@@ -107,7 +104,7 @@ def nonlinear_system(model: ExportedModel) -> control.NonlinearIOSystem:
     )
 
 
-def _systems(document: Place) -> dict[str, System]:
+def _systems(document: JsonValue) -> dict[str, System]:
     fields = _fields(document)
     systems: dict[str, System] = {
         name: parse_space(place, name) for name, place in fields["state_spaces"].table(LINEAR).items()
@@ -115,7 +112,7 @@ def _systems(document: Place) -> dict[str, System]:
     return systems | {NONLINEAR: nonlinear_system(parse_model(fields["model"]))}
 
 
-def _fields(document: Place) -> dict[str, Place]:
+def _fields(document: JsonValue) -> dict[str, JsonValue]:
     fields = document.table(_KEYS)
     if fields["kind"].value != KIND:
         raise fields["kind"].wrong(f"'{KIND}'")
@@ -124,8 +121,8 @@ def _fields(document: Place) -> dict[str, Place]:
     return fields
 
 
-def _at_rest(fields: Mapping[str, Place]) -> tuple[Vector, Vector]:
+def _at_rest(fields: Mapping[str, JsonValue]) -> tuple[Vector, Vector]:
     equations, rest = parse_model(fields["model"]).equations, fields["at_rest"].table(("x", "u"))
-    (x,) = Place([rest["x"].value], rest["x"].where).matrix(1, len(equations.states))
-    (u,) = Place([rest["u"].value], rest["u"].where).matrix(1, len(equations.inputs))
+    (x,) = JsonValue([rest["x"].value], rest["x"].where).matrix(1, len(equations.states))
+    (u,) = JsonValue([rest["u"].value], rest["u"].where).matrix(1, len(equations.inputs))
     return x, u

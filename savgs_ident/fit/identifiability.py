@@ -1,16 +1,28 @@
-"""What the data can and cannot tell, in words.
+"""What a fit identifies: errors, what trades off, how low a parameter can go, which further test would help.
 
-Identified parameters live on logarithmic coordinates, so a direction that the data do not tell is a product of
-powers: (+1, +1) on (mu_t, ydot_Hth) means that both may grow together while their ratio stays. The verdict
-names such groups, says what is known instead, and how far down a parameter can go.
+Identified parameters without a tolerance live on logarithmic coordinates, so a direction that the data do not
+identify is a product of powers: (+1, +1) on (mu_t, ydot_Hth) means that both may grow together while their ratio
+stays. The verdict names such groups and says what is known instead. How low a parameter of such a group can go is
+its profile likelihood's to say: it is held while all others follow. Which dwell would help follows from the
+sensitivities of candidates, faster and slower dwells and other amplitudes with the noise of the dwells at hand,
+added to the information of the fit.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
+from savgs_ident.core.status import Status
+from savgs_ident.fit.minimise import Minimiser, Minimum, Progress, spread_of
 from savgs_ident.fit.result import Verdict
+from savgs_ident.inference.problem import Pins, Problem, Task
+from savgs_ident.plants.base import Excitation
+from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 
 TOLD = 0.25
 """A free parameter is told if its standard error is below this share of its value."""
@@ -94,3 +106,230 @@ def _about_group(
             unit = f"{units[pair[0]]}/({units[pair[1]]})" if "/" in label else "(SI)"
             sentences.append(f"What is known is {label} = {value:.4g} {unit}, to {100.0 * error:.2g} %.")
     return sentences
+
+
+PIN = 1e4
+"""Weight that holds a coordinate: it gives way by chi2-sensitivity / PIN^2."""
+
+STEPS = 6
+
+CHI2_95 = 3.841458820694124
+"""95 % point of chi2 with one degree of freedom."""
+
+
+class ProfilePoint(NamedTuple):
+    """chi2 (priors included) with the parameter held at ``value`` [its unit], all others refitted."""
+
+    value: float
+    chi2: float
+    status: Status
+
+
+class Profile(NamedTuple):
+    """The profile likelihood of a parameter: its points by growing value, and the least chi2 known."""
+
+    name: str
+    points: tuple[ProfilePoint, ...]
+    best: float
+
+
+def held_at(
+    minimiser: Minimiser, start: Minimum, name: str, coordinate: float, progress: Progress
+) -> Minimum:
+    """Refit everything with one parameter's unconstrained coordinate [1] held."""
+    place = minimiser.problem.free.names.index(name)
+    blank = jnp.zeros_like(start.u)
+    pins = Pins(blank.at[place].set(PIN), blank.at[place].set(coordinate))
+    moved = start.u.at[place].set(coordinate)
+    return minimiser.minimise(moved, start.solution, STEPS, progress, pins)
+
+
+def profile_likelihood(
+    minimiser: Minimiser,
+    best: Minimum,
+    name: str,
+    coordinates: Float[Array, " k"] | NDArray[np.float64],
+    progress: Progress,
+) -> Profile:
+    """The profile of ``name`` at unconstrained ``coordinates`` [1], (k,), each refitted from its neighbour.
+
+    Starts from the best fit outwards in both directions, so that warm starts stay close.
+    """
+    problem, place = minimiser.problem, minimiser.problem.free.names.index(name)
+    middle = float(best.u[place])
+    points = []
+    for side in (-1.0, 1.0):
+        at = best
+        outward = [c for c in map(float, coordinates) if side * (c - middle) >= 0.0]
+        for coordinate in sorted(outward, key=lambda c: abs(c - middle)):
+            at = held_at(minimiser, at, name, coordinate, progress)
+            value = float(problem.parameters(at.u)[name])
+            points.append(ProfilePoint(value, at.cost, at.status))
+    return Profile(name, tuple(sorted(set(points))), best.cost)
+
+
+def lower_bound(minimiser: Minimiser, best: Minimum, name: str, progress: Progress) -> float | None:
+    """The smallest value of a parameter within the 95 % region of its profile; None if there is none.
+
+    Halves outward from the best fit until chi2 has risen by :data:`CHI2_95`, then bisects to 3 %.
+    """
+    problem, place = minimiser.problem, minimiser.problem.free.names.index(name)
+
+    def rise(at: Minimum, coordinate: float) -> tuple[Minimum, float]:
+        found = held_at(minimiser, at, name, coordinate, progress)
+        return found, found.cost - best.cost
+
+    inside, at = float(best.u[place]), best
+    for _ in range(8):
+        trial, gain = rise(at, inside - np.log(1.5))
+        if not np.isfinite(gain) or gain > CHI2_95:
+            break
+        inside, at = inside - np.log(1.5), trial
+    else:
+        return None
+    outside = inside - np.log(1.5)
+    while inside - outside > 0.03:
+        middle = 0.5 * (inside + outside)
+        trial, gain = rise(at, middle)
+        if np.isfinite(gain) and gain <= CHI2_95:
+            inside, at = middle, trial
+        else:
+            outside = middle
+    return float(problem.parameters(at.u)[name])
+
+
+class Candidate(NamedTuple):
+    """A family of dwells: what it is in words, and what drives the plant in each."""
+
+    label: str
+    excitation: Excitation
+
+
+class Proposal(NamedTuple):
+    """A dwell that would help: in words, and the worst standard error of the free logarithms with it [1]."""
+
+    test: str
+    worst_sd: float
+
+
+def candidates(excitation: Excitation, driven: str) -> tuple[Candidate, ...]:
+    """Families with as many dwells as were recorded: faster, slower, smaller and larger motions of one input."""
+    frequency = np.asarray(excitation.frequency)
+    count = frequency.size
+    faster = np.linspace(frequency.max(), 2.0 * frequency.max(), count + 1)[1:]
+    slower = np.linspace(0.4 * frequency.min(), frequency.min(), count + 1)[:-1]
+    families = [
+        Candidate("a faster dwell", _sine_in(driven, excitation, faster, 1.0)),
+        Candidate("a slower dwell", _sine_in(driven, excitation, slower, 1.0)),
+        Candidate("a dwell at 0.7 of the amplitude", _sine_in(driven, excitation, frequency, 0.7)),
+        Candidate("a dwell at 1.4 of the amplitude", _sine_in(driven, excitation, frequency, 1.4)),
+    ]
+    return tuple(families)
+
+
+def _sine_in(driven: str, excitation: Excitation, frequency: NDArray[np.float64], scale: float) -> Excitation:
+    """The recorded amplitudes of one input at other frequencies and sizes, with the others at rest."""
+
+    def moved(name: str, recorded: Array) -> Array:
+        still = jnp.zeros_like(recorded)
+        if name == driven:
+            return still.at[:, 1].set(scale * jnp.abs(recorded[:, 1]))
+        return still.at[:, 0].set(recorded[:, 0])
+
+    inputs = {name: moved(name, recorded) for name, recorded in excitation.harmonics.items()}
+    return Excitation(jnp.asarray(frequency), inputs)
+
+
+def propose_dwells(minimiser: Minimiser, best: Minimum, settings: PeriodicSettings) -> tuple[Proposal, ...]:
+    """The best dwell of every family that would tell all free parameters; empty if none would."""
+    free = len(minimiser.problem.free.identified)
+
+    def worst(jacobian: NDArray[np.float64]) -> float:
+        return float(spread_of(jacobian).sd[:free].max())
+
+    leaders = []
+    for candidate in candidates(best.solution.excitation, minimiser.problem.model.inputs[0].name):
+        proposals = _proposals(minimiser, best, candidate, settings, worst)
+        leader = min(proposals, key=lambda each: each.worst_sd, default=None)
+        if leader is not None and leader.worst_sd <= TOLD:
+            leaders.append(leader)
+    return tuple(leaders)
+
+
+def _proposals(
+    minimiser: Minimiser,
+    best: Minimum,
+    candidate: Candidate,
+    settings: PeriodicSettings,
+    worst: Callable[[NDArray[np.float64]], float],
+) -> list[Proposal]:
+    problem = minimiser.problem
+    p = problem.parameters(best.u)
+    layout = best.solution.mesh.layout
+    solution = simulate_periodic(problem.model, p, candidate.excitation, settings, layout)
+    found = minimiser.evaluate(best.u, solution)
+    dwells = candidate.excitation.frequency.size
+    priors = len(problem.free.names)
+    rows = found.jacobian[: found.jacobian.shape[0] - priors].reshape(dwells, -1, found.jacobian.shape[1])
+    proposals = []
+    for dwell, status in enumerate(solution.status()):
+        if status.ok and np.isfinite(rows[dwell]).all():
+            sd = worst(np.concatenate([best.jacobian, rows[dwell]]))
+            hertz = float(candidate.excitation.frequency[dwell])
+            proposals.append(Proposal(f"{candidate.label}, {hertz:.2g} Hz", sd))
+    return proposals
+
+
+EXPLAINED = 2.0
+"""chi2 per datum up to which the data count as explained."""
+
+
+def judge(task: Task, minimiser: Minimiser, best: Minimum, tell: Progress) -> Verdict:
+    """What the data tell about the free parameters at ``best``."""
+    problem, table = task.problem, task.table
+    names = problem.free.identified
+    values = {name: float(value) for name, value in problem.parameters(best.u).items()}
+    units = {name: table[name].unit for name in names}
+    if not np.isfinite(best.jacobian).all():
+        return Verdict(False, ("The fit broke down: nothing can be said about the parameters.",))
+    covariance = _log_covariance(problem, best, values)
+    bounds: dict[str, float] = {}
+    advice: tuple[str, ...] = ()
+    if np.sqrt(np.diag(covariance)).max() > TOLD:
+        for group in untold_groups(names, covariance):
+            name = group[-1]  # The others follow it along the line that they trade off along.
+            tell(f"looking for a lower bound of {name}")
+            bound = lower_bound(minimiser, best, name, tell)
+            bounds |= {} if bound is None else {name: bound}
+        tell("looking for a test that would help")
+        advice = advice_of(task, minimiser, best)
+    verdict = verdict_of(names, values, units, covariance, bounds, advice)
+    return replace(verdict, sentences=(*_misfit(problem, best), *verdict.sentences))
+
+
+def _misfit(problem: Problem, best: Minimum) -> tuple[str, ...]:
+    rows = best.residual[: best.residual.size - len(problem.free.names)]
+    excess = float(rows @ rows) / max(problem.target.entries - len(problem.free.identified), 1)
+    if excess <= EXPLAINED:
+        return ()
+    return (
+        f"The model does not explain these data: chi2/dof = {excess:.3g}. The parameters make up for what is "
+        "missing in it; their errors are those of the noise alone.",
+    )
+
+
+def advice_of(task: Task, minimiser: Minimiser, best: Minimum) -> tuple[str, ...]:
+    """In words, which further dwells would tell every free parameter; one sentence."""
+    proposals = propose_dwells(minimiser, best, task.settings.periodic)
+    if not proposals:
+        return ("No single further dwell that was considered would help.",)
+    tests = "; ".join(f"{each.test} (to {100.0 * each.worst_sd:.2g} %)" for each in proposals)
+    return (f"What would tell every free parameter: {tests}.",)
+
+
+def _log_covariance(problem: Problem, best: Minimum, values: dict[str, float]) -> np.ndarray:
+    """Covariance of the logarithms of the free parameters."""
+    count = len(problem.free.identified)
+    slope = np.asarray(problem.slopes(best.u))[:count]
+    scale = slope / np.array([values[name] for name in problem.free.identified])
+    return spread_of(best.jacobian).covariance[:count, :count] * np.outer(scale, scale)

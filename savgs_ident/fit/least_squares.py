@@ -1,32 +1,129 @@
 """The fit: from a measured response to identified parameters with their covariance.
 
-    fit = fit_least_squares(measured, rig, effects=MODELS["simtr"], free=FREE)
+    fit = fit_least_squares(measured, model, free=("mu_r", "mu_t", "ydot_Hth", "c_sd"))
     fit.by_name["mu_r"].value, fit.by_name["mu_r"].stderr
 
-The free parameters are told by the data alone; parameters known to a tolerance are estimated along under
-their priors. Each start is solved cold and minimised on its own time nodes; the best is minimised once more
-on nodes adapted to it.
+The free parameters are asked for; those known to a tolerance are estimated along. All have the transform and the
+prior of :mod:`savgs_ident.core.transforms`, of which only a tolerance is felt. Each start is solved cold and
+minimised on its own time nodes; the best is minimised once more on nodes adapted to it.
 """
 
 import time
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.fit.assemble import Outcome, assemble_fit
-from savgs_ident.fit.judge import EXPLAINED, judge
-from savgs_ident.fit.minimise import Minimiser, Minimum, Progress
-from savgs_ident.fit.result import Fit
-from savgs_ident.fit.settings import FitSettings
-from savgs_ident.fit.task import Task, plan_task
+from savgs_ident.core.values import as_values
+from savgs_ident.fit.identifiability import EXPLAINED, judge
+from savgs_ident.fit.minimise import Minimiser, Minimum, Progress, spread_of
+from savgs_ident.fit.result import Estimate, Fit, Verdict
+from savgs_ident.inference.problem import ProblemSettings, Quantity, Task, plan_task
+from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import adapt, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, adapt, simulate_periodic
 
-FREE = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
-"""The four parameters that the paper identifies."""
+
+@dataclass(frozen=True)
+class FitSettings:
+    """How to fit.
+
+    Attributes:
+        orders: highest harmonic order that is compared.
+        fixed_tolerances: take the parameters with a tolerance as exact instead of estimating them along.
+        quantity: compare complex harmonics, or peak-to-peak values only, as the paper did.
+        starts: most starting points of the optimisation; the model's values are the first, and further ones
+            are tried if that does not explain the data.
+        steps: most steps from one start.
+        periodic: how finely to solve the model.
+    """
+
+    orders: int = 9
+    fixed_tolerances: bool = False
+    quantity: Quantity = "harmonics"
+    starts: int = 3
+    steps: int = 40
+    periodic: PeriodicSettings = field(default_factory=PeriodicSettings)
+
+    @property
+    def problem(self) -> ProblemSettings:
+        """What is compared with what."""
+        return ProblemSettings(self.orders, self.fixed_tolerances, self.quantity, self.periodic)
+
+
+class Outcome(NamedTuple):
+    """Where a fit ended: the response ``as_given`` before it, every start, the best, what it tells.
+
+    ``as_given`` are complex harmonics [unit of the reading], (D, C, orders + 1).
+    """
+
+    as_given: np.ndarray
+    tried: tuple[Minimum, ...]
+    best: Minimum
+    verdict: Verdict
+    wall_s: float
+
+
+def assemble_fit(task: Task, outcome: Outcome) -> Fit:
+    """The whole, frozen result."""
+    problem, best = task.problem, outcome.best
+    estimates, covariance = _estimates(task, best)
+    rows = best.residual.size - len(problem.free.names)
+    p = problem.parameters(best.u)
+    values = {each.name: each.value for each in estimates}
+    return Fit(
+        estimated=task.model.with_values(values),
+        estimates=estimates,
+        covariance=covariance,
+        chi2=float(best.residual[:rows] @ best.residual[:rows]),
+        dof=problem.target.entries - len(problem.free.identified),
+        prior_chi2=float(best.residual[rows:] @ best.residual[rows:]),
+        status=best.status,
+        dwell_status=best.solution.status(),
+        verdict=outcome.verdict,
+        measured=task.measured,
+        orders=problem.orders,
+        used=np.array(problem.target.used),
+        predicted=np.array(harmonics(problem.model, p, best.solution, problem.orders)),
+        frictionless=_frictionless(task, best),
+        as_given=np.array(outcome.as_given),
+        starts=tuple((each.cost, each.status) for each in outcome.tried),
+        quantity=task.settings.quantity,
+        wall_s=outcome.wall_s,
+    )
+
+
+def _estimates(task: Task, best: Minimum) -> tuple[tuple[Estimate, ...], np.ndarray]:
+    problem = task.problem
+    values = problem.parameters(best.u)
+    slope = np.asarray(problem.slopes(best.u))
+    spread = spread_of(best.jacobian)
+    covariance = spread.covariance * np.outer(slope, slope)
+    widths, estimates = problem.free.widths, []
+    for place, name in enumerate(problem.free.names):
+        told = spread.sd[place] < INFORMED * widths[place] or name in problem.free.tolerated
+        stderr = float(np.sqrt(covariance[place, place])) if told else np.inf
+        free = name in problem.free.identified
+        known = task.table[name]
+        estimates.append(
+            Estimate(name, float(values[name]), stderr, known.unit, free, known.value, known.tolerance)
+        )
+    return tuple(estimates), covariance
+
+
+def _frictionless(task: Task, best: Minimum) -> np.ndarray:
+    """The same estimates with every effect at its null: the compiled model serves for the plant alone too."""
+    problem = task.problem
+    nulls = {name: value for effect in problem.model.effects for name, value in effect.null.items()}
+    p = dict(problem.parameters(best.u)) | as_values(nulls)
+    solution = simulate_periodic(problem.model, p, task.excitation, task.settings.periodic)
+    ok = np.array([status.ok for status in solution.status()])
+    response = np.asarray(harmonics(problem.model, p, solution, problem.orders))
+    return np.where(ok[:, None, None], response, np.nan)
+
 
 ROUGHLY = 0.05
 """Share of chi2 below which a step is not worth another before the nodes are adapted to the result."""
@@ -35,25 +132,29 @@ EXPLORING = 12
 """Most steps from a further start: enough to see whether it leads to a better minimum."""
 
 _SHIFT = 0.4
-"""Distance of further starts from the first in every free coordinate: about a factor of one and a half."""
+"""Distance of further starts from the first in every identified coordinate: about a factor of one and a half, or less
+than half a tolerance."""
+
+INFORMED = 0.5
+"""Share of its spread before the data below which an identified parameter has a standard error."""
 
 
 def fit_least_squares(
     measured: HarmonicResponse,
-    rig: Rig,
+    model: Model,
     *,
-    effects: tuple[str, ...],
     free: tuple[str, ...],
     settings: FitSettings | None = None,
     progress: Progress | None = None,
 ) -> Fit:
-    """Fit ``free`` parameters of a rig with ``effects`` to a measured response.
+    """Fit ``free`` parameters of a model to a measured response.
 
     ``progress`` is told what is going on. Raises :class:`InputError` for names that do not exist or that the
     model does not use, and for a response that cannot be used. Look at ``trusted`` of the result.
     """
     began, tell = time.perf_counter(), progress or _silent
-    task = plan_task(measured, rig, effects, free, settings or FitSettings())
+    settings = settings or FitSettings()
+    task = plan_task(measured, model, free, settings.problem)
     problem = task.problem
 
     tell("solving the model as given")
@@ -61,16 +162,16 @@ def fit_least_squares(
     as_given = np.asarray(harmonics(problem.model, problem.fixed, first, problem.orders))
     tell("preparing the fit")
     minimiser = Minimiser(problem)
-    first_u, *others = _starts(task)
-    tried = [minimiser.minimise(first_u, first, task.settings.steps, tell, enough=ROUGHLY)]
+    first_u, *others = _starts(task, settings.starts)
+    tried = [minimiser.minimise(first_u, first, settings.steps, tell, enough=ROUGHLY)]
     for u in others:
         if tried[0].status.ok and tried[0].cost < EXPLAINED * problem.target.entries:
             break
         tell("trying another start")
-        tried.append(_from_start(task, minimiser, u, tell))
+        tried.append(_from_start(task, minimiser, u, min(EXPLORING, settings.steps), tell))
     best = min(tried, key=lambda each: each.cost if np.isfinite(each.cost) else np.inf)
     tell("refining on nodes adapted to the result")
-    best = _refined(task, minimiser, best, tell)
+    best = _refined(task, minimiser, best, settings.steps, tell)
     verdict = judge(task, minimiser, best, tell)
     return assemble_fit(task, Outcome(as_given, tuple(tried), best, verdict, time.perf_counter() - began))
 
@@ -79,27 +180,27 @@ def _silent(line: str) -> None:
     del line
 
 
-def _starts(task: Task) -> list[Array]:
-    """The rig's values, then points to alternating sides of them in the free coordinates."""
+def _starts(task: Task, most: int) -> list[Array]:
+    """The model's values, then points to alternating sides of them in the free coordinates."""
     free = task.problem.free
     first = free.to_unconstrained(task.table.as_dict())
     count, starts = len(free.identified), [first]
-    for number in range(1, task.settings.starts):
+    for number in range(1, most):
         signs = [1.0 if (number >> (place % 4)) & 1 else -1.0 for place in range(count)]
         starts.append(first.at[:count].add(_SHIFT * jnp.asarray(signs)))
     return starts
 
 
-def _from_start(task: Task, minimiser: Minimiser, u: Array, tell: Progress) -> Minimum:
+def _from_start(task: Task, minimiser: Minimiser, u: Array, steps: int, tell: Progress) -> Minimum:
     p = task.problem.parameters(u)
     near = simulate_periodic(task.problem.model, p, task.excitation, task.settings.periodic)
-    return minimiser.minimise(u, near, min(EXPLORING, task.settings.steps), tell, enough=ROUGHLY)
+    return minimiser.minimise(u, near, steps, tell, enough=ROUGHLY)
 
 
-def _refined(task: Task, minimiser: Minimiser, best: Minimum, tell: Progress) -> Minimum:
+def _refined(task: Task, minimiser: Minimiser, best: Minimum, steps: int, tell: Progress) -> Minimum:
     if not np.isfinite(best.cost):
         return best
     p, layout = task.problem.parameters(best.u), best.solution.mesh.layout
     limit = task.settings.periodic.iterations
     near = adapt(task.problem.model, p, best.solution, layout, limit)
-    return minimiser.minimise(best.u, near, task.settings.steps, tell)
+    return minimiser.minimise(best.u, near, steps, tell)

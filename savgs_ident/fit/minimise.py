@@ -1,7 +1,10 @@
-"""Levenberg-Marquardt steps of optimistix, taken one by one.
+"""Levenberg-Marquardt steps of optimistix, taken one by one, and the covariance of where they lead.
 
-Taking the steps from Python costs nothing beside the model and lets each one be reported and interrupted. The
-problem is evaluated, residuals and Jacobian, before the optimiser is asked for its step.
+Taking the steps from Python costs nothing beside the model and lets each one be reported and interrupted. The problem
+is evaluated, residuals and Jacobian, before the optimiser is asked for its step.
+
+A direction of the coordinates along which the residuals do not change has no covariance. It is given a large one
+instead of a wrong one: the inverse information is capped at :data:`UNTOLD`, so that correlations stay meaningful.
 """
 
 from collections.abc import Callable
@@ -13,11 +16,12 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
+from numpy.typing import NDArray
 
 from savgs_ident.core.status import Status
-from savgs_ident.fit.problem import Evaluation, Linearised, Pins, Problem, evaluate, evaluate_beside
+from savgs_ident.inference.problem import Evaluation, Linearised, Pins, Problem, evaluate, evaluate_beside
 from savgs_ident.simulate.periodic import PeriodicSolution
-from savgs_ident.simulate.stored import placed
+from savgs_ident.simulate.program_cache import placed
 
 Progress = Callable[[str], None]
 """Is told what is going on, a line at a time."""
@@ -97,7 +101,7 @@ class Minimiser(eqx.Module):
         self.problem = problem
         self.solver = optx.LevenbergMarquardt(rtol=TOLERANCE, atol=TOLERANCE)
         count = len(problem.free.names)
-        self.blank = _blank(self.solver, problem.target.size + len(problem.free.tolerated) + count, count)
+        self.blank = _blank(self.solver, problem.target.size + 2 * count, count)
 
     def minimise(
         self,
@@ -145,3 +149,27 @@ def _minimum(found: Evaluation, status: Status) -> Minimum:
     u, residual, jacobian = found.at
     rows = residual.size - u.size
     return Minimum(u, np.asarray(residual)[:rows], np.asarray(jacobian)[:rows], found.solution, status)
+
+
+UNTOLD = 1e3
+"""Standard deviation given to an untold direction [1]: a thousand e-folds of an identified parameter."""
+
+
+class Spread(NamedTuple):
+    """Covariance (n, n) of the unconstrained coordinates [1]."""
+
+    covariance: NDArray[np.float64]
+
+    @property
+    def sd(self) -> NDArray[np.float64]:
+        """Standard deviations, (n,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def spread_of(jacobian: NDArray[np.float64]) -> Spread:
+    """The spread for residuals of unit variance with ``jacobian`` (m, n), priors among the rows."""
+    # Fewer residuals than coordinates leave directions untold; the thin decomposition would drop them.
+    missing = max(0, jacobian.shape[1] - jacobian.shape[0])
+    _, singular, axes = np.linalg.svd(np.pad(jacobian, ((0, missing), (0, 0))), full_matrices=False)
+    sd = 1.0 / np.maximum(singular, 1.0 / UNTOLD)
+    return Spread((axes.T * sd**2) @ axes)

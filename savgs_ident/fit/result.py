@@ -2,13 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.rig import Rig
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.files import spelled_out
+from savgs_ident.core.presentation import Result, package_versions
 from savgs_ident.core.status import Status
+from savgs_ident.plants.model import Model
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+
+PACKAGES = ("jax", "optimistix", "numpy", "scipy")
+"""Whose version matters to a fit."""
 
 
 @dataclass(frozen=True)
@@ -42,36 +51,40 @@ class Verdict:
     sentences: tuple[str, ...]
     confounded: tuple[tuple[str, ...], ...] = ()
 
+    def __str__(self) -> str:
+        return "\n".join(self.sentences)
+
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(Result):
     """A finished fit; arrays are read-only.
 
     Attributes:
-        rig: the rig with the estimated values in place of the assumed ones.
-        effects: names of the effects in the model, () for SimQC.
+        estimated: the model with the estimated values in place of the assumed ones.
         estimates: all estimated parameters, free ones first.
         covariance: of the estimates in their order [products of their units], (n, n).
         chi2: weighted sum of squared residuals of the data alone.
         dof: real data entries less free parameters.
-        prior_chi2: squared deviations of the tolerance parameters in their standard deviations.
+        prior_chi2: squared deviations of all parameters from what was known before, in its standard deviations.
         status: how the optimisation ended, over all dwells.
         dwell_status: whether the model's periodic solution converged, per dwell.
         verdict: what the data can and cannot tell.
         measured: the response that was fitted.
         orders: highest harmonic order used.
-        used: which entries of ``predicted`` were fitted, (D, 2, orders + 1).
-        predicted: identified model, complex [unit of the reading], (D, 2, orders + 1), channels as in
-            :data:`savgs_ident.model.sensors.RESPONSE_CHANNELS`.
-        frictionless: SimQC at the same estimates [unit of the reading], (D, 2, orders + 1).
-        as_given: the model before fitting [unit of the reading], (D, 2, orders + 1).
+        used: which entries of ``predicted`` were fitted, (D, C, orders + 1).
+        predicted: identified model, complex [unit of the reading], (D, C, orders + 1), in the plant's channels.
+        frictionless: the plant without effects at the same estimates [unit of the reading], (D, C, orders + 1).
+        as_given: the model before fitting [unit of the reading], (D, C, orders + 1).
         starts: (chi2 reached, status) of each start of the optimisation.
         quantity: "harmonics" or "peak_to_peak", what was fitted.
         wall_s: time taken [s].
+
+    ``fit["mu_r"].value`` is an estimate, ``fit.model`` the identified model.
     """
 
-    rig: Rig
-    effects: tuple[str, ...]
+    presenter: ClassVar[str] = "FIT"
+
+    estimated: Model
     estimates: tuple[Estimate, ...]
     covariance: NDArray[np.float64]
     chi2: float
@@ -95,6 +108,32 @@ class Fit:
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
 
+    def __getitem__(self, name: str) -> Estimate:
+        """The estimate of a parameter; raises ``KeyError`` for one that was not estimated."""
+        return self.by_name[name]
+
+    @property
+    def model(self) -> Any:
+        """The identified model, of the kind that was fitted, which remembers where its numbers come from."""
+        return self.estimated.with_provenance(self._provenance())
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects in the model, () for SimQC."""
+        return self.estimated.effects
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the C channels of the plant."""
+        return tuple(each.name for each in self.estimated.channels)
+
+    @property
+    def rig(self) -> Rig:
+        """The quarter car with the estimated values; raises :class:`InputError` where another plant was fitted."""
+        if not isinstance(self.estimated, RigModel):
+            raise InputError(f"{self.estimated.name} is no rig with a file", remedy="take fit.model instead")
+        return self.estimated.rig
+
     @property
     def trusted(self) -> bool:
         """Whether the fit converged everywhere and every free parameter is told by the data."""
@@ -115,3 +154,30 @@ class Fit:
         """Correlation of the estimates [1], (n, n)."""
         sd = np.sqrt(np.diag(self.covariance))
         return np.asarray(self.covariance / np.outer(sd, sd))
+
+    def _provenance(self) -> dict[str, object]:
+        """The table ``[provenance]`` of a ``model.toml``.
+
+        ``before`` holds the values that the estimated parameters had before the fit, the centres of their priors;
+        the covariance is in the order of its names. SI.
+        """
+        return {
+            "command": spelled_out(self.origin.command_line),
+            "data": spelled_out(self.origin.data),
+            "data_sha256": self.origin.data_sha256,
+            "effects": list(self.effects),
+            "free": list(self.free_names),
+            "known_to_tolerance": [each.name for each in self.estimates if not each.free],
+            "quantity": self.quantity,
+            "orders": self.orders,
+            "chi2": float(self.chi2),
+            "dof": int(self.dof),
+            "status": self.status.name.lower(),
+            "trusted": bool(self.trusted),
+            "before": {each.name: each.prior for each in self.estimates},
+            "versions": package_versions(PACKAGES),
+            "covariance": {
+                "names": [each.name for each in self.estimates],
+                "matrix": self.covariance.tolist(),
+            },
+        }

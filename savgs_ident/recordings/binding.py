@@ -1,25 +1,54 @@
-"""From the signals a file offers to the canonical channels: which is which, and with what gain.
+"""What a reader of a file format works with: its interface, and the step from signals to canonical channels.
 
-A reader lists its :class:`Candidate` signals (columns, fields of topics); :func:`bind` applies the channel
-map first and the usual names after it.
+A reader lists the signals that a file offers (columns, fields of topics) as :class:`SignalCandidate` records.
+:func:`bind` assigns them to channels: the channel map first, then the usual names. The reader returns a
+:class:`Reading`: the tests as they stand in the file, before any check, and its warnings.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.channel_map import ChannelMap, ChannelRule
-from savgs_ident.recordings.names import canonical_name, is_exact, split_header
-from savgs_ident.recordings.recording import CANONICAL_UNITS
-from savgs_ident.recordings.units import unit_factor
+from savgs_ident.recordings.channels import (
+    ChannelMap,
+    ChannelRule,
+    canonical_name,
+    is_exact,
+    split_header,
+    unit_factor,
+)
+from savgs_ident.recordings.recording import CANONICAL_UNITS, Recording
+
+Progress = Callable[[float], None]
+"""Called with the share of the source that has been read, 0 to 1."""
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Reading:
+    """Unchecked recordings (missing samples are NaN) and the reader's own warnings."""
+
+    recordings: tuple[Recording, ...]
+    warnings: tuple[DataWarning, ...]
+
+
+@dataclass(frozen=True)
+class Reader:
+    """One file format: its suffixes, the bytes it may begin with (none: plain text), and how it is read."""
+
+    name: str
+    suffixes: tuple[str, ...]
+    magic: tuple[bytes, ...]
+    plain_text: bool
+    read: Callable[[Path, ChannelMap, Progress], Reading]
+
+
+@dataclass(frozen=True)
+class SignalCandidate:
     """A signal in a file.
 
     ``key`` is how the reader finds it, ``text`` its header or field name (a unit may be written there),
-    ``unit`` one that is known from elsewhere (a schema, a convention), ``label`` what people call it.
+    ``unit`` one that is known from elsewhere (a schema, a convention), ``label`` its name in messages.
     """
 
     key: str
@@ -30,7 +59,10 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Binding:
-    """A channel made of one signal: SI = gain * raw + bias; ``exact``: its own name or the map said so."""
+    """A channel made of one signal: SI = gain * raw + bias.
+
+    ``exact``: recognised by the canonical name or the map, not by a usual variant.
+    """
 
     channel: str
     key: str
@@ -41,14 +73,14 @@ class Binding:
 
 
 def bind(
-    candidates: Sequence[Candidate],
+    candidates: Sequence[SignalCandidate],
     rules: Sequence[tuple[ChannelRule, str]],
     mapped: frozenset[str],
     source: str,
 ) -> tuple[tuple[Binding, ...], tuple[DataWarning, ...]]:
     """Bind signals to channels; ``rules`` pairs each rule of the map with the key of its signal.
 
-    ``mapped`` names the channels that the map settles, here or elsewhere: the usual names do not touch them.
+    ``mapped`` names the channels that the map assigns, here or elsewhere: usual names are ignored for them.
     Raises :class:`InputError` for an unknown unit or two signals that look alike.
     """
     by_key = {candidate.key: candidate for candidate in candidates}
@@ -81,11 +113,11 @@ def ambiguous(channel: str, one: str, other: str, source: str) -> InputError:
 
 
 def mapped_channels(channel_map: ChannelMap) -> frozenset[str]:
-    """The channels that the map settles."""
+    """The channels that the map assigns."""
     return frozenset(rule.channel for rule in channel_map.rules)
 
 
-def factor_or_si(
+def unit_factor_or_si(
     unit: str | None, channel: str, label: str, source: str, warnings: list[DataWarning]
 ) -> float:
     """The factor of a unit [SI per unit], or 1 with a warning where none is written."""
@@ -104,17 +136,19 @@ def factor_or_si(
     return 1.0
 
 
-def _by_rule(rule: ChannelRule, candidate: Candidate, source: str, warnings: list[DataWarning]) -> Binding:
+def _by_rule(
+    rule: ChannelRule, candidate: SignalCandidate, source: str, warnings: list[DataWarning]
+) -> Binding:
     unit = rule.unit or split_header(candidate.text).unit or candidate.unit
-    factor = factor_or_si(unit, rule.channel, candidate.label, source, warnings) * rule.sign
+    factor = unit_factor_or_si(unit, rule.channel, candidate.label, source, warnings) * rule.sign
     return Binding(
         rule.channel, candidate.key, factor * rule.scale, factor * rule.offset, candidate.label, exact=True
     )
 
 
 def _by_name(
-    name: str, candidate: Candidate, exact: bool, source: str, warnings: list[DataWarning]
+    name: str, candidate: SignalCandidate, exact: bool, source: str, warnings: list[DataWarning]
 ) -> Binding:
     unit = split_header(candidate.text).unit or candidate.unit
-    factor = factor_or_si(unit, name, candidate.label, source, warnings)
+    factor = unit_factor_or_si(unit, name, candidate.label, source, warnings)
     return Binding(name, candidate.key, factor, 0.0, candidate.label, exact)

@@ -1,17 +1,23 @@
-"""What any quarter car must do, whatever its parameters: catches units and signs that bounds cannot.
+"""Checks that hold for any quarter car, whatever its parameters: they find wrong units and signs.
 
-* Far below resonance the body follows the road: sprung acceleration = -(2 pi f)^2 road height. A ratio far
-  from one is a unit (g for m/s^2 is a factor 9.8), the other sign is a sign.
-* The strut pushes the body up when it is compressed, so acceleration and deflection are in phase.
+* Far below resonance the body follows the road: sprung acceleration = -(2 pi f)^2 road height. A ratio far from
+  one indicates a unit (g for m/s^2 is a factor 9.8), the opposite sign indicates a sign.
+* A compressed strut pushes the body up, so acceleration and deflection are in phase.
+* An accelerometer at rest reads +9.8 m/s^2 along an axis that points up (so does ``sensor_msgs/Imu``); the
+  canonical channel does not contain gravity. Where the mean of the channel shows that it does, the mean of the
+  standstill is subtracted, which removes the sensor's bias too; without a standstill, standard gravity is
+  subtracted and the bias remains.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import pi
 
 import numpy as np
 
 from savgs_ident.core.errors import DataWarning
-from savgs_ident.recordings.place import Place
+from savgs_ident.recordings.channels import STANDARD_GRAVITY
+from savgs_ident.recordings.checks_signal import DataLocation
 from savgs_ident.recordings.recording import Channel, Recording
 
 _LOW_HZ = 1.25
@@ -37,7 +43,7 @@ def _body_follows_road(dwells: list[Recording], source: str) -> tuple[DataWarnin
     dwell = min(slow, key=lambda d: d.frequency_hz or 0.0)
     road, accel = dwell.channels["road_height"], dwell.channels["sprung_accel"]
     expected = (2 * pi * (dwell.frequency_hz or 0.0)) ** 2 * float(np.std(road.values))
-    place = Place(source, dwell.name, "sprung_accel")
+    place = DataLocation(source, dwell.name, "sprung_accel")
     ratio = float(np.std(accel.values)) / expected if expected else 1.0
     if not _LOWEST <= ratio <= _HIGHEST:
         return (
@@ -67,7 +73,7 @@ def _strut_pushes(dwells: list[Recording], source: str) -> tuple[DataWarning, ..
     if not pairs or np.median([_correlation(accel, deflection) for accel, deflection in pairs]) > _OPPOSED:
         return ()
     return (
-        Place(source, channel="susp_deflection").warning(
+        DataLocation(source, channel="susp_deflection").warning(
             "sign_suspect",
             "is opposed to the sprung acceleration in most dwells: a compressed strut pushes up",
             "check the signs of susp_deflection (positive in bump) and sprung_accel (up positive)",
@@ -84,7 +90,7 @@ def _deflects(dwells: list[Recording], source: str) -> tuple[DataWarning, ...]:
     if not ratios or max(ratios) >= _SMALLEST_DEFLECTION:
         return ()
     return (
-        Place(source, channel="susp_deflection").warning(
+        DataLocation(source, channel="susp_deflection").warning(
             "implausible_unit",
             f"moves at most {max(ratios):.2g} times as much as the road",
             "check the units of susp_deflection and road_height (mm or m)",
@@ -99,3 +105,46 @@ def _correlation(one: Channel, other: Channel) -> float:
     return (
         float(np.mean((one.values - one.values.mean()) * (there - there.mean()))) / spread if spread else 0.0
     )
+
+
+_CHANNEL = "sprung_accel"
+_LEAST = 5.0
+"""A mean [m/s^2] beyond this is gravity: no rig accelerates upwards for good, no bias is half a g."""
+
+
+def remove_gravity(
+    recordings: Sequence[Recording], source: str
+) -> tuple[tuple[Recording, ...], tuple[DataWarning, ...]]:
+    """The recordings with gravity taken off ``sprung_accel`` where it was in.
+
+    Raises :class:`InputError` where the sensor reads gravity downwards: its sign is the other one.
+    """
+    means = {
+        r.name: float(np.mean(r.channels[_CHANNEL].values)) for r in recordings if _CHANNEL in r.channels
+    }
+    level = float(np.median(list(means.values()))) if means else 0.0
+    place = DataLocation(source, channel=_CHANNEL)
+    if abs(level) < _LEAST:
+        return tuple(recordings), ()
+    if level < 0.0:
+        raise place.error(
+            f"its mean is {level:.3f} m/s^2: it contains gravity and points downwards",
+            "map it with sign = -1 in channels.toml",
+        )
+    still = [means[r.name] for r in recordings if r.kind == "standstill" and r.name in means]
+    offset = float(np.mean(still)) if still else STANDARD_GRAVITY
+    basis = "the mean at standstill" if still else "standard gravity, there is no standstill"
+    note = place.warning(
+        "gravity_removed",
+        f"contained gravity, {offset:.5f} m/s^2 ({basis}) is taken off",
+        "none needed" if still else "record a standstill, so that the sensor's bias is known too",
+    )
+    return tuple(_subtract(recording, offset) for recording in recordings), (note,)
+
+
+def _subtract(recording: Recording, offset: float) -> Recording:
+    channel = recording.channels.get(_CHANNEL)
+    if channel is None:
+        return recording
+    lowered = replace(channel, values=channel.values - offset)
+    return replace(recording, channels={**recording.channels, _CHANNEL: lowered})

@@ -1,21 +1,214 @@
-"""The body of a CSV file as growing float columns; a bad cell or row is named by its line.
+"""A CSV file as float columns in bounded memory: text blocks, the head, the body.
 
-pandas parses the numbers (it is fast and rounds correctly); how many cells a row has is counted here,
-because pandas fills a short row with missing values and says nothing.
+:class:`TextBlocks` reads a text file, plain or gzipped, as blocks of whole lines. gzip is decompressed with
+``zlib`` itself, because Python's ``gzip`` discards the last part of a file that ends too early, and that part is
+good data. :func:`read_head` finds delimiter, decimal mark, encoding, column names and a row of units if there is
+one. :class:`CsvTable` parses the body with pandas (fast, correctly rounded); the cells of a row are counted here,
+because pandas fills a short row with missing values silently. Errors name the line of a bad cell or row.
 """
 
+import csv
 import re
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
 from io import BytesIO
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.recordings.csv_header import CsvHead
+from savgs_ident.recordings.binding import Progress, SignalCandidate
+from savgs_ident.recordings.channels import canonical_name, find_unit, split_header
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+GZIP_MAGIC = b"\x1f\x8b"
+_RAW_BLOCK = 1 << 18
+_TEXT_BLOCK = 1 << 22
+_LONGEST_LINE = 1 << 20
+
+
+class TextBlocks:
+    """Iterate to get blocks of whole lines (bytes, each block ends with a newline).
+
+    After the last block, ``cut`` says why the file ended early (empty if it did not) and ``tail`` is the
+    line without a newline that was left over.
+    """
+
+    def __init__(self, path: Path, progress: Progress) -> None:
+        self.path = path
+        self.progress = progress
+        self.cut = ""
+        self.tail = b""
+
+    def __iter__(self) -> Iterator[bytes]:
+        with self.path.open("rb") as stream:
+            zipped = stream.read(2) == GZIP_MAGIC
+            stream.seek(0)
+            parts = self._inflated(stream) if zipped else self._raw(stream)
+            waiting, size = [], 0
+            for part in parts:
+                waiting.append(part)
+                size += len(part)
+                if size >= _TEXT_BLOCK:
+                    block, rest = self._split(b"".join(waiting))
+                    waiting, size = [rest], len(rest)
+                    if block:
+                        yield block
+            block, self.tail = self._split(b"".join(waiting))
+            if block:
+                yield block
+
+    def _split(self, text: bytes) -> tuple[bytes, bytes]:
+        end = text.rfind(b"\n") + 1
+        if len(text) - end > _LONGEST_LINE:
+            raise InputError(
+                f"has a line longer than {_LONGEST_LINE} bytes",
+                source=self.path,
+                remedy="this is not a table of measurements: give a CSV or MCAP file",
+            )
+        return text[:end], text[end:]
+
+    def _raw(self, stream: BinaryIO) -> Iterator[bytes]:
+        total = max(self.path.stat().st_size, 1)
+        read = 0
+        while part := stream.read(_RAW_BLOCK):
+            read += len(part)
+            self.progress(min(read / total, 1.0))
+            yield part
+
+    def _inflated(self, stream: BinaryIO) -> Iterator[bytes]:
+        inflater = zlib.decompressobj(wbits=31)
+        try:
+            for raw in self._raw(stream):
+                pending = raw
+                while pending:
+                    if inflater.eof:
+                        if not pending.startswith(GZIP_MAGIC):
+                            return
+                        inflater = zlib.decompressobj(wbits=31)
+                    text = inflater.decompress(pending, _TEXT_BLOCK)
+                    pending = inflater.unused_data if inflater.eof else inflater.unconsumed_tail
+                    if text:
+                        yield text
+        except zlib.error as error:
+            self.cut = f"its compressed data is damaged ({error})"
+        else:
+            if not inflater.eof:
+                self.cut = "its compressed data ends too early"
+
+
+_DELIMITERS = (",", ";", "\t")
+_CONTENT = re.compile(rb"^[ \t\r\v\f]*[^\s#][^\n]*", re.MULTILINE)
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+
+@dataclass(frozen=True)
+class CsvHead:
+    """How the table is written; ``body``: what of the first block follows the head, ``lines``: its length."""
+
+    delimiter: str
+    decimal: str
+    encoding: str
+    columns: tuple[str, ...]
+    units: tuple[str | None, ...]
+    body: bytes
+    lines: int
+
+    def candidates(self) -> tuple[SignalCandidate, ...]:
+        """The columns as signals; the key is the position."""
+        return tuple(
+            SignalCandidate(str(position), text, self.units[position], text)
+            for position, text in enumerate(self.columns)
+        )
+
+
+def read_head(block: bytes, source: str) -> CsvHead:
+    """Read the head from the first block of whole lines.
+
+    Raises :class:`InputError` where there is no header, a column is named twice, or the file is not text.
+    """
+    if b"\x00" in block[:4096]:
+        raise InputError("is not a text file", source=source, remedy="give a CSV or MCAP file")
+    encoding = _encoding(block)
+    lines = _content_lines(block.removeprefix(_BYTE_ORDER_MARK))
+    head, rest, count = next(lines, (b"", b"", 0))
+    if not head:
+        raise InputError("is empty", source=source, remedy="record again, or give another file")
+    text = head.decode(encoding)
+    delimiter = max(_DELIMITERS, key=text.count)
+    columns = _cells(text, delimiter)
+    _check_columns(columns, source)
+    units: tuple[str | None, ...] = (None,) * len(columns)
+    second, rest_after, count_after = next(lines, (b"", b"", count))
+    row = _cells(second.decode(encoding), delimiter)
+    if _is_unit_row(row, columns):
+        units, rest, count = tuple(cell.strip("[]() ") or None for cell in row), rest_after, count_after
+        row = _cells(next(lines, (b"", b"", count))[0].decode(encoding), delimiter)
+    decimal = "," if delimiter != "," and any("," in cell for cell in row) else "."
+    return CsvHead(delimiter, decimal, encoding, columns, units, rest, count)
+
+
+def _encoding(block: bytes) -> str:
+    try:
+        block.decode("utf-8")
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8"
+
+
+def _content_lines(block: bytes) -> Iterator[tuple[bytes, bytes, int]]:
+    """Lines that are neither blank nor comments: the line, what follows it, and its number from 1."""
+    for found in _CONTENT.finditer(block):
+        yield found[0].strip(), block[found.end() + 1 :], block.count(b"\n", 0, found.start()) + 1
+
+
+def _cells(line: str, delimiter: str) -> tuple[str, ...]:
+    try:
+        row = next(csv.reader([line], delimiter=delimiter), [])
+    except csv.Error:
+        row = line.split(delimiter)
+    return tuple(cell.strip() for cell in row)
+
+
+def _check_columns(columns: tuple[str, ...], source: str) -> None:
+    twice = sorted({name for name in columns if name and columns.count(name) > 1})
+    if twice:
+        raise InputError(
+            f"column '{twice[0]}' is there twice", source=source, remedy="rename or delete one of the two"
+        )
+    if all(_is_number(name) for name in columns):
+        raise InputError(
+            "has no header line",
+            source=source,
+            remedy="write one such as 'time [s],road_height [m],sprung_accel [m/s^2]'",
+        )
+
+
+def _is_unit_row(row: tuple[str, ...], columns: tuple[str, ...]) -> bool:
+    """A second line such as ``s;mm;g``: what stands below a known column is a unit or empty."""
+    if len(row) != len(columns) or any(_is_number(cell) for cell in row):
+        return False
+    known = [
+        cell.strip("[]() ")
+        for cell, name in zip(row, columns, strict=True)
+        if canonical_name(split_header(name).label)
+    ]
+    return bool(known) and all(not cell or find_unit(cell) for cell in known) and any(known)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
 
 _QUOTED = re.compile(rb'"[^"\n]*"')
 
@@ -47,7 +240,7 @@ class CsvTable:
         self._line += block.count(b"\n")
 
     def take(self, position: int) -> NDArray[np.float64]:
-        """The whole column (rows,) in the unit of its header; it is handed over, not kept."""
+        """The whole column (rows,) in the unit of its header; it is removed from the table."""
         blocks = self._blocks.pop(position)
         return np.concatenate(blocks) if blocks else np.empty(0)
 

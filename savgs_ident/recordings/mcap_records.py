@@ -1,8 +1,9 @@
 """The container of an MCAP file (specification: mcap.dev/spec), read front to back without its index.
 
-Everything that a message needs stands before it, so neither index nor summary is used: files without them,
-and files that end too early, read the same way. A chunk is undone one at a time, and never to more bytes
-than it declares.
+Everything that a message needs stands before it, so neither index nor summary is used: files without them, and
+files that end too early, are read the same way. Chunks are decompressed one at a time, and never to more bytes
+than they declare. A :class:`Segment` holds the records of a chunk; :func:`message_block` addresses the messages
+of one topic in it, and :func:`gather` reads the same field of all of them at once.
 """
 
 import struct
@@ -11,27 +12,31 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import lz4.frame
+import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema
+from mcap.records import Channel as McapChannel
+from mcap.records import Schema
+from numpy.typing import NDArray
 
-from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.reading import Progress
+from savgs_ident.core.errors import DataWarning, InputError, SavgsIdentError
+from savgs_ident.recordings.binding import Progress
 
 MAGIC = b"\x89MCAP0\r\n"
 LARGEST_CHUNK = 1 << 27
-"""Bytes that one chunk may unfold to. Writers use about 1 MiB: this is an accident or worse."""
-
+"""Bytes that one chunk may expand to. Writers use about 1 MiB: more is a mistake or an attack."""
 _HEAD = struct.Struct("<BQ")
 _RECORD = struct.Struct("<BQH")
 _CHUNK = struct.Struct("<QQQII")
-_LOG_TIME, _LOG_TIME_AT = struct.Struct("<Q"), 15
+_LENGTH_AT, _LOG_TIME_AT, _PUBLISH_TIME_AT = 1, 15, 23
+_LOG_TIME = struct.Struct("<Q")
 _MESSAGE_HEAD = 22
+"""Bytes of a message record's content before its payload: channel, sequence, log and publish time."""
 _LOOSE_BLOCK = 1 << 20
 _BROKEN = (McapError, struct.error, UnicodeDecodeError, RuntimeError, EOFError, zstandard.ZstdError)
 
@@ -45,12 +50,12 @@ class Segment:
 
     data: bytes
     schemas: tuple[Schema, ...]
-    channels: tuple[Channel, ...]
+    channels: tuple[McapChannel, ...]
     messages: dict[int, list[int]]
 
 
 class McapRecords:
-    """Iterate to get :class:`Segment` after segment; ``warnings`` grows as damage is met."""
+    """Iterate to get :class:`Segment` after segment; ``warnings`` grows as damage is found."""
 
     def __init__(self, path: Path, progress: Progress) -> None:
         self.path = path
@@ -75,7 +80,7 @@ class McapRecords:
             self.warnings.append(self._truncated())
 
     def _payloads(self, stream: BinaryIO, size: int) -> Iterator[bytes]:
-        """Undone chunks, and loose records gathered into blocks."""
+        """Decompressed chunks, and the records outside chunks in blocks."""
         loose = bytearray()
         while True:
             head = stream.read(_HEAD.size)
@@ -91,7 +96,7 @@ class McapRecords:
             if opcode == Opcode.CHUNK:
                 yield bytes(loose)
                 loose.clear()
-                yield self._undo(stream.read(length))
+                yield self._unpack_chunk(stream.read(length))
                 self.progress(stream.tell() / size)
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
                 loose += head
@@ -114,7 +119,7 @@ class McapRecords:
             remedy="copy the file again, or run `mcap recover`",
         )
 
-    def _undo(self, body: bytes) -> bytes:
+    def _unpack_chunk(self, body: bytes) -> bytes:
         """The records of a chunk, or nothing with a warning where the chunk is damaged."""
         try:
             start, end, declared, crc, name_length = _CHUNK.unpack_from(body)
@@ -144,7 +149,7 @@ class McapRecords:
             )
 
     def _decompress(self, packed: bytes, compression: str, declared: int) -> bytes:
-        """At most ``declared`` + 1 bytes, whatever the stream says of itself."""
+        """At most ``declared`` + 1 bytes, whatever size the stream itself declares."""
         if compression == "":
             return packed
         if compression == "zstd":
@@ -170,7 +175,7 @@ class McapRecords:
 
     def _walk(self, data: bytes) -> Segment:
         schemas: list[Schema] = []
-        channels: list[Channel] = []
+        channels: list[McapChannel] = []
         messages: dict[int, list[int]] = {}
         position, size = 0, len(data)
         unpack, smallest, message = _RECORD.unpack_from, _RECORD.size, int(Opcode.MESSAGE)
@@ -202,15 +207,57 @@ class McapRecords:
         if not self._first_log:
             (self._first_log,) = _LOG_TIME.unpack_from(data, first + _LOG_TIME_AT)
 
-    def _definition(self, opcode: int, body: bytes, schemas: list[Schema], channels: list[Channel]) -> None:
+    def _definition(
+        self, opcode: int, body: bytes, schemas: list[Schema], channels: list[McapChannel]
+    ) -> None:
         try:
             if opcode == Opcode.SCHEMA:
                 schemas.append(Schema.read(ReadDataStream(BytesIO(body))))
             else:
-                channels.append(Channel.read(ReadDataStream(BytesIO(body))))
+                channels.append(McapChannel.read(ReadDataStream(BytesIO(body))))
         except _BROKEN as error:
             raise InputError(
                 f"a schema or channel record is damaged ({str(error) or type(error).__name__})",
                 source=self.path,
                 remedy="copy the file again, or run `mcap recover`",
             ) from error
+
+
+class DecodeError(SavgsIdentError):
+    """A message that cannot be decoded: the reason and its index in the block; the reader adds topic and time."""
+
+    def __init__(self, why: str, index: int = 0) -> None:
+        super().__init__(why)
+        self.index = index
+
+
+@dataclass(frozen=True)
+class MessageBlock:
+    """``data`` holds the message records; payload i is ``data[starts[i]:stops[i]]``; times [ns], (n,)."""
+
+    data: bytes
+    starts: NDArray[np.int64]
+    stops: NDArray[np.int64]
+    log: NDArray[np.int64]
+    publish: NDArray[np.int64]
+
+    def payload(self, index: int) -> bytes:
+        """The bytes of one message."""
+        return self.data[self.starts[index] : self.stops[index]]
+
+
+def gather(data: bytes, positions: NDArray[np.int64], code: str) -> NDArray[Any]:
+    """The numbers of type ``code`` that begin at ``positions``, aligned or not, shape (n,)."""
+    kind = np.dtype(code)
+    raw = np.frombuffer(data, dtype=np.uint8)
+    picked: NDArray[Any] = raw[positions[:, None] + np.arange(kind.itemsize)]
+    return picked.view(kind).ravel()
+
+
+def message_block(data: bytes, records: NDArray[np.int64]) -> MessageBlock:
+    """The messages whose records begin at ``records`` (n,) in ``data``."""
+    length = gather(data, records + _LENGTH_AT, "<u8").astype(np.int64)
+    log = gather(data, records + _LOG_TIME_AT, "<i8").astype(np.int64)
+    publish = gather(data, records + _PUBLISH_TIME_AT, "<i8").astype(np.int64)
+    starts = records + _HEAD.size + _MESSAGE_HEAD
+    return MessageBlock(data, starts, starts + length - _MESSAGE_HEAD, log, publish)

@@ -1,4 +1,4 @@
-"""Read a campaign: a file, or a folder with the files of an afternoon.
+"""Read a campaign: a file, or a folder with the files of one visit to the rig.
 
     campaign = read_campaign("campaign.csv.gz")
     for dwell in campaign.of_kind("dwell"):
@@ -7,8 +7,9 @@
     for warning in campaign.warnings:
         print(warning)
 
-Names and units are recognised where they are usual; where they are not, ``channels.toml`` beside the file
-says what is what (see ``channel_map``).
+Usual names and units are recognised; others are mapped in ``channels.toml`` beside the file (see
+:mod:`savgs_ident.recordings.channels`). A new file format is a module with a
+:class:`~savgs_ident.recordings.binding.Reader` and one line in ``READERS``.
 """
 
 import hashlib
@@ -16,11 +17,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.channel_map import FILE_NAME, ChannelMap, read_channel_map
-from savgs_ident.recordings.readers import is_campaign_file, reader_for
-from savgs_ident.recordings.reading import Progress, Reading
+from savgs_ident.recordings.binding import Progress, Reader, Reading
+from savgs_ident.recordings.channels import FILE_NAME, ChannelMap, read_channel_map
+from savgs_ident.recordings.checks import screen
+from savgs_ident.recordings.csv import CSV
+from savgs_ident.recordings.mcap import MCAP
 from savgs_ident.recordings.recording import Campaign, Recording
-from savgs_ident.recordings.screening import screen
+
+READERS: tuple[Reader, ...] = (
+    CSV,
+    MCAP,
+)
 
 
 def read_campaign(
@@ -30,7 +37,7 @@ def read_campaign(
 
     ``path`` is a CSV (plain or gzipped) or MCAP file, or a folder of such files, each with a test or several.
     ``channel_map`` is a map, or the path of one; without it, a ``channels.toml`` beside the file (or in the
-    folder) is used if there is one. ``progress`` is told the fraction read, 0 to 1.
+    folder) is used if there is one. ``progress`` is called with the fraction read, 0 to 1.
 
     Channels are in SI, time in [s] from the start of each test; see :class:`Recording`. Raises
     :class:`InputError`, which names file, test, channel and time, and what to do.
@@ -39,8 +46,8 @@ def read_campaign(
     try:
         files = campaign_files(path)
         the_map = _map_for(path, channel_map)
-        readings = _read_files(files, the_map, progress or _silent)
-        digest = digest_of(files)
+        readings = _read_files(files, the_map, progress or (lambda fraction: None))
+        digest = digest_files(files)
     except OSError as error:
         raise InputError(
             f"cannot be read: {error.strerror or error}",
@@ -49,26 +56,8 @@ def read_campaign(
         ) from error
     _check_unique(files, readings)
     recordings, found = _screen_all(files, readings)
-    told = tuple(warning for reading in readings for warning in reading.warnings)
-    return Campaign(str(path), recordings, (*told, *found), digest)
-
-
-def _silent(fraction: float) -> None:
-    """Nobody wants to know."""
-
-
-def campaign_files(path: Path) -> list[Path]:
-    """The files that make up the campaign at ``path``, a file or a folder; :class:`InputError` if there are none."""
-    if not path.exists():
-        raise InputError("does not exist", source=path, remedy="check the path")
-    if path.is_file():
-        return [path]
-    if not path.is_dir():
-        raise InputError("is neither a file nor a folder", source=path, remedy="give a CSV or MCAP file")
-    files = sorted(entry for entry in path.iterdir() if is_campaign_file(entry))
-    if not files:
-        raise InputError("the folder holds no campaign", source=path, remedy="put CSV or MCAP files into it")
-    return files
+    reported = tuple(warning for reading in readings for warning in reading.warnings)
+    return Campaign(str(path), recordings, (*reported, *found), digest)
 
 
 def _map_for(path: Path, channel_map: ChannelMap | Path | str | None) -> ChannelMap:
@@ -90,34 +79,60 @@ def _read_files(files: Sequence[Path], channel_map: ChannelMap, progress: Progre
     readings = []
     for index, file in enumerate(files):
 
-        def told(fraction: float, index: int = index) -> None:
+        def report(fraction: float, index: int = index) -> None:
             progress((index + fraction) / len(files))
 
-        readings.append(reader_for(file).read(file, channel_map, told))
+        readings.append(choose_reader(file).read(file, channel_map, report))
     progress(1.0)
     return readings
 
 
-def digest_of(files: Sequence[Path]) -> str:
-    """The digest (SHA-256, hexadecimal) of what is in ``files``, as :attr:`Campaign.sha256` has it."""
-    digests = []
-    for file in files:
-        with file.open("rb") as stream:
-            digests.append(hashlib.file_digest(stream, "sha256").hexdigest())
-    return digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
+def choose_reader(path: Path) -> Reader:
+    """The reader of ``path``: by its first bytes, else, for plain text, by its suffix.
 
-
-def map_digest(path: Path, channels: Path | None) -> str | None:
-    """The digest of the map for the campaign at ``path``: ``channels``, or the one beside it; None if there is none.
-
-    Raises :class:`OSError` where it cannot be read.
+    Raises :class:`InputError` where no reader takes the file, or its bytes contradict its suffix.
     """
-    used = channels or map_beside(path)
-    return None if used is None else digest_of([used])
+    with path.open("rb") as stream:
+        head = stream.read(16)
+    name = path.name.lower()
+    for reader in READERS:
+        if head.startswith(reader.magic):
+            return reader
+    for reader in READERS:
+        if not name.endswith(reader.suffixes):
+            continue
+        if reader.plain_text:
+            return reader
+        what = "is empty" if not head else f"is not an {reader.name} file: its first bytes are {head[:8]!r}"
+        raise InputError(what, source=path, remedy="copy the file again, or give another")
+    raise InputError(
+        f"has a suffix that no reader knows ('{path.suffix}')",
+        source=path,
+        remedy="give " + ", ".join(suffix for reader in READERS for suffix in reader.suffixes),
+    )
+
+
+def campaign_files(path: Path) -> list[Path]:
+    """The files that make up the campaign at ``path``, a file or a folder; :class:`InputError` if there are none."""
+    if not path.exists():
+        raise InputError("does not exist", source=path, remedy="check the path")
+    if path.is_file():
+        return [path]
+    if not path.is_dir():
+        raise InputError("is neither a file nor a folder", source=path, remedy="give a CSV or MCAP file")
+    files = sorted(entry for entry in path.iterdir() if is_campaign_file(entry))
+    if not files:
+        raise InputError("the folder holds no campaign", source=path, remedy="put CSV or MCAP files into it")
+    return files
+
+
+def is_campaign_file(path: Path) -> bool:
+    """Whether a file in a folder has the suffix of a recording."""
+    return path.is_file() and path.name.lower().endswith(tuple(s for r in READERS for s in r.suffixes))
 
 
 def _check_unique(files: Sequence[Path], readings: Sequence[Reading]) -> None:
-    """The same test in two files is one recording in two formats, or two afternoons: not one campaign."""
+    """The same test in two files is one recording in two formats, or two campaigns: an error."""
     owner: dict[str, Path] = {}
     for file, reading in zip(files, readings, strict=True):
         for recording in reading.recordings:
@@ -137,3 +152,21 @@ def _screen_all(
     """Screen together, so that a standstill in one file serves the dwells in the others."""
     source = str(files[0] if len(files) == 1 else files[0].parent)
     return screen([recording for reading in readings for recording in reading.recordings], source)
+
+
+def digest_files(files: Sequence[Path]) -> str:
+    """The digest (SHA-256, hexadecimal) of the content of ``files``, as :attr:`Campaign.sha256` has it."""
+    digests = []
+    for file in files:
+        with file.open("rb") as stream:
+            digests.append(hashlib.file_digest(stream, "sha256").hexdigest())
+    return digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
+
+
+def map_digest(path: Path, channels: Path | None) -> str | None:
+    """The digest of the map for the campaign at ``path``: ``channels``, or the one beside it; None if there is none.
+
+    Raises :class:`OSError` where it cannot be read.
+    """
+    used = channels or map_beside(path)
+    return None if used is None else digest_files([used])

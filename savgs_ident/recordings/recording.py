@@ -1,12 +1,24 @@
-"""A recorded test as immutable channels in SI, each with its own clock.
+"""A campaign of recorded tests: immutable channels in SI units, each with its own clock.
 
-A :class:`Campaign` is what one afternoon at the rig gives: dwells, sweeps, a standstill. Channels carry
-their own time stamps, because a bus samples an accelerometer and an encoder neither at the same instants
-nor at the same rate.
+A :class:`Campaign` holds the tests of one visit to the rig: dwells, sweeps, a standstill. Every channel has its
+own time stamps, because a bus samples an accelerometer and an encoder neither at the same instants nor at the
+same rate. The kind of a test and its frequency are read from its name:
+
+>>> classify_test("dwell_2.35Hz")
+('dwell', 2.35)
+>>> classify_test("sweep_0_3Hz_60s")
+('sweep', None)
+
+A clock that counts from 1970 gives the date of a test; a clock that starts with the recorder does not:
+
+>>> unix_time(1_763_820_000.0), unix_time(12.5)
+(1763820000.0, None)
 """
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from math import isfinite
 from types import MappingProxyType
 from typing import Literal
 
@@ -56,9 +68,9 @@ class Channel:
 
 @dataclass(frozen=True)
 class Recording:
-    """One test: its name, what kind it is, the frequency asked for [Hz] (None if not told), its channels.
+    """One test: its name, what kind it is, the frequency asked for [Hz] (None if unknown), its channels.
 
-    ``start`` is when it began [s since 1970, UTC]; None if the clock does not tell the date.
+    ``start`` is when it began [s since 1970, UTC]; None if the clock has no date.
     """
 
     name: str
@@ -83,7 +95,7 @@ class Recording:
 class Campaign:
     """All tests of one source, in the order in which they were recorded.
 
-    ``sha256`` is the digest of the bytes read, for provenance; ``warnings`` is what the checks found.
+    ``sha256`` is the digest of the bytes read, for provenance; ``warnings`` are those of the reader and the checks.
     """
 
     source: str
@@ -93,7 +105,7 @@ class Campaign:
 
     @property
     def start(self) -> float | None:
-        """When the first test began [s since 1970, UTC]; None if no clock tells the date."""
+        """When the first test began [s since 1970, UTC]; None if no clock has a date."""
         return min((each.start for each in self.recordings if each.start is not None), default=None)
 
     def only(self, channels: Collection[str]) -> "Campaign":
@@ -107,3 +119,33 @@ class Campaign:
     def of_kind(self, kind: TestKind) -> tuple[Recording, ...]:
         """The tests of one kind, in recorded order."""
         return tuple(recording for recording in self.recordings if recording.kind == kind)
+
+
+_FREQUENCY = re.compile(r"(?<![\d.])(\d+(?:[.,p]\d+)?)\s*_?hz", re.IGNORECASE)
+_SWEEP = re.compile(r"sweep|chirp", re.IGNORECASE)
+_STANDSTILL = re.compile(r"stand_?still|at_?rest|idle", re.IGNORECASE)
+_DWELL = re.compile(r"dwell|harmonic|sine|sinus", re.IGNORECASE)
+
+
+def classify_test(name: str) -> tuple[TestKind, float | None]:
+    """Kind and frequency [Hz] (None where the name has none) of the test called ``name``."""
+    if _SWEEP.search(name):
+        return "sweep", None
+    if _STANDSTILL.search(name):
+        return "standstill", None
+    found = _FREQUENCY.search(name)
+    frequency = float(re.sub("[,p]", ".", found[1])) if found else None
+    if frequency is not None and not (isfinite(frequency) and frequency > 0.0):
+        frequency = None
+    if _DWELL.search(name) or frequency is not None:
+        return "dwell", frequency
+    return "other", None
+
+
+_YEAR_2000 = 946_684_800.0
+_YEAR_2100 = 4_102_444_800.0
+
+
+def unix_time(seconds: float) -> float | None:
+    """``seconds`` if they are a time of this century, counted from 1970 in UTC [s]; None for any other count."""
+    return seconds if _YEAR_2000 <= seconds < _YEAR_2100 else None

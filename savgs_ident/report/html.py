@@ -4,6 +4,11 @@ A page is a Jinja2 template of the folder ``templates`` that extends ``page.html
 SVG, which stays sharp on a screen and on paper. Three locks stand between a hostile name in the data and the
 reader: escaping in the template, images that cannot execute anything, and a content security policy in the page
 that forbids scripts and every request.
+
+Most reports have the same shape: a sentence, a few numbers, and sections with a heading, a picture and a table. Their
+page is written once, and what differs between them is data:
+
+    section_page(SectionPage("Linear models", "Linear models of gt_rear", "The suspension is ...", ..., sections))
 """
 
 import base64
@@ -18,7 +23,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from savgs_ident.report.style import styled
+from savgs_ident.report.theme import styled
 
 _RASTER_DPI = 160
 _CSS_PIXELS_PER_INCH = 96
@@ -78,3 +83,86 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A number at a glance: its ``name``, its ``value`` with unit, ``then`` what to hold it against.
+
+    ``bad`` marks one that is not as it should be.
+    """
+
+    name: str
+    value: str
+    then: str = ""
+    bad: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of cells below ``headers``, the first cell of each its heading.
+
+    ``numeric_columns`` are the places, from 0, of those that hold numbers.
+    """
+
+    caption: str
+    headers: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    numeric_columns: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Section:
+    """One piece of evidence.
+
+    Attributes:
+        name: its address on the page, letters and hyphens.
+        heading: what it is about.
+        note: a paragraph below the heading.
+        picture: what there is to see.
+        caption: what to see in it.
+        wide: whether the picture is too large for a phone and scrolls there in its own box.
+        table: the numbers.
+    """
+
+    name: str
+    heading: str
+    note: str = ""
+    picture: Picture | None = None
+    caption: str = ""
+    wide: bool = False
+    table: Table | None = None
+
+
+@dataclass(frozen=True)
+class SectionPage:
+    """A report.
+
+    Attributes:
+        kind: what sort of report it is, above the sentence.
+        title: of the window.
+        sentence: what was found.
+        intro: a paragraph on what was done; empty for none.
+        alarm: why the numbers are not to be trusted; empty if they are.
+        facts: the numbers at a glance.
+        sections: the evidence, in the order to be read.
+        settings: what it was made from and with, by name.
+        command: the command line.
+        versions: of the packages, by name.
+    """
+
+    kind: str
+    title: str
+    sentence: str
+    intro: str
+    alarm: str
+    facts: tuple[Fact, ...]
+    sections: tuple[Section, ...]
+    settings: Mapping[str, str]
+    command: str
+    versions: Mapping[str, str]
+
+
+def section_page(page: SectionPage) -> str:
+    """The page: one file, no network, nothing executed; the same record gives the same bytes."""
+    return render_page("sections.html.j2", {"page": page})

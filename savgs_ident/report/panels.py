@@ -1,4 +1,4 @@
-"""The panels that response figures are made of; each draws one quantity of one channel over frequency.
+"""The panels of response figures: magnitude, phase, peak to peak and residuals of one channel over frequency.
 
 Lines differ by dash and grey value, points by shape, so that nothing is lost without colour.
 """
@@ -12,9 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from savgs_ident.report.curves import MeasuredPoints, ModelCurve, phase_deg
-from savgs_ident.report.readings import Shown
-from savgs_ident.report.style import BLUE, GREY, INK, ORANGE, PALE, label_of, magnitude_axis
+from savgs_ident.fit.residuals import MeasuredPoints
+from savgs_ident.report.text import ChannelLabel
+from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, PALE, magnitude_axis, printable
+from savgs_ident.simulate.frequency_response import ModelCurve
 
 LINES: tuple[Mapping[str, Any], ...] = (
     MappingProxyType({"color": BLUE, "linestyle": "-", "linewidth": 1.7}),
@@ -38,13 +39,13 @@ _SIGMAS = 2.0
 
 
 def draw_magnitude(
-    axes: Axes, curves: Sequence[ModelCurve], measured: MeasuredPoints | None, c: int, shown: Shown
+    axes: Axes, curves: Sequence[ModelCurve], measured: MeasuredPoints | None, c: int, shown: ChannelLabel
 ) -> None:
     """Magnitude of the first harmonic per metre of road, labelled for a legend."""
     magnitude_axis(axes)
     axes.set_ylabel(f"magnitude [{shown.per_road} of road]")
     for curve, line in zip(curves, LINES, strict=False):
-        axes.plot(curve.frequency, np.abs(curve.transfer[:, c]), label=label_of(curve.label), **line)
+        axes.plot(curve.frequency, np.abs(curve.transfer[:, c]), label=printable(curve.label), **line)
     if measured is not None:
         error = _SIGMAS * measured.magnitude_sd[:, c]
         label = f"measured, ± {_SIGMAS:g} sd"
@@ -63,7 +64,7 @@ def draw_phase(axes: Axes, curves: Sequence[ModelCurve], measured: MeasuredPoint
 
 
 def draw_peak_to_peak(
-    axes: Axes, curves: Sequence[ModelCurve], measured: MeasuredPoints | None, c: int, shown: Shown
+    axes: Axes, curves: Sequence[ModelCurve], measured: MeasuredPoints | None, c: int, shown: ChannelLabel
 ) -> None:
     """Peak to peak of the waveform, as the paper plots it."""
     axes.set_ylabel(f"peak to peak [{shown.unit}]")
@@ -98,3 +99,27 @@ def _draw_parts(
     spread = np.broadcast_to(frequency[:, None], residuals.shape[:2])
     axes.scatter(spread, residuals[..., 0], marker="+", label=f"{label}, Re", **look)
     axes.scatter(spread, residuals[..., 1], marker="x", label=f"{label}, Im", **look)
+
+
+def fix_labels(axes: Axes) -> None:
+    """Put the labels of an axes at a fixed distance, which also aligns them with those of its neighbours.
+
+    Left to themselves they look for room among all ticks of all neighbours, half of the time that a figure takes.
+    """
+    axes.yaxis.set_label_coords(-0.125, 0.5)
+    if not axes.get_xlabel():
+        axes.xaxis.set_label_coords(0.5, 0.0)
+    axes.set_title(axes.get_title(), y=1.0)
+
+
+def phase_deg(transfer: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Phase of one channel over frequency [deg], (n,), without jumps, beginning within [-90, 270).
+
+    A suspension's readings begin between 0 and 180 deg: neither end of that range is near.
+    """
+    known = np.isfinite(transfer)
+    phase = np.full(transfer.shape, np.nan)
+    if np.any(known):
+        unwrapped = np.degrees(np.unwrap(np.angle(transfer[known])))
+        phase[known] = unwrapped - 360.0 * np.floor((unwrapped[0] + 90.0) / 360.0)
+    return phase

@@ -1,8 +1,8 @@
 """One dwell: frequency, harmonics and noise of every channel.
 
-The road's own frequency starts the fit; every channel then says how far its phase drifts against it, and the
-estimates are pooled by their variances. The fit of a channel takes all orders that its sampling carries, not
-only those asked for: what is cut off must neither bend the orders kept nor count as noise.
+The fit starts at the road's own frequency; every channel then estimates the drift of its phase against it, and the
+estimates are pooled by their variances. A channel is fitted with all orders that its sampling carries, not only
+those asked for: truncated orders would otherwise bias the orders kept, or be counted as noise.
 """
 
 from collections.abc import Mapping
@@ -11,12 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.responses.clocks import ClockGroup, highest_fitted_order, highest_valid_order, shared_line
-from savgs_ident.responses.fundamental import frequency_step, refine_frequency, step_variance
+from savgs_ident.responses.fundamental import (
+    ClockGroup,
+    frequency_step,
+    highest_fitted_order,
+    highest_valid_order,
+    refine_frequency,
+    shared_line,
+    step_variance,
+)
 from savgs_ident.responses.noise_spectrum import estimate_noise_density
 from savgs_ident.responses.periodic_fit import fit_periodic, plan_basis
 
-_REFITS = 4
+_MOST_REFITS = 4
 _MANY_VALUES = 0.5
 _ARITHMETIC = 1e-12
 _FLATTEST, _STEEPEST = 2.0, 8.0
@@ -60,29 +67,29 @@ def fit_dwell(groups: tuple[ClockGroup, ...], road: str, start: float, orders: i
     """
     lead = next(group for group in groups if road in group.names)
     frequency = refine_frequency(lead, lead.names.index(road), start)
-    for _ in range(_REFITS):
+    for _ in range(_MOST_REFITS):
         channels = {
             name: fit for group in groups for name, fit in _fit_group(group, frequency, orders).items()
         }
         shift, variance = _pool(channels)
         frequency += shift
-        if _is_settled(abs(shift), variance, frequency, orders * lead.span_s):
+        if _has_converged(abs(shift), variance, frequency, orders * lead.span_s):
             break
     periods = min(int(group.span_s * frequency + 0.02) for group in groups)
     return DwellFit(frequency, float(np.sqrt(variance)), periods, channels)
 
 
-def _is_settled(shift: float, variance: float, frequency: float, reach: float) -> bool:
-    """Whether a last step is too small to change the harmonics, which feel it to second order only.
+def _has_converged(shift: float, variance: float, frequency: float, order_seconds: float) -> bool:
+    """Whether a step is too small to change the harmonics, which depend on it to second order only.
 
-    ``reach`` is highest order times duration [s]: the phase at the ends of the record moves by
-    pi * shift * reach, and an amplitude by a sixth of its square.
+    ``order_seconds`` is highest order times duration [s]: the phase at the ends of the record moves by
+    pi * shift * order_seconds, and an amplitude by a sixth of its square.
     """
-    return shift <= 1e-13 * frequency or (shift <= np.sqrt(variance) and np.pi * shift * reach < 3e-3)
+    return shift <= 1e-13 * frequency or (shift <= np.sqrt(variance) and np.pi * shift * order_seconds < 3e-3)
 
 
 def _pool(channels: Mapping[str, ChannelFit]) -> tuple[float, float]:
-    """Common frequency correction [Hz] and its variance, from the channels that tell."""
+    """Common frequency correction [Hz] and its variance, weighted by information."""
     drift = np.array([fit.drift_hz for fit in channels.values()])
     variance = np.array([fit.drift_variance for fit in channels.values()])
     information = 1.0 / variance
@@ -131,9 +138,9 @@ def _folded_power(
 ) -> NDArray[np.float64]:
     """Power E|X_l|^2 of the orders l = line -+ k that share a line with order k, (C, last + 1).
 
-    What shares a line cannot be measured. The power of the uppermost quarter of the orders fitted, less their
+    Orders that share a line cannot be separated. The power of the uppermost quarter of the orders fitted, less their
     noise, is continued with the power law by which it has fallen from the quarter below (no flatter than the
-    1/l^2 of a waveform with steps): a bias that cannot be known, turned into a variance.
+    1/l^2 of a waveform with steps): a bias that cannot be known, expressed as a variance.
     """
     highest = amplitude.shape[1] - 1
     power = np.abs(amplitude) ** 2 - density[:, -1:] * gain[-1]
@@ -151,19 +158,19 @@ def _folded_power(
 
 
 def _smallest_density(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Variance that rounding alone leaves, (C,): of the sensor's steps where seen, else of the arithmetic.
+    """Variance that rounding alone leaves, (C,): of the sensor's quantisation where visible, else of the arithmetic.
 
-    Rounding error repeats with the signal where the period is a whole number of samples, so that what does
-    not repeat would miss it.
+    Rounding error repeats with the signal where the period is a whole number of samples, so the
+    estimate of the noise would miss it.
     """
-    step = np.array([_step_of(row) for row in values])
+    step = np.array([_quantisation_step(row) for row in values])
     arithmetic = _ARITHMETIC * np.max(np.abs(values), axis=1)
     smallest: NDArray[np.float64] = np.maximum(step / np.sqrt(12.0), np.maximum(arithmetic, 1e-150))
     return smallest**2
 
 
-def _step_of(row: NDArray[np.float64]) -> float:
-    """The sensor's step, where values recur often enough to show one; 0 otherwise."""
+def _quantisation_step(row: NDArray[np.float64]) -> float:
+    """The quantisation step of the sensor where values recur often enough to show one; 0 otherwise."""
     distinct = np.unique(row)
     if not 1 < distinct.size < _MANY_VALUES * row.size:
         return 0.0

@@ -1,10 +1,14 @@
-"""Measured periodic responses as complex harmonics with their covariance.
+"""Measured responses: complex harmonics of dwells with their covariance, and local harmonics along a sweep.
 
 Convention: a channel x(t) of a dwell with fundamental f is
 
     x(t) = X_0 + Re sum_{k=1..n} X_k exp(2 pi i k f t),
 
 with the time origin of every dwell moved so that the fundamental of the road height is real and positive.
+
+:func:`peak_to_peak` evaluates a waveform from its harmonics. Measured and predicted responses use the same
+function with the same orders, so that a steep flank, which needs many orders, is truncated alike on both sides.
+Noise in the harmonics biases a measured peak-to-peak upwards; :func:`unbiased_peak_to_peak` subtracts that bias.
 """
 
 from dataclasses import dataclass
@@ -29,9 +33,9 @@ class HarmonicResponse:
         valid: which entries the sampling of the channel supports, (D, C, n + 1); the others are 0.
         peak_to_peak: of the harmonic reconstruction with valid orders, noise bias removed [unit], (D, C).
         peak_to_peak_sd: its standard deviation [unit], (D, C).
-        noise_sd: standard deviation of one sample of what does not repeat [unit], (D, C).
+        noise_sd: standard deviation of the noise (what does not repeat) of one sample [unit], (D, C).
         periods: whole periods in the record, (D,).
-        warnings: what a careful reader would want to know.
+        warnings: findings of the checks.
         covariance_dof: degrees of freedom of the noise level behind ``covariance``, (D, C, n + 1): its
             relative variance is 2 / dof. None where the covariance is known rather than estimated. A
             quadratic form weighted with the inverse of an estimated covariance is too large by
@@ -65,3 +69,110 @@ class HarmonicResponse:
     def channel(self, name: str) -> int:
         """The index of a channel on the second axis; raises ``ValueError`` if it is absent."""
         return self.channels.index(name)
+
+
+@dataclass(frozen=True)
+class SweepResponse:
+    """Local first harmonics at W instants of a sweep, for C channels.
+
+    Attributes:
+        test: name of the test.
+        channels: names of the channels, length C, without the road itself.
+        time: middle of each window on the recording's own clock [s], (W,).
+        frequency: instantaneous frequency of the road there [Hz], (W,).
+        frequency_sd: its standard deviation [Hz], (W,).
+        sweep_rate: its rate of change [Hz/s], (W,).
+        window_s: duration of each window [s], (W,).
+        road_amplitude: of the road's first harmonic [m], (W,).
+        response: complex first harmonic of the channel over that of the road [unit/m], (W, C).
+        response_sd: standard deviation of its real part, equal to that of its imaginary part, (W, C).
+        valid: which entries the sampling of the channel supports, (W, C); the others are 0.
+        warnings: findings of the checks.
+    """
+
+    test: str
+    channels: tuple[str, ...]
+    time: NDArray[np.float64]
+    frequency: NDArray[np.float64]
+    frequency_sd: NDArray[np.float64]
+    sweep_rate: NDArray[np.float64]
+    window_s: NDArray[np.float64]
+    road_amplitude: NDArray[np.float64]
+    response: NDArray[np.complex128]
+    response_sd: NDArray[np.float64]
+    valid: NDArray[np.bool_]
+    warnings: tuple[DataWarning, ...] = ()
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    def channel(self, name: str) -> int:
+        """The index of a channel on the second axis; raises ``ValueError`` if it is absent."""
+        return self.channels.index(name)
+
+
+def signal_to_noise(response: HarmonicResponse) -> NDArray[np.float64]:
+    """|X_k| over the rms of its complex error, (D, C, n + 1); 0 where the entry is not valid.
+
+    An order with a ratio below about 2 carries no information of its own. A covariance of zero (a noise-free
+    response) gives infinity.
+    """
+    error = np.sqrt(np.trace(response.covariance, axis1=-2, axis2=-1))
+    size = np.abs(response.harmonics)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = size / error
+    return np.where(response.valid & (size > 0.0), ratio, 0.0)
+
+
+DEFAULT_SAMPLES = 512
+"""Points in a period: the extreme of a component of order k is found to within (pi k / 512)^2 / 2 of its own
+amplitude."""
+
+
+def peak_to_peak(
+    harmonics: NDArray[np.complex128], valid: NDArray[np.bool_], samples: int = DEFAULT_SAMPLES
+) -> NDArray[np.float64]:
+    """Largest less smallest value of Re sum_k X_k exp(2 pi i k s), 0 <= s < 1, over orders 1..n.
+
+    ``harmonics`` and ``valid`` have shape (..., n + 1), the mean first, n < ``samples`` / 2; orders that are
+    not ``valid`` are left out. Returns shape (...), in the unit of ``harmonics``. Written noisy_peaksst the array
+    API: arrays of another library that follows it pass through, and stay differentiable there.
+    """
+    xp = harmonics.__array_namespace__()
+    kept = harmonics * valid
+    wave = xp.fft.irfft(kept, n=samples) * (0.5 * samples)
+    extent: NDArray[np.float64] = xp.max(wave, axis=-1) - xp.min(wave, axis=-1)
+    return extent
+
+
+_PAIRS = 64
+_SEED = 20170709
+
+
+def unbiased_peak_to_peak(
+    harmonics: NDArray[np.complex128], covariance: NDArray[np.float64], valid: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Peak-to-peak with the noise bias subtracted, and its standard deviation, both (C,).
+
+    Noise moves the extremes of the waveform, and the largest value of a noisy curve is on average too large. Bias
+    and deviation are found by adding the estimated noise, with fixed draws in antithetic pairs (the part linear in
+    the noise cancels in the mean exactly), to a waveform near the truth: each harmonic shrunk by its share of
+    noise, 1 - E|dX|^2 / |X|^2 or zero, because orders of pure noise would otherwise hide part of the bias.
+
+    ``harmonics`` and ``valid`` (C, n + 1), ``covariance`` (C, n + 1, 2, 2). Where noise dominates the
+    waveform, only part of the bias can be removed; the result is never negative.
+    """
+    measured = peak_to_peak(harmonics, valid)
+    draws = np.random.default_rng(_SEED).standard_normal((_PAIRS, harmonics.shape[1], 2))
+    draws = np.concatenate([draws, -draws])
+    noise, power = np.trace(covariance, axis1=-2, axis2=-1), np.abs(harmonics) ** 2
+    shrunk = harmonics * np.maximum(1.0 - noise / np.where(power > 0.0, power, 1.0), 0.0)
+    size, direction = np.linalg.eigh(covariance)
+    root = direction * np.sqrt(np.maximum(size, 0.0))[..., None, :]
+    shift = np.einsum("ckij,bkj->cbki", root, draws)
+    noisy = shrunk[:, None] + shift[..., 0] + 1j * shift[..., 1]
+    noisy_peaks = peak_to_peak(noisy, valid[:, None])
+    bias = np.mean(noisy_peaks, axis=1) - peak_to_peak(shrunk, valid)
+    return np.maximum(measured - bias, 0.0), np.std(noisy_peaks, axis=1)

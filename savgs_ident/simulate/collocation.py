@@ -1,9 +1,9 @@
 """Periodic collocation: the implicit residual at every node, the trapezoidal rule between nodes.
 
-Unknowns at a node are x = (z_s, theta_LW, their velocities, s) and y = (their accelerations, sd). The model
-asks for r(x, y) = 0 at every node; between nodes
+Unknowns at a node are x = (q, qd, s) and y = (qdd, sd): m = 2 n + s and k = n + s numbers for a plant with n
+coordinates and s internal states. The plant asks for r(x, y) = 0 at every node; between nodes
 
-    x_{n+1} = x_n + h ((1 - g) xd_n + g xd_{n+1}),      xd = (velocities, y),
+    x_{n+1} = x_n + h ((1 - g) xd_n + g xd_{n+1}),      xd = (qd, y),
 
 with g = 1/2, or g = 1 for states that slip, where backward Euler is the exact play operator. A Newton step
 eliminates y at each node, dy = J dx + e, and what is left is
@@ -15,26 +15,23 @@ only; it closes after one period (:mod:`savgs_ident.simulate.cyclic`).
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jax.extend.core import jaxpr_as_fun
 from jaxtyping import Array, Float
 
-from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.section import SectionCurves
-from savgs_ident.model.values import Values
+from savgs_ident.core.values import Values
+from savgs_ident.plants.base import AbstractPlant, Motion
 from savgs_ident.simulate import cyclic
-from savgs_ident.simulate.layout import CHUNK, Layout
+from savgs_ident.simulate.mesh import CHUNK, Layout
 
 Nodes = Float[Array, "k P"]
 
 
 class Trajectory(NamedTuple):
-    """States x (4 + s, P) and their algebraic partners y = (accelerations, sd), (2 + s, P)."""
+    """States x = (q, qd, s), (m, P), and their algebraic partners y = (qdd, sd), (k, P)."""
 
     x: Nodes
     y: Nodes
@@ -43,7 +40,7 @@ class Trajectory(NamedTuple):
 class Linearised(NamedTuple):
     """A trajectory's linearisation, ready to solve for any right side.
 
-    ``imbalance`` is -(dr/dy)^-1 r, (2 + s, P); ``slope`` is dy/dx, (2 + s, 4 + s, P); ``mass`` dr/dy;
+    ``imbalance`` is -(dr/dy)^-1 r, (k, P); ``slope`` is dy/dx, (k, m, P); ``mass`` dr/dy;
     ``inverse`` A^-1. Rows are in the units of the residual (SI), columns in those of x and y.
     """
 
@@ -54,10 +51,11 @@ class Linearised(NamedTuple):
     factors: cyclic.CyclicFactors
 
 
-def blank_linearised(model: QuarterCar, layout: Layout) -> Linearised:
+def blank_linearised(model: AbstractPlant, layout: Layout) -> Linearised:
     """Zeros of the shapes that :func:`linearise` gives."""
-    size, nodes, dwells = 4 + len(model.states), layout.total, len(layout.counts)
-    inner = size - 2
+    n, nodes, dwells = len(model.coordinates), layout.total, len(layout.counts)
+    inner = n + len(model.states)
+    size = n + inner
     return Linearised(
         imbalance=jnp.zeros((inner, nodes)),
         slope=jnp.zeros((inner, size, nodes)),
@@ -71,34 +69,26 @@ def blank_linearised(model: QuarterCar, layout: Layout) -> Linearised:
     )
 
 
-def node_residual(
-    model: QuarterCar, p: Values, curves: SectionCurves, parts: tuple[Array, ...], inputs: Inputs
-) -> Array:
-    """The model's residual at one node from its scalar unknowns (x then y), each () and in SI; it is (2 + s,)."""
-    motion, states, rates = node_motion(model, parts)
-    return model.residual(p, motion, states, rates, inputs, curves)
-
-
-def node_motion(model: QuarterCar, parts: tuple[Array, ...]) -> tuple[Motion, Array, Array]:
+def node_motion(model: AbstractPlant, parts: tuple[Array, ...]) -> tuple[Motion, Array, Array]:
     """Motion, internal states (s,) and their rates (s,) at one node from its scalar unknowns (x then y), in SI."""
-    size = len(model.states)
-    states = jnp.stack(parts[4 : 4 + size]) if size else jnp.zeros(0)
-    rates = jnp.stack(parts[6 + size :]) if size else jnp.zeros(0)
-    motion = Motion(
-        Coordinates(*parts[:2]), Coordinates(*parts[2:4]), Coordinates(*parts[4 + size : 6 + size])
-    )
+    n, size = len(model.coordinates), len(model.states)
+    inner, end = 2 * n, 2 * n + size
+    states = jnp.stack(parts[inner:end]) if size else jnp.zeros(0)
+    rates = jnp.stack(parts[end + n :]) if size else jnp.zeros(0)
+    motion = Motion(*(model.coordinate_type(*parts[i : i + n]) for i in (0, n, end)))
     return motion, states, rates
 
 
 def residual_at_nodes(
-    model: QuarterCar, p: Values, curves: SectionCurves, parts: tuple[Array, ...], inputs: Inputs
+    model: AbstractPlant, p: Values, prepared: Any, parts: tuple[Array, ...], u: Any
 ) -> Nodes:
-    """The residual at all nodes of all dwells, (2 + s, P), in SI."""
+    """The residual at all nodes of all dwells, (k, P), in SI."""
 
-    def one(inputs: Inputs, *parts: Array) -> Array:
-        return node_residual(model, p, curves, parts, inputs)
+    def one(u: Any, *parts: Array) -> Array:
+        motion, states, rates = node_motion(model, parts)
+        return model.residual(p, motion, states, rates, u, prepared)
 
-    return jax.vmap(one, in_axes=0, out_axes=-1)(inputs, *parts)
+    return jax.vmap(one, in_axes=0, out_axes=-1)(u, *parts)
 
 
 def _residual_and_columns(function: Callable[..., Array], parts: tuple[Array, ...]) -> tuple[Array, Array]:
@@ -118,27 +108,26 @@ def _residual_and_columns(function: Callable[..., Array], parts: tuple[Array, ..
     return residual, jnp.stack(columns, axis=1)
 
 
-def implicitness(model: QuarterCar) -> Float[Array, "m 1"]:
+def implicitness(model: AbstractPlant) -> Float[Array, "m 1"]:
     """Weight g [1] of the far end of a step for each state."""
-    weights = [0.5] * 4 + [1.0 if state.slips else 0.5 for state in model.states]
+    weights = [0.5] * (2 * len(model.coordinates)) + [1.0 if state.slips else 0.5 for state in model.states]
     return jnp.asarray(weights)[:, None]
 
 
 def linearise(
-    model: QuarterCar, p: Values, at: Trajectory, inputs: Inputs, layout: Layout, steps: Float[Array, " P"]
+    model: AbstractPlant, p: Values, at: Trajectory, u: Any, layout: Layout, steps: Float[Array, " P"]
 ) -> Linearised:
     """Linearise residual and steps about a trajectory; ``steps`` [s] from each node to the next."""
     parts = (*at.x, *at.y)
-    curves = model.curves(p)
-    residual, jacobian = _residual_and_columns(
-        lambda *z: residual_at_nodes(model, p, curves, z, inputs), parts
-    )
+    prepared = model.prepare(p)
+    residual, jacobian = _residual_and_columns(lambda *z: residual_at_nodes(model, p, prepared, z, u), parts)
     size = at.x.shape[0]
     mass = jacobian[:, size:]
     right = -jnp.concatenate([jacobian[:, :size], residual[:, None]], axis=1)
     solved = cyclic.solve_nodes(mass, right)
     slope, imbalance = solved[:, :size], solved[:, size]
-    kinematic = jnp.zeros((2, *slope.shape[1:])).at[0, 2].set(1.0).at[1, 3].set(1.0)
+    n = len(model.coordinates)
+    kinematic = jnp.broadcast_to(jnp.eye(n, size, k=n)[:, :, None], (n, *slope.shape[1:]))
     flow = jnp.concatenate([kinematic, slope])
     weight = implicitness(model)[:, None]
     eye = jnp.broadcast_to(jnp.eye(size)[:, :, None], flow.shape)
@@ -148,7 +137,7 @@ def linearise(
 
 
 def step_defects(
-    model: QuarterCar, at: Trajectory, rate: Nodes, layout: Layout, steps: Float[Array, " P"]
+    model: AbstractPlant, at: Trajectory, rate: Nodes, layout: Layout, steps: Float[Array, " P"]
 ) -> Nodes:
     """By how much x_n plus its step misses x_{n+1}, for rates xd = ``rate``, in SI; ``steps`` [s]."""
     weight = implicitness(model)

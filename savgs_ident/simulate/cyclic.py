@@ -19,7 +19,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from savgs_ident.simulate.layout import CHUNK, Layout
+from savgs_ident.simulate.mesh import CHUNK, Layout
 
 Matrices = Float[Array, "m k P"]
 Vectors = Float[Array, "m P"]

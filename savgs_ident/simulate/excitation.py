@@ -1,40 +1,39 @@
-"""What drives the rig in a dwell: harmonics of the road and of the link angle at a frequency."""
+"""What drives a plant in periodic tests: the harmonics of its inputs, from a recording, at the nodes of a mesh."""
 
-from typing import NamedTuple
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Complex, Float
-from numpy.typing import ArrayLike
+from jaxtyping import Array
+from numpy.typing import NDArray
 
-from savgs_ident.model.effect import Cam
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.strut import Link
-from savgs_ident.model.tyre import Road
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.parameter import ParameterTable
+from savgs_ident.effects.base import Fundamental, InputSignal
+from savgs_ident.plants.base import AbstractPlant, Excitation, Input
+from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.mesh import Mesh, turns
 
-
-class Excitation(NamedTuple):
-    """Inputs of D dwells as complex harmonics, x(t) = X_0 + Re sum_k X_k exp(2 pi i k f t).
-
-    Attributes:
-        frequency: fundamental [Hz], (D,).
-        road: harmonics of the plate's height [m], (D, R + 1).
-        link: harmonics of the link angle [rad], (D, L + 1).
-    """
-
-    frequency: Float[Array, " D"]
-    road: Complex[Array, "D R"]
-    link: Complex[Array, "D L"]
+SIGNIFICANT = 4.0
+"""Harmonics below this many standard deviations are taken as noise and not imposed."""
 
 
-def cam_excitation(frequency: ArrayLike, peak_to_peak: float, link_angle: float) -> Excitation:
-    """A cam of height ``peak_to_peak`` [m] at ``frequency`` [Hz], (D,), with a rigid link [rad]."""
-    frequency = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
-    road = np.zeros((frequency.size, 2), dtype=np.complex128)
-    road[:, 1] = peak_to_peak / 2.0
-    link = np.full((frequency.size, 1), link_angle, dtype=np.complex128)
-    return Excitation(jnp.asarray(frequency), jnp.asarray(road), jnp.asarray(link))
+def signals_at(
+    plant: AbstractPlant, excitation: Excitation, mesh: Mesh
+) -> tuple[tuple[InputSignal, ...], Fundamental]:
+    """Value and rate of every input at the nodes of a mesh, (P,) each, and the angle of the test."""
+    dwell, phase = mesh.layout.dwell, jnp.asarray(mesh.phase)
+    omega = 2.0 * jnp.pi * excitation.frequency[dwell]
+    harmonics = [excitation.harmonics[each.name] for each in plant.inputs]
+    first = harmonics[0]
+    offset = jnp.angle(first[:, 1]) if first.shape[1] > 1 else jnp.zeros(())
+    fundamental = Fundamental(phase + jnp.broadcast_to(offset, excitation.frequency.shape)[dwell], omega)
+    return tuple(InputSignal(*_synthesise(each[dwell], omega, phase)) for each in harmonics), fundamental
+
+
+def inputs_at(plant: AbstractPlant, excitation: Excitation, mesh: Mesh) -> Any:
+    """The plant's inputs at the nodes of a mesh; every field is of shape (P,)."""
+    return plant.drive(*signals_at(plant, excitation, mesh))
 
 
 def _synthesise(harmonics: Array, omega: Array, phase: Array) -> tuple[Array, Array]:
@@ -44,13 +43,42 @@ def _synthesise(harmonics: Array, omega: Array, phase: Array) -> tuple[Array, Ar
     return jnp.sum(terms.real, axis=1), jnp.sum((1j * order * terms).real, axis=1) * omega
 
 
-def inputs_at(excitation: Excitation, mesh: Mesh) -> Inputs:
-    """Road and link at the nodes of a mesh; every field is of shape (P,)."""
-    dwell, phase = mesh.layout.dwell, jnp.asarray(mesh.phase)
-    omega = 2.0 * jnp.pi * excitation.frequency[dwell]
-    turned = jnp.angle(excitation.road[:, 1]) if excitation.road.shape[1] > 1 else jnp.zeros(())
-    return Inputs(
-        Road(*_synthesise(excitation.road[dwell], omega, phase)),
-        Link(*_synthesise(excitation.link[dwell], omega, phase)),
-        Cam(phase + jnp.broadcast_to(turned, excitation.frequency.shape)[dwell], omega),
-    )
+def recorded_names(plant: AbstractPlant | type[AbstractPlant]) -> tuple[str, ...]:
+    """The channels of a recording that a plant takes or gives: its inputs, then what its sensors read."""
+    return (*(each.name for each in plant.inputs), *(each.name for each in plant.channels))
+
+
+def measured_excitation(
+    plant: AbstractPlant | type[AbstractPlant], measured: HarmonicResponse, table: ParameterTable
+) -> Excitation:
+    """The inputs of the tests as they were recorded, harmonics that stand out of their noise.
+
+    An input that was not recorded, and need not be, rests at the value that ``table`` has for it. Raises
+    :class:`InputError` if an input that is required was not recorded.
+    """
+    harmonics = {each.name: jnp.asarray(_recorded(each, measured, table)) for each in plant.inputs}
+    return Excitation(jnp.asarray(measured.frequency), harmonics)
+
+
+def _recorded(given: Input, measured: HarmonicResponse, table: ParameterTable) -> NDArray[np.complex128]:
+    rest = table[given.rest].value if given.rest else 0.0
+    if given.name not in measured.channels:
+        if given.required:
+            raise InputError(
+                f"the {given.about} was not recorded",
+                channel=given.name,
+                remedy="map its channel in channels.toml",
+            )
+        return np.full((measured.frequency.size, 1), rest, dtype=np.complex128)
+    place = measured.channel(given.name)
+    harmonics = measured.harmonics[:, place].copy()
+    variance = np.trace(measured.covariance[:, place], axis1=-2, axis2=-1)
+    stands_out = np.abs(harmonics) ** 2 > SIGNIFICANT**2 * variance
+    stands_out[:, 0] = True
+    valid = measured.valid[:, place]
+    harmonics[~(stands_out & valid)] = 0.0
+    if given.keeps_mean:
+        harmonics[~valid[:, 0], 0] = rest
+    else:
+        harmonics[:, 0] = 0.0
+    return harmonics if given.orders is None else harmonics[:, : given.orders + 1]

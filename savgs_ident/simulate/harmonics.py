@@ -1,29 +1,35 @@
 """What the sensors read along periodic motions, as complex harmonics.
 
-    response = harmonics(model, p, solution, orders=9)   # complex, (dwells, 2 channels, 10)
+    response = harmonics(model, p, solution, orders=9)   # complex, (dwells, channels, 10)
 
 What the truncation to a finite number of nodes costs is stated by :func:`truncation_error`, which solves once
 more on twice as many nodes.
 """
 
-from functools import partial
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values
-from savgs_ident.simulate.collocation import Trajectory
-from savgs_ident.simulate.layout import Layout
-from savgs_ident.simulate.mesh import Mesh, turns
+from savgs_ident.core.values import Values
+from savgs_ident.plants.base import AbstractPlant
+from savgs_ident.simulate.collocation import Trajectory, node_motion
+from savgs_ident.simulate.excitation import inputs_at
+from savgs_ident.simulate.mesh import Layout, Mesh, turns
 from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, adapt
 
 
-def _readings(model: QuarterCar, p: Values, trajectory: Trajectory) -> Float[Array, "P C"]:
-    at_nodes = jax.vmap(partial(model.read, p))
-    return jnp.stack(at_nodes(trajectory.x[1], trajectory.y[0]), axis=-1)
+def _readings(
+    model: AbstractPlant, p: Values, trajectory: Trajectory, known: PeriodicSolution
+) -> Float[Array, "P C"]:
+    def one(u: Any, *parts: Array) -> tuple[Array, ...]:
+        motion, states, rates = node_motion(model, parts)
+        return model.read(p, motion, states, rates, u)
+
+    u = inputs_at(model, known.excitation, known.mesh)
+    return jnp.stack(jax.vmap(one)(u, *trajectory.x, *trajectory.y), axis=-1)
 
 
 def analyse(signals: Float[Array, "P C"], mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
@@ -37,28 +43,28 @@ def analyse(signals: Float[Array, "P C"], mesh: Mesh, orders: int) -> Complex[Ar
 
 @eqx.filter_jit
 def harmonics(
-    model: QuarterCar, p: Values, solution: PeriodicSolution, orders: int
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int
 ) -> Complex[Array, "D C K"]:
-    """Complex harmonics 0..orders of the sensor readings, (D, 2, orders + 1), in the channels' SI units.
+    """Complex harmonics 0..orders of the sensor readings, (D, C, orders + 1), in the channels' SI units.
 
-    Channels are those of :data:`savgs_ident.model.sensors.RESPONSE_CHANNELS`.
+    Channels are those of the plant, in its order.
     """
     return harmonics_of(model, p, solution.trajectory, solution, orders)
 
 
 def harmonics_of(
-    model: QuarterCar, p: Values, motions: Trajectory, known: PeriodicSolution, orders: int
+    model: AbstractPlant, p: Values, motions: Trajectory, known: PeriodicSolution, orders: int
 ) -> Complex[Array, "D C K"]:
     """The same of motions on the nodes of a ``known`` solution, as a part of a larger program that is compiled.
 
     Each is in the unit of its reading.
     """
-    seen = analyse(_readings(model, p, motions), known.mesh, orders)
+    seen = analyse(_readings(model, p, motions, known), known.mesh, orders)
     return seen * _sensors(model, p, known.excitation.frequency, orders)
 
 
 def _sensors(
-    model: QuarterCar, p: Values, frequency: Float[Array, " D"], orders: int
+    model: AbstractPlant, p: Values, frequency: Float[Array, " D"], orders: int
 ) -> Complex[Array, "D C K"]:
     """What the sensors make of each order."""
     order = jnp.arange(orders + 1, dtype=frequency.dtype)
@@ -66,7 +72,7 @@ def _sensors(
 
 
 def truncation_error(
-    model: QuarterCar, p: Values, solution: PeriodicSolution, orders: int
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int
 ) -> Float[Array, "D C"]:
     """Largest change of any order 1..orders when the nodes are doubled, relative to the first harmonic [1].
 

@@ -1,50 +1,49 @@
-"""The road and the link of recorded dwells, as what drives the model."""
-
-import jax.numpy as jnp
-import numpy as np
-from numpy.typing import NDArray
+"""From a campaign to the responses that models are held against."""
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.model.sensors import RESPONSE_CHANNELS
-from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.excitation import Excitation
+from savgs_ident.core.presentation import Progress, no_progress
+from savgs_ident.plants.base import AbstractPlant
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.responses.dwells import estimate_response
+from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
+from savgs_ident.responses.selection import up_to_frequency
+from savgs_ident.responses.sweeps import estimate_sweep_response
+from savgs_ident.simulate.excitation import recorded_names
 
-SIGNIFICANT = 4.0
-"""Harmonics below this many standard deviations are taken as noise and not imposed."""
-
-MODELLED_CHANNELS = ("road_height", "link_angle", *RESPONSE_CHANNELS)
-"""The channels that the model takes or gives."""
-
-LINK_ORDERS = 9
-"""Highest order of the link's motion that is imposed; what lies above is below the encoder's resolution."""
+Measurements = Campaign | HarmonicResponse
+"""What a model is held against: recordings, or the response of their dwells."""
 
 
-def measured_excitation(measured: HarmonicResponse, link_angle: float) -> Excitation:
-    """Road and link of the dwells as they were recorded, harmonics that stand out of their noise.
+def campaign_of(measured: Measurements) -> Campaign | None:
+    """The recordings, where they are known."""
+    return measured if isinstance(measured, Campaign) else None
 
-    The means of the road are left out (a plate has no absolute height here); a link that was not recorded is
-    rigid at ``link_angle`` [rad]. Raises :class:`InputError` if the road was not recorded.
+
+def measured_response(
+    measured: Measurements,
+    orders: int,
+    max_frequency: float | None = None,
+    progress: Progress = no_progress,
+    plant: AbstractPlant | type[AbstractPlant] = QuarterCar,
+) -> HarmonicResponse:
+    """The response of the dwells up to ``max_frequency`` [Hz], orders 0..``orders``, in the channels of ``plant``.
+
+    A response that is given stays as it is but for the dwells that are left out. Raises :class:`InputError` if no
+    dwell can be used or none is that slow.
     """
-    if "road_height" not in measured.channels:
-        raise InputError(
-            "the road was not recorded", channel="road_height", remedy="map the road channel in channels.toml"
-        )
-    road = _significant(measured, "road_height")
-    road[:, 0] = 0.0
-    if "link_angle" in measured.channels:
-        link = _significant(measured, "link_angle")[:, : LINK_ORDERS + 1]
-        at_rest = ~measured.valid[:, measured.channel("link_angle"), 0]
-        link[at_rest, 0] = link_angle
-    else:
-        link = np.full((road.shape[0], 1), link_angle, dtype=np.complex128)
-    return Excitation(jnp.asarray(measured.frequency), jnp.asarray(road), jnp.asarray(link))
+    if isinstance(measured, HarmonicResponse):
+        return up_to_frequency(measured, max_frequency)
+    progress("estimating responses")
+    only = measured.only(recorded_names(plant))
+    return up_to_frequency(estimate_response(only, orders, plant.inputs[0].name), max_frequency)
 
 
-def _significant(measured: HarmonicResponse, channel: str) -> NDArray[np.complex128]:
-    place = measured.channel(channel)
-    harmonics = measured.harmonics[:, place].copy()
-    variance = np.trace(measured.covariance[:, place], axis1=-2, axis2=-1)
-    stands_out = np.abs(harmonics) ** 2 > SIGNIFICANT**2 * variance
-    stands_out[:, 0] = True
-    harmonics[~(stands_out & measured.valid[:, place])] = 0.0
-    return harmonics
+def first_sweep(campaign: Campaign) -> SweepResponse | None:
+    """The response along the first sweep of a campaign; None if there is none that can be used."""
+    for recording in campaign.only(recorded_names(QuarterCar)).of_kind("sweep"):
+        try:
+            return estimate_sweep_response(recording, source=campaign.source)
+        except InputError:
+            continue
+    return None

@@ -4,7 +4,7 @@ Each dwell has its own damping: where a step is longer than the one before it (a
 here, now there), the next ones are shortened; where steps shrink they are taken whole again.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,9 +12,9 @@ import numpy as np
 from jax.tree_util import PyTreeDef
 from jaxtyping import Array, Float, Int
 
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values
+from savgs_ident.core.values import Values
+from savgs_ident.effects.base import InputSignal
+from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.simulate.collocation import (
     Linearised,
     Trajectory,
@@ -24,7 +24,7 @@ from savgs_ident.simulate.collocation import (
     step_defects,
 )
 from savgs_ident.simulate.cyclic import CyclicFactors
-from savgs_ident.simulate.layout import Layout
+from savgs_ident.simulate.mesh import Layout
 
 TOLERANCE = 1e-7
 """Largest last Newton step, relative to the size of the motion: the error left is far smaller."""
@@ -34,9 +34,6 @@ TRUST = 0.5
 
 LEAST_SHARE = 1.0 / 8.0
 """The strongest damping."""
-
-LINK = 0.01
-"""Typical length of a link [m]: how far it moves things where the road stands still."""
 
 
 class NewtonResult(NamedTuple):
@@ -62,16 +59,17 @@ class _Progress(NamedTuple):
 
 
 def motion_scale(
-    model: QuarterCar, inputs: Inputs, frequency: Float[Array, " D"], layout: Layout
+    model: AbstractPlant, signals: tuple[InputSignal, ...], frequency: Float[Array, " D"], layout: Layout
 ) -> Float[Array, "m P"]:
-    """A typical size of every state [its unit] at the dwells' frequencies [Hz].
-
-    What moves road and link, seen over an arm of a third of a metre.
-    """
-    lift = _amplitude(inputs.road.height, layout) + LINK * _amplitude(inputs.link.angle, layout)
-    speed = 2.0 * jnp.pi * frequency * lift
-    states = [jnp.full_like(lift, state.scale) for state in model.states]
-    return jnp.stack([lift, 3.0 * lift, speed, 3.0 * speed, *states])[:, layout.dwell]
+    """A typical size of every state [its unit] at the dwells' frequencies [Hz], from the amplitudes of the inputs."""
+    amplitudes = [_amplitude(each.value, layout) for each in signals]
+    sizes = [
+        sum(given.moves[i] * amplitude for given, amplitude in zip(model.inputs, amplitudes, strict=True))
+        for i in range(len(model.coordinates))
+    ]
+    rates = [2.0 * jnp.pi * frequency * size for size in sizes]
+    states = [jnp.full_like(frequency, state.scale) for state in model.states]
+    return jnp.stack([*sizes, *rates, *states])[:, layout.dwell]
 
 
 def _over_dwells(values: Float[Array, " P"], layout: Layout) -> Float[Array, " D"]:
@@ -84,24 +82,25 @@ def _amplitude(values: Float[Array, " P"], layout: Layout) -> Float[Array, " D"]
     return (_over_dwells(values, layout) + _over_dwells(-values, layout)) / 2.0
 
 
-def rates_of(at: Trajectory) -> Array:
-    """xd = (velocities, y), (4 + s, P), in SI per second."""
-    return jnp.concatenate([at.x[2:4], at.y])
+def _rates(model: AbstractPlant, at: Trajectory) -> Array:
+    """xd = (qd, y), (m, P), in SI per second."""
+    n = len(model.coordinates)
+    return jnp.concatenate([at.x[n : 2 * n], at.y])
 
 
 def _newton_step(
-    model: QuarterCar, p: Values, at: Trajectory, inputs: Inputs, layout: Layout, steps: Array
+    model: AbstractPlant, p: Values, at: Trajectory, u: Any, layout: Layout, steps: Array
 ) -> tuple[Trajectory, Linearised]:
-    lin = linearise(model, p, at, inputs, layout, steps)
-    rate = rates_of(at).at[2:].add(lin.imbalance)
+    lin = linearise(model, p, at, u, layout, steps)
+    rate = _rates(model, at).at[len(model.coordinates) :].add(lin.imbalance)
     return solve_linearised(layout, lin, step_defects(model, at, rate, layout, steps), lin.imbalance), lin
 
 
 def solve_newton(
-    model: QuarterCar,
+    model: AbstractPlant,
     p: Values,
     start: Trajectory,
-    inputs: Inputs,
+    u: Any,
     layout: Layout,
     steps: Float[Array, " P"],
     scale: Float[Array, "m P"],
@@ -117,7 +116,7 @@ def solve_newton(
     def advance(progress: _Progress) -> _Progress:
         before = progress.result
         at = before.trajectory
-        change, lin = _newton_step(model, p, at, inputs, layout, steps)
+        change, lin = _newton_step(model, p, at, u, layout, steps)
         length = _over_dwells(jnp.max(jnp.abs(change.x) / scale, axis=0), layout)
         damped = jnp.maximum(progress.share / 2.0, LEAST_SHARE)
         share = jnp.where(length > before.last_step, damped, jnp.minimum(1.0, 2.0 * progress.share))

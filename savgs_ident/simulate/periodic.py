@@ -5,7 +5,7 @@ periodic collocation in time (:mod:`savgs_ident.simulate.collocation`): a coarse
 where the accelerations change, the nodes move there, and the solution is repeated on them. The nodes then
 serve any nearby parameter set, which is how fits warm-start.
 
-    solution = simulate_periodic(model, p, cam_excitation([2.0, 2.35], 0.0275, np.pi / 2))
+    solution = simulate_periodic(plant, p, excitation)
 
 :mod:`savgs_ident.simulate.harmonics` says what sensors read along it, and
 :mod:`savgs_ident.simulate.sensitivity` how that changes with the parameters.
@@ -19,20 +19,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
+from numpy.typing import NDArray
 
 from savgs_ident.core.status import Status
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.section import TRAVEL
-from savgs_ident.model.values import Values, as_values
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.simulate.collocation import (
     Linearised,
     Trajectory,
 )
-from savgs_ident.simulate.excitation import Excitation, inputs_at
-from savgs_ident.simulate.layout import Layout, layout_for
-from savgs_ident.simulate.mesh import Mesh, adapted_mesh, uniform_mesh
+from savgs_ident.simulate.excitation import inputs_at, signals_at
+from savgs_ident.simulate.mesh import Layout, Mesh, adapted_mesh, layout_for, uniform_mesh
 from savgs_ident.simulate.newton import TOLERANCE, motion_scale, newton_structure, solve_newton
-from savgs_ident.simulate.stored import placed, stored
+from savgs_ident.simulate.program_cache import placed, stored
 
 COARSE = 10
 """Iterations on nodes that are to move: enough to show where, whether or not all dwells have converged."""
@@ -55,7 +54,8 @@ class PeriodicSettings:
 class PeriodicSolution(eqx.Module):
     """Periodic motions of D dwells on P nodes, with what is needed to differentiate them.
 
-    ``last_step`` is the last Newton step of each dwell relative to the size of its motion [1], (D,).
+    ``last_step`` is the last Newton step of each dwell relative to the size of its motion [1], (D,);
+    ``travel`` is the largest displacement of each coordinate for which the equations hold [its unit], (n,).
     """
 
     excitation: Excitation
@@ -64,16 +64,21 @@ class PeriodicSolution(eqx.Module):
     linearised: Linearised
     last_step: Float[Array, " D"]
     iterations: Int[Array, ""]
+    travel: tuple[float, ...] = eqx.field(static=True)
 
     def status(self) -> tuple[Status, ...]:
-        """How each dwell ended; a linkage beyond its travel counts as not finite."""
-        step, layout = np.asarray(self.last_step), self.mesh.layout
-        swing = np.maximum.reduceat(np.abs(np.asarray(self.trajectory.x[1])), layout.starts)
-        finite, small = np.isfinite(step) & (swing <= TRAVEL), step <= TOLERANCE
+        """How each dwell ended; a motion beyond a coordinate's travel counts as not finite."""
+        step = np.asarray(self.last_step)
+        finite, small = np.isfinite(step) & self._within_travel(), step <= TOLERANCE
         return tuple(
             Status.CONVERGED if ok and done else Status.MAX_ITERATIONS if ok else Status.NOT_FINITE
             for ok, done in zip(finite, small, strict=True)
         )
+
+    def _within_travel(self) -> NDArray[np.bool_]:
+        limits = np.asarray(self.travel)[:, None]
+        inside = np.all(np.abs(np.asarray(self.trajectory.x[: len(limits)])) <= limits, axis=0)
+        return np.logical_and.reduceat(inside, self.mesh.layout.starts)
 
 
 def node_steps(excitation: Excitation, mesh: Mesh) -> Float[Array, " P"]:
@@ -82,13 +87,15 @@ def node_steps(excitation: Excitation, mesh: Mesh) -> Float[Array, " P"]:
 
 
 def solve_on_mesh(
-    model: QuarterCar, p: Values, excitation: Excitation, mesh: Mesh, start: Trajectory, limit: int
+    model: AbstractPlant, p: Values, excitation: Excitation, mesh: Mesh, start: Trajectory, limit: int
 ) -> PeriodicSolution:
     """Newton's method on given nodes from a given start."""
     bounds = jnp.asarray(limit), jnp.asarray(TOLERANCE)
     p, excitation, mesh, start, bounds = placed((p, excitation, mesh, start, bounds))
     parts = _solved(model, p, excitation, mesh, start, *bounds)
-    return PeriodicSolution(excitation, mesh, *jax.tree.unflatten(newton_structure(), parts))
+    trajectory, linearised, last_step, iterations = jax.tree.unflatten(newton_structure(), parts)
+    travel = tuple(each.travel for each in model.coordinates)
+    return PeriodicSolution(excitation, mesh, trajectory, linearised, last_step, iterations, travel=travel)
 
 
 @eqx.filter_jit
@@ -97,7 +104,7 @@ def _solved(*args: Any) -> tuple[Array, ...]:
 
 
 def _solve(
-    model: QuarterCar,
+    model: AbstractPlant,
     p: Values,
     excitation: Excitation,
     mesh: Mesh,
@@ -105,14 +112,15 @@ def _solve(
     limit: Array,
     enough: Array,
 ) -> tuple[Array, ...]:
-    inputs = inputs_at(excitation, mesh)
+    signals, turning = signals_at(model, excitation, mesh)
     layout, steps = mesh.layout, node_steps(excitation, mesh)
-    scale = motion_scale(model, inputs, excitation.frequency, layout)
-    return tuple(jax.tree.leaves(solve_newton(model, p, start, inputs, layout, steps, scale, limit, enough)))
+    scale = motion_scale(model, signals, excitation.frequency, layout)
+    u = model.drive(signals, turning)
+    return tuple(jax.tree.leaves(solve_newton(model, p, start, u, layout, steps, scale, limit, enough)))
 
 
 def solve_near(
-    model: QuarterCar, p: Values, known: PeriodicSolution, start: Trajectory, limit: int, enough: float
+    model: AbstractPlant, p: Values, known: PeriodicSolution, start: Trajectory, limit: int, enough: float
 ) -> tuple[Trajectory, Float[Array, ""]]:
     """Motions on the nodes of a ``known`` solution from a close ``start``, and their last relative step [1].
 
@@ -126,13 +134,10 @@ def solve_near(
 
 
 @eqx.filter_jit
-def _riding_the_road(model: QuarterCar, excitation: Excitation, mesh: Mesh) -> Trajectory:
-    """The rig carried along by the road as one: where a cold start begins."""
-    road = inputs_at(excitation, mesh).road
-    rest = jnp.zeros_like(road.height)
-    states = [road.height if state.slips else rest for state in model.states]
-    x = jnp.stack([road.height, rest, road.velocity, rest, *states])
-    return Trajectory(x, jnp.zeros((2 + len(states), *rest.shape)))
+def _cold_start(model: AbstractPlant, excitation: Excitation, mesh: Mesh) -> Trajectory:
+    q, qd, states = model.cold_start(inputs_at(model, excitation, mesh))
+    x = jnp.stack([*q, *qd, *states])
+    return Trajectory(x, jnp.zeros((len(q) + len(states), x.shape[1])))
 
 
 def _carry_over(trajectory: Trajectory, old: Mesh, new: Mesh) -> Trajectory:
@@ -151,10 +156,10 @@ def _carry_over(trajectory: Trajectory, old: Mesh, new: Mesh) -> Trajectory:
 
 
 def adapt(
-    model: QuarterCar, p: Values, solution: PeriodicSolution, layout: Layout, limit: int
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, layout: Layout, limit: int
 ) -> PeriodicSolution:
     """The solution again, on nodes that follow its accelerations."""
-    accelerations = np.asarray(solution.trajectory.y[:2])
+    accelerations = np.asarray(solution.trajectory.y[: len(model.coordinates)])
     if not np.isfinite(accelerations).all():
         return solution
     frequency = np.asarray(solution.excitation.frequency)
@@ -164,7 +169,7 @@ def adapt(
 
 
 def simulate_periodic(
-    model: QuarterCar,
+    model: AbstractPlant,
     p: Values,
     excitation: Excitation,
     settings: PeriodicSettings | None = None,
@@ -178,7 +183,7 @@ def simulate_periodic(
     if layout is None:
         layout = layout_for(np.asarray(excitation.frequency), settings.nodes, settings.slow)
     mesh = uniform_mesh(layout)
-    start = _riding_the_road(model, excitation, mesh)
+    start = _cold_start(model, excitation, mesh)
     first, *later = [COARSE] * settings.adaptations + [settings.iterations]
     solution = solve_on_mesh(model, p, excitation, mesh, start, first)
     for limit in later:
@@ -187,7 +192,7 @@ def simulate_periodic(
 
 
 def resolve(
-    model: QuarterCar,
+    model: AbstractPlant,
     p: Values,
     solution: PeriodicSolution,
     limit: int = PeriodicSettings.iterations,

@@ -1,44 +1,48 @@
 """Motions from a given start, by error-controlled time integration.
 
-    road = sweep_road(0.0275, start=0.0, end=3.0, duration=60.0)
-    solution = simulate_transient(model, p, road, held_link(np.pi / 2), np.linspace(0.0, 60.0, 30001))
+    source = RigSource(sweep_road(0.0275, start=0.0, end=3.0, duration=60.0), held_link(np.pi / 2))
+    solution = simulate_transient(plant, p, source, np.linspace(0.0, 60.0, 30001))
     assert solution.status().ok
-    solution.readings.sprung_accel          # (30001,) [m/s^2]
+    solution.readings          # one array (30001,) for each channel of the plant
 
-The residual is solved for the accelerations at every stage (:mod:`savgs_ident.simulate.rates`). What is stiff
-is a sliding bristle, whose anchor follows within 0.2 ms. It limits the steps of an explicit method to about a
-millisecond, which the reversals ask for anyway: Tsitouras' method of order five takes 2-3 times less time
+At every stage the residual is solved for what an integration asks: the accelerations and the rates of the internal
+states. They are its root in (qdd, sd), which is piecewise smooth only: a friction that depends on its load depends on
+the accelerations, too.
+
+What is stiff is a sliding bristle, whose anchor follows within 0.2 ms. It limits the steps of an explicit method to
+about a millisecond, which the reversals ask for anyway: Tsitouras' method of order five takes 2-3 times less time
 here at equal error than implicit ones (Kvaerno), whose longer steps do not pay for their Jacobians.
 """
 
-from typing import cast
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple, cast
 
 import diffrax as dfx
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Complex, Float
 from numpy.typing import ArrayLike
 
+from savgs_ident.core.small_root import find_root
 from savgs_ident.core.status import Status
-from savgs_ident.model.actuation import AbstractActuation
-from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.equilibrium import deflection_zero, static_equilibrium
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.quarter_car import Loads, QuarterCar
-from savgs_ident.model.road import RoadMotion
-from savgs_ident.model.section import TRAVEL, SectionCurves
-from savgs_ident.model.sensors import Readings, pass_through
-from savgs_ident.model.strut import Link
-from savgs_ident.model.tyre import Road
-from savgs_ident.model.values import Values
-from savgs_ident.simulate.rates import Rates, solve_rates
+from savgs_ident.core.values import Values
+from savgs_ident.plants.base import (
+    AbstractPlant,
+    AbstractSource,
+    Motion,
+    find_rest,
+    nominal_readings,
+    standing,
+    state_sizes,
+)
 
 TOLERANCE = 1e-7
 """Relative tolerance of a step by default."""
 
-STATE_SCALE = (1e-2, 3e-2, 1e-1, 3e-1)
-"""Typical z_s [m], theta_LW [rad] and their rates [m/s], [rad/s]: times the tolerance, the absolute one."""
+STATE_TIME = 1e-2
+"""Time [s] in which an internal state typically changes by its scale."""
 
 FIRST_STEP = 1e-4
 """Step with which the integration begins [s]."""
@@ -49,17 +53,56 @@ LEAST_STEP = 1e-13
 MOST_STEPS = 2_000_000
 """Steps after which the integration gives up: a quarter of an hour of a rig that slides all the time."""
 
+SHORTEST = 1e-12
+"""Shortest time between two readings [s]: a record of one instant has none."""
 
-class RigState(eqx.Module):
+
+class Rates(NamedTuple):
+    """Accelerations (n scalars) and rates of the internal states (s,), in SI."""
+
+    qdd: Any
+    sd: Float[Array, " s"]
+
+
+def solve_rates(
+    model: AbstractPlant,
+    p: Values,
+    q: Any,
+    qd: Any,
+    s: Float[Array, " s"],
+    u: Any,
+    prepared: Any = None,
+    near: Float[Array, " k"] | None = None,
+) -> Rates:
+    """Accelerations and rates that make the residual vanish; NaN where there are none; all in SI.
+
+    ``prepared`` serves as in :meth:`AbstractPlant.residual`; ``near`` (n + s,) are accelerations and rates of a
+    moment ago, from where they are found sooner. Differentiable in everything, exactly, by the implicit function
+    theorem.
+    """
+    n = len(model.coordinates)
+
+    def residual(y: Array) -> Array:
+        motion = Motion(q, qd, model.coordinate_type(*jnp.unstack(y[:n])))
+        return model.residual(p, motion, s, y[n:], u, prepared)
+
+    rates = [state.scale / STATE_TIME for state in model.states]
+    scale = jnp.asarray([*(each.acceleration_size for each in model.coordinates), *rates])
+    start = jnp.zeros_like(scale) if near is None else near
+    y = find_root(residual, start, scale)
+    return Rates(model.coordinate_type(*jnp.unstack(y[:n])), y[n:])
+
+
+class PlantState(eqx.Module):
     """All that the future of a motion depends on.
 
-    Coordinates and velocities; internal states of the effects (s,) [SI]; states of what moves the link (k,).
+    Coordinates and rates; internal states of the effects (s,) [SI]; states of what drives the plant (k,).
     """
 
-    q: Coordinates
-    qd: Coordinates
+    q: Any
+    qd: Any
     s: Float[Array, " s"]
-    actuation: Float[Array, " k"]
+    source: Float[Array, " k"]
 
 
 class TransientSolution(eqx.Module):
@@ -67,13 +110,12 @@ class TransientSolution(eqx.Module):
 
     Attributes:
         times: [s], (n,).
-        motion: coordinates, velocities and accelerations, each (n,).
+        motion: coordinates, rates and accelerations, each (n,).
         s: internal states of the effects [unit of each], (n, s).
         sd: their rates, (n, s).
-        actuation: states of what moves the link [SI], (n, k).
-        inputs: what the road and the link did, each (n,).
-        readings: what the sensors show, each (n,); the deflection counts from standstill at the nominal link
-            angle.
+        source: states of what drives the plant [SI], (n, k).
+        inputs: the plant's inputs, each (n,).
+        readings: what the sensors show, each (n,), counted from standstill in the nominal state.
         steps: number of steps that the integration took, rejected ones included [1], ().
         result: how the integration ended.
     """
@@ -82,118 +124,104 @@ class TransientSolution(eqx.Module):
     motion: Motion
     s: Float[Array, "n s"]
     sd: Float[Array, "n s"]
-    actuation: Float[Array, "n k"]
-    inputs: Inputs
-    readings: Readings
+    source: Float[Array, "n k"]
+    inputs: Any
+    readings: Any
     steps: Array
     result: dfx.RESULTS
 
     def status(self) -> Status:
         """How the integration ended. Only if it is ``ok`` do the arrays hold a motion."""
         if bool(self.result == dfx.RESULTS.successful):
-            finite = bool(jnp.isfinite(self.readings.sprung_accel).all())
+            finite = all(bool(jnp.isfinite(each).all()) for each in self.readings)
             return Status.CONVERGED if finite else Status.NOT_FINITE
         if bool(self.result == dfx.RESULTS.max_steps_reached):
             return Status.MAX_ITERATIONS
         return Status.NOT_FINITE
 
-    def state_at(self, index: int) -> RigState:
+    def state_at(self, index: int) -> PlantState:
         """The state at one of the instants, from which a further simulation can go on."""
-        q, qd = (Coordinates(*(part[index] for part in each)) for each in self.motion[:2])
-        return RigState(q, qd, self.s[index], self.actuation[index])
+        q, qd = (jax.tree.map(lambda part: part[index], each) for each in self.motion[:2])
+        return PlantState(q, qd, self.s[index], self.source[index])
 
 
 @eqx.filter_jit
 def rest_state(
-    model: QuarterCar,
-    p: Values,
-    road: RoadMotion,
-    link: AbstractActuation,
-    t: Float[Array, ""],
-    curves: SectionCurves | None = None,
-) -> RigState:
-    """The rig at static equilibrium with the road and the link as they stand at time ``t`` [s].
-
-    ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`.
-    """
-    angle = link.start_angle(t)
-    rest = static_equilibrium(model, p, angle, road.height(t), curves)
-    zero = jnp.zeros_like(angle)
-    still = Coordinates(zero, zero)
-    inputs = Inputs(Road(road.height(t), zero), Link(angle, zero))
-    loads = model.loads(p, Motion(rest.q, still, still), rest.s, jnp.zeros_like(rest.s), inputs, curves)
-    return RigState(rest.q, still, rest.s, link.start(p, t, loads.link_torque))
+    model: AbstractPlant, p: Values, source: AbstractSource, t: Float[Array, ""], prepared: Any = None
+) -> PlantState:
+    """The plant at static equilibrium with its inputs as they stand at time ``t`` [s]."""
+    u = source.at_rest(model, t)
+    q, s = find_rest(model, p, u, prepared)
+    motion = standing(model, q)
+    loads = model.loads(p, motion, s, jnp.zeros_like(s), u, prepared)
+    return PlantState(q, motion.qd, s, source.start(p, t, loads))
 
 
 def _inputs_and_rates(
-    model: QuarterCar,
+    model: AbstractPlant,
     p: Values,
-    road: RoadMotion,
-    link: AbstractActuation,
+    source: AbstractSource,
     t: Array,
-    now: RigState,
-    curves: SectionCurves | None = None,
+    now: PlantState,
+    prepared: Any = None,
     near: Array | None = None,
-) -> tuple[Inputs, Rates]:
-    inputs = Inputs(road.at(t), link.link(t, now.actuation), road.cam_at(t))
-    return inputs, solve_rates(model, p, now.q, now.qd, now.s, inputs, curves, near)
+) -> tuple[Any, Rates]:
+    u = source.inputs(model, t, now.source)
+    return u, solve_rates(model, p, now.q, now.qd, now.s, u, prepared, near)
 
 
 def state_rates(
-    model: QuarterCar,
+    model: AbstractPlant,
     p: Values,
-    road: RoadMotion,
-    link: AbstractActuation,
+    source: AbstractSource,
     t: Float[Array, ""],
-    now: RigState,
-    curves: SectionCurves | None = None,
-    near: Float[Array, " y"] | None = None,
-) -> RigState:
+    now: PlantState,
+    prepared: Any = None,
+    near: Float[Array, " k"] | None = None,
+) -> PlantState:
     """Time derivative of the state at time ``t`` [s], in SI: the right side of the differential equations.
 
-    ``curves`` of the same parameters serve as in :meth:`QuarterCar.residual`, ``near`` as in
-    :func:`savgs_ident.simulate.rates.solve_rates`.
+    ``prepared`` serves as in :meth:`AbstractPlant.residual`, ``near`` as in :func:`solve_rates`.
     """
-    inputs, rates = _inputs_and_rates(model, p, road, link, t, now, curves, near)
-    loads = model.loads(p, Motion(now.q, now.qd, rates.qdd), now.s, rates.sd, inputs, curves)
-    return RigState(now.qd, rates.qdd, rates.sd, link.rate(p, t, now.actuation, loads.link_torque))
+    u, rates = _inputs_and_rates(model, p, source, t, now, prepared, near)
+    loads = model.loads(p, Motion(now.q, now.qd, rates.qdd), now.s, rates.sd, u, prepared)
+    return PlantState(now.qd, rates.qdd, rates.sd, source.rate(p, t, now.source, loads))
 
 
-def _scales(model: QuarterCar, link: AbstractActuation) -> Float[Array, " x"]:
-    return jnp.asarray([*STATE_SCALE, *(state.scale for state in model.states), *link.scales])
+def pack_state(state: PlantState) -> Float[Array, " x"]:
+    """The state as one vector in SI: coordinates, rates, internal states, states of what drives the plant."""
+    return jnp.concatenate([jnp.stack([*state.q, *state.qd]), state.s, state.source])
 
 
-def pack_state(state: RigState) -> Float[Array, " x"]:
-    """The state as one vector in SI: coordinates, velocities, internal states, states of what moves the link."""
-    return jnp.concatenate([jnp.stack([*state.q, *state.qd]), state.s, state.actuation])
-
-
-def unpack_state(model: QuarterCar, x: Float[Array, " x"]) -> RigState:
+def unpack_state(model: AbstractPlant, x: Float[Array, " x"]) -> PlantState:
     """The state that :func:`pack_state` made a vector of, in SI."""
-    end = 4 + len(model.states)
-    return RigState(Coordinates(x[0], x[1]), Coordinates(x[2], x[3]), x[4:end], x[end:])
+    n = len(model.coordinates)
+    end = 2 * n + len(model.states)
+    q, qd = (model.coordinate_type(*jnp.unstack(x[first : first + n])) for first in (0, n))
+    return PlantState(q, qd, x[2 * n : end], x[end:])
 
 
 @eqx.filter_jit
 def _integrate(
-    model: QuarterCar,
+    model: AbstractPlant,
     p: Values,
-    road: RoadMotion,
-    link: AbstractActuation,
+    source: AbstractSource,
     times: Array,
-    start: RigState,
+    start: PlantState,
     tolerance: Float[Array, ""],
-    curves: SectionCurves,
+    prepared: Any,
 ) -> dfx.Solution:
+    travel = jnp.asarray([each.travel for each in model.coordinates])
+
     def rates(t: object, x: Array, args: None) -> Array:
-        return pack_state(state_rates(model, p, road, link, jnp.asarray(t), unpack_state(model, x), curves))
+        return pack_state(state_rates(model, p, source, jnp.asarray(t), unpack_state(model, x), prepared))
 
     def out_of_range(t: Array, x: Array, args: None, **kwargs: object) -> Array:
-        return jnp.abs(x[1]) > TRAVEL
+        return jnp.any(jnp.abs(x[: travel.size]) > travel)
 
     controller = dfx.PIDController(
         rtol=tolerance,
-        atol=tolerance * _scales(model, link),
+        atol=tolerance * jnp.asarray([*state_sizes(model), *source.scales]),
         pcoeff=0.2,
         icoeff=0.4,
         dtmin=LEAST_STEP,
@@ -215,62 +243,77 @@ def _integrate(
     )
 
 
-_zero = eqx.filter_jit(deflection_zero)
+_nominal_readings = eqx.filter_jit(nominal_readings)
 
 
 @eqx.filter_jit
 def _observe(
-    model: QuarterCar,
+    model: AbstractPlant,
     p: Values,
-    road: RoadMotion,
-    link: AbstractActuation,
+    source: AbstractSource,
     found: dfx.Solution,
-    zero: Float[Array, ""],
-    curves: SectionCurves,
+    zeros: tuple[Array, ...],
+    prepared: Any,
 ) -> TransientSolution:
-    def one(at: tuple[Array, Array]) -> tuple[RigState, Inputs, Motion, Array, Readings]:
+    def one(at: tuple[Array, Array]) -> tuple[PlantState, Any, Motion, Array, Any]:
         t, now = at[0], unpack_state(model, at[1])
-        inputs, rates = _inputs_and_rates(model, p, road, link, t, now, curves)
-        seen = model.read(p, now.q.theta_LW, rates.qdd.z_s)
-        shown = seen._replace(
-            susp_deflection=seen.susp_deflection - model.effective(p)["deflection_gain"] * zero
-        )
-        return now, inputs, Motion(now.q, now.qd, rates.qdd), rates.sd, shown
+        u, rates = _inputs_and_rates(model, p, source, t, now, prepared)
+        motion = Motion(now.q, now.qd, rates.qdd)
+        seen = model.read(p, motion, now.s, rates.sd, u, prepared)
+        return now, u, motion, rates.sd, jax.tree.map(jnp.subtract, seen, zeros)
 
     # One after the other: compiling the Newton iteration for all instants side by side takes far longer.
-    now, inputs, motion, sd, seen = jax.lax.map(one, (found.ts, found.ys))
+    now, u, motion, sd, readings = jax.lax.map(one, (found.ts, found.ys))
     steps, times = found.stats["num_steps"], cast(Array, found.ts)
-    readings = seen
     if model.sensors_have_dynamics:
-        readings = pass_through(lambda frequency: model.transfers(p, frequency), times, seen)
-    return TransientSolution(times, motion, now.s, sd, now.actuation, inputs, readings, steps, found.result)
+        shown = through_sensors(partial(model.transfers, p), times, jnp.stack(readings))
+        readings = jax.tree.unflatten(jax.tree.structure(readings), list(shown))
+    return TransientSolution(times, motion, now.s, sd, now.source, u, readings, steps, found.result)
+
+
+def through_sensors(
+    transfer: Callable[[Float[Array, " f"]], Complex[Array, "C f"]],
+    times: Float[Array, " n"],
+    truth: Float[Array, "C n"],
+) -> Float[Array, "C n"]:
+    """Readings at evenly spaced ``times`` [s] after the dynamics of the sensors, in the units of ``truth``.
+
+    ``transfer`` is reading over truth of every channel at frequencies [Hz]. Before and after the record the truth
+    counts as what it was at its ends.
+    """
+    count = times.shape[0]
+    rest = count // 2
+    total = count + 2 * rest
+    step = (times[-1] - times[0]) / max(count - 1, 1)
+    padded = jnp.pad(truth, ((0, 0), (rest, rest)), mode="edge")
+    frequency = jnp.arange(total // 2 + 1, dtype=step.dtype) / (jnp.maximum(step, SHORTEST) * total)
+    shown = jnp.fft.irfft(jnp.fft.rfft(padded) * transfer(frequency), total)
+    return shown[:, rest : rest + count]
 
 
 def simulate_transient(
-    model: QuarterCar,
+    model: AbstractPlant,
     p: Values,
-    road: RoadMotion,
-    link: AbstractActuation,
+    source: AbstractSource,
     times: ArrayLike,
-    initial: RigState | None = None,
+    initial: PlantState | None = None,
     tolerance: float = TOLERANCE,
 ) -> TransientSolution:
     """The motion at ``times`` [s], (n,), increasing, that begins at the first of them.
 
-    It begins in the state ``initial``, by default at static equilibrium. ``link`` is a motion imposed on the
-    link (:func:`savgs_ident.model.actuation.held_link`) or a drive (:class:`savgs_ident.model.drive.Drive`),
-    whose states are then part of the motion. ``tolerance`` is relative, per step. Look at ``status()`` of the
+    It begins in the state ``initial``, by default at static equilibrium. ``source`` drives the plant; where it has
+    states of its own, they are part of the motion. ``tolerance`` is relative, per step. Look at ``status()`` of the
     result before using it. Differentiable in forward mode (``jax.jvp``, ``jax.jacfwd``).
     """
-    instants, curves = jnp.asarray(times, dtype=jnp.float64), model.curves(p)
-    start = rest_state(model, p, road, link, instants[0], curves) if initial is None else initial
-    found = _integrate(model, p, road, link, instants, start, jnp.asarray(tolerance), curves)
-    return _observe(model, p, road, link, found, _zero(model, p, curves), curves)
+    instants, prepared = jnp.asarray(times, dtype=jnp.float64), model.prepare(p)
+    start = rest_state(model, p, source, instants[0], prepared) if initial is None else initial
+    found = _integrate(model, p, source, instants, start, jnp.asarray(tolerance), prepared)
+    return _observe(model, p, source, found, _nominal_readings(model, p, prepared), prepared)
 
 
 @eqx.filter_jit
-def transient_loads(model: QuarterCar, p: Values, solution: TransientSolution) -> Loads:
-    """Forces and reactions along a motion, each (n,) or (n, 2)."""
+def transient_loads(model: AbstractPlant, p: Values, solution: TransientSolution) -> Any:
+    """Forces along a motion, as the plant's ``loads`` arranges them, each (n, ...)."""
     return jax.vmap(lambda *at: model.loads(p, *at))(
         solution.motion, solution.s, solution.sd, solution.inputs
     )

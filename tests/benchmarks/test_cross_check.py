@@ -7,8 +7,8 @@ import pytest
 from benchmarks import cross_check
 from benchmarks.cross_check import distances
 from savgs_ident.core.status import Status
-from savgs_ident.fit.least_squares import FREE
 from savgs_ident.fit.result import Estimate
+from savgs_ident.plants.quarter_car.model import FREE
 
 
 def _estimate(name: str, value: float, stderr: float) -> Estimate:

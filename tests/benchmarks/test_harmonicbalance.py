@@ -9,7 +9,8 @@ from benchmarks.task import make_task
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 
 
-@pytest.mark.parametrize("frequency", [2.35, pytest.param(6.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("frequency", [2.35, 6.0])
 def test_motions_of_the_package_leave_no_force(frequency: float) -> None:
     """On even nodes, where both march the bristle by the same rule; friction alone is a hundred newtons."""
     task = make_task((frequency,))

@@ -8,10 +8,10 @@ import pytest
 from benchmarks.motion import SAMPLES, period_harmonics, settling_periods
 from benchmarks.processes import run_process
 from benchmarks.task import ORDERS, Task, errors_percent
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS, build_model, model_parameters
-from savgs_ident.model.section import section_curves
-from savgs_ident.model.values import as_values
+from savgs_ident.core.values import as_values
+from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.dynamics import section_curves
+from savgs_ident.plants.quarter_car.rig import Rig
 
 
 @pytest.fixture

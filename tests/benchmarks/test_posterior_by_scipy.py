@@ -13,12 +13,11 @@ from benchmarks.scipy_likelihood import Dwell, ScipyDwells
 from benchmarks.stretch_moves import Stretching, autocorrelation_time, stretch
 from benchmarks.task import QUICK_HZ, TOLERANCE_PERCENT, errors_percent
 from benchmarks.task import Task as Work
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
-from savgs_ident.fit.least_squares import FREE
-from savgs_ident.fit.settings import FitSettings
-from savgs_ident.fit.task import Task, plan_task
-from savgs_ident.model.section import SectionCurves, section_curves
+from savgs_ident.inference.problem import ProblemSettings, Task, plan_task
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.dynamics import SectionCurves, section_curves
+from savgs_ident.plants.quarter_car.model import FREE, RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import simulate_periodic
 
@@ -26,7 +25,9 @@ from savgs_ident.simulate.periodic import simulate_periodic
 @pytest.fixture(scope="module")
 def task(rig: Rig) -> Task:
     """Two dwells as they were recorded, tolerances free."""
-    return plan_task(response_of(read_dwells((4.5, 6.0))), rig, MODELS["simtr"], FREE, FitSettings())
+    return plan_task(
+        response_of(read_dwells((4.5, 6.0))), RigModel(rig, MODELS["simtr"]), FREE, ProblemSettings()
+    )
 
 
 def test_only_the_dwells_asked_for_are_kept() -> None:

@@ -8,7 +8,7 @@ import pytest
 from benchmarks import posterior_process
 from benchmarks.posterior_process import measure_posterior, outcome_of
 from benchmarks.processes import Ran
-from savgs_ident.posterior.samplers import SAMPLERS
+from savgs_ident.inference.sample import SAMPLERS
 
 
 def _output(ess: float, reasons: Sequence[str] = ()) -> str:

@@ -12,9 +12,9 @@ import pytest
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 
-from savgs_ident.posterior.result import Posterior
-from savgs_ident.report.origin import Origin
-from savgs_ident.report.posterior_html import posterior_html
+from savgs_ident.core.presentation import Origin
+from savgs_ident.inference.result import Posterior
+from savgs_ident.report.posterior.page import posterior_html
 
 from ..report.posterior_synthetic import nominal_response, renamed, synthetic_posterior, unconverged
 
@@ -110,7 +110,9 @@ def page(posterior: Posterior, tmp_path_factory: pytest.TempPathFactory) -> Path
 def hostile_page(posterior: Posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The report of one that did not, from data where every name is an attack."""
     named = renamed(replace(posterior, sentences=(HOSTILE,)), f"k{HOSTILE}", HOSTILE, HOSTILE)
-    failed = unconverged(replace(named, effects=(HOSTILE,), rig=replace(named.rig, name=HOSTILE)), HOSTILE)
+    failed = unconverged(
+        replace(named, model=replace(named.model, rig=replace(named.model.rig, name=HOSTILE))), HOSTILE
+    )
     origin = Origin(("savgs-ident", HOSTILE), HOSTILE, HOSTILE, HOSTILE, {HOSTILE: HOSTILE})
     return _written(tmp_path_factory, posterior_html(failed, origin))
 

@@ -6,13 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from savgs_ident.report.diagnosis_html import diagnosis_html
-from savgs_ident.report.origin import Origin
+from savgs_ident.core.presentation import Origin
+from savgs_ident.report.diagnosis.page import diagnosis_html
 
 from ..report.diagnosis_synthetic import hostile, synthetic_diagnosis, unconverged
 from ..report.posterior_synthetic import nominal_response
 from .conftest import HOSTILE, SHOWN, Browser
 from .test_posterior_page import OPEN_ALL, OVERFLOWING, SIZES, SMALLEST_PICTURE_TEXT, SMALLEST_TEXT
+
+pytestmark = pytest.mark.slow
 
 PICTURES = 10
 PAGES = ["found", "nothing", "attacked"]
@@ -125,17 +127,17 @@ def test_tables_fit_beside_their_headings_on_a_desk(browser: Browser, pages: dic
     assert browser.ask(scrolling) == 0
 
 
-def test_the_guilty_port_and_effect_are_told_by_colour_and_picture(
+def test_the_named_port_and_effect_are_marked_by_colour_and_picture(
     browser: Browser, pages: dict[str, Path]
 ) -> None:
     browser.open(pages["found"])
-    guilty = "return [...document.querySelectorAll('tr.guilty th')].map(t => t.innerText.split(/\\s/)[0])"
-    assert browser.ask(guilty) == ["rail", "rail_stribeck"]
+    named = "return [...document.querySelectorAll('tr.named th')].map(t => t.innerText.split(/\\s/)[0])"
+    assert browser.ask(named) == ["rail", "rail_stribeck"]
     assert browser.ask("return document.images[0].alt").startswith(
-        "The rig with its ports. Guilty port: rail."
+        "The rig with its ports. Named port: rail."
     )
     browser.open(pages["nothing"])
-    assert browser.ask(guilty) == []
+    assert browser.ask(named) == []
 
 
 def test_the_page_has_a_language_a_title_and_headings_in_order(

@@ -8,6 +8,8 @@ import pytest
 
 from .conftest import SHOWN, Browser
 
+pytestmark = pytest.mark.slow
+
 PICTURES = 13
 SMALLEST_TEXT = 14.0
 SMALLEST_PICTURE_TEXT = 8.0

@@ -8,25 +8,27 @@ from pathlib import Path
 
 import pytest
 
+from savgs_ident.campaigns.study import CampaignRow, CampaignStudy, Identified, RowStatus, study_campaigns
 from savgs_ident.control.closed_loop.programme import DEFAULT_SPEED, LoopKind, bump_test
 from savgs_ident.control.closed_loop.study import LoopStudy, study_loop
 from savgs_ident.control.design import Design, controller_for, design_controller
+from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS
 from savgs_ident.control.linear_study import LinearStudy, study_linear
 from savgs_ident.control.rigs import rigs_from_covariance
-from savgs_ident.control.weights import DEFAULT_WEIGHTS
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS, build_model, model_parameters
-from savgs_ident.model.values import Values, as_values
-from savgs_ident.report.campaigns_html import campaigns_html
-from savgs_ident.report.campaigns_study import CampaignRow, Identified, RowStatus, Study, study_campaigns
-from savgs_ident.report.design_html import design_html
-from savgs_ident.report.linear_html import linear_html
-from savgs_ident.report.loop_html import loop_html
-from savgs_ident.report.model_origin import ModelOrigin, model_origin
+from savgs_ident.core.presentation import Origin
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.report.campaigns.page import campaigns_html
+from savgs_ident.report.control.design_page import design_html
+from savgs_ident.report.control.linear_page import linear_html
+from savgs_ident.report.control.loop_page import loop_html
 
 from ..relaxed import with_kept_programs
 from .conftest import HOSTILE, SHOWN, Browser
 from .test_posterior_page import OPEN_ALL, OVERFLOWING, SIZES, SMALLEST_PICTURE_TEXT, SMALLEST_TEXT
+
+pytestmark = pytest.mark.slow
 
 PICTURES = {"linear": 3, "design": 5, "loop": 4, "campaigns": 1, "attacked": 5, "attacked campaigns": 1}
 EFFECTS = MODELS["simtr"]
@@ -63,7 +65,7 @@ def _loop(rig: Rig) -> tuple[LoopStudy, Values]:
     return study_loop(model, p, controller, test, lambda _: None, rigs, causes=True), p
 
 
-def _campaigns(name: str) -> Study:
+def _campaigns(name: str) -> CampaignStudy:
     """Fourteen days, friction rising; a campaign that failed and one that is not to be trusted."""
     rows = [
         CampaignRow(
@@ -87,8 +89,16 @@ def _campaigns(name: str) -> Study:
 @pytest.fixture(scope="module")
 def pages(rig: Rig, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pages]:
     """The four reports, and two with an attack in every name, one of a failed controller; made when asked for."""
-    origin = model_origin("gt_rear", "gt_rear.toml", EFFECTS, ("savgs-ident", "design", "gt_rear.toml"))
-    bad = ModelOrigin(HOSTILE, HOSTILE, (HOSTILE,), ("savgs-ident", HOSTILE), {HOSTILE: HOSTILE})
+    origin = Origin(
+        ("savgs-ident", "design", "gt_rear.toml"), model="gt_rear.toml", rig="gt_rear", effects=EFFECTS
+    )
+    bad = Origin(
+        ("savgs-ident", HOSTILE),
+        model=HOSTILE,
+        versions={HOSTILE: HOSTILE},
+        rig=HOSTILE,
+        effects=(HOSTILE,),
+    )
     design = cache(lambda: _design(rig))
 
     def attacked() -> str:

@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from savgs_ident.cli.blind_trial import Drawn, Plan
-from savgs_ident.cli.blinding import Job, run_blind
-from savgs_ident.cli.console import Voice
-from savgs_ident.core.rig import Rig
-from savgs_ident.diagnose.blind.bench import Bench
+from savgs_ident.cli.console import Reporter
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording
+from savgs_ident.validation.blind import Job, run_blind
+from savgs_ident.validation.blind_trial import Drawn, Plan
+from savgs_ident.validation.virtual_rig import Bench
 
-from ..diagnose.blind_answers import answer, diagnosis
+from ..diagnosis.blind_answers import answer, diagnosis
 
 KINDS = {
     0: ("none",),
@@ -107,9 +107,17 @@ def slowly_right(seconds: float, folder: Path, rig: Rig, without: tuple[str, ...
     return always_right(folder, rig, without)
 
 
+def concluded(job: Job, draw: Any, diagnose: Any, reporter: Reporter, out: Path) -> int:
+    """The exit code of the command, with other rigs and another diagnosis."""
+    with reporter.working() as progress:
+        study = run_blind(job, draw, diagnose, out, progress)
+        files = study.save(out, progress)
+    return reporter.conclude(study, files)
+
+
 def _main(folder: str, trials: str, jobs: str, seconds: str) -> int:
     slow = partial(slowly_right, float(seconds))
-    return run_blind(job(trials=int(trials), jobs=int(jobs)), draw, slow, Voice(False, True), Path(folder))
+    return concluded(job(trials=int(trials), jobs=int(jobs)), draw, slow, Reporter(False, True), Path(folder))
 
 
 if __name__ == "__main__":

@@ -16,19 +16,17 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from savgs_ident.cli.campaign_store import Kept
-from savgs_ident.cli.campaign_work import Failure, Outcome, Task
-from savgs_ident.cli.campaigns import ManyJob, run_campaigns, spread_of
-from savgs_ident.cli.console import Voice
-from savgs_ident.cli.identify import Job
-from savgs_ident.cli.models import ModelName
-from savgs_ident.core.rig import default_rig_path
-from savgs_ident.fit.settings import FitSettings
+from savgs_ident.campaigns.run import Failure, Job, Jobs, Outcome, Task, identify_all, spread_of
+from savgs_ident.campaigns.store import Kept
+from savgs_ident.cli.campaign import conclude
+from savgs_ident.cli.console import Reporter
+from savgs_ident.fit.least_squares import FitSettings
+from savgs_ident.plants.quarter_car.rig import default_rig_path
 
 STDERR = 0.1
 DAY = 86400.0
 MONDAY = datetime(2026, 3, 2, 8, 0, tzinfo=UTC).timestamp()
-SILENT, TALKING = Voice(False, True), Voice(False, False)
+SILENT, TALKING = Reporter(False, True), Reporter(False, False)
 
 
 def campaign_file(path: Path, value: float, start: float | None = None, **more: Any) -> Path:
@@ -38,19 +36,19 @@ def campaign_file(path: Path, value: float, start: float | None = None, **more: 
     return path
 
 
-def job(*arguments: Path, **changes: Any) -> ManyJob:
+def job(*arguments: Path, **changes: Any) -> Jobs:
     """Identify mu_r and c_sd of the campaigns in ``arguments``; changes are of the single fit."""
     given: dict[str, Any] = {
         "campaign": Path(),
         "rig": default_rig_path(),
         "channels": None,
-        "model": ModelName.simtr,
+        "model": "simtr",
         "free": ("mu_r", "c_sd"),
         "settings": FitSettings(),
         "max_frequency": None,
         "command": ("savgs-ident", "campaign"),
     }
-    return ManyJob(arguments, Job(**(given | changes)), None, 2)
+    return Jobs(arguments, Job(**(given | changes)), None, 2)
 
 
 def read_number(task: Task) -> Outcome:
@@ -97,9 +95,19 @@ def one_by_one(work: Callable[[Task], Outcome], tasks: Sequence[Task]) -> Iterat
     yield from ((number, work(task)) for number, task in enumerate(tasks))
 
 
-def run(*arguments: Path, out: Path, work: Any = read_number, voice: Voice = SILENT, **changes: Any) -> int:
+def run(
+    *arguments: Path, out: Path, work: Any = read_number, voice: Reporter = SILENT, **changes: Any
+) -> int:
     """The exit code of a run in this process."""
-    return run_campaigns(job(*arguments, **changes), work, one_by_one, voice, out)
+    return _concluded(job(*arguments, **changes), work, one_by_one, voice, out)
+
+
+def _concluded(asked: Jobs, work: Any, spread: Any, voice: Reporter, out: Path) -> int:
+    """The command, with other work and another executor."""
+    with voice.working() as progress:
+        study = identify_all(asked, work, spread, out, progress)
+        files = study.save(out, progress)
+    return conclude(study, files, voice)
 
 
 def record_of(out: Path) -> dict[str, Any]:
@@ -125,9 +133,9 @@ def slowly(seconds: float, task: Task) -> Outcome:
 def _main(out: str, seconds: str, where: str, *arguments: str) -> int:
     asked = job(*map(Path, arguments))
     local = where.isdecimal()
-    asked = ManyJob(asked.arguments, asked.one, None if local else where, int(where) if local else 1)
+    asked = Jobs(asked.arguments, asked.one, None if local else where, int(where) if local else 1)
     slow = partial(slowly, float(seconds))
-    return run_campaigns(asked, slow, spread_of(asked), Voice(False, False), Path(out))
+    return _concluded(asked, slow, spread_of(asked), Reporter(False, False), Path(out))
 
 
 if __name__ == "__main__":

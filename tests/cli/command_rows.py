@@ -2,7 +2,7 @@
 
 from typer.main import get_command
 
-from savgs_ident.cli.main import app
+from savgs_ident.cli.app import app
 
 ROWS: dict[str, tuple[str, ...]] = {
     "demo": (),

@@ -11,8 +11,8 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
-from savgs_ident.cli.arguments import spread_values
-from savgs_ident.cli.main import app
+from savgs_ident.cli.app import app
+from savgs_ident.cli.options import spread_values
 
 from .. import relaxed
 from .campaign_fakes import DAY, MONDAY, campaign_file
@@ -26,9 +26,9 @@ COMMAND = (sys.executable, "-m", "savgs_ident.cli")
 
 
 @pytest.fixture(scope="session")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where compiled programs are kept during the tests, instead of in the user's folder."""
-    return tmp_path_factory.mktemp("cache")
+def cache() -> Path:
+    """Where compiled programs are kept during the tests, instead of in the user's folder; see tests/conftest.py."""
+    return Path(os.environ["SAVGS_IDENT_CACHE"])
 
 
 @pytest.fixture(scope="session")
@@ -82,6 +82,17 @@ def invoke(
 
     def run(*words: object) -> Result:
         return as_users_have_it([str(word) for word in words])
+
+    return run
+
+
+@pytest.fixture
+def inside(invoke: Invoke) -> Callable[..., "subprocess.CompletedProcess[str]"]:
+    """The same with the outcome of a process: for what does not depend on there being one."""
+
+    def run(*words: object) -> "subprocess.CompletedProcess[str]":
+        done = invoke(*words)
+        return subprocess.CompletedProcess(words, done.exit_code, done.stdout, done.stderr)
 
     return run
 

@@ -1,13 +1,19 @@
 """Draws of campaigns with nothing missing, through the program: kept, continued, refused."""
 
 import json
+from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
 
-from savgs_ident.cli.alarming import Job, draws_in
-from savgs_ident.cli.diagnosing import Job as DiagnosisJob
 from savgs_ident.core.errors import InputError
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
+from savgs_ident.validation.false_alarms import read_draw
+from savgs_ident.validation.trials import known_trials, marks_of
+
+RIG = read_rig(default_rig_path())
 
 DRAWS = ("false-alarms", "--orders", "3", "--quiet", "--out", "o")
 
@@ -17,15 +23,18 @@ def test_draws_from_files_that_were_edited_are_refused(edited: str, tmp_path: Pa
     files = {name: tmp_path / name for name in ("rig file", "campaign", "channel map")}
     for path in files.values():
         path.write_text("as it was")
-    asked = DiagnosisJob(
-        files["campaign"], files["channel map"], files["rig file"], None, (), None, 3, ("savgs-ident",)
-    )
-    job, kept = Job(asked, 10, 1, resume=True), tmp_path / "draws.jsonl"
-    kept.write_text(json.dumps(job.marks(job.rig.read_bytes())) + "\n")
-    assert draws_in(kept, job.marks(job.rig.read_bytes())) == []
+    kept = tmp_path / "draws.jsonl"
+
+    def marks() -> dict[str, object]:
+        content = files["rig file"].read_bytes()
+        rig = replace(RIG, source=str(files["rig file"]), sha256=sha256(content).hexdigest())
+        return marks_of(RigModel(rig), files["campaign"], files["channel map"]) | {"seed": 1}
+
+    kept.write_text(json.dumps(marks()) + "\n")
+    assert known_trials(kept, marks(), read_draw) == []
     files[edited].write_text("as it is")
     with pytest.raises(InputError, match=f"holds trials of another state of the {edited}. Remedy"):
-        draws_in(kept, job.marks(job.rig.read_bytes()))
+        known_trials(kept, marks(), read_draw)
 
 
 @pytest.mark.slow

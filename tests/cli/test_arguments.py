@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from savgs_ident.cli.arguments import spread_values
+from savgs_ident.cli.options import spread_values
 
 WORDS = st.lists(
     st.sampled_from(["--free", "--quiet", "mu_r", "c_sd", "run.csv", "2.5", "--frequency", "-h"])

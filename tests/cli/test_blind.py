@@ -13,17 +13,16 @@ from typing import Any
 
 import pytest
 
-from savgs_ident.cli.blind_trial import Drawn
-from savgs_ident.cli.blinding import Job, run_blind
-from savgs_ident.cli.console import Voice
-from savgs_ident.cli.guard import NOT_TRUSTED, OK
+from savgs_ident.cli.console import NOT_TRUSTED, OK, Reporter
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.rig import default_rig_path
+from savgs_ident.plants.quarter_car.rig import default_rig_path
+from savgs_ident.validation.blind import Job
+from savgs_ident.validation.blind_trial import Drawn
 
-from .blind_fakes import always_none, always_right, draw, job
+from .blind_fakes import always_none, always_right, concluded, draw, job
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-SILENT = Voice(False, True)
+SILENT = Reporter(False, True)
 
 
 def _never(*_: object) -> Any:
@@ -36,8 +35,8 @@ def _record(out: Path) -> dict[str, Any]:
 
 
 def test_a_run_that_goes_on_equals_one_that_was_never_stopped(tmp_path: Path) -> None:
-    assert run_blind(job(), draw, always_right, SILENT, tmp_path / "whole") == OK
-    run_blind(job(trials=3), draw, always_right, SILENT, tmp_path / "parts")
+    assert concluded(job(), draw, always_right, SILENT, tmp_path / "whole") == OK
+    concluded(job(trials=3), draw, always_right, SILENT, tmp_path / "parts")
     kept = tmp_path / "parts" / "trials.jsonl"
     # Stopped in the middle of a line, and of the recording of the fourth trial.
     kept.write_text(kept.read_text()[:-25])
@@ -45,22 +44,22 @@ def test_a_run_that_goes_on_equals_one_that_was_never_stopped(tmp_path: Path) ->
     begun.mkdir(parents=True)
     (begun / "campaign.csv.gz").write_bytes(b"half")
     (begun / ".seal.json.abcd1_23.part").write_bytes(b"half")
-    assert run_blind(job(), draw, always_right, SILENT, tmp_path / "parts") == OK
+    assert concluded(job(), draw, always_right, SILENT, tmp_path / "parts") == OK
     assert _record(tmp_path / "parts") == _record(tmp_path / "whole")
     assert (tmp_path / "parts/blind.html").read_bytes() == (tmp_path / "whole/blind.html").read_bytes()
     assert kept.read_text() == (tmp_path / "whole/trials.jsonl").read_text()
 
 
 def test_trials_that_are_there_are_neither_drawn_nor_diagnosed(tmp_path: Path) -> None:
-    run_blind(job(), draw, always_right, SILENT, tmp_path)
+    concluded(job(), draw, always_right, SILENT, tmp_path)
     before = _record(tmp_path)
-    assert run_blind(job(seed=None), _never, _never, SILENT, tmp_path) == OK
+    assert concluded(job(seed=None), _never, _never, SILENT, tmp_path) == OK
     assert _record(tmp_path) == before
 
 
 def test_again_diagnoses_the_same_recordings(tmp_path: Path) -> None:
-    run_blind(job(), draw, always_right, SILENT, tmp_path)
-    code = run_blind(job(again=True), _never, always_none, SILENT, tmp_path)
+    concluded(job(), draw, always_right, SILENT, tmp_path)
+    code = concluded(job(again=True), _never, always_none, SILENT, tmp_path)
     assert code == NOT_TRUSTED
     record = _record(tmp_path)
     assert record["trials"] == 6
@@ -68,7 +67,7 @@ def test_again_diagnoses_the_same_recordings(tmp_path: Path) -> None:
 
 
 def test_what_is_told_is_what_was_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_blind(job(trials=8), draw, always_right, Voice(True, False), tmp_path) == OK
+    assert concluded(job(trials=8), draw, always_right, Reporter(True, False), tmp_path) == OK
     printed = json.loads(capsys.readouterr().out)
     assert printed == _record(tmp_path)
     assert printed["kinds"] == {"none": 2, "effect": 2, "two": 2, "unknown": 2}
@@ -83,19 +82,19 @@ def test_what_is_told_is_what_was_found(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_an_answer_that_was_changed_is_noticed(tmp_path: Path) -> None:
-    run_blind(job(trials=1), draw, always_right, SILENT, tmp_path)
+    concluded(job(trials=1), draw, always_right, SILENT, tmp_path)
     path = tmp_path / "trial_0001" / "answer.json"
     path.write_text(path.read_text().replace("accel_lag", "cam_scale"))
     with pytest.raises(InputError, match="not the one that was sealed"):
-        run_blind(job(trials=1, again=True), _never, always_right, SILENT, tmp_path)
+        concluded(job(trials=1, again=True), _never, always_right, SILENT, tmp_path)
 
 
 def test_recordings_that_were_changed_are_noticed(tmp_path: Path) -> None:
-    run_blind(job(trials=2), draw, always_right, SILENT, tmp_path)
+    concluded(job(trials=2), draw, always_right, SILENT, tmp_path)
     data = [tmp_path / f"trial_000{n}" / "campaign" / "campaign.csv.gz" for n in (1, 2)]
     data[0].write_bytes(data[1].read_bytes())
     with pytest.raises(InputError, match="recordings are not those"):
-        run_blind(job(trials=1, again=True), _never, always_none, SILENT, tmp_path)
+        concluded(job(trials=1, again=True), _never, always_none, SILENT, tmp_path)
 
 
 @pytest.mark.parametrize("name", ["mine.txt", "campaign/run.csv", "campaign/seal.json/mine", ".git/config"])
@@ -107,15 +106,15 @@ def test_a_folder_that_is_not_a_trials_is_not_removed(name: str, tmp_path: Path)
     with pytest.raises(
         InputError, match=f"trial_0002: holds {re.escape(top.removesuffix('/config'))}, which is"
     ):
-        run_blind(job(trials=2), _never, _never, SILENT, tmp_path)
+        concluded(job(trials=2), _never, _never, SILENT, tmp_path)
     assert (tmp_path / "trial_0002" / name).read_text() == "mine"
 
 
 def test_notes_beside_a_recorded_trial_are_left_and_hinder_nobody(tmp_path: Path) -> None:
-    run_blind(job(trials=1), draw, always_right, SILENT, tmp_path)
+    concluded(job(trials=1), draw, always_right, SILENT, tmp_path)
     notes = tmp_path / "trial_0001" / "notes.txt"
     notes.write_text("mine")
-    assert run_blind(job(trials=1, again=True), _never, always_right, SILENT, tmp_path) == OK
+    assert concluded(job(trials=1, again=True), _never, always_right, SILENT, tmp_path) == OK
     assert notes.read_text() == "mine"
 
 
@@ -127,7 +126,7 @@ def test_what_is_put_into_a_trials_folder_during_the_run_is_not_removed(tmp_path
         return draw(*given)
 
     with pytest.raises(InputError, match=r"holds mine\.txt, which is not of a trial"):
-        run_blind(job(trials=1), disturbed, _never, SILENT, tmp_path)
+        concluded(job(trials=1), disturbed, _never, SILENT, tmp_path)
     assert mine.read_text() == "mine"
 
 
@@ -136,7 +135,7 @@ def test_a_diagnosis_that_ends_with_an_error_counts_as_wrong(error: Exception, t
     def broken(*_: object) -> Any:
         raise error
 
-    assert run_blind(job(trials=1), draw, broken, SILENT, tmp_path) == NOT_TRUSTED
+    assert concluded(job(trials=1), draw, broken, SILENT, tmp_path) == NOT_TRUSTED
     (score,) = _record(tmp_path)["scores"]
     assert (score["verdict"], score["named_right"], score["located_right"]) == ("failed", False, False)
     told = json.loads((tmp_path / "trial_0001" / "diagnosis.json").read_text())
@@ -149,25 +148,25 @@ def test_a_disk_that_is_full_is_no_mark_of_a_diagnosis(tmp_path: Path) -> None:
         raise OSError(28, "No space left on device")
 
     with pytest.raises(OSError, match="No space left"):
-        run_blind(job(trials=1), draw, full, SILENT, tmp_path)
-    assert run_blind(job(trials=1), _never, always_right, SILENT, tmp_path) == OK
+        concluded(job(trials=1), draw, full, SILENT, tmp_path)
+    assert concluded(job(trials=1), _never, always_right, SILENT, tmp_path) == OK
 
 
 @pytest.mark.parametrize("other", [job(seed=5), job(every=2), job(shares=(1.0, 1.0, 0.0, 0.0))])
 def test_trials_of_other_settings_are_refused(tmp_path: Path, other: Job) -> None:
-    run_blind(job(trials=1), draw, always_right, SILENT, tmp_path)
+    concluded(job(trials=1), draw, always_right, SILENT, tmp_path)
     for again in (False, True):
         with pytest.raises(InputError, match="trials of another"):
-            run_blind(replace(other, again=again), _never, _never, SILENT, tmp_path)
+            concluded(replace(other, again=again), _never, _never, SILENT, tmp_path)
 
 
 def test_trials_of_a_rig_that_was_edited_are_refused(tmp_path: Path) -> None:
     mine, given = tmp_path / "mine.toml", default_rig_path().read_text()
     mine.write_text(given)
-    run_blind(job(trials=1, rig=mine), draw, always_right, SILENT, tmp_path / "out")
+    concluded(job(trials=1, rig=mine), draw, always_right, SILENT, tmp_path / "out")
     mine.write_text(given.replace("value = 320.0", "value = 321.0"))
     with pytest.raises(InputError, match="trials of another state of the rig file"):
-        run_blind(job(trials=2, rig=mine), _never, _never, SILENT, tmp_path / "out")
+        concluded(job(trials=2, rig=mine), _never, _never, SILENT, tmp_path / "out")
 
 
 def test_the_rig_is_the_one_that_was_there_when_the_run_began(tmp_path: Path) -> None:
@@ -178,13 +177,13 @@ def test_the_rig_is_the_one_that_was_there_when_the_run_began(tmp_path: Path) ->
         mine.write_text("edited")
         return draw(*given)
 
-    code = run_blind(job(trials=2, rig=mine), edited, always_right, SILENT, tmp_path / "out")
+    code = concluded(job(trials=2, rig=mine), edited, always_right, SILENT, tmp_path / "out")
     assert (code, _record(tmp_path / "out")["trials"]) == (OK, 2)
 
 
 def test_a_seed_that_nobody_gave_is_another_one_each_time(tmp_path: Path) -> None:
     for name in ("one", "two"):
-        run_blind(job(trials=1, seed=None), draw, always_right, SILENT, tmp_path / name)
+        concluded(job(trials=1, seed=None), draw, always_right, SILENT, tmp_path / name)
     seeds = {_record(tmp_path / name)["settings"]["seed"] for name in ("one", "two")}
     assert len(seeds) == 2
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from savgs_ident.cli.blind_workers import side_by_side
 from savgs_ident.core.errors import InputError
+from savgs_ident.validation.trials import side_by_side
 
 
 def doubled(marks: Path, kills: int, number: int) -> int:
@@ -24,10 +24,12 @@ def refused(number: int) -> int:
     raise InputError(f"{number} is no good", remedy="take another")
 
 
+@pytest.mark.slow
 def test_what_a_killed_process_had_in_hand_is_done_again(tmp_path: Path) -> None:
     assert sorted(side_by_side(partial(doubled, tmp_path, 1), [1, 2, 3, 4], 2)) == [2, 4, 6, 8]
 
 
+@pytest.mark.slow
 def test_what_is_killed_each_time_is_told_when_the_others_are_done(tmp_path: Path) -> None:
     found: list[int] = []
     said = r"trial 3: its process was killed by signal 9, 3 times\. Remedy: run again"

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from savgs_ident.cli.calibrating import Job
-from savgs_ident.cli.kept_trials import known_trials
 from savgs_ident.core.errors import InputError
-from savgs_ident.posterior.calibration import RANKED, Trial
-from savgs_ident.report.calibration import calibration_figure, calibration_record
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
+from savgs_ident.report.validation.calibration import calibration_figure, calibration_record
+from savgs_ident.validation.calibration import RANKED, Trial
+from savgs_ident.validation.trials import known_trials, marks_of
 
 NAMES = ("mu_r", "c_sd")
 
@@ -23,12 +24,14 @@ def _trial(fields: dict[str, Any]) -> Trial:
     return Trial(**fields)
 
 
-MODEL = b"as it was"
+MODEL = RigModel(replace(read_rig(default_rig_path()), source="model.toml", sha256="as it was"))
+OTHER_MODEL = RigModel(replace(MODEL.rig, sha256="as it is"))
 
 
-def _job(campaign: Path, **changes: Any) -> Job:
-    job = Job(Path("model.toml"), campaign, None, 10, "emcee", 3, 1, True, ("savgs-ident",))
-    return replace(job, **changes)
+def _marks(
+    campaign: Path, channels: Path | None = None, seed: int = 1, model: RigModel = MODEL
+) -> dict[str, object]:
+    return marks_of(model, campaign, channels) | {"sampler": "emcee", "every": 3, "seed": seed}
 
 
 @pytest.fixture
@@ -54,33 +57,33 @@ def _trials(count: int, share: float, seed: int) -> list[Trial]:
     ]
 
 
-def _written(path: Path, job: Job, trials: list[Trial]) -> None:
-    lines = [json.dumps(job.marks(MODEL)), *(json.dumps(asdict(trial)) for trial in trials)]
+def _written(path: Path, marks: dict[str, object], trials: list[Trial]) -> None:
+    lines = [json.dumps(marks), *(json.dumps(asdict(trial)) for trial in trials)]
     path.write_text("\n".join(lines) + "\n")
 
 
 def test_whole_trials_are_kept_and_a_line_that_was_cut_off_is_not(tmp_path: Path, campaign: Path) -> None:
-    kept, trials, marks = tmp_path / "trials.jsonl", _trials(5, 0.95, 1), _job(campaign).marks(MODEL)
-    _written(kept, _job(campaign), trials)
+    kept, trials, marks = tmp_path / "trials.jsonl", _trials(5, 0.95, 1), _marks(campaign)
+    _written(kept, _marks(campaign), trials)
     kept.write_text(kept.read_text()[:-20])
     assert known_trials(kept, marks, _trial) == trials[:4]
     assert known_trials(kept, marks, _trial) == trials[:4]
 
 
-def _edited(campaign: Path) -> tuple[Job, bytes]:
+def _edited(campaign: Path) -> dict[str, object]:
     campaign.write_text("as it is")
-    return _job(campaign), MODEL
+    return _marks(campaign)
 
 
-def _mapped(campaign: Path) -> tuple[Job, bytes]:
+def _mapped(campaign: Path) -> dict[str, object]:
     (campaign.parent / "channels.toml").write_text("")
-    return _job(campaign), MODEL
+    return _marks(campaign)
 
 
-OTHERS: dict[str, Callable[[Path], tuple[Job, bytes]]] = {
-    "seed": lambda campaign: (_job(campaign, seed=2), MODEL),
-    "channels, state of the channel map": lambda campaign: (_job(campaign, channels=campaign), MODEL),
-    "state of the rig file": lambda campaign: (_job(campaign), b"as it is"),
+OTHERS: dict[str, Callable[[Path], dict[str, object]]] = {
+    "seed": lambda campaign: _marks(campaign, seed=2),
+    "channels, state of the channel map": lambda campaign: _marks(campaign, channels=campaign),
+    "state of the rig file": lambda campaign: _marks(campaign, model=OTHER_MODEL),
     "state of the campaign": _edited,
     "state of the channel map": _mapped,
 }
@@ -89,17 +92,17 @@ OTHERS: dict[str, Callable[[Path], tuple[Job, bytes]]] = {
 @pytest.mark.parametrize("other", OTHERS)
 def test_trials_of_something_else_are_refused(other: str, tmp_path: Path, campaign: Path) -> None:
     kept = tmp_path / "trials.jsonl"
-    _written(kept, _job(campaign), _trials(2, 0.95, 1))
-    job, model = OTHERS[other](campaign)
+    _written(kept, _marks(campaign), _trials(2, 0.95, 1))
+    marks = OTHERS[other](campaign)
     with pytest.raises(InputError, match=f"holds trials of another {other}. Remedy"):
-        known_trials(kept, job.marks(model), _trial)
+        known_trials(kept, marks, _trial)
 
 
 def test_trials_of_a_version_that_noted_less_are_refused_with_the_reason(
     tmp_path: Path, campaign: Path
 ) -> None:
     kept = tmp_path / "trials.jsonl"
-    marks = _job(campaign).marks(MODEL)
+    marks = _marks(campaign)
     kept.write_text(json.dumps({name: each for name, each in marks.items() if "sha256" not in name}) + "\n")
     said = (
         "an earlier version, which did not note the state of the campaign, state of the channel map, state of"
@@ -110,14 +113,14 @@ def test_trials_of_a_version_that_noted_less_are_refused_with_the_reason(
 
 def test_a_campaign_that_is_not_there_has_no_marks(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.csv: does not exist"):
-        _job(tmp_path / "none.csv").marks(MODEL)
+        _marks(tmp_path / "none.csv")
 
 
 def test_what_is_no_list_of_trials_is_refused(tmp_path: Path, campaign: Path) -> None:
     kept = tmp_path / "trials.jsonl"
     kept.write_text("nonsense\n")
     with pytest.raises(InputError, match="no list of trials"):
-        known_trials(kept, _job(campaign).marks(MODEL), _trial)
+        known_trials(kept, _marks(campaign), _trial)
 
 
 def test_a_right_sampler_is_found_right_and_a_bold_one_is_not() -> None:

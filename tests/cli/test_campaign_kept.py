@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from savgs_ident import __version__
-from savgs_ident.cli.campaign_work import identify_one
-from savgs_ident.cli.guard import BAD_INPUT, OK
-from savgs_ident.fit.settings import FitSettings
+from savgs_ident.campaigns.run import identify_one
+from savgs_ident.cli.console import BAD_INPUT, OK
+from savgs_ident.fit.least_squares import FitSettings
 
 from .campaign_fakes import TALKING, campaign_file, job, never, read_number, rows_of, run
 
@@ -97,6 +97,7 @@ def test_only_own_parts_that_nobody_writes_are_removed(week: Path, tmp_path: Pat
     assert {*out.glob(".*")} == others
 
 
+@pytest.mark.slow
 def test_other_settings_another_rig_and_other_data_are_done_anew(
     week: Path, tmp_path: Path, rig: Any
 ) -> None:
@@ -156,9 +157,7 @@ def test_what_changed_during_the_run_is_not_kept(
         return identify_one(replace(task, **change))
 
     out = tmp_path / "out"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("savgs_ident.cli.identify.fit_least_squares", lambda *args, **kwargs: None)
-        assert run(short_campaign, out=out, work=late, **QUICK) == BAD_INPUT
+    assert run(short_campaign, out=out, work=late, **QUICK) == BAD_INPUT
     assert said in rows_of(out)[0]["reason"]
     assert not list(out.glob("*/done.json"))
 
@@ -174,9 +173,7 @@ def test_a_map_that_is_put_beside_the_recordings_during_the_run_is_noticed(
         (data.parent / "channels.toml").write_text("")
         return identify_one(task)
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("savgs_ident.cli.identify.fit_least_squares", lambda *args, **kwargs: None)
-        assert run(data, out=tmp_path / "out", work=late, **QUICK) == BAD_INPUT
+    assert run(data, out=tmp_path / "out", work=late, **QUICK) == BAD_INPUT
     assert "the map of its channels is not what it was" in rows_of(tmp_path / "out")[0]["reason"]
 
 
@@ -187,7 +184,7 @@ def test_ctrl_c_is_code_130_and_keeps_what_is_done(
         yield 0, read_number(tasks[0])
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("savgs_ident.cli.campaigns.spread_of", lambda _: stopped)
+    monkeypatch.setattr("savgs_ident.campaigns.run.spread_of", lambda _: stopped)
     done = invoke("campaign", week, "--out", "out")
     assert done.exit_code == 130
     assert done.stderr.endswith("Stopped by Ctrl-C; files that were finished are kept.\n")

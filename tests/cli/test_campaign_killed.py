@@ -12,9 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from savgs_ident.cli.guard import NOT_TRUSTED, OK
+from savgs_ident.cli.console import NOT_TRUSTED, OK
 
 from .campaign_fakes import campaign_file
+
+pytestmark = pytest.mark.slow
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -87,7 +89,6 @@ def test_what_a_killed_process_had_in_hand_is_done_again(six: Path, tmp_path: Pa
     assert "6 of 6 done" in said
 
 
-@pytest.mark.slow
 def test_a_campaign_whose_process_always_dies_is_a_failed_one(six: Path, tmp_path: Path) -> None:
     killed: set[int] = set()
     with _started(tmp_path / "out", 1.0, 2, six) as process:
@@ -106,7 +107,6 @@ def test_a_campaign_whose_process_always_dies_is_a_failed_one(six: Path, tmp_pat
     assert [row["status"] for row in _rows(tmp_path / "out")] == ["ok", "ok", "ok", "failed", "ok", "ok"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_stopped_run_leaves_no_process_and_keeps_what_is_done(
     six: Path, tmp_path: Path, how: signal.Signals
@@ -162,7 +162,6 @@ def cluster(tmp_path: Path) -> Iterator[str]:
             process.wait()
 
 
-@pytest.mark.slow
 def test_what_a_killed_worker_of_a_cluster_had_in_hand_is_done_again(
     cluster: str, six: Path, tmp_path: Path
 ) -> None:

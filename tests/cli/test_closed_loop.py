@@ -10,11 +10,13 @@ import pandas as pd
 import pytest
 from click.testing import Result
 
-from savgs_ident.cli import closed_looping
-from savgs_ident.control.closed_loop.failure import KINDS, NOTHING
+from savgs_ident.control import public
+from savgs_ident.control.closed_loop.laws import KINDS, NOTHING
 from savgs_ident.control.closed_loop.programme import LoopKind, LoopTest
 from savgs_ident.control.closed_loop.study import LoopStudy
-from savgs_ident.core.rig import default_rig_path
+from savgs_ident.plants.quarter_car.rig import default_rig_path
+
+pytestmark = pytest.mark.slow
 
 Invoke = Callable[..., Result]
 RIG = default_rig_path()
@@ -31,7 +33,7 @@ def run(
     """The harmonic test with causes and other rigs: folder, outcome, and the study behind it."""
     folder = tmp_path_factory.mktemp("loop")
     found: list[LoopStudy] = []
-    original = closed_looping.study_loop
+    original = public.study_loop
 
     def remembering(*args: Any, **kwargs: Any) -> LoopStudy:
         found.append(original(*args, **kwargs))
@@ -39,7 +41,7 @@ def run(
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SAVGS_IDENT_CACHE", str(cache))
-        patch.setattr(closed_looping, "study_loop", remembering)
+        patch.setattr(public, "study_loop", remembering)
         words = ["closed-loop", str(RIG), "--rigs", str(RIGS), "--causes", "--json", "--out", str(folder)]
         done = as_users_have_it(words)
     return folder, done, found[0]
@@ -125,7 +127,7 @@ def test_a_loop_that_is_not_stable_is_code_1(
 ) -> None:
     study = run[2]
     unstable = replace(study, active_ride=replace(study.active_ride, stable=False))
-    monkeypatch.setattr(closed_looping, "study_loop", lambda *args: unstable)
+    monkeypatch.setattr(public, "study_loop", lambda *args: unstable)
     done = invoke("closed-loop", RIG, "--quiet", "--out", "o")
     assert done.exit_code == 1
     assert done.stderr.startswith("Not to be trusted: The loop is not stable on this rig")
@@ -155,7 +157,7 @@ def test_the_test_asked_for_is_the_test_that_runs(
         asked.append(test)
         return run[2]
 
-    monkeypatch.setattr(closed_looping, "study_loop", study)
+    monkeypatch.setattr(public, "study_loop", study)
     assert invoke("closed-loop", RIG, *words, "--rigs", "0", "--quiet", "--out", "o").exit_code == 0
     assert asked[0].name is name
     assert says in asked[0].title

@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 from click.testing import Result
 
-from savgs_ident.cli import designing, linearising
-from savgs_ident.control.controller_file import read_controller
-from savgs_ident.control.design import FACTORS, REGULARISATION, Design
-from savgs_ident.control.digital import reduce_order
+from savgs_ident.control import public
+from savgs_ident.control.design import FACTORS, REGULARISATION, Design, read_controller
+from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS
 from savgs_ident.control.linear_study import LinearStudy
-from savgs_ident.control.weights import DEFAULT_WEIGHTS
-from savgs_ident.core.rig import default_rig_path
+from savgs_ident.control.synthesis import reduce_order
+from savgs_ident.plants.quarter_car.rig import default_rig_path
 
 Invoke = Callable[..., Result]
 RIG = default_rig_path()
@@ -57,18 +56,18 @@ def once(
 @pytest.fixture(scope="module")
 def linearised(once: Callable[..., Any]) -> tuple[Path, Result, LinearStudy]:
     """A finished ``linearise``: folder, outcome, and the study behind it."""
-    found: tuple[Path, Result, LinearStudy] = once(linearising, "study_linear", "linearise", RIG)
+    found: tuple[Path, Result, LinearStudy] = once(public, "study_linear", "linearise", RIG)
     return found
 
 
 @pytest.fixture(scope="module")
 def designed(once: Callable[..., Any]) -> tuple[Path, Result, Design]:
     """A finished ``design``: folder, outcome, and the design behind it."""
-    found: tuple[Path, Result, Design] = once(designing, "design_controller", "design", RIG, "--rigs", RIGS)
+    found: tuple[Path, Result, Design] = once(public, "design_controller", "design", RIG, "--rigs", RIGS)
     return found
 
 
-@pytest.mark.parametrize("command", PICTURES)
+@pytest.mark.parametrize("command", [pytest.param("linearise", marks=pytest.mark.slow), "design"])
 def test_the_files_are_there_and_standard_output_is_the_record(
     command: str, request: pytest.FixtureRequest
 ) -> None:
@@ -90,8 +89,12 @@ def test_the_files_are_there_and_standard_output_is_the_record(
 @pytest.mark.parametrize(
     ("run", "stages"),
     [
-        ("linearised", ("linear equivalent", "small motions", "motions of the test", "drawing", "writing")),
-        ("designed", ("synthesis", f"trying it on {RIGS} rigs", "regularising", "drawing", "writing")),
+        pytest.param(
+            "linearised",
+            ("linear equivalent", "small motions", "motions of the test", "drawing", "writing"),
+            marks=pytest.mark.slow,
+        ),
+        ("designed", ("synthesis", f"robustness on {RIGS} rigs", "regularising", "drawing", "writing")),
     ],
 )
 def test_progress_is_said_on_the_way(
@@ -102,6 +105,7 @@ def test_progress_is_said_on_the_way(
     assert places == sorted(places)
 
 
+@pytest.mark.slow
 def test_the_linear_equivalent_is_that_of_the_paper(linearised: Any) -> None:
     record = json.loads(linearised[1].stdout)
     nominal = record["nominal"]
@@ -116,6 +120,7 @@ def test_the_linear_equivalent_is_that_of_the_paper(linearised: Any) -> None:
     assert max(curve["alpha"]) < 1e-3
 
 
+@pytest.mark.slow
 def test_the_exact_linearisation_is_the_rig_and_every_step_comes_nearer(linearised: Any) -> None:
     small = json.loads(linearised[1].stdout)["small_motions"]
     errors = [each["largest_error_percent"] for each in small["models"].values()]
@@ -125,6 +130,7 @@ def test_the_exact_linearisation_is_the_rig_and_every_step_comes_nearer(linearis
     assert 0.9 < small["slow_link"]["value"] < 1.0
 
 
+@pytest.mark.slow
 def test_describing_functions_hold_at_the_size_of_the_test(linearised: Any) -> None:
     test = json.loads(linearised[1].stdout)["test_motions"]
     assert test["largest_error_percent"] < 1.0
@@ -135,6 +141,7 @@ def test_describing_functions_hold_at_the_size_of_the_test(linearised: Any) -> N
         assert min(described["damping_n_s_per_m"]) > 0.0
 
 
+@pytest.mark.slow
 def test_the_state_space_is_equation_8_in_named_signals(linearised: Any) -> None:
     record = json.loads(linearised[1].stdout)
     space = record["state_space"]
@@ -148,11 +155,12 @@ def test_the_state_space_is_equation_8_in_named_signals(linearised: Any) -> None
     assert set(space["inputs"].values()) == {"m/s"}
 
 
+@pytest.mark.slow
 def test_a_rig_without_friction_has_nothing_to_describe(
     invoke: Invoke, linearised: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study = replace(linearised[2], at_test=None)
-    monkeypatch.setattr(linearising, "study_linear", lambda *args: study)
+    monkeypatch.setattr(public, "study_linear", lambda *args: study)
     done = invoke("linearise", RIG, "--model", "simqc", "--json", "--out", "o")
     assert done.exit_code == 0
     record = json.loads(done.stdout)
@@ -161,11 +169,12 @@ def test_a_rig_without_friction_has_nothing_to_describe(
     assert not Path("o/described.png").exists()
 
 
+@pytest.mark.slow
 def test_an_exact_linearisation_that_is_not_the_rig_is_code_1(
     invoke: Invoke, linearised: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small = replace(linearised[2].small, nonlinear=1.1 * linearised[2].small.nonlinear)
-    monkeypatch.setattr(linearising, "study_linear", lambda *args: replace(linearised[2], small=small))
+    monkeypatch.setattr(public, "study_linear", lambda *args: replace(linearised[2], small=small))
     done = invoke("linearise", RIG, "--quiet", "--out", "o")
     assert done.exit_code == 1
     assert done.stdout == ""
@@ -218,12 +227,13 @@ def again(invoke: Invoke, designed: Any, monkeypatch: pytest.MonkeyPatch) -> Cal
     """``design`` once more, with a given design in place of the work."""
 
     def run(design: Design, *words: object) -> Result:
-        monkeypatch.setattr(designing, "design_controller", lambda *args: design)
+        monkeypatch.setattr(public, "design_controller", lambda *args: design)
         return invoke("design", RIG, "--rigs", RIGS, "--out", "o", *words)
 
     return run
 
 
+@pytest.mark.slow
 def test_tables_are_shown_without_json(again: Any, designed: Any) -> None:
     done = again(designed[2])
     assert done.exit_code == 0
@@ -243,6 +253,7 @@ def test_an_unstable_loop_is_code_1_with_the_reason(again: Any, designed: Any) -
     assert "does not pass its checks" in page
 
 
+@pytest.mark.slow
 def test_a_reduced_controller_is_told_with_its_own_peak(again: Any, designed: Any) -> None:
     design: Design = designed[2]
     reduced = replace(design, controller=reduce_order(design.controller, 4))
@@ -254,6 +265,7 @@ def test_a_reduced_controller_is_told_with_its_own_peak(again: Any, designed: An
     assert "keeps gamma" not in page
 
 
+@pytest.mark.slow
 def test_a_rig_on_which_the_loop_is_unstable_is_named(again: Any, designed: Any) -> None:
     robust = designed[2].robustness
     margins = (replace(robust.margins[0], stable=False), *robust.margins[1:])
@@ -267,6 +279,7 @@ def test_a_rig_on_which_the_loop_is_unstable_is_named(again: Any, designed: Any)
     assert record["least_phase_margin_deg"] == min(each.phase_deg for each in robust.margins[1:])
 
 
+@pytest.mark.slow
 def test_a_posterior_gives_the_rigs(invoke: Invoke, designed: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     draws = np.linspace(0.02, 0.04, 30).reshape(3, 10)
     with h5py.File("posterior.nc", "w") as file:
@@ -278,7 +291,7 @@ def test_a_posterior_gives_the_rigs(invoke: Invoke, designed: Any, monkeypatch: 
         design: Design = designed[2]
         return design
 
-    monkeypatch.setattr(designing, "design_controller", noting)
+    monkeypatch.setattr(public, "design_controller", noting)
     done = invoke("design", RIG, "--posterior", "posterior.nc", "--rigs", "3", "--quiet")
     assert done.exit_code == 0
     assert [values["mu_r"] for values in tried[0].values] == pytest.approx([0.02, draws[1, 4], 0.04])

@@ -7,7 +7,7 @@ import h5py
 import pytest
 from click.testing import Result
 
-from savgs_ident.core.rig import default_rig_path
+from savgs_ident.plants.quarter_car.rig import default_rig_path
 
 Invoke = Callable[..., Result]
 RIG = default_rig_path()

@@ -3,10 +3,9 @@
 import re
 from pathlib import Path
 
-import pytest
-
+from ..in_one_test import over
 from .command_rows import COMMANDS
-from .installed import Installed
+from .conftest import Program
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "exit-codes.md").read_text("utf-8")
 
@@ -31,20 +30,20 @@ def test_every_command_is_in_both_tables() -> None:
     assert {typed.split()[0] for typed in SAID} >= set(COMMANDS)
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@over("name", COMMANDS)
 def test_what_1_means_is_what_the_help_says(name: str) -> None:
     assert _rows("What 1 means")[name] == _code_1_in_help(name)
 
 
-def test_the_codes_are_those_of_the_help_of_the_program(installed: Installed) -> None:
-    told = " ".join(installed.run("--help").stdout.split())
+def test_the_codes_are_those_of_the_help_of_the_program(inside: Program) -> None:
+    told = " ".join(inside("--help").stdout.split())
     listed = re.search(r"Exit codes: (.+?stopped)", told)
     assert listed is not None
     assert re.findall(r"(\d+) ", listed[1]) == re.findall(r"^\| (\d+) \|", PAGE, re.MULTILINE)
 
 
-@pytest.mark.parametrize("typed", SAID)
-def test_a_missing_file_is_one_line_with_a_remedy_and_code_2(installed: Installed, typed: str) -> None:
+@over("typed", SAID)
+def test_a_missing_file_is_one_line_with_a_remedy_and_code_2(inside: Program, typed: str) -> None:
     name, *rest = typed.split()
-    done = installed.run(name, "--quiet", *rest)
+    done = inside(name, "--quiet", *rest)
     assert (done.returncode, done.stdout, done.stderr) == (2, "", f"{SAID[typed]}\n")

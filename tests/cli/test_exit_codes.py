@@ -11,10 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from savgs_ident.cli.arguments import spread_values
-from savgs_ident.core.rig import default_rig_path
+from savgs_ident.cli.options import spread_values
+from savgs_ident.plants.quarter_car.rig import default_rig_path
 
+from ..in_one_test import over
 from .command_rows import ASKING, COMMANDS, READING, ROWS, words_of
+from .conftest import Program
 from .installed import Installed, files_in
 
 RIG = default_rig_path()
@@ -40,24 +42,24 @@ def test_every_command_has_its_row() -> None:
     assert set(ROWS) == set(COMMANDS)
 
 
-def test_without_a_command_the_help_is_shown_and_the_code_is_2(installed: Installed) -> None:
-    done = installed.run()
+def test_without_a_command_the_help_is_shown_and_the_code_is_2(inside: Program) -> None:
+    done = inside()
     assert (done.returncode, done.stderr) == (2, "")
     assert "closed-loop" in done.stdout
 
 
-@pytest.mark.parametrize("name", ROWS)
-def test_help_is_code_0_and_an_unknown_option_code_2(installed: Installed, name: str) -> None:
-    asked = installed.run(name, "--help")
+@over("name", ROWS)
+def test_help_is_code_0_and_an_unknown_option_code_2(inside: Program, name: str) -> None:
+    asked = inside(name, "--help")
     assert (asked.returncode, asked.stderr) == (0, "")
     assert f"savgs-ident {name}" in asked.stdout
-    line = _refused(installed.run(name, "--nonsense"), "--nonsense")
+    line = _refused(inside(name, "--nonsense"), "--nonsense")
     assert line.endswith(f"Remedy: see savgs-ident {name} --help.")
 
 
-@pytest.mark.parametrize("name", ASKING)
-def test_without_its_argument_a_command_is_code_2(installed: Installed, name: str) -> None:
-    line = _refused(installed.run(name), "Missing argument '")
+@over("name", ASKING)
+def test_without_its_argument_a_command_is_code_2(inside: Program, name: str) -> None:
+    line = _refused(inside(name), "Missing argument '")
     assert line.endswith(f"Remedy: see savgs-ident {name} --help.")
 
 
@@ -74,8 +76,8 @@ def test_without_its_argument_a_command_is_code_2(installed: Installed, name: st
         ),
     ],
 )  # fmt: skip
-def test_what_was_typed_is_told_in_one_line(installed: Installed, words: tuple[str, ...], said: str) -> None:
-    done = installed.run(*words)
+def test_what_was_typed_is_told_in_one_line(inside: Program, words: tuple[str, ...], said: str) -> None:
+    done = inside(*words)
     assert _refused(done, "").endswith(said)
     assert "\x1b" not in done.stderr
 
@@ -84,10 +86,10 @@ def test_what_was_typed_is_told_in_one_line(installed: Installed, words: tuple[s
     "name",
     [pytest.param(name, marks=() if name in LIGHT else pytest.mark.slow) for name in READING],
 )
-def test_a_file_of_the_wrong_kind_is_code_2(installed: Installed, tmp_path: Path, name: str) -> None:
+def test_a_file_of_the_wrong_kind_is_code_2(inside: Program, tmp_path: Path, name: str) -> None:
     picture = tmp_path / "picture.csv"
     picture.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(range(256)))
-    _refused(installed.run(name, *words_of(name, picture, picture), "--quiet"), "picture")
+    _refused(inside(name, *words_of(name, picture, picture), "--quiet"), "picture")
     written = {Path(path).name for path in files_in(tmp_path / "out")}
     # Many campaigns have a report even if each of them failed.
     assert written <= (
@@ -118,15 +120,15 @@ def test_words_mean_the_same_in_any_order(name: str, monkeypatch: pytest.MonkeyP
 
 
 def test_options_before_and_after_the_argument_give_the_same_result(
-    installed: Installed, short_campaign: Path
+    inside: Program, short_campaign: Path
 ) -> None:
-    before = installed.run("inspect", "--json", "--quiet", "--out", "a", short_campaign)
-    after = installed.run("inspect", short_campaign, "--out", "b", "--quiet", "--json")
+    before = inside("inspect", "--json", "--quiet", "--out", "a", short_campaign)
+    after = inside("inspect", short_campaign, "--out", "b", "--quiet", "--json")
     assert (before.returncode, before.stderr) == (after.returncode, after.stderr) == (0, "")
     assert before.stdout == after.stdout
     assert json.loads(before.stdout)["dwells"]
     for name in ("inspect.json", "inspect.png", "inspect.pdf"):
-        assert (installed.folder / "a" / name).read_bytes() == (installed.folder / "b" / name).read_bytes()
+        assert Path("a", name).read_bytes() == Path("b", name).read_bytes()
 
 
 @pytest.mark.slow

@@ -12,11 +12,11 @@ import pytest
 from click.testing import Result
 
 from savgs_ident.core.errors import InputError, SavgsIdentError
-from savgs_ident.core.rig import default_rig_path, read_rig, write_rig
-from savgs_ident.effects.registry import MODELS
 from savgs_ident.export import registry
-from savgs_ident.export.exported_model import Exporter
 from savgs_ident.export.json_export import read_model_json
+from savgs_ident.export.registry import Exporter
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig, write_rig
 
 from ..export.diagnoses import MOUNT, UNKNOWN, diagnosis
 
@@ -200,7 +200,7 @@ def test_a_rig_that_finds_no_rest_is_code_2_and_names_its_file(invoke: Invoke) -
     done = invoke("export", "soft.toml", "--to", "casadi", "--quiet")
     assert done.exit_code == 2
     assert done.stderr.startswith(
-        "Error: soft.toml: the rig finds no rest with its link at the nominal 90 deg"
+        "Error: soft.toml: the rig finds no rest in its nominal state (link angle 1.571 rad)"
     )
     assert not list(Path("out/export").iterdir())
 
@@ -238,9 +238,9 @@ def test_a_format_that_cannot_hold_the_model_is_code_2(
     def fails(*args: object) -> tuple[Path, ...]:
         raise raised
 
-    from savgs_ident.cli import exporting
+    from savgs_ident.export import public
 
-    monkeypatch.setattr(exporting, "EXPORTS", {"json": Exporter("", fails)})
+    monkeypatch.setattr(public, "EXPORTS", {"json": Exporter("", fails)})
     done = invoke("export", RIG, "--to", "json", "--quiet")
     assert done.exit_code == 2
     assert said in done.stderr

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from mcap.writer import Writer
 
-from savgs_ident.core.rig import default_rig_path
+from savgs_ident.plants.quarter_car.rig import default_rig_path
 
 from ..report.page_reader import Reader
 from .installed import Installed, files_in
@@ -35,7 +35,7 @@ TESTS = (
 EVIL = "<script>alert(1)</script><img src=x onerror=alert(2)>[bold]\"'&\x1b[31m../../x"
 
 
-NOW = 2
+NOW = 1
 """Of each kind so many are tried every time, the others with the slow tests."""
 
 
@@ -74,6 +74,7 @@ def test_a_file_of_any_name_is_read_and_nothing_is_written_elsewhere(
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("test", some_now(TESTS), ids=range(len(TESTS)))
 def test_a_test_and_a_column_of_any_name(installed: Installed, short_campaign: Path, test: str) -> None:
     table = pd.read_csv(short_campaign)

@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 from click.testing import Result
 
-from savgs_ident.cli import identify
-from savgs_ident.core.rig import default_rig_path, read_rig
 from savgs_ident.core.status import Status
+from savgs_ident.fit import public
 from savgs_ident.fit.result import Fit, Verdict
+from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
+from savgs_ident.report import presenters
 
 Invoke = Callable[..., Result]
 WORDS = ("--free", "mu_r", "c_sd", "--fixed-tolerances", "--orders", "5")
@@ -29,7 +30,7 @@ def fitted(
     """A finished ``fit`` on four dwells: folder, outcome, and the record behind it."""
     folder = tmp_path_factory.mktemp("fit")
     found: list[Fit] = []
-    original = identify.fit_least_squares
+    original = public.fit_least_squares
 
     def remembering(*args: Any, **kwargs: Any) -> Fit:
         found.append(original(*args, **kwargs))
@@ -38,7 +39,7 @@ def fitted(
     words = ["fit", str(short_campaign), *WORDS, "--json", "--out", str(folder)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SAVGS_IDENT_CACHE", str(cache))
-        patch.setattr(identify, "fit_least_squares", remembering)
+        patch.setattr(public, "fit_least_squares", remembering)
         done = as_users_have_it(words)
     return folder, done, found[0]
 
@@ -54,8 +55,8 @@ def again(
     """``fit`` once more, with a given fit in place of the work and without its picture."""
 
     def run(fit: Fit, *words: str, draw: Callable[..., tuple[Path, ...]] = _no_picture) -> Result:
-        monkeypatch.setattr(identify, "fit_least_squares", lambda *args, **kwargs: fit)
-        monkeypatch.setattr(identify, "draw_comparison", draw)
+        monkeypatch.setattr(public, "fit_least_squares", lambda *args, **kwargs: fit)
+        monkeypatch.setattr(presenters, "draw_comparison", draw)
         return invoke("fit", short_campaign, *WORDS, "--out", tmp_path / "again", *words)
 
     return run
@@ -157,6 +158,7 @@ def test_ctrl_c_during_the_pictures_keeps_the_fit(again: Any, fitted: Any, tmp_p
     read_rig(tmp_path / "again" / "model.toml")
 
 
+@pytest.mark.slow
 def test_simulate_writes_the_same_numbers_three_times(invoke: Invoke) -> None:
     words = ("--frequency", "2.35", "1.4", "--model", "simqc", "--orders", "5")
     done = invoke("simulate", default_rig_path(), *words, "--json", "--out", "s")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from savgs_ident.core.rig import default_rig_path, read_rig
+from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
 
 from .installed import Installed, files_in
 

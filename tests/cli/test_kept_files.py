@@ -20,9 +20,10 @@ from fuzz.kept import (
 from fuzz.loader import Original
 from fuzz.registry import LOADERS
 from fuzz.trial import place
-from savgs_ident.cli.alarming import draws_in
-from savgs_ident.cli.calibrating import trials_in
 from savgs_ident.core.errors import InputError
+from savgs_ident.validation.calibration import trial_reader
+from savgs_ident.validation.false_alarms import read_draw
+from savgs_ident.validation.trials import known_trials
 
 NESTED = "[" * 100_000 + "]" * 100_000
 
@@ -61,10 +62,14 @@ CHANGES: dict[str, Callable[[dict[str, Any]], object]] = {
 @pytest.mark.parametrize("change", CHANGES)
 def test_lines_that_are_no_trials_are_refused(change: str, tmp_path: Path) -> None:
     path = tmp_path / "kept.jsonl"
-    for original, read in ((kept_draws(), draws_in), (kept_trials(), trials_in)):
+    readers: tuple[tuple[Original, Any], ...] = (
+        (kept_draws(), read_draw),
+        (kept_trials(), trial_reader()),
+    )
+    for original, read in readers:
         path.write_bytes(_lines(original, CHANGES[change]))
         with pytest.raises(InputError, match="is no list of trials"):
-            read(path, MARKS)
+            known_trials(path, MARKS, read)
     path.write_bytes(_lines(kept_blind(), CHANGES[change]))
     with pytest.raises(InputError, match="is no list of trials"):
         read_blind(path)
@@ -85,7 +90,7 @@ def test_trials_of_other_parameters_are_not_counted_together(change: dict[str, A
     path = tmp_path / "trials.jsonl"
     path.write_bytes(_lines(kept_trials(), lambda line: line | change))
     with pytest.raises(InputError, match="is no list of trials"):
-        trials_in(path, MARKS)
+        known_trials(path, MARKS, trial_reader())
 
 
 @pytest.mark.parametrize(

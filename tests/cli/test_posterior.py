@@ -16,10 +16,10 @@ import pytest
 import xarray as xr
 from click.testing import Result
 
-from savgs_ident.cli.models import effects_in, identified_in, rig_before
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.rig import default_campaign_path, default_rig_path, read_rig, write_rig
-from savgs_ident.effects.registry import MODELS
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import RigModel, model_of
+from savgs_ident.plants.quarter_car.rig import default_campaign_path, default_rig_path, read_rig, write_rig
 
 TRUTH = {"mu_r": 0.03, "mu_t": 0.25, "ydot_Hth": 0.05, "c_sd": 0.93 * 5792.0}
 CONTRACT = {"median", "sd", "q025", "q975", "unit", "ess_bulk", "ess_tail", "r_hat"}
@@ -66,6 +66,7 @@ def sampled(
     return folder, done
 
 
+@pytest.mark.slow
 def test_the_run_converges_and_hands_over_what_it_writes(sampled: tuple[Path, Result]) -> None:
     folder, done = sampled
     assert done.exit_code == 0, done.stderr
@@ -84,6 +85,7 @@ def test_the_run_converges_and_hands_over_what_it_writes(sampled: tuple[Path, Re
     assert record["ess_min"] >= 150.0
 
 
+@pytest.mark.slow
 def test_the_truth_is_not_far(sampled: tuple[Path, Result]) -> None:
     """Within what the damper's table, a coarse print of the true curve, leaves open when all else is held."""
     parameters = json.loads(sampled[1].stdout)["parameters"]
@@ -93,10 +95,12 @@ def test_the_truth_is_not_far(sampled: tuple[Path, Result]) -> None:
         assert parameters[name]["laplace"]["sd"] == pytest.approx(parameters[name]["sd"], rel=0.35)
 
 
+@pytest.mark.slow
 def test_progress_tells_the_effective_sample_size(sampled: tuple[Path, Result]) -> None:
     assert "effective sample size" in sampled[1].stderr
 
 
+@pytest.mark.slow
 def test_the_inference_data_holds_the_draws_that_the_record_sums_up(sampled: tuple[Path, Result]) -> None:
     folder, done = sampled
     median = json.loads(done.stdout)["parameters"]["mu_r"]["median"]
@@ -106,6 +110,7 @@ def test_the_inference_data_holds_the_draws_that_the_record_sums_up(sampled: tup
         assert tree["observed_data"]["harmonics_re"].dims == ("dwell", "channel", "order")
 
 
+@pytest.mark.slow
 def test_a_chain_is_continued_only_with_what_it_was_begun_with(
     sampled: tuple[Path, Result], model: Path, short_campaign: Path, invoke: Callable[..., Result]
 ) -> None:
@@ -147,8 +152,8 @@ def test_priors_are_those_from_before_the_fit() -> None:
     before = {"k_sd": drawing.parameters["k_sd"].value, "mu_r": drawing.parameters["mu_r"].value}
     moved = drawing.parameters.with_values({"k_sd": 1.5e5, "mu_r": 0.04})
     identified = replace(drawing, parameters=moved, provenance={"free": ["mu_r"], "before": before})
-    assert rig_before(identified, MODELS["simtr"], "x").parameters["k_sd"].value == before["k_sd"]
-    free, values = identified_in(identified, MODELS["simtr"], "x")
+    assert RigModel(identified, MODELS["simtr"]).before.rig.parameters["k_sd"].value == before["k_sd"]
+    free, values = RigModel(identified, MODELS["simtr"]).identified
     assert free == ("mu_r",)
     assert values == {"mu_r": 0.04, "k_sd": 1.5e5}
 
@@ -169,15 +174,16 @@ def test_priors_are_those_from_before_the_fit() -> None:
 def test_a_model_file_that_remembers_nonsense_is_refused(broken: dict[str, object]) -> None:
     rig = replace(read_rig(default_rig_path()), provenance=broken)
     with pytest.raises(InputError, match="provenance"):
-        identified_in(rig, MODELS["simtr"], "x")
+        _ = RigModel(rig, MODELS["simtr"]).identified
 
 
 def test_what_a_model_file_remembers_is_refused_with_its_name() -> None:
-    rig = replace(read_rig(default_rig_path()), provenance={"before": {"m_s": -1.0}, "effects": [["a"]]})
+    provenance = {"before": {"m_s": -1.0}, "effects": [["a"]]}
+    rig = replace(read_rig(default_rig_path()), provenance=provenance, source="model.toml")
     with pytest.raises(InputError, match=r"model\.toml: parameter 'm_s'"):
-        rig_before(rig, MODELS["simtr"], "model.toml")
+        _ = RigModel(rig, MODELS["simtr"]).before
     with pytest.raises(InputError, match=r"model\.toml: provenance\.effects"):
-        effects_in(rig, "model.toml")
+        model_of(rig)
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from savgs_ident.cli.reading import first_sweep
 from savgs_ident.recordings.read import read_campaign
+from savgs_ident.simulate.measured import first_sweep
 
 
 def test_the_first_sweep_that_can_be_used_is_taken(nominal_campaign: Path) -> None:

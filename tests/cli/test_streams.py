@@ -13,13 +13,13 @@ WRITTEN = ["inspect.json", "inspect.pdf", "inspect.png"]
 @pytest.mark.parametrize(
     "line",
     [
-        '"$@" | head -1; exit ${PIPESTATUS[0]}',
+        pytest.param('"$@" | head -1; exit ${PIPESTATUS[0]}', marks=pytest.mark.slow),
         '"$@" | true; exit ${PIPESTATUS[0]}',
-        '"$@" 2>&1 | true; exit ${PIPESTATUS[0]}',
-        '"$@" >&-',
-        '"$@" 2>&-',
-        '"$@" >&- 2>&-',
-        '"$@" 2>/dev/full',
+        pytest.param('"$@" 2>&1 | true; exit ${PIPESTATUS[0]}', marks=pytest.mark.slow),
+        pytest.param('"$@" >&-', marks=pytest.mark.slow),
+        pytest.param('"$@" 2>&-', marks=pytest.mark.slow),
+        pytest.param('"$@" >&- 2>&-', marks=pytest.mark.slow),
+        pytest.param('"$@" 2>/dev/full', marks=pytest.mark.slow),
     ],
 )
 def test_nobody_who_listens_is_no_reason_to_stop(
@@ -49,7 +49,12 @@ def test_nobody_who_listens_changes_no_code(installed: Installed, line: str, cod
 
 
 @pytest.mark.parametrize(
-    "words", [("inspect", "--help"), ("inspect", "{campaign}"), ("inspect", "{campaign}", "--json")]
+    "words",
+    [
+        ("inspect", "--help"),
+        pytest.param(("inspect", "{campaign}"), marks=pytest.mark.slow),
+        pytest.param(("inspect", "{campaign}", "--json"), marks=pytest.mark.slow),
+    ],
 )
 def test_a_full_disk_under_standard_output_is_told(
     installed: Installed, short_campaign: Path, words: tuple[str, ...]
@@ -63,6 +68,7 @@ def test_a_full_disk_under_standard_output_is_told(
     assert "Exception" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "told",
     [

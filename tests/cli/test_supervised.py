@@ -6,7 +6,7 @@ from multiprocessing.context import SpawnProcess
 
 import pytest
 
-from savgs_ident.cli.supervised import supervised
+from savgs_ident.core.executor import on_processes
 
 
 def _started(monkeypatch: pytest.MonkeyPatch, whom: str) -> list[SpawnProcess]:
@@ -27,7 +27,7 @@ def _started(monkeypatch: pytest.MonkeyPatch, whom: str) -> list[SpawnProcess]:
 def test_ctrl_c_while_a_process_starts_is_not_lost_and_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
     started = _started(monkeypatch, "its parent")
     with pytest.raises(KeyboardInterrupt):
-        list(supervised(abs, [-1, -2], 1))
+        list(on_processes(abs, [-1, -2], 1))
     assert [process.exitcode for process in started] == [-signal.SIGTERM]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
@@ -35,7 +35,7 @@ def test_ctrl_c_while_a_process_starts_is_not_lost_and_ends_it(monkeypatch: pyte
 
 def test_ctrl_c_does_not_reach_a_process_that_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     started = _started(monkeypatch, "itself")
-    assert list(supervised(abs, [-1, -2], 1)) == [(0, 1), (1, 2)]
+    assert list(on_processes(abs, [-1, -2], 1)) == [(0, 1), (1, 2)]
     assert len(started) == 1
 
 
@@ -43,6 +43,6 @@ def test_where_ctrl_c_is_ignored_it_stays_so(monkeypatch: pytest.MonkeyPatch) ->
     _started(monkeypatch, "its parent")
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        assert list(supervised(abs, [-1], 1)) == [(0, 1)]
+        assert list(on_processes(abs, [-1], 1)) == [(0, 1)]
     finally:
         signal.signal(signal.SIGINT, before)

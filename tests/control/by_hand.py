@@ -6,8 +6,8 @@ import jax
 import numpy as np
 from scipy.optimize import brentq
 
-from savgs_ident.model.kinematics import strut_length, suspension_travel
-from savgs_ident.model.values import Values
+from savgs_ident.core.values import Values
+from savgs_ident.plants.quarter_car.kinematics import strut_length, suspension_travel
 
 _length = jax.jit(strut_length)
 _travel = jax.jit(suspension_travel)

@@ -6,29 +6,24 @@ from dataclasses import replace
 import control
 import pytest
 
-from savgs_ident.control.alpha_map import alpha_map
 from savgs_ident.control.closed_loop.run import Loop
 from savgs_ident.control.closed_loop.study import loop_around
-from savgs_ident.control.controller_file import DigitalController
-from savgs_ident.control.design import Design, design_controller
-from savgs_ident.control.digital import discretise
-from savgs_ident.control.generalised_plant import generalised_plant
+from savgs_ident.control.design import Design, DigitalController, design_controller
+from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS, generalised_plant
+from savgs_ident.control.linear_equivalent import TwoMasses, alpha_map, paper_masses, quarter_car_space
 from savgs_ident.control.linear_study import (
     CamMotions,
     SmallMotions,
     study_small_motions,
     study_test_motions,
 )
-from savgs_ident.control.quarter_car_space import TwoMasses, quarter_car_space
 from savgs_ident.control.rigs import rigs_from_covariance
-from savgs_ident.control.synthesis import Synthesis, synthesise_hinf
-from savgs_ident.control.two_masses import paper_masses
-from savgs_ident.control.weights import DEFAULT_WEIGHTS
+from savgs_ident.control.synthesis import Synthesis, discretise, synthesise_hinf
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS, build_model, model_parameters
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values, as_values
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig
 
 from ..relaxed import with_kept_programs
 
@@ -128,5 +123,5 @@ def controller(synthesis: Synthesis, friction: QuarterCar, numbers: Values) -> D
 
 @pytest.fixture(scope="package")
 def loop(numbers: Values, controller: DigitalController) -> Loop:
-    """That controller in a loop with the instruments of the sheet, nothing failing."""
+    """That controller in a loop with the instruments of the sheet, without failures."""
     return loop_around(numbers, controller)

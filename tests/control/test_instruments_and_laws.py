@@ -11,22 +11,24 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 from scipy.signal import dlsim
 
-from savgs_ident.control.alpha_map import AlphaMap
-from savgs_ident.control.closed_loop.failure import KINDS, NOTHING, failing
-from savgs_ident.control.closed_loop.instruments import ideal_instruments, sheet_instruments
 from savgs_ident.control.closed_loop.laws import (
     ENDS,
     GUARD_RATE,
     JUMP,
-    AbstractLaw,
+    KINDS,
+    NOTHING,
+    AbstractControlLaw,
     HinfLaw,
     hinf_law,
     hold_law,
+    ideal_instruments,
+    make_failure,
+    sheet_instruments,
 )
-from savgs_ident.control.controller_file import DigitalController
-from savgs_ident.control.linear_equivalent import equivalents
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values
+from savgs_ident.control.design import DigitalController
+from savgs_ident.control.linear_equivalent import AlphaMap, equivalents
+from savgs_ident.core.values import Values
+from savgs_ident.plants.quarter_car.plant import QuarterCar
 
 GEAR = 40.0
 SAMPLE = 1e-3
@@ -52,7 +54,7 @@ def by_hand(gain: float = 1.0) -> HinfLaw:
 
 
 @jax.jit
-def _follow(law: AbstractLaw, readings: Array) -> tuple[Array, Array]:
+def _follow(law: AbstractControlLaw, readings: Array) -> tuple[Array, Array]:
     def one(state: Array, reading: Array) -> tuple[Array, tuple[Array, Array]]:
         after, asked = law.command(state, reading, jnp.asarray(FASTEST))
         return after, (after, asked)
@@ -61,7 +63,7 @@ def _follow(law: AbstractLaw, readings: Array) -> tuple[Array, Array]:
 
 
 def follow(
-    law: AbstractLaw, readings: NDArray[np.float64]
+    law: AbstractControlLaw, readings: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """States after, and velocities asked at, each of the readings (n, 3), from the law's start."""
     states, asked = _follow(law, jnp.asarray(readings))
@@ -115,7 +117,7 @@ def test_ideal_instruments_show_the_truth(
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_failure_changes_nothing_before_its_time_and_what_it_is_named_for_after(kind: str) -> None:
-    failure, readings = failing(kind, 2.0), jnp.array([1.0, 2.0, 3.0])
+    failure, readings = make_failure(kind, 2.0), jnp.array([1.0, 2.0, 3.0])
     before, after = jnp.asarray(1.999), jnp.asarray(2.0)
     assert np.asarray(failure.shown(before, readings)).tolist() == [1.0, 2.0, 3.0]
     assert float(failure.drive_at(before)) == 1.0

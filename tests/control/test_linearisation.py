@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from savgs_ident.control.linearisation import INPUTS, OUTPUTS, OperatingPoint, linearise, resting
 from savgs_ident.core.errors import InputError
-from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.kinematics import strut_length, suspension_travel
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.strut import Link
-from savgs_ident.model.tyre import Road
-from savgs_ident.model.values import Values
-from savgs_ident.simulate.rates import solve_rates
+from savgs_ident.core.values import Values
+from savgs_ident.plants.base import Motion
+from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.inputs import Inputs
+from savgs_ident.plants.quarter_car.kinematics import strut_length, suspension_travel
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.strut import Link
+from savgs_ident.plants.quarter_car.tyre import Road
+from savgs_ident.simulate.transient import solve_rates
 
 STEPS = (1e-7, 3e-7, 1e-5, 3e-5, 1e-6, 1e-5, 1e-4, 1e-3)
 """Of coordinates, their rates, road height, link angle and the velocities of these two; the anchor's is 1e-8 m."""
@@ -96,6 +97,7 @@ def _largest_error(model: QuarterCar, p: Values, place: Place) -> NDArray[np.flo
     return np.max(np.abs(got - wanted) * typical, axis=1) / np.where(size > 0.0, size, 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", PLACES, ids=lambda place: place.name)
 def test_without_friction_it_has_the_slopes_of_the_rates(
     frictionless: QuarterCar, numbers: Values, place: Place
@@ -103,6 +105,7 @@ def test_without_friction_it_has_the_slopes_of_the_rates(
     assert np.max(_largest_error(frictionless, numbers, place)) < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [PLACES[0], PLACES[2]], ids=lambda place: place.name)
 def test_with_friction_it_has_the_slopes_of_the_rates(
     friction: QuarterCar, numbers: Values, place: Place
@@ -110,6 +113,7 @@ def test_with_friction_it_has_the_slopes_of_the_rates(
     assert np.max(_largest_error(friction, numbers, place)) < 1e-5
 
 
+@pytest.mark.slow
 def test_its_signals_have_names(frictionless: QuarterCar, numbers: Values) -> None:
     space = linearise(frictionless, numbers, resting(frictionless, numbers, np.pi / 2.0))
     assert tuple(space.input_labels) == INPUTS
@@ -119,6 +123,7 @@ def test_its_signals_have_names(frictionless: QuarterCar, numbers: Values) -> No
     assert complex(turned) == pytest.approx(1.0 / (2j * np.pi))
 
 
+@pytest.mark.slow
 def test_a_state_that_the_linkage_cannot_take_is_refused(frictionless: QuarterCar, numbers: Values) -> None:
     at = resting(frictionless, numbers, np.pi / 2.0)
     beyond = at._replace(q=Coordinates(at.q.z_s, jnp.asarray(-1.6)))

@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 
-from savgs_ident.control.closed_loop.failure import KINDS, NOTHING, failing
-from savgs_ident.control.closed_loop.metrics import Gain, gain_of, ride_after
+from savgs_ident.control.closed_loop.laws import KINDS, NOTHING, make_failure
+from savgs_ident.control.closed_loop.metrics import RideGain, compare_rides, ride_after
 from savgs_ident.control.closed_loop.run import ClosedLoopRun, Loop
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values
+from savgs_ident.core.values import Values
+from savgs_ident.plants.quarter_car.plant import QuarterCar
 
 from .loops import cam, passive, ran
+
+pytestmark = pytest.mark.slow
 
 TEST = cam(2.0)
 FAILS = round(1000.0 * TEST.fails_at)
@@ -20,7 +22,7 @@ FAILS = round(1000.0 * TEST.fails_at)
 def runs(friction: QuarterCar, numbers: Values, loop: Loop) -> dict[str, ClosedLoopRun]:
     """The active rig by kind of failure."""
     return {
-        kind: ran(friction, numbers, TEST, loop._replace(failure=failing(kind, TEST.fails_at)))
+        kind: ran(friction, numbers, TEST, loop._replace(failure=make_failure(kind, TEST.fails_at)))
         for kind in KINDS
     }
 
@@ -28,10 +30,10 @@ def runs(friction: QuarterCar, numbers: Values, loop: Loop) -> dict[str, ClosedL
 @pytest.fixture(scope="module")
 def gains(
     friction: QuarterCar, numbers: Values, loop: Loop, runs: dict[str, ClosedLoopRun]
-) -> dict[str, Gain]:
+) -> dict[str, RideGain]:
     """What is left of the gain after each of them."""
     before = ride_after(ran(friction, numbers, TEST, passive(loop, numbers)), TEST)
-    return {kind: gain_of(before, ride_after(run, TEST)) for kind, run in runs.items()}
+    return {kind: compare_rides(before, ride_after(run, TEST)) for kind, run in runs.items()}
 
 
 def test_until_something_fails_all_runs_are_the_same(runs: dict[str, ClosedLoopRun]) -> None:
@@ -57,13 +59,13 @@ def test_the_loop_stays_stable_whatever_fails(runs: dict[str, ClosedLoopRun], ki
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != NOTHING])
 def test_the_rig_rides_no_worse_than_a_passive_one_by_more_than_three_tenths(
-    gains: dict[str, Gain], kind: str
+    gains: dict[str, RideGain], kind: str
 ) -> None:
     gain = gains[kind]
     assert min(gain.sprung_accel, gain.susp_deflection, gain.tyre_load) > -30.0
 
 
-def test_half_a_drive_is_enough_at_2_hz(gains: dict[str, Gain]) -> None:
+def test_half_a_drive_is_enough_at_2_hz(gains: dict[str, RideGain]) -> None:
     """Its motion is that of the whole one but for the peaks."""
     whole, half = gains[NOTHING], gains["actuator-weak"]
     assert (half.sprung_accel, half.susp_deflection) == pytest.approx(
@@ -72,7 +74,7 @@ def test_half_a_drive_is_enough_at_2_hz(gains: dict[str, Gain]) -> None:
 
 
 def test_without_a_drive_the_strut_turns_the_link_to_where_it_rests(
-    runs: dict[str, ClosedLoopRun], gains: dict[str, Gain]
+    runs: dict[str, ClosedLoopRun], gains: dict[str, RideGain]
 ) -> None:
     """In line with the strut, at 0 or 180 deg, where that has no lever; from there on the rig is a passive one."""
     angle = np.degrees(runs["actuator-off"].signals.link_angle)

@@ -10,21 +10,20 @@ import numpy as np
 import pytest
 from jaxtyping import Array
 
-from savgs_ident.control.alpha_map import AlphaMap
-from savgs_ident.control.closed_loop.failure import failing
-from savgs_ident.control.closed_loop.metrics import doubted_from, gain_of, ride_of
+from savgs_ident.control.closed_loop.laws import make_failure
+from savgs_ident.control.closed_loop.metrics import compare_rides, doubted_from, measure_ride
 from savgs_ident.control.closed_loop.run import Loop, loop_case, run_loop, steps_within
 from savgs_ident.control.closed_loop.study import loop_around, study_loop
-from savgs_ident.control.controller_file import DigitalController
-from savgs_ident.control.design import controller_for
-from savgs_ident.control.weights import DEFAULT_WEIGHTS
+from savgs_ident.control.design import DigitalController, controller_for
+from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS
+from savgs_ident.control.linear_equivalent import AlphaMap
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.rig import Rig
 from savgs_ident.core.status import Status
-from savgs_ident.effects.registry import MODELS, build_model, model_parameters
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values, as_values
-from savgs_ident.report.loop_words import alarm, saturation_words
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.report.control.loop_text import alarm, saturation_words
 
 from .loops import cam, ideal, passive, ran, with_changed
 
@@ -51,11 +50,11 @@ def test_a_slow_controller_is_followed_as_closely(friction: QuarterCar, numbers:
     slow = loop_around(numbers, controller_for(friction, numbers, DEFAULT_WEIGHTS, 100.0))
     test = TEST
     held, active = (
-        ride_of(ran(friction, numbers, test, each), test) for each in (passive(slow, numbers), slow)
+        measure_ride(ran(friction, numbers, test, each), test) for each in (passive(slow, numbers), slow)
     )
     assert held.stable
     assert active.stable
-    gain = gain_of(held, active)
+    gain = compare_rides(held, active)
     assert gain.sprung_accel > 35.0
     assert gain.susp_deflection > 15.0
 
@@ -68,11 +67,12 @@ def test_errors_of_the_test_bench_are_refused(rig: Rig, loop: Loop, name: str) -
         loop_case(build_model(rig, names), p, TEST.road, loop, TEST.duration)
 
 
+@pytest.mark.slow
 def test_the_law_sees_what_the_sensors_show(friction: QuarterCar, numbers: Values, loop: Loop) -> None:
     """An accelerometer without gain is one that shows zero."""
     quiet = ideal(loop)
     deaf = ran(friction, with_changed(numbers, accel_gain=0.0), TEST, quiet)
-    lost = ran(friction, numbers, TEST, quiet._replace(failure=failing("accelerometer", 0.0)))
+    lost = ran(friction, numbers, TEST, quiet._replace(failure=make_failure("accelerometer", 0.0)))
     assert np.asarray(deaf.signals.asked) == pytest.approx(np.asarray(lost.signals.asked), abs=1e-9)
     assert np.std(deaf.signals.sprung_accel) > 0.1
 
@@ -80,7 +80,7 @@ def test_the_law_sees_what_the_sensors_show(friction: QuarterCar, numbers: Value
 def test_a_motion_beyond_the_linkage_is_none(friction: QuarterCar, numbers: Values, loop: Loop) -> None:
     run = run_loop(friction, numbers, cam(2.0, 0.4).road, passive(loop, numbers), TEST.duration)
     assert run.status is Status.NOT_FINITE
-    assert not ride_of(run, TEST).stable
+    assert not measure_ride(run, TEST).stable
 
 
 def test_a_law_that_begins_at_another_angle_says_that_it_doubts(
@@ -91,7 +91,7 @@ def test_a_law_that_begins_at_another_angle_says_that_it_doubts(
     assert doubted_from(run) == 0.0
     assert np.max(np.abs(np.asarray(run.signals.asked))) == 0.0
     assert doubted_from(ran(friction, numbers, TEST, loop)) is None
-    lost = ran(friction, numbers, TEST, loop._replace(failure=failing("encoder", 6.0)))
+    lost = ran(friction, numbers, TEST, loop._replace(failure=make_failure("encoder", 6.0)))
     assert doubted_from(lost) == pytest.approx(6.0, abs=2e-3)
 
 
@@ -115,7 +115,7 @@ def test_what_is_wrong_is_told_in_its_own_words() -> None:
     assert alarm(_study(passive=lost, passive_ride=moving)).startswith("The passive rig leaves the travel")
     assert alarm(_study(active=lost, active_ride=moving)).startswith("The loop leaves the travel")
     assert alarm(_study(active_ride=moving)).startswith("The loop is not stable on this rig")
-    assert alarm(_study(doubted_from=1.5)).startswith("From 1.5 s on the law did not believe")
+    assert alarm(_study(doubted_from=1.5)).startswith("From 1.5 s on the control law rejected")
     assert alarm(_study(on_rigs=(moving, SimpleNamespace(stable=True)))).endswith(
         "1 of 2 rigs that the data allow."
     )

@@ -15,15 +15,17 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from savgs_ident.control.closed_loop.run import Loop, Signals
-from savgs_ident.control.controller_file import DigitalController
+from savgs_ident.control.design import DigitalController
 from savgs_ident.control.linearisation import INPUTS, linearise, resting
-from savgs_ident.model.drive import Drive, VelocityReference
-from savgs_ident.model.profile import Constant
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.strut import strut_at_rest
-from savgs_ident.model.values import Values
+from savgs_ident.core.values import Values
+from savgs_ident.plants.profiles import Constant
+from savgs_ident.plants.quarter_car.drive import Drive, VelocityReference
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.strut import strut_at_rest
 
 from .loops import NO_FRICTION, cam, harmonics_of, ideal, judged, ran, with_changed
+
+pytestmark = pytest.mark.slow
 
 SMALL = 2e-6
 """Peak to peak of the road [m]."""

@@ -9,7 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from savgs_ident.control.closed_loop.metrics import Gain, Ride, drive_use, gain_of, ride_after, ride_of
+from savgs_ident.control.closed_loop.metrics import (
+    Ride,
+    RideGain,
+    compare_rides,
+    drive_use,
+    measure_ride,
+    ride_after,
+)
 from savgs_ident.control.closed_loop.programme import (
     FADE,
     REST,
@@ -20,9 +27,9 @@ from savgs_ident.control.closed_loop.programme import (
     sweep_test,
 )
 from savgs_ident.control.closed_loop.run import FRAME, ClosedLoopRun, Signals
-from savgs_ident.control.digital import RATE
+from savgs_ident.control.synthesis import RATE
 from savgs_ident.core.status import Status
-from savgs_ident.model.values import Values
+from savgs_ident.core.values import Values
 
 from .loops import along
 
@@ -99,7 +106,7 @@ def test_the_rms_of_a_sine_is_its_amplitude_over_root_two_wherever_it_begins_and
     test = harmonic_test(CAM, frequency)
     wave = while_driven(test, lambda t: mean + amplitude * np.sin(2.0 * np.pi * frequency * t + phase))
     run = a_run(test, sprung_accel=wave, susp_deflection=0.1 * wave, tyre_load=1000.0 * wave)
-    ride = ride_of(run, test)
+    ride = measure_ride(run, test)
     rms = amplitude / np.sqrt(2.0)
     # Half a frame more or less than whole periods.
     left = 0.5 * FRAME / RATE / (test.end - test.start) + 1e-3
@@ -112,7 +119,7 @@ def test_what_happens_outside_the_judged_time_does_not_count() -> None:
     time = times_of(AT_TWO)
     outside = (time < AT_TWO.start) | (time >= AT_TWO.end)
     quiet, wild = np.sin(4.0 * np.pi * time), np.where(outside, 100.0, np.sin(4.0 * np.pi * time))
-    assert ride_of(a_run(AT_TWO, sprung_accel=wild), AT_TWO) == ride_of(
+    assert measure_ride(a_run(AT_TWO, sprung_accel=wild), AT_TWO) == measure_ride(
         a_run(AT_TWO, sprung_accel=quiet), AT_TWO
     )
 
@@ -122,13 +129,13 @@ def test_after_a_failure_only_what_follows_counts() -> None:
     wave = np.where(time < AT_TWO.fails_at, 5.0, 1.0) * np.sin(4.0 * np.pi * time)
     run = a_run(AT_TWO, sprung_accel=wave)
     assert ride_after(run, AT_TWO).sprung_accel == pytest.approx(np.sqrt(0.5), rel=1e-6)
-    assert ride_of(run, AT_TWO).sprung_accel == pytest.approx(np.sqrt(0.5 * 13.0), rel=1e-6)
+    assert measure_ride(run, AT_TWO).sprung_accel == pytest.approx(np.sqrt(0.5 * 13.0), rel=1e-6)
 
 
 def test_the_time_without_contact_is_that_at_which_the_plate_carries_nothing() -> None:
     time = times_of(AT_TWO)
     load = np.where((time >= 5.0) & (time < 6.0), 0.0, 3600.0)
-    assert ride_of(a_run(AT_TWO, tyre_load=load), AT_TWO).lifts == pytest.approx(1.0 / 8.0)
+    assert measure_ride(a_run(AT_TWO, tyre_load=load), AT_TWO).lifts == pytest.approx(1.0 / 8.0)
 
 
 @pytest.mark.parametrize(("growth", "stable"), [(-3.0, True), (-0.1, False), (0.2, False)])
@@ -136,11 +143,11 @@ def test_a_motion_that_goes_on_when_the_road_stands_is_not_stable(growth: float,
     time = times_of(AT_TWO)
     left = np.where(time < AT_TWO.end, 1.0, np.exp(growth * (time - AT_TWO.end)))
     run = a_run(AT_TWO, susp_deflection=0.01 * left * np.sin(7.0 * time))
-    assert ride_of(run, AT_TWO).stable is stable
+    assert measure_ride(run, AT_TWO).stable is stable
 
 
 def test_a_run_that_is_not_finite_is_not_stable_and_worth_nothing() -> None:
-    ride = ride_of(a_run(AT_TWO, Status.NOT_FINITE, sprung_accel=np.full(14_500, np.nan)), AT_TWO)
+    ride = measure_ride(a_run(AT_TWO, Status.NOT_FINITE, sprung_accel=np.full(14_500, np.nan)), AT_TWO)
     assert not ride.stable
     assert np.isnan([ride.sprung_accel, ride.susp_deflection, ride.tyre_load, ride.lifts]).all()
 
@@ -149,7 +156,7 @@ def test_a_run_that_is_not_finite_is_not_stable_and_worth_nothing() -> None:
 def test_the_gain_is_what_the_rms_fell_by(share: float) -> None:
     passive = Ride(2.0, 0.01, 700.0, 0.0, stable=True)
     active = Ride(2.0 * share, 0.01 * share**2, 700.0, 0.0, stable=True)
-    gain = gain_of(passive, active)
+    gain = compare_rides(passive, active)
     assert gain.sprung_accel == pytest.approx(100.0 * (1.0 - share), abs=1e-9)
     assert gain.susp_deflection == pytest.approx(100.0 * (1.0 - share**2), abs=1e-9)
     assert gain.tyre_load == 0.0
@@ -157,14 +164,14 @@ def test_the_gain_is_what_the_rms_fell_by(share: float) -> None:
 
 def test_a_rig_that_did_not_move_gains_nothing() -> None:
     still = Ride(0.0, 0.0, 0.0, 0.0, stable=True)
-    assert gain_of(still, still) == Gain(0.0, 0.0, 0.0)
+    assert compare_rides(still, still) == RideGain(0.0, 0.0, 0.0)
 
 
 def test_what_a_lost_run_gains_is_not_known() -> None:
     lost = Ride(np.nan, np.nan, np.nan, np.nan, stable=False)
     moving = Ride(1.0, 0.01, 300.0, 0.0, stable=True)
     for passive, active in ((lost, moving), (moving, lost)):
-        gain = gain_of(passive, active)
+        gain = compare_rides(passive, active)
         assert np.isnan([gain.sprung_accel, gain.susp_deflection, gain.tyre_load]).all()
     use = drive_use(a_run(AT_TWO, Status.NOT_FINITE), AT_TWO, DRIVE)
     assert np.isnan([use.speed_peak_rpm, use.saturated, use.energy, *use.angle_deg]).all()

@@ -12,6 +12,8 @@ from savgs_ident.control.rigs import Rigs, rigs_from_covariance, rigs_from_poste
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 
+from ..in_one_test import over
+
 NAMES = ("m_s", "k_sd", "c_sd")
 MANY = 40_000
 
@@ -87,7 +89,7 @@ BAD_COVARIANCES: dict[str, object] = {
 }
 
 
-@pytest.mark.parametrize("fault", BAD_COVARIANCES)
+@over("fault", BAD_COVARIANCES)
 def test_what_is_no_covariance_is_refused(table: ParameterTable, fault: str) -> None:
     with pytest.raises(InputError, match="no covariance") as caught:
         rigs_from_covariance(table, {"covariance": BAD_COVARIANCES[fault]}, 5, "model.toml")
@@ -166,7 +168,7 @@ BAD_POSTERIORS: dict[str, Callable[[h5py.File], None]] = {
 }
 
 
-@pytest.mark.parametrize("fault", BAD_POSTERIORS)
+@over("fault", BAD_POSTERIORS)
 def test_what_is_no_posterior_is_refused(table: ParameterTable, tmp_path: Path, fault: str) -> None:
     path = tmp_path / "posterior.nc"
     with h5py.File(path, "w") as file:

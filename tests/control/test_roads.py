@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from savgs_ident.control.roads import BAND, REFERENCE, STEP, bump_road, iso_height, iso_road
-from savgs_ident.model.profile import Faded, Sine
-from savgs_ident.model.road import RoadMotion
+from savgs_ident.control.closed_loop.programme import BAND, REFERENCE, STEP, bump_road, iso_height, iso_road
+from savgs_ident.plants.profiles import Faded, Sine
+from savgs_ident.plants.quarter_car.road import RoadMotion
 
+from ..in_one_test import over
 from .loops import along
 
 GEOMETRIC_MEAN = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6}
@@ -32,8 +33,8 @@ def test_the_standard_is_read_as_it_is_printed() -> None:
     assert pytest.approx((0.011, 2.83)) == BAND
 
 
-@pytest.mark.parametrize("grade", GEOMETRIC_MEAN)
-@pytest.mark.parametrize("speed", [5.0, 20.0, 40.0])
+@over("grade", GEOMETRIC_MEAN)
+@over("speed", [5.0, 20.0, 40.0])
 def test_the_spectrum_of_a_road_is_that_of_its_class_at_any_speed(grade: str, speed: float) -> None:
     """Estimated by Welch's method and compared band by band, within four deviations of such an estimate."""
     part = 2**15

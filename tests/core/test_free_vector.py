@@ -11,11 +11,20 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from jax.test_util import check_grads
 
-from savgs_ident.core.bijection import AbstractBijection, identified_bijection, tolerated_bijection
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.free_vector import FreeVector, known_to_tolerance
 from savgs_ident.core.parameter import Parameter, ParameterTable
-from savgs_ident.core.rig import Rig
+from savgs_ident.core.transforms import (
+    WIDTH,
+    AbstractBijection,
+    FreeVector,
+    identified_bijection,
+    known_to_tolerance,
+    prior_width,
+    tolerated_bijection,
+)
+from savgs_ident.plants.quarter_car.rig import Rig
+
+from ..in_one_test import over
 
 IDENTIFIED = {
     "rail friction": Parameter("mu_r", 0.03, "1", lower=0.0, upper=0.5),
@@ -46,11 +55,11 @@ class Case:
 
     def __init__(self, parameter: Parameter, make: Callable[[Parameter], AbstractBijection]) -> None:
         bijection = make(parameter)
-        self.parameter, self.inverse = parameter, bijection.inverse
+        self.parameter, self.bijection, self.inverse = parameter, bijection, bijection.inverse
         self.forward, self.slope = jax.jit(bijection.forward), jax.jit(jax.grad(bijection.forward))
 
 
-every_case = pytest.mark.parametrize("case", [Case(*case) for case in CASES], ids=NAMES)
+every_case = over("case", [Case(*case) for case in CASES], ids=NAMES)
 
 
 @every_case
@@ -83,6 +92,13 @@ def test_the_slope_is_that_of_finite_differences(case: Case) -> None:
     points = jnp.array([-3.3, -1.01, -0.2, 0.0, 0.7, 1.9, 4.1])
     scaled = jax.jit(lambda u: jax.vmap(case.forward)(u) / case.slope(0.0))
     check_grads(scaled, (points,), order=2, modes=("fwd",), rtol=1e-5, eps=1e-5)
+
+
+@every_case
+def test_numbers_go_the_same_way_as_arrays(case: Case) -> None:
+    for u in (-6.0, -1.3, 0.0, 0.4, 9.0):
+        assert float(case.bijection.forward(u)) == pytest.approx(float(case.forward(u)), rel=1e-13)
+        assert case.bijection.slope(u) == pytest.approx(float(case.slope(u)), rel=1e-9)
 
 
 @every_case
@@ -147,12 +163,17 @@ def test_it_goes_through_jit_and_vmap(rig: Rig) -> None:
         np.testing.assert_allclose(row, list(free.to_constrained(start).values()), rtol=1e-14)
 
 
-def test_the_prior_is_the_unit_normal_of_the_tolerances(rig: Rig) -> None:
-    free = FreeVector(rig.parameters, ("mu_r",), ("k_t", "m_s"))
-    values = {"mu_r": 0.1, "k_t": 275e3 - 2.0 * 13750.0, "m_s": 320.0 + 1.6}
-    np.testing.assert_allclose(free.prior_residuals(free.to_unconstrained(values)), [-2.0, 1.0], rtol=1e-12)
-    alone = FreeVector(rig.parameters, ("mu_r",))
-    assert alone.prior_residuals(jnp.array([0.3])).shape == (0,)
+def test_the_prior_is_the_unit_normal_of_the_tolerances_and_wide_without_one(rig: Rig) -> None:
+    free = FreeVector(rig.parameters, ("mu_r", "c_sd"), ("k_t", "m_s"))
+    values = {"mu_r": 0.1, "c_sd": 5792.0 - 463.36, "k_t": 275e3 - 2.0 * 13750.0, "m_s": 320.0 + 1.6}
+    friction = np.log(0.1 / 0.4) - np.log(0.03 / 0.47)
+    found = free.prior_residuals(free.to_unconstrained(values))
+    np.testing.assert_allclose(found, [friction / WIDTH, -1.0, -2.0, 1.0], rtol=1e-12)
+
+
+def test_a_tolerance_about_a_bound_is_no_more_than_a_scale() -> None:
+    assert prior_width(IDENTIFIED["compliance from null"]) == WIDTH
+    assert prior_width(TOLERATED["no bounds"]) == 1.0
 
 
 def test_a_start_on_a_bound_is_moved_inside(rig: Rig) -> None:

@@ -7,7 +7,9 @@ from typing import Any, Literal
 
 import pytest
 
-from savgs_ident.core.records import record_of
+from savgs_ident.core.files import record_of
+
+from ..in_one_test import over
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ def test_what_has_a_default_may_be_missing() -> None:
     assert record_of(Outer, {name: FIELDS[name] for name in list(FIELDS)[:6]}).counts == {}
 
 
-@pytest.mark.parametrize(
+@over(
     ("change", "said"),
     [
         ({"number": 1.5}, "number is 1.5, not a whole number"),

@@ -14,15 +14,14 @@ from typing import Any
 import pytest
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.parameter import Parameter, ParameterTable
-from savgs_ident.core.rig import (
+from savgs_ident.core.parameter import Parameter, ParameterTable, merge_parameters
+from savgs_ident.plants.quarter_car.rig import (
     Rig,
     default_campaign_path,
-    merge_parameters,
     read_rig,
     write_rig,
 )
-from savgs_ident.core.rig_form import UNIT_OF
+from savgs_ident.plants.quarter_car.rig_toml import UNIT_OF
 
 TO_BE_IDENTIFIED = ("mu_r", "mu_t", "ydot_Hth")
 
@@ -124,7 +123,10 @@ def test_the_shipped_campaign_is_the_nominal_one(shared_rig: Path) -> None:
 
 
 def test_reading_a_rig_does_not_import_jax() -> None:
-    code = "import sys, savgs_ident.core.rig; sys.exit('jax' in sys.modules or 'matplotlib' in sys.modules)"
+    code = (
+        "import sys, savgs_ident.plants.quarter_car.rig;"
+        "sys.exit('jax' in sys.modules or 'matplotlib' in sys.modules)"
+    )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

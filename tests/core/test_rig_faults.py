@@ -8,8 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.rig import Rig, default_rig_path, read_rig
-from savgs_ident.core.rig_form import SECTION_OF
+from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig
+from savgs_ident.plants.quarter_car.rig_toml import SECTION_OF
+
+from ..in_one_test import over
 
 SHIPPED = default_rig_path().read_text(encoding="utf-8")
 
@@ -79,7 +81,7 @@ FAULTS: dict[str, tuple[Callable[[], str], str, str]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@over("fault", FAULTS)
 def test_a_faulty_file_is_refused_with_file_key_and_remedy(fault: str, tmp_path: Path) -> None:
     make, what, remedy = FAULTS[fault]
     path = tmp_path / "faulty.toml"

@@ -41,19 +41,21 @@ def test_every_public_module_has_its_page_and_no_other_has(built: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", ["index", "guide", "reference"])
+@pytest.mark.parametrize(
+    "page", ["index", "guide", "how-it-works", "validation", "performance", "formats", "reference"]
+)
 def test_the_pages_by_hand_are_there(built: Path, page: str) -> None:
     assert (built / f"{page}.html").is_file()
 
 
 @pytest.mark.slow
 def test_signatures_and_fields_are_shown_as_written(built: Path) -> None:
-    rig = _text_of(built, "savgs_ident.model.quarter_car")
-    assert "transfers( p: Values, frequency: Float[Array, '*f'], ) → Complex[Array, 'C *f']" in rig
+    base = _text_of(built, "savgs_ident.plants.base")
+    assert "transfers( p: Values, frequency: Float[Array, '*f'], ) → Complex[Array, 'C *f']" in base
     fit = _text_of(built, "savgs_ident.fit.result")
     assert "covariance: NDArray[float64]" in fit
     assert "of the estimates in their order [products of their units], (n, n)." in fit
-    assert "Annotated" not in _text_of(built, "savgs_ident.cli.simulate_command")
+    assert "Annotated" not in _text_of(built, "savgs_ident.cli.simulate")
 
 
 @pytest.mark.slow
@@ -67,5 +69,8 @@ def test_private_names_and_those_of_others_are_left_out(built: Path) -> None:
 @pytest.mark.slow
 def test_names_lead_to_where_they_are_told(built: Path) -> None:
     page = (built / "reference" / "savgs_ident.fit.result.html").read_text(encoding="utf-8")
-    assert 'href="savgs_ident.core.rig.html#savgs_ident.core.rig.Rig"' in page
-    assert 'href="savgs_ident.model.sensors.html#savgs_ident.model.sensors.RESPONSE_CHANNELS"' in page
+    assert 'href="savgs_ident.plants.quarter_car.rig.html#savgs_ident.plants.quarter_car.rig.Rig"' in page
+    assert (
+        'href="savgs_ident.plants.quarter_car.sensors.html#savgs_ident.plants.quarter_car.sensors.RESPONSE_CHANNELS"'
+        in page
+    )

@@ -2,9 +2,9 @@
 
 import pytest
 
-from savgs_ident.core.rig import Rig
+from savgs_ident.plants.quarter_car.rig import Rig
 
-from ..model.instants import all_parameters
+from ..plants.instants import all_parameters
 
 
 @pytest.fixture(scope="session")

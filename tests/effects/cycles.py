@@ -14,45 +14,55 @@ import numpy as np
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.core.rig import default_rig_path, read_rig
-from savgs_ident.effects.rail_coulomb import RailCoulomb
-from savgs_ident.effects.registry import build_model
-from savgs_ident.model.bristle import ANCHOR, Presliding, bristle
-from savgs_ident.model.effect import (
-    AbstractEffect,
-    AbstractForce,
-    AbstractGrip,
-    AbstractSeries,
-    Grip,
+from savgs_ident.core.small_root import solve_dense
+from savgs_ident.core.values import Values
+from savgs_ident.effects.base import (
+    AbstractFrictionLimitLaw,
+    AbstractSeriesLaw,
+    FrictionLimit,
     Load,
-    Port,
     PortSignals,
 )
-from savgs_ident.model.small_root import solve_dense
-from savgs_ident.model.values import Values
+from savgs_ident.effects.bristle import Presliding, bristle
+from savgs_ident.effects.composition import states_of
+from savgs_ident.effects.effect import Effect
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, build_model
+from savgs_ident.plants.quarter_car.ports import (
+    CARCASS,
+    DAMPER,
+    FRAME,
+    LINK,
+    MOUNT,
+    PLATE,
+    STRUT,
+    TYRE_LATERAL,
+    TYRE_RADIAL,
+)
+from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
 
 NODES, PERIODS, FREQUENCY = 1024, 8, 1.7
 STEP = 1.0 / (FREQUENCY * NODES)
 
-CENTRE = {Port.STRUT: 0.45, Port.TYRE_RADIAL: 0.013, Port.TYRE_LATERAL: 0.65}
+CENTRE = {STRUT: 0.45, TYRE_RADIAL: 0.013, TYRE_LATERAL: 0.65}
 """About where a port's displacement is [m]; elsewhere zero."""
 
 CARRIED = {
-    Port.STRUT: (5300.0, 3000.0),
-    Port.LINK: (-57.0, 80.0),
-    Port.ROAD: (3600.0, 2500.0),
-    Port.TYRE_LATERAL: (0.0, 500.0),
-    Port.FRAME: (-3600.0, 2500.0),
+    MOUNT: (5300.0, 3000.0),
+    DAMPER: (0.0, 3000.0),
+    LINK: (-57.0, 80.0),
+    PLATE: (3600.0, 2500.0),
+    CARCASS: (0.0, 500.0),
+    FRAME: (-3600.0, 2500.0),
 }
-"""Load at rest and by how much it changes, where something may give way [N or N m]; none at rest at the damper."""
+"""Load at rest and by how much it changes, where something may give way [N or N m]."""
 
 
 @dataclass(frozen=True)
 class Cycle:
     """A cycle of a mechanism, at NODES instants.
 
-    ``drive`` is the displacement, velocity and load of a port (n, 3), or for what gives way its load and that at
-    rest (n, 2); ``state`` and ``rate`` are (n, s), the bristle's anchor for a grip. ``power`` [W] is what the
+    ``drive`` is the displacement, velocity, load and rest of a port (n, 4), or for what gives way its load and that
+    at rest (n, 2); ``state`` and ``rate`` are (n, s), the bristle's anchor for a grip. ``power`` [W] is what the
     mechanism takes from the rig; ``open`` is by how much the states do not repeat, relative to their scale.
     """
 
@@ -74,63 +84,59 @@ def _waves(seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return value / highest, rate * 2.0 * np.pi * FREQUENCY / highest
 
 
-def _drive(effect: AbstractEffect, p: Values, seed: int) -> NDArray[np.float64]:
+def _drive(effect: Effect, p: Values, seed: int) -> NDArray[np.float64]:
     value, rate = _waves(seed)
-    if isinstance(effect, AbstractSeries):
-        rest, size = (0.0, 3000.0) if effect.in_damper else CARRIED[effect.port]
+    if isinstance(effect.law, AbstractSeriesLaw):
+        rest, size = CARRIED[effect.port]
         return np.column_stack([rest + size * value, np.full(NODES, rest)])
     displacement, velocity = CENTRE.get(effect.port, 0.0) + 0.01 * value, 0.01 * rate
-    if effect.port is Port.STRUT:
+    if effect.port == STRUT:
         damper = build_model(read_rig(default_rig_path()), ()).damper
         load = np.asarray(p["c_sd"] * jax.vmap(damper)(-velocity))
     else:
         load = 3000.0 * (1.0 + 0.8 * _waves(seed + 100)[0])
-    return np.column_stack([displacement, velocity, load])
+    return np.column_stack([displacement, velocity, load, np.full(NODES, CENTRE.get(effect.port, 0.0))])
 
 
-def _held(effect: AbstractGrip, p: Values, signals: PortSignals) -> Grip:
+def _held(effect: Effect, p: Values, signals: PortSignals) -> FrictionLimit:
     """The rail's friction and what the effect makes of it."""
-    shares = [
-        each.grip(p, signals) for each in {each.name: each for each in (RailCoulomb(), effect)}.values()
-    ]
-    return Grip(*(sum(each[way] for each in shares) for way in (0, 1)))
+    both = {each.name: each for each in (CATALOGUE["rail_coulomb"], effect)}
+    shares = [each.friction_limit(p, signals) for each in both.values()]
+    return FrictionLimit(*(sum(each[way] for each in shares) for way in (0, 1)))
 
 
-def _balance(effect: AbstractEffect, p: Values, drive: Array, state: Array, rate: Array) -> Array:
+def _balance(effect: Effect, p: Values, drive: Array, state: Array, rate: Array) -> Array:
     """What vanishes for the right rates."""
-    if isinstance(effect, AbstractSeries):
+    if isinstance(effect.law, AbstractSeriesLaw):
         return effect.balance(p, Load(*jnp.unstack(drive)), state, rate)
     signals = PortSignals(*jnp.unstack(drive))
-    if isinstance(effect, AbstractGrip):
+    if isinstance(effect.law, AbstractFrictionLimitLaw):
         held = bristle(Presliding(p["k_pre"], p["c_pre"]), signals, _held(effect, p, signals), state[0])
         return rate - held.rate
-    assert isinstance(effect, AbstractForce)
     return rate - effect.rate(p, signals, state)
 
 
-def _power(effect: AbstractEffect, p: Values, drive: Array, state: Array, rate: Array) -> Array:
+def _power(effect: Effect, p: Values, drive: Array, state: Array, rate: Array) -> Array:
     """Power [W] that the mechanism takes.
 
     At the strut the load is itself a force at the port, the damper's push: a force that depends on it is one with
     the damper.
     """
-    if isinstance(effect, AbstractSeries):
+    if isinstance(effect.law, AbstractSeriesLaw):
         return drive[0] * rate[0]
     signals = PortSignals(*jnp.unstack(drive))
-    if isinstance(effect, AbstractGrip):
+    if isinstance(effect.law, AbstractFrictionLimitLaw):
         held = bristle(Presliding(p["k_pre"], p["c_pre"]), signals, _held(effect, p, signals), state[0])
         return -held.force * signals.velocity
-    assert isinstance(effect, AbstractForce)
     force = effect.force(p, signals, state)
-    if effect.port is Port.STRUT:
+    if effect.port == STRUT:
         unloaded = effect.force(p, signals._replace(load=jnp.zeros_like(signals.load)), state)
         force = force + jnp.where(force == unloaded, 0.0, signals.load)
-    # The tyre pushes against its compression.
-    return (1.0 if effect.port is Port.TYRE_RADIAL else -1.0) * force * signals.velocity
+    return -effect.port.sense * force * signals.velocity
 
 
 @eqx.filter_jit
-def _march(effect: AbstractEffect, p: Values, drive: Array, start: Array) -> tuple[Array, Array, Array]:
+def _march(effect: Effect, p: Values, drive: Array, start: Array) -> tuple[Array, Array, Array]:
     """States, rates and powers along a cycle (n, ...), and the states at its end."""
 
     def advance(before: Array, at: Array) -> tuple[Array, tuple[Array, Array, Array]]:
@@ -148,15 +154,15 @@ def _march(effect: AbstractEffect, p: Values, drive: Array, start: Array) -> tup
 
 
 @eqx.filter_jit
-def _powers(effect: AbstractEffect, p: Values, drive: Array) -> Array:
+def _powers(effect: Effect, p: Values, drive: Array) -> Array:
     """Of a mechanism without states, (n,)."""
     return jax.vmap(lambda at: _power(effect, p, at, jnp.zeros(0), jnp.zeros(0)))(drive)
 
 
-def along_a_cycle(effect: AbstractEffect, p: Values, seed: int) -> Cycle:
+def along_a_cycle(effect: Effect, p: Values, seed: int) -> Cycle:
     """A mechanism along a random cycle."""
     drive = _drive(effect, p, seed)
-    states = (ANCHOR,) if isinstance(effect, AbstractGrip) else effect.states
+    states = states_of((effect,))
     if not states:
         none = np.zeros((NODES, 0))
         return Cycle(drive, none, none, np.asarray(_powers(effect, p, jnp.asarray(drive))), 0.0)

@@ -9,34 +9,45 @@ import numpy as np
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import build_model
-from savgs_ident.model.effect import AbstractEffect, AbstractForce, AbstractSeries, Load, PortSignals
-from savgs_ident.model.quarter_car import Loads
-from savgs_ident.model.small_root import solve_dense
-from savgs_ident.model.values import Values
+from savgs_ident.core.small_root import solve_dense
+from savgs_ident.core.values import Values
+from savgs_ident.effects.base import (
+    Load,
+    PortSignals,
+)
+from savgs_ident.effects.effect import Effect
+from savgs_ident.plants.quarter_car.catalogue import build_model
+from savgs_ident.plants.quarter_car.plant import Loads
+from savgs_ident.plants.quarter_car.rig import Rig
 
-from ..model.instants import NOMINAL, as_values, inputs_of, motion_of
+from ..plants.instants import NOMINAL, as_values, inputs_of, motion_of
 
 
-def typical(effect: AbstractEffect, **others: float) -> Values:
+def typical(effect: Effect, **others: float) -> Values:
     """The effect's own values, and others on top of them."""
     return as_values({each.name: each.value for each in effect.parameters} | others)
 
 
-def signals(displacement: float = 0.0, velocity: float = 0.0, load: float = 0.0) -> PortSignals:
-    """What a port shows [m], [m/s], [N]."""
-    return PortSignals(*(jnp.asarray(each, float) for each in (displacement, velocity, load)))
+def signals(
+    displacement: float = 0.0, velocity: float = 0.0, load: float = 0.0, rest: float = 0.0
+) -> PortSignals:
+    """What a port shows [m], [m/s], [N], [m]."""
+    return PortSignals(*(jnp.asarray(each, float) for each in (displacement, velocity, load, rest)))
 
 
 _force = eqx.filter_jit(lambda effect, p, seen: effect.force(p, seen, jnp.zeros(0)))
 
 
 def force_of(
-    effect: AbstractForce, p: Values, displacement: float = 0.0, velocity: float = 0.0, load: float = 0.0
+    effect: Effect,
+    p: Values,
+    displacement: float = 0.0,
+    velocity: float = 0.0,
+    load: float = 0.0,
+    rest: float = 0.0,
 ) -> float:
     """Force [N] of an effect without states."""
-    return float(_force(effect, p, signals(displacement, velocity, load)))
+    return float(_force(effect, p, signals(displacement, velocity, load, rest)))
 
 
 def _settled(defect: Callable[[Array], Array], start: Array) -> Array:
@@ -49,7 +60,7 @@ def _settled(defect: Callable[[Array], Array], start: Array) -> Array:
 
 
 @eqx.filter_jit
-def _followed(effect: AbstractForce, p: Values, seen: PortSignals, start: Array, step: Array) -> Array:
+def _followed(effect: Effect, p: Values, seen: PortSignals, start: Array, step: Array) -> Array:
     def advance(before: Array, at: PortSignals) -> tuple[Array, Array]:
         now = _settled(lambda now: now - before - step * effect.rate(p, at, now), before)
         return now, effect.force(p, at, now)
@@ -58,17 +69,22 @@ def _followed(effect: AbstractForce, p: Values, seen: PortSignals, start: Array,
 
 
 def follow(
-    effect: AbstractForce, p: Values, displacement: NDArray[np.float64], step: float, start: float
+    effect: Effect, p: Values, displacement: NDArray[np.float64], step: float, start: float, rest: float = 0.0
 ) -> NDArray[np.float64]:
     """Force [N] along a displacement [m] sampled every ``step`` [s], from a state ``start``; backward Euler."""
     velocity = np.gradient(displacement, step)
-    seen = PortSignals(*map(jnp.asarray, (displacement, velocity, np.zeros_like(displacement))))
+    seen = PortSignals(
+        *map(
+            jnp.asarray,
+            (displacement, velocity, np.zeros_like(displacement), np.full_like(displacement, rest)),
+        )
+    )
     return np.asarray(_followed(effect, p, seen, jnp.asarray([start]), jnp.asarray(step)))
 
 
 @eqx.filter_jit
 def _yielded(
-    effect: AbstractSeries, p: Values, load: Callable[[Array, Array], Array], drive: Array, step: Array
+    effect: Effect, p: Values, load: Callable[[Array, Array], Array], drive: Array, step: Array
 ) -> Array:
     def advance(before: Array, at: Array) -> tuple[Array, Array]:
         def defect(now: Array) -> Array:
@@ -82,7 +98,7 @@ def _yielded(
 
 
 def give_way(
-    effect: AbstractSeries,
+    effect: Effect,
     p: Values,
     drive: NDArray[np.float64],
     step: float,
@@ -96,7 +112,7 @@ def give_way(
 
 
 def balance_of(
-    effect: AbstractSeries, p: Values, total: float, rest: float, state: float, rate: float = 0.0
+    effect: Effect, p: Values, total: float, rest: float, state: float, rate: float = 0.0
 ) -> float:
     """What vanishes for the right rate of an effect with one state."""
     load = Load(jnp.asarray(total), jnp.asarray(rest))
@@ -125,7 +141,7 @@ def in_the_rig(
     model, p = build_model(rig, effects), as_values(numbers)
     s = jnp.asarray(states or [0.0] * len(model.states), float)
     # Piece by piece, not compiled: each model is asked but a few times.
-    seen = (p, motion_of(jnp.asarray(at)), s, jnp.zeros_like(s), inputs_of(jnp.asarray(at)), model.curves(p))
+    seen = (p, motion_of(jnp.asarray(at)), s, jnp.zeros_like(s), inputs_of(jnp.asarray(at)), model.prepare(p))
     return np.asarray(model.residual(*seen)), model.loads(*seen)
 
 

@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import CATALOGUE, MODELS, build_model, model_parameters
-from savgs_ident.model.actuation import held_link
-from savgs_ident.model.effect import AbstractEffect, AbstractSeries
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.road import cam_road
-from savgs_ident.model.values import Values, as_values
-from savgs_ident.simulate.excitation import cam_excitation
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.effects.base import AbstractSeriesLaw
+from savgs_ident.effects.effect import Effect
+from savgs_ident.plants.quarter_car.actuation import RigSource, held_link
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.road import cam_excitation, cam_road
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, simulate_periodic
 from savgs_ident.simulate.transient import simulate_transient
 
 from ..relaxed import with_kept_programs
-from .kinds import PORTS, effects_of
+from .kinds import KINDS, effects_of
 
 LIFT, LINK, HERTZ = 0.0275, np.pi / 2.0, 2.35
 PERIODS, SAMPLES, ORDERS = 30, 512, 9
@@ -70,7 +70,7 @@ def _transient(model: QuarterCar, p: Values) -> NDArray[np.complex128]:
     """The same of the last but one of some periods from rest: sensors know nothing of what follows the last."""
     times = np.arange(PERIODS * SAMPLES + 1) / (HERTZ * SAMPLES)
     road = cam_road(LIFT, HERTZ, settle=1.0)
-    solution = simulate_transient(model, p, road, held_link(LINK), times)
+    solution = simulate_transient(model, p, RigSource(road, held_link(LINK)), times)
     assert solution.status().ok
     shown = np.stack(solution.readings)[:, (PERIODS - 2) * SAMPLES : (PERIODS - 1) * SAMPLES]
     return 2.0 * np.fft.rfft(shown, axis=1)[:, 1 : ORDERS + 1] / SAMPLES
@@ -82,7 +82,7 @@ def _differ(found: NDArray[np.complex128], wanted: NDArray[np.complex128]) -> fl
 
 
 def test_there_is_one_of_each_kind() -> None:
-    assert all(any(isinstance(CATALOGUE[name], kind) for name in OF_ALL_KINDS) for kind in PORTS)
+    assert all(any(isinstance(CATALOGUE[name].law, kind) for name in OF_ALL_KINDS) for kind in KINDS)
 
 
 @pytest.mark.slow
@@ -98,8 +98,8 @@ def test_effects_of_all_kinds_together_end_in_the_periodic_motion(rig: Rig) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effect", effects_of())
-def test_each_effect_ends_in_its_periodic_motion(effect: AbstractEffect, rig: Rig) -> None:
+@pytest.mark.parametrize("effect", effects_of(), ids=lambda effect: effect.name)
+def test_each_effect_ends_in_its_periodic_motion(effect: Effect, rig: Rig) -> None:
     model, p = _bench(rig, [effect.name])
     assert _differ(_transient(model, p), _periodic(model, p)[1]) < 1e-3
 
@@ -111,7 +111,7 @@ def test_the_whole_catalogue_at_its_null_is_simtr(rig: Rig) -> None:
     at_null = _at_null(p, set(CATALOGUE) - set(MODELS["simtr"]))
     solution, found = _periodic(model, at_null, SAME_NODES)
     assert _differ(found, _periodic(*_bench(rig, ()), SAME_NODES)[1]) < 1e-9
-    given = [effect for effect in CATALOGUE.values() if isinstance(effect, AbstractSeries)]
+    given = [effect for effect in CATALOGUE.values() if isinstance(effect.law, AbstractSeriesLaw)]
     yields = {state.name for effect in given for state in effect.states}
     for place, state in enumerate(model.states):
         if state.name in yields:

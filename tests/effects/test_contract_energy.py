@@ -5,18 +5,18 @@ and sensors that err are no mechanisms.
 """
 
 import numpy as np
-import pytest
 
-from savgs_ident.model.effect import AbstractEffect
+from savgs_ident.effects.effect import Effect
 
-from ..model.instants import as_values
+from ..in_one_test import over
+from ..plants.instants import as_values
 from .cycles import along_a_cycle
 from .kinds import MECHANISMS, effects_of
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("effect", effects_of(*MECHANISMS))
-def test_it_adds_no_energy_over_a_cycle(effect: AbstractEffect, numbers: dict[str, float], seed: int) -> None:
+@over("seed", range(3))
+@over("effect", effects_of(*MECHANISMS))
+def test_it_adds_no_energy_over_a_cycle(effect: Effect, numbers: dict[str, float], seed: int) -> None:
     """With its internal states back where they were."""
     cycle = along_a_cycle(effect, as_values(numbers), seed)
     assert cycle.open < 1e-6

@@ -9,44 +9,45 @@ import pytest
 from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.model.effect import (
-    AbstractChange,
-    AbstractEffect,
-    AbstractForce,
-    AbstractGrip,
-    AbstractRoadFault,
-    AbstractSensorFault,
-    AbstractSeries,
-    Cam,
+from savgs_ident.core.values import Values
+from savgs_ident.effects.base import (
+    AbstractForceLaw,
+    AbstractFrictionLimitLaw,
+    AbstractInputLaw,
+    AbstractNumberLaw,
+    AbstractSensorLaw,
+    AbstractSeriesLaw,
+    Fundamental,
+    InputSignal,
 )
-from savgs_ident.model.tyre import Road
-from savgs_ident.model.values import Values
+from savgs_ident.effects.effect import Effect
 
-from ..model.instants import as_values
-from ..model.primitives import MAPPABLE, primitives_of
+from ..in_one_test import over
+from ..plants.instants import as_values
+from ..plants.primitives import MAPPABLE, primitives_of
 from .kinds import MECHANISMS, effects_of, outcome, outcomes, seen_by, slopes
 
 
-def _nothing(effect: AbstractEffect, numbers: dict[str, float], found: NDArray[np.float64]) -> bool:
+def _nothing(effect: Effect, numbers: dict[str, float], found: NDArray[np.float64]) -> bool:
     """Whether an outcome (n, m) is that of an effect that is not there."""
-    match effect:
-        case AbstractForce():
+    match effect.law:
+        case AbstractForceLaw():
             return not np.any(found[:, 0])
-        case AbstractChange():
+        case AbstractNumberLaw():
             return bool(np.all(found == [numbers[name] for name in sorted(effect.changes(numbers))]))
-        case AbstractSensorFault():
+        case AbstractSensorLaw():
             return bool(np.all(found == [1.0, 0.0]))
     return not np.any(found)
 
 
-@pytest.mark.parametrize("effect", effects_of())
+@over("effect", effects_of())
 def test_it_is_nothing_at_its_null_and_something_at_its_value(
-    effect: AbstractEffect, numbers: dict[str, float]
+    effect: Effect, numbers: dict[str, float]
 ) -> None:
     """Exactly; what gives way stays where it is under any load."""
     p = as_values(numbers)
     seen = seen_by(effect, p, seed=4)
-    if isinstance(effect, AbstractSeries):
+    if isinstance(effect.law, AbstractSeriesLaw):
         seen[:, 2:] = 0.0
     assert not _nothing(effect, numbers, outcomes(effect, p, seen))
     null = numbers | dict(effect.null)
@@ -62,19 +63,21 @@ def _moved(parameter: Parameter) -> float:
     return next(each for each in ends if parameter.lower < each < parameter.upper)
 
 
-@pytest.mark.parametrize("effect", effects_of(AbstractForce, AbstractGrip, AbstractSeries))
-def test_it_gives_one_number_per_force_and_state(effect: AbstractEffect, numbers: dict[str, float]) -> None:
+@over("effect", effects_of(AbstractForceLaw, AbstractFrictionLimitLaw, AbstractSeriesLaw))
+def test_it_gives_one_number_per_force_and_state(effect: Effect, numbers: dict[str, float]) -> None:
     seen = jnp.asarray(seen_by(effect, as_values(numbers), seed=4)[0])
     found = outcome(effect, as_values(numbers), seen)
     assert found.dtype == jnp.float64
     assert found.shape == (
-        {AbstractForce: 1, AbstractGrip: 2, AbstractSeries: 0}[type(effect).__bases__[0]]
+        {AbstractForceLaw: 1, AbstractFrictionLimitLaw: 2, AbstractSeriesLaw: 0}[
+            type(effect.law).__bases__[0]
+        ]
         + len(effect.states),
     )
 
 
-@pytest.mark.parametrize("effect", effects_of(AbstractSeries))
-def test_its_balance_grows_with_the_rates(effect: AbstractSeries, numbers: dict[str, float]) -> None:
+@over("effect", effects_of(AbstractSeriesLaw))
+def test_its_balance_grows_with_the_rates(effect: Effect, numbers: dict[str, float]) -> None:
     """At its value and at its null alike, so that there is one rate to every load."""
     seen, size = seen_by(effect, as_values(numbers), seed=4), len(effect.states)
     for p in (numbers, numbers | dict(effect.null)):
@@ -85,19 +88,19 @@ def test_its_balance_grows_with_the_rates(effect: AbstractSeries, numbers: dict[
             assert np.all(grown[:, place] > 0.0)
 
 
-@pytest.mark.parametrize("effect", effects_of(AbstractRoadFault))
-def test_its_velocity_is_the_rate_of_its_height(effect: AbstractRoadFault, numbers: dict[str, float]) -> None:
+@over("effect", effects_of(AbstractInputLaw))
+def test_its_velocity_is_the_rate_of_its_height(effect: Effect, numbers: dict[str, float]) -> None:
     p, still = as_values(numbers), jnp.zeros(())
     for seen in seen_by(effect, p, seed=4)[:16]:
         height, velocity, angle, speed = jnp.unstack(jnp.asarray(seen))
         (shift, _), (rate, _) = jax.jvp(
-            lambda height, angle: effect.shift(p, Road(height, still), Cam(angle, still)),
+            lambda height, angle: effect.shift(p, InputSignal(height, still), Fundamental(angle, still)),
             (height, angle),
             (velocity, speed),
         )
-        moving = effect.shift(p, Road(height, velocity), Cam(angle, speed))
-        assert float(moving.height) == float(shift)
-        assert float(moving.velocity) == pytest.approx(float(rate), rel=1e-12, abs=1e-15)
+        moving = effect.shift(p, InputSignal(height, velocity), Fundamental(angle, speed))
+        assert float(moving.value) == float(shift)
+        assert float(moving.rate) == pytest.approx(float(rate), rel=1e-12, abs=1e-15)
 
 
 Difference = Callable[[float], NDArray[np.float64]]
@@ -111,10 +114,10 @@ def _into_the_bounds(at: Difference, step: float) -> NDArray[np.float64]:
     return (4.0 * at(step) - at(2.0 * step) - 3.0 * at(0.0)) / (2.0 * step)
 
 
-@pytest.mark.parametrize("place", ["value", "null"])
-@pytest.mark.parametrize("effect", effects_of())
+@over("place", ["value", "null"])
+@over("effect", effects_of())
 def test_derivatives_in_its_parameters_are_those_of_differences(
-    effect: AbstractEffect, numbers: dict[str, float], place: str
+    effect: Effect, numbers: dict[str, float], place: str
 ) -> None:
     """Off the few points at which a law changes within the difference. On a bound the difference goes inwards."""
     here = numbers | (dict(effect.null) if place == "null" else {})
@@ -140,8 +143,8 @@ def test_derivatives_in_its_parameters_are_those_of_differences(
         assert not np.any(wrong & smooth), parameter.name
 
 
-@pytest.mark.parametrize("effect", effects_of())
-def test_at_its_null_something_tells_it(effect: AbstractEffect, numbers: dict[str, float]) -> None:
+@over("effect", effects_of())
+def test_at_its_null_something_tells_it(effect: Effect, numbers: dict[str, float]) -> None:
     """Its outcome has a slope there in what makes it vanish: it can be tested for."""
     p: Values = as_values(numbers | dict(effect.null))
     seen = seen_by(effect, as_values(numbers), seed=6)
@@ -152,8 +155,8 @@ def test_at_its_null_something_tells_it(effect: AbstractEffect, numbers: dict[st
         assert np.any(found != 0.0), name
 
 
-@pytest.mark.parametrize("effect", effects_of(*MECHANISMS, AbstractChange, AbstractRoadFault))
-def test_it_is_made_of_what_can_be_translated(effect: AbstractEffect, numbers: dict[str, float]) -> None:
+@over("effect", effects_of(*MECHANISMS, AbstractNumberLaw, AbstractInputLaw))
+def test_it_is_made_of_what_can_be_translated(effect: Effect, numbers: dict[str, float]) -> None:
     """All that the rig's residual holds; what sensors do is not part of it."""
     seen = seen_by(effect, as_values(numbers), seed=4)[0]
     law = primitives_of(lambda p, one: outcome(effect, p, one), as_values(numbers), seen)

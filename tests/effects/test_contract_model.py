@@ -10,14 +10,16 @@ import pytest
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import CATALOGUE, MODELS, build_model
-from savgs_ident.model.effect import AbstractEffect, AbstractSensorFault, AbstractSeries, Cam
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.sensors import RESPONSE_CHANNELS
-from savgs_ident.model.values import Values
+from savgs_ident.core.values import Values
+from savgs_ident.effects.base import AbstractSensorLaw, AbstractSeriesLaw, Fundamental
+from savgs_ident.effects.effect import Effect
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
 
-from ..model.instants import as_values, draw_instants, inputs_of, motion_of
+from ..in_one_test import over
+from ..plants.instants import as_values, draw_instants, inputs_of, motion_of
 from .kinds import effects_of
 
 COUNT = 40
@@ -50,12 +52,15 @@ def _look(model: QuarterCar, anchors: NDArray[np.float64]) -> Look:
 
     @jax.jit
     def evaluate(p: Values, s: Array, sd: Array, instants: Array, cam: Array) -> tuple[Array, Array, Array]:
-        curves = model.curves(p)
+        curves = model.prepare(p)
 
         def one(s: Array, instant: Array, turned: Array) -> tuple[Array, Array]:
-            motion, inputs = motion_of(instant), inputs_of(instant)._replace(cam=Cam(turned[0], turned[1]))
+            motion, inputs = (
+                motion_of(instant),
+                inputs_of(instant)._replace(cam=Fundamental(turned[0], turned[1])),
+            )
             residual = model.residual(p, motion, s, sd, inputs, curves)
-            return residual, jnp.stack(model.read(p, motion.q.theta_LW, motion.qdd.z_s))
+            return residual, jnp.stack(model.read(p, motion, s, sd, inputs))
 
         residuals, readings = jax.vmap(one)(s, instants, cam)
         return residuals, readings, model.transfers(p, jnp.asarray(FREQUENCY))
@@ -103,23 +108,23 @@ def test_with_everything_at_its_null_it_is_simtr(
     assert np.max(np.abs(found.states["anchor"] - anchor)) < 1e-14 * np.max(np.abs(anchor))
     assert np.array_equal(found.readings, expected.readings)
     assert np.array_equal(found.transfers, expected.transfers)
-    given = [effect for effect in CATALOGUE.values() if isinstance(effect, AbstractSeries)]
+    given = [effect for effect in CATALOGUE.values() if isinstance(effect.law, AbstractSeriesLaw)]
     for state in (state for effect in given for state in effect.states):
         assert not np.any(found.states[state.name]), state.name
 
 
-@pytest.mark.parametrize("effect", effects_of())
+@over("effect", effects_of())
 def test_at_its_value_it_moves_the_rig_or_what_is_seen_of_it(
-    effect: AbstractEffect, everything: Look, at_null: dict[str, float], numbers: dict[str, float]
+    effect: Effect, everything: Look, at_null: dict[str, float], numbers: dict[str, float]
 ) -> None:
     value = at_null | {name: numbers[name] for name in effect.null}
     here, there = everything(at_null | dict(effect.null)), everything(value)
     moves = not np.array_equal(here.motion, there.motion)
     shown = [not np.array_equal(*each) for each in zip(here.transfers, there.transfers, strict=True)]
-    if isinstance(effect, AbstractSensorFault):
+    if isinstance(effect.law, AbstractSensorLaw):
         assert not moves
-        assert shown == [effect.port.value == f"sensor.{channel}" for channel in RESPONSE_CHANNELS]
-    elif isinstance(effect, AbstractSeries):
+        assert shown == [effect.port.location == f"sensor.{channel}" for channel in RESPONSE_CHANNELS]
+    elif isinstance(effect.law, AbstractSeriesLaw):
         assert not moves
         assert np.any([there.states[state.name] for state in effect.states])
         given = everything(value, effect.states[0].name)

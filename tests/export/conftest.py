@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
 from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.rig import Rig
 
 from ..relaxed import with_kept_programs
 from .diagnoses import MOUNT

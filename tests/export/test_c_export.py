@@ -7,12 +7,12 @@ import subprocess
 import numpy as np
 import pytest
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
-from savgs_ident.export.c_export import STEM, write_c
-from savgs_ident.export.casadi_functions import casadi_functions
-from savgs_ident.export.exported_model import ExportedModel
-from savgs_ident.export.signals import resting_inputs, resting_state
+from savgs_ident.export.casadi_export import STEM, write_c
+from savgs_ident.export.exported_model import ExportedModel, casadi_functions, resting_inputs, resting_state
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.rig import Rig
+
+pytestmark = pytest.mark.slow
 
 COMPILER = shutil.which("cc") or shutil.which("gcc")
 

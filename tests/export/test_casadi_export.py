@@ -12,16 +12,19 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
+from savgs_ident.core.values import as_values
 from savgs_ident.export.casadi_export import write_casadi
 from savgs_ident.export.exported_model import ExportedModel
-from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.strut import Link
-from savgs_ident.model.tyre import Road
-from savgs_ident.model.values import as_values
-from savgs_ident.simulate.rates import solve_rates
+from savgs_ident.plants.base import Motion
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.inputs import Inputs
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.strut import Link
+from savgs_ident.plants.quarter_car.tyre import Road
+from savgs_ident.simulate.transient import solve_rates
+
+pytestmark = pytest.mark.slow
 
 COUNT = 60
 EXAMPLE = Path(__file__).parents[2] / "examples" / "optimal_control.py"

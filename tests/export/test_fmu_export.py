@@ -9,27 +9,32 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
+from savgs_ident.core.values import as_values
 from savgs_ident.export import fmu_export
-from savgs_ident.export.exported_model import ExportedModel
-from savgs_ident.export.fmu_export import write_fmu
+from savgs_ident.export.exported_model import ExportedModel, resting_state
+from savgs_ident.export.fmu_export import base_units, write_fmu
 from savgs_ident.export.json_export import read_model_json
-from savgs_ident.export.signals import resting_state
-from savgs_ident.model.actuation import held_link
-from savgs_ident.model.road import flat_road
-from savgs_ident.model.values import as_values
+from savgs_ident.plants.quarter_car.actuation import RigSource, held_link
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.rig_toml import KNOWN_UNITS
+from savgs_ident.plants.quarter_car.road import flat_road
 from savgs_ident.simulate.transient import TransientSolution, simulate_transient, unpack_state
 
+from ..in_one_test import over
+
 fmpy = pytest.importorskip("fmpy", reason="needs FMPy")
+
+
 if shutil.which("gcc") is None:
     pytest.skip("needs gcc", allow_module_level=True)
+
 
 LIFT, DURATION = 0.02, 2.0
 """From how high the rig is let go [m], and for how long it is watched [s]."""
 
 
-@pytest.fixture(scope="module", params=[pytest.param("simqc", marks=pytest.mark.slow), "simtr"])
+@pytest.fixture(scope="module", params=["simqc", "simtr"])
 def exported(
     rig: Rig, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[ExportedModel, Path]:
@@ -50,7 +55,9 @@ def _by_diffrax(model: ExportedModel, changes: dict[str, float]) -> TransientSol
     car, p = model.equations.model, as_values(model.table.as_dict() | changes)
     times = np.linspace(0.0, DURATION, round(1e3 * DURATION) + 1)
     start = unpack_state(car, jnp.asarray(_let_go(model)))
-    return simulate_transient(car, p, flat_road(), held_link(float(p["psi_nominal"])), times, start, 1e-9)
+    return simulate_transient(
+        car, p, RigSource(flat_road(), held_link(float(p["psi_nominal"]))), times, start, 1e-9
+    )
 
 
 def _by_fmpy(model: ExportedModel, file: Path, changes: dict[str, float]) -> np.ndarray:
@@ -66,12 +73,14 @@ def _by_fmpy(model: ExportedModel, file: Path, changes: dict[str, float]) -> np.
     return found
 
 
+@pytest.mark.slow
 def test_it_is_valid(exported: tuple[ExportedModel, Path]) -> None:
     from fmpy.validation import validate_fmu
 
     assert validate_fmu(str(exported[1])) == []
 
 
+@pytest.mark.slow
 def test_every_variable_has_unit_and_description_and_all_digits(exported: tuple[ExportedModel, Path]) -> None:
     model, file = exported
     description = fmpy.read_model_description(str(file))
@@ -90,6 +99,7 @@ def test_every_variable_has_unit_and_description_and_all_digits(exported: tuple[
         assert (by_name[signal.name].unit, by_name[signal.name].description) == (signal.unit, signal.about)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes", [{}, {"m_s": 350.0, "c_sd": 4000.0}], ids=["as it is", "other parameters"]
 )
@@ -106,6 +116,7 @@ def test_the_motion_is_that_of_diffrax(
     assert np.sqrt(np.mean(difference**2)) < 1e-4 * np.std(acceleration)
 
 
+@pytest.mark.slow
 def test_what_is_known_about_the_model_travels_inside(
     exported: tuple[ExportedModel, Path], tmp_path: Path
 ) -> None:
@@ -117,9 +128,24 @@ def test_what_is_known_about_the_model_travels_inside(
     assert found.effects == model.effects
 
 
+@pytest.mark.slow
 def test_without_the_headers_of_fmi_it_says_what_to_install(
     rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(fmu_export, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"savgs-ident\[fmu\]"):
         write_fmu(ExportedModel(rig, ()), tmp_path)
+
+
+@over("unit", sorted(KNOWN_UNITS))
+def test_every_unit_of_a_rig_file_has_base_units(unit: str) -> None:
+    assert (base_units(unit) == {}) == (unit == "1")
+
+
+@over(
+    ("unit", "same"),
+    [("N", "kg m/s^2"), ("J", "N m"), ("Pa", "N/m^2"), ("V", "W/A"), ("N m/A", "Wb"), ("V/(A s)", "ohm/s"),
+     ("N m s/rad", "J s/rad"), ("m/(N s)", "s/kg"), ("Hz", "1/s"), ("H", "Wb/A")],
+)  # fmt: skip
+def test_equal_units_have_equal_base_units(unit: str, same: str) -> None:
+    assert base_units(unit.replace("1/", "/")) == base_units(same.replace("1/", "/"))

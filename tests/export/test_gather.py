@@ -1,18 +1,23 @@
-"""Rig file, posterior and diagnosis of different runs: what does not belong together is told."""
+"""The model of a rig file, a posterior and a diagnosis: what is added, what is refused, what is reported."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import h5py
+import jax
 import numpy as np
 import pytest
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
-from savgs_ident.export.gather import gather
+from savgs_ident.core.errors import InputError
+from savgs_ident.export.exported_model import ExportedModel, resting_state
+from savgs_ident.export.gather import gather, read_diagnosis, with_diagnosis
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.rig import Rig
 
-from .diagnoses import MOUNT, NOTHING, UNKNOWN
+from ..in_one_test import over
+from .diagnoses import COEFFICIENTS, IDENTIFIED, LEARNED, MOUNT, NOTHING, SPANS, UNKNOWN, diagnosis
 
 SIMTR = MODELS["simtr"]
 
@@ -116,3 +121,179 @@ def test_a_diagnosis_that_did_not_converge_is_told(identified: Rig) -> None:
 def test_what_a_sensor_does_is_told_to_be_left_out(rig: Rig) -> None:
     (sentence,) = gather(rig, (*SIMTR, "accel_lag")).said
     assert sentence.startswith("accel_lag is an error of a sensor")
+
+
+def test_the_named_effect_joins_with_all_numbers_of_its_fit(identified: Rig) -> None:
+    found = with_diagnosis(identified, SIMTR, MOUNT)
+    assert found.added == ("mount_compliance",)
+    assert found.effects == (*SIMTR, "mount_compliance")
+    for name, value in IDENTIFIED.items():
+        assert found.rig.parameters[name].value == value
+    # The recalibrated baseline makes up for the missing mount by a soft tyre: its numbers are not taken.
+    assert found.rig.parameters["k_t"].value != MOUNT["baseline"]["parameters"]["k_t"]
+    # What was not fitted stays.
+    assert found.rig.parameters["mu_t"] == identified.parameters["mu_t"]
+    states = ExportedModel(found.rig, found.effects).equations.states
+    assert states[-1].name == "state_1_mount_deflection"
+
+
+def test_it_is_said_which_numbers_were_taken(identified: Rig) -> None:
+    effect, others, covariance = with_diagnosis(identified, SIMTR, MOUNT).said
+    assert "mount_compliance = 1.65e-06 m/N, mount_damping = 357 N s/m" in effect
+    assert others.startswith("2 more numbers (mu_r, k_t")
+    assert "covariance" in covariance
+
+
+def test_the_covariance_of_the_fit_without_it_is_left_behind(identified: Rig) -> None:
+    found = with_diagnosis(identified, SIMTR, MOUNT).rig
+    assert ExportedModel(found, SIMTR).covariance[0] == ()
+    assert found.provenance["effects"] == [*SIMTR, "mount_compliance"]
+    assert found.provenance["data_sha256"] == "ab12"
+    before: Any = found.provenance["fit_before"]
+    assert before["data"] == identified.provenance["data"]
+    assert "covariance" not in before
+
+
+def test_a_diagnosis_of_the_contract_alone_gives_the_effect_its_numbers(identified: Rig) -> None:
+    short = {
+        name: value for name, value in MOUNT.items() if name not in ("identified", "provenance", "converged")
+    }
+    found = with_diagnosis(identified, SIMTR, short)
+    assert found.rig.parameters["mount_damping"].value == 357.0
+    assert found.rig.parameters["k_t"] == identified.parameters["k_t"]
+    assert "all other numbers are those of the rig file" in " ".join(found.said)
+
+
+@pytest.mark.parametrize(
+    ("document", "said"),
+    [(NOTHING, "nothing missing"), (UNKNOWN, "at frame) and that no force there explains")],
+)
+def test_without_a_named_effect_the_model_stays_as_it_is(
+    identified: Rig, document: dict[str, Any], said: str
+) -> None:
+    found = with_diagnosis(identified, SIMTR, document)
+    assert (found.rig, found.effects, found.added) == (identified, SIMTR, ())
+    (sentence,) = found.said
+    assert said in sentence
+
+
+@pytest.mark.slow
+def test_what_was_learned_for_something_unknown_joins_the_model(identified: Rig) -> None:
+    found = with_diagnosis(identified, SIMTR, LEARNED)
+    assert found.added == ("learned_strut",)
+    assert found.effects == (*SIMTR, "learned_strut")
+    for name, value in (SPANS | COEFFICIENTS | {"mu_r": 0.0301}).items():
+        assert found.rig.parameters[name].value == value
+    assert "edge of the motion" in found.said[-1]
+    model, without = (ExportedModel(found.rig, effects).equations for effects in (found.effects, SIMTR))
+    assert len(model.parameters) == len(without.parameters)
+    x, u = np.array(resting_state(ExportedModel(identified, SIMTR))), np.array([0.0, 0.0, 1.57, 0.0])
+    p = np.array(found.rig.parameters.values_of(model.parameters))
+    y = np.zeros(len(x) - 2)
+    missing = jax.jit(lambda: model.residual(x, y, u, p) - without.residual(x, y, u, p))()
+    assert float(np.abs(missing).max()) > 1.0
+    again = with_diagnosis(found.rig, found.effects, LEARNED)
+    assert (again.rig, again.effects) == (found.rig, found.effects)
+
+
+def test_an_effect_that_is_in_the_model_is_not_added_again(identified: Rig) -> None:
+    whole = (*SIMTR, "mount_compliance")
+    found = with_diagnosis(identified, whole, MOUNT)
+    assert (found.rig, found.effects, found.added) == (identified, whole, ())
+
+
+def test_several_effects_join_together(rig: Rig) -> None:
+    pair = {
+        "effect": "rail_coulomb + tyre_friction",
+        "parameters": {
+            "mu_r": {"value": 0.031, "unit": "1"},
+            "mu_t": {"value": 0.24, "unit": "1"},
+            "ydot_Hth": {"value": 0.052, "unit": "m/s"},
+        },
+    }
+    document = diagnosis(
+        "several", ["rail_coulomb", "tyre_friction"], ["rail", "tyre_lateral"], which=[pair],
+        baseline={"model": "simqc", "parameters": {}, "effects": []},
+    )  # fmt: skip
+    found = with_diagnosis(rig, (), document)
+    assert found.effects == SIMTR
+    assert found.rig.parameters["mu_r"].value == 0.031
+    assert "rail_coulomb and tyre_friction" in found.said[0]
+
+
+FAULTS = {
+    "another baseline": (
+        MOUNT | {"baseline": {"model": "simqc", "parameters": {}, "effects": []}},
+        "no friction",
+    ),
+    "no such hypothesis": (MOUNT | {"which": []}, "no fitted parameters of mount_compliance"),
+    "a value too few": (
+        MOUNT
+        | {
+            "identified": {},
+            "which": [
+                {
+                    "effect": "mount_compliance",
+                    "parameters": {"mount_damping": {"value": 1.0, "unit": "N s/m"}},
+                }
+            ],
+        },
+        "no value for 'mount_compliance'",
+    ),
+    "a stranger": (MOUNT | {"identified": IDENTIFIED | {"nobody": 1.0}}, "no parameter 'nobody'"),
+    "beyond its bounds": (MOUNT | {"identified": IDENTIFIED | {"mu_r": -1.0}}, "outside its bounds"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_diagnosis_of_another_model_is_refused(identified: Rig, fault: str) -> None:
+    document, said = FAULTS[fault]
+    with pytest.raises(InputError, match=said):
+        with_diagnosis(identified, SIMTR, document)
+
+
+def _written(folder: Path, document: object) -> Path:
+    path = folder / "diagnosis.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("document", [MOUNT, NOTHING, UNKNOWN], ids=["effect", "none", "unknown"])
+def test_a_diagnosis_is_read_whole(tmp_path: Path, document: dict[str, Any]) -> None:
+    assert read_diagnosis(_written(tmp_path, document)) == document
+
+
+DOCUMENT_FAULTS: dict[str, tuple[object, str]] = {
+    "a list": ([], "the document is [], not a table"),
+    "another schema": (MOUNT | {"schema": 2}, "schema is 2"),
+    "a model.json": ({"schema": 1, "kind": "savgs_ident model"}, "baseline is missing"),
+    "no verdict": ({k: v for k, v in MOUNT.items() if k != "verdict"}, "verdict is missing"),
+    "no kind": (MOUNT | {"verdict": {"effects": []}}, "verdict.kind is missing"),
+    "named nothing": (MOUNT | {"verdict": MOUNT["verdict"] | {"effects": []}}, "of the kind 'effect'"),
+    "nothing named": (MOUNT | {"verdict": MOUNT["verdict"] | {"kind": "none"}}, "of the kind 'none'"),
+    "an effect that is none": (
+        MOUNT | {"verdict": MOUNT["verdict"] | {"effects": ["magic"]}},
+        "effects[0] is 'magic'",
+    ),
+    "a law that is a text": (
+        MOUNT | {"verdict": MOUNT["verdict"] | {"another_law": "yes"}},
+        "another_law is 'yes'",
+    ),
+    "values as texts": (MOUNT | {"identified": {"k_t": "soft"}}, "identified.k_t is 'soft'"),
+    "a value that is null": (
+        MOUNT | {"which": [{"effect": "x", "parameters": {"a": {"value": None, "unit": "m"}}}]},
+        "which[0].parameters.a.value is None",
+    ),
+    "a text for a truth": (MOUNT | {"converged": "yes"}, "converged is 'yes'"),
+}  # fmt: skip
+
+
+@over("fault", DOCUMENT_FAULTS)
+def test_what_is_no_diagnosis_is_refused(tmp_path: Path, fault: str) -> None:
+    document, said = DOCUMENT_FAULTS[fault]
+    path = _written(tmp_path, document)
+    with pytest.raises(InputError) as caught:
+        read_diagnosis(path)
+    assert said in caught.value.what
+    assert caught.value.source == str(path)
+    assert "savgs-ident diagnose" in caught.value.remedy

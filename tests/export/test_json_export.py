@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.rig import Rig, read_rig, write_rig
-from savgs_ident.effects.registry import CATALOGUE, MODELS
+from savgs_ident.export.document import JsonValue, json_text
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.json_export import json_schema, model_record, parse_model, read_model_json, write_json
-from savgs_ident.export.json_text import json_text
-from savgs_ident.export.place import Place
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
+from savgs_ident.plants.quarter_car.rig import Rig, read_rig, write_rig
 
+from ..in_one_test import over
 from .diagnoses import MOUNT, UNKNOWN
 
 Document = dict[str, Any]
@@ -198,7 +198,7 @@ MEANING = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("fault", {**FORM, **MEANING})
+@over("fault", {**FORM, **MEANING})
 def test_a_mutilated_document_is_refused_with_file_place_and_remedy(
     fault: str, document: Document, tmp_path: Path
 ) -> None:
@@ -212,7 +212,7 @@ def test_a_mutilated_document_is_refused_with_file_place_and_remedy(
     assert caught.value.remedy
 
 
-@pytest.mark.parametrize("fault", FORM)
+@over("fault", FORM)
 def test_a_mutilated_document_is_not_what_the_schema_describes(
     fault: str, document: Document, validator: Draft202012Validator
 ) -> None:
@@ -241,7 +241,7 @@ def test_whatever_the_schema_asks_for_the_reader_asks_for(
         _drop(*place)(changed)
         assert not validator.is_valid(changed), place
         with pytest.raises(InputError):
-            parse_model(Place(changed))
+            parse_model(JsonValue(changed))
 
 
 def test_what_is_no_readable_file_is_refused(tmp_path: Path) -> None:
@@ -287,7 +287,7 @@ def test_anything_in_place_of_an_entry_gives_a_model_or_an_input_error(
     _set(*place, value=data.draw(junk))(changed)
     # Any other error would be a traceback to a user.
     with contextlib.suppress(InputError):
-        assert isinstance(parse_model(Place(changed)), ExportedModel)
+        assert isinstance(parse_model(JsonValue(changed)), ExportedModel)
 
 
 def test_the_diagnosis_travels_whole(model: ExportedModel, tmp_path: Path) -> None:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from jaxtyping import Array
 
+from savgs_ident.control.linear_equivalent import paper_masses, quarter_car_space
 from savgs_ident.control.linearisation import linearise, resting
-from savgs_ident.control.quarter_car_space import quarter_car_space
-from savgs_ident.control.two_masses import paper_masses
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.learned.forces import frictions_at
-from savgs_ident.effects.registry import EFFECTS, LEARNED, MODELS, build_model
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.effects.base import PortSignals
+from savgs_ident.effects.effect import Effect
+from savgs_ident.effects.learned import frictions_at
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.linear_models import (
     equation_8,
@@ -22,8 +22,9 @@ from savgs_ident.export.linear_models import (
     values_without_friction,
     without_friction,
 )
-from savgs_ident.model.effect import AbstractForce, Port, PortSignals
-from savgs_ident.model.values import Values, as_values
+from savgs_ident.plants.quarter_car.catalogue import EFFECTS, LEARNED, MODELS, build_model
+from savgs_ident.plants.quarter_car.ports import RAIL
+from savgs_ident.plants.quarter_car.rig import Rig
 
 DRY = {
     "rail_coulomb", "rail_preload", "rail_stribeck", "rail_asymmetry", "joint_friction", "strut_friction",
@@ -79,11 +80,13 @@ def _with(rig: Rig, effect: str, numbers: dict[str, float]) -> ExportedModel:
     return ExportedModel(replace(rig, parameters=table), (effect,))
 
 
-def _steepness(model: ExportedModel, effect: AbstractForce, p: Values) -> float:
+def _steepness(model: ExportedModel, effect: Effect, p: Values) -> float:
     """By how much a force [N] changes with the velocity over its port [m/s], nothing moving but a little."""
 
     def force(velocity: Array) -> Array:
-        return effect.force(p, PortSignals(jnp.asarray(0.01), velocity, jnp.asarray(2e3)), jnp.zeros(0))
+        return effect.force(
+            p, PortSignals(jnp.asarray(0.01), velocity, jnp.asarray(2e3), jnp.zeros(())), jnp.zeros(0)
+        )
 
     return abs(float(jax.grad(force)(jnp.zeros(()))))
 
@@ -92,7 +95,6 @@ def _steepness(model: ExportedModel, effect: AbstractForce, p: Values) -> float:
 def test_what_turns_round_in_a_learned_force_is_left_out(rig: Rig, name: str) -> None:
     """Of coefficients of 100 N over 0.5 m/s, the dampings among them make 1e3 N s/m at most, the frictions 1e4."""
     effect = LEARNED[name]
-    assert isinstance(effect, AbstractForce)
     spans = {f"{name}_middle": 0.0, f"{name}_stroke": 0.03, f"{name}_speed": 0.5}
     model = _with(rig, name, dict.fromkeys(effect.null, 100.0) | spans)
     (kept,) = without_friction(model.equations.model).effects
@@ -108,9 +110,10 @@ DAMPER = {
     "learned_rail_speed": SPEED, "learned_rail_stroke": 0.03, "learned_rail_carried": 4e3,
     "learned_rail_3": -DAMPING * SPEED,
 }  # fmt: skip
-RUBBING = DAMPER | dict.fromkeys(frictions_at(Port.RAIL), -300.0)
+RUBBING = DAMPER | dict.fromkeys(frictions_at(RAIL), -300.0)
 
 
+@pytest.mark.slow
 def test_friction_that_was_learned_is_not_in_the_exact_one(rig: Rig) -> None:
     found, wanted = (exact(_with(rig, "learned_rail", each)).space for each in (RUBBING, DAMPER))
     assert all(np.array_equal(getattr(found, name), getattr(wanted, name)) for name in "ABCD")

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from savgs_ident.control.first_harmonic import first_harmonic, motions_on_cam
+from savgs_ident.control.describing_function import first_harmonic, motions_on_cam
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import Parameter, ParameterTable
-from savgs_ident.core.rig import Rig
+from savgs_ident.core.values import as_values
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.linear_models import linear_models
 from savgs_ident.export.mat_export import write_mat
-from savgs_ident.model.values import as_values
+from savgs_ident.plants.quarter_car.rig import Rig
 
 FIELD = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 
@@ -117,6 +117,7 @@ def test_a_parameter_that_matlab_cannot_name_is_refused(rig: Rig, tmp_path: Path
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_long_names_are_kept(rig: Rig, tmp_path: Path) -> None:
     name = "a" * 63
     long = ParameterTable((*rig.parameters.entries, Parameter(name, 2.0, "m")))
@@ -124,6 +125,7 @@ def test_long_names_are_kept(rig: Rig, tmp_path: Path) -> None:
     assert loadmat(path, simplify_cells=True)["parameters"][name]["value"] == 2.0
 
 
+@pytest.mark.slow
 def test_a_drawing_has_nothing_of_a_fit(rig: Rig, tmp_path: Path) -> None:
     (path,) = write_mat(ExportedModel(rig, ()), tmp_path)
     found = loadmat(path, simplify_cells=True)

@@ -9,12 +9,11 @@ import numpy as np
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
-from savgs_ident.fit.least_squares import FREE
 from savgs_ident.fit.minimise import Minimiser, Minimum
-from savgs_ident.fit.settings import FitSettings
-from savgs_ident.fit.task import plan_task
+from savgs_ident.inference.problem import ProblemSettings, plan_task
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import FREE, RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import resolve, simulate_periodic
@@ -65,8 +64,8 @@ class Bench:
     """The paper's four parameters on a response, all others exact, and one compiled step for all tests."""
 
     def __init__(self, measured: HarmonicResponse, rig: Rig) -> None:
-        settings = FitSettings(fixed_tolerances=True)
-        self.task = plan_task(measured, rig, MODELS["simtr"], FREE, settings)
+        settings = ProblemSettings(fixed_tolerances=True)
+        self.task = plan_task(measured, RigModel(rig, MODELS["simtr"]), FREE, settings)
         problem = self.task.problem
         self.first = simulate_periodic(problem.model, problem.fixed, self.task.excitation)
         self.minimiser = Minimiser(problem)

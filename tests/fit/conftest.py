@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
-from savgs_ident.fit.least_squares import FREE, fit_least_squares
+from savgs_ident.fit.least_squares import fit_least_squares
 from savgs_ident.fit.result import Fit
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import FREE, RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.read import read_campaign
-from savgs_ident.responses.estimate import estimate_response
+from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 from ..relaxed import with_kept_programs
@@ -37,7 +38,7 @@ def measured(nominal_campaign: Path) -> HarmonicResponse:
 @pytest.fixture(scope="package")
 def nominal(measured: HarmonicResponse, rig: Rig) -> Fit:
     """The paper's fit of the shipped campaign."""
-    return fit_least_squares(measured, rig, effects=MODELS["simtr"], free=FREE)
+    return fit_least_squares(measured, RigModel(rig, MODELS["simtr"]), free=FREE)
 
 
 @pytest.fixture(scope="package")

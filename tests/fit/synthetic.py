@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import build_model, model_parameters
-from savgs_ident.model.sensors import read_sensors
-from savgs_ident.model.values import as_values
+from savgs_ident.core.values import as_values
+from savgs_ident.plants.quarter_car.catalogue import build_model, model_parameters
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.road import cam_excitation
+from savgs_ident.plants.quarter_car.sensors import read_sensors
 from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, Channel, Recording
-from savgs_ident.simulate.excitation import cam_excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 
 STROKE = 0.0275

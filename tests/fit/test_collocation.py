@@ -7,20 +7,21 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.core.rig import Rig
 from savgs_ident.core.status import Status
-from savgs_ident.effects.registry import MODELS
-from savgs_ident.fit.collocation.crosscheck import CollocationSettings, fit_by_collocation
-from savgs_ident.fit.collocation.result import CollocationFit
-from savgs_ident.fit.least_squares import FREE
+from savgs_ident.fit.collocation.crosscheck import CollocationFit, CollocationSettings, fit_by_collocation
 from savgs_ident.fit.result import Fit
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import FREE, RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.responses.estimate import estimate_response
+from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 from .bench import TRUTH, only
 from .synthetic import NOISE, synthetic_campaign
+
+pytestmark = pytest.mark.slow
 
 THERE = {"mu_r": 0.034, "mu_t": 0.28, "ydot_Hth": 0.045, "c_sd": 5300.0}
 """What the synthetic rig has; the cross-check starts from 0.03, 0.25, 0.05 and 5792 [SI]."""
@@ -50,7 +51,7 @@ def response(campaign: Campaign) -> HarmonicResponse:
 @pytest.fixture(scope="module")
 def found(campaign: Campaign, response: HarmonicResponse, rig: Rig) -> CollocationFit:
     """Their cross-check, all but the free parameters known."""
-    return fit_by_collocation(campaign, response, rig, effects=MODELS["simtr"], free=FREE, settings=EXACT)
+    return fit_by_collocation(campaign, response, RigModel(rig, MODELS["simtr"]), free=FREE, settings=EXACT)
 
 
 def test_it_finds_what_the_recordings_were_made_with(found: CollocationFit) -> None:
@@ -84,8 +85,7 @@ def test_it_says_that_it_did_not_get_there(campaign: Campaign, response: Harmoni
     found = fit_by_collocation(
         campaign,
         response,
-        rig,
-        effects=MODELS["simtr"],
+        RigModel(rig, MODELS["simtr"]),
         free=FREE,
         settings=replace(EXACT, iterations=2),
         progress=told.append,
@@ -101,7 +101,7 @@ def test_a_response_of_other_recordings_is_refused(
 ) -> None:
     first_only = replace(campaign, recordings=campaign.recordings[:1])
     with pytest.raises(InputError, match=r"dwell_4\.5Hz.*was not recorded"):
-        fit_by_collocation(first_only, response, rig, effects=MODELS["simtr"], free=FREE)
+        fit_by_collocation(first_only, response, RigModel(rig, MODELS["simtr"]), free=FREE)
 
 
 def test_clocks_that_drift_apart_are_refused(
@@ -110,7 +110,7 @@ def test_clocks_that_drift_apart_are_refused(
     drifting = DataWarning("clock_rate_differs", "runs slow", channel="sprung_accel")
     with pytest.raises(InputError, match=r"sprung_accel.*different rates"):
         fit_by_collocation(
-            campaign, replace(response, warnings=(drifting,)), rig, effects=MODELS["simtr"], free=FREE
+            campaign, replace(response, warnings=(drifting,)), RigModel(rig, MODELS["simtr"]), free=FREE
         )
 
 
@@ -118,17 +118,16 @@ def test_a_parameter_that_does_nothing_is_refused(
     campaign: Campaign, response: HarmonicResponse, rig: Rig
 ) -> None:
     with pytest.raises(InputError, match="does not depend on 'mu_r'"):
-        fit_by_collocation(campaign, response, rig, effects=(), free=("mu_r",))
+        fit_by_collocation(campaign, response, RigModel(rig, ()), free=("mu_r",))
 
 
 @pytest.fixture(scope="module")
 def crosschecked(measured: HarmonicResponse, nominal_campaign: Path, rig: Rig) -> CollocationFit:
     """All dwells of the shipped campaign, tolerances estimated along."""
     campaign = read_campaign(nominal_campaign)
-    return fit_by_collocation(campaign, measured, rig, effects=MODELS["simtr"], free=FREE)
+    return fit_by_collocation(campaign, measured, RigModel(rig, MODELS["simtr"]), free=FREE)
 
 
-@pytest.mark.slow
 def test_on_the_shipped_campaign_it_agrees_with_the_fit(nominal: Fit, crosschecked: CollocationFit) -> None:
     """To half a standard error: the samples tell a little more than nine orders do."""
     assert crosschecked.status.ok
@@ -142,7 +141,6 @@ def test_on_the_shipped_campaign_it_agrees_with_the_fit(nominal: Fit, crosscheck
         assert abs(crosschecked.by_name[name].value - by_harmonics.value) < 1.5 * by_harmonics.stderr
 
 
-@pytest.mark.slow
 def test_on_the_shipped_campaign_it_finds_the_truth(crosschecked: CollocationFit) -> None:
     assert crosschecked.chi2 / crosschecked.dof == pytest.approx(1.0, abs=0.01)
     for name, value in {**TRUTH, **PRESLIDING}.items():
@@ -150,11 +148,10 @@ def test_on_the_shipped_campaign_it_finds_the_truth(crosschecked: CollocationFit
         assert abs(estimate.value - value) < 3.0 * estimate.stderr
 
 
-@pytest.mark.slow
 def test_the_frictionless_rig_too(measured: HarmonicResponse, nominal_campaign: Path, rig: Rig) -> None:
     """It has no internal states; it does not explain the recordings, which shows in chi2."""
     campaign = read_campaign(nominal_campaign)
     one = only(measured, np.isin(np.round(measured.frequency, 2), (6.0,)))
-    found = fit_by_collocation(campaign, one, rig, effects=(), free=("c_sd",), settings=EXACT)
+    found = fit_by_collocation(campaign, one, RigModel(rig, ()), free=("c_sd",), settings=EXACT)
     assert found.status.ok
     assert found.chi2 / found.dof > 2.0

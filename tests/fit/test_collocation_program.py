@@ -8,21 +8,25 @@ import pytest
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
-from savgs_ident.fit.collocation.objective import assemble_objective
-from savgs_ident.fit.collocation.program import Program, assemble_program
-from savgs_ident.fit.collocation.radau import Points, radau_points
-from savgs_ident.fit.collocation.samples import Samples, interpolation, misfit_of
-from savgs_ident.fit.collocation.start import start_vector
-from savgs_ident.fit.collocation.unknowns import unknowns_of
-from savgs_ident.fit.least_squares import FREE
-from savgs_ident.fit.settings import FitSettings
-from savgs_ident.fit.task import Task, plan_task
+from savgs_ident.fit.collocation.program import Program, assemble_objective, assemble_program, start_vector
+from savgs_ident.fit.collocation.transcription import (
+    Points,
+    Samples,
+    interpolation,
+    misfit_of,
+    radau_points,
+    unknowns_of,
+)
+from savgs_ident.inference.problem import ProblemSettings, Task, plan_task
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import FREE, RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import simulate_periodic
 
 from .bench import FEW
+
+pytestmark = pytest.mark.slow
 
 
 class Posed(NamedTuple):
@@ -38,7 +42,7 @@ class Posed(NamedTuple):
 @pytest.fixture(scope="module")
 def posed(few: HarmonicResponse, rig: Rig) -> Posed:
     """Deflections of the first dwell only, all tolerances free."""
-    task = plan_task(few, rig, MODELS["simtr"], FREE, FitSettings())
+    task = plan_task(few, RigModel(rig, MODELS["simtr"]), FREE, ProblemSettings())
     near = simulate_periodic(task.problem.model, task.problem.fixed, task.excitation)
     points = radau_points(near.mesh)
     layout, free = points.mesh.layout, task.problem.free
@@ -46,8 +50,7 @@ def posed(few: HarmonicResponse, rig: Rig) -> Posed:
     rng = np.random.default_rng(1)
     samples = Samples(rng.uniform(0.0, 2.0 * np.pi, 300), 0.01 * rng.standard_normal(300), 1e-3)
     misfit = misfit_of(samples, np.asarray(points.mesh.phase)[layout.dwell == 0])
-    priors = np.arange(len(free.identified), len(free.names))
-    quadratic = assemble_objective(unknowns, points, [{1: misfit}] + [{}] * (len(FEW) - 1), priors)
+    quadratic = assemble_objective(unknowns, points, [{1: misfit}] + [{}] * (len(FEW) - 1), free.widths)
     program = assemble_program(task.problem, unknowns, points, task.excitation, quadratic)
     return Posed(task, points, program, start_vector(task, program, points, near), samples)
 
@@ -103,6 +106,6 @@ def test_the_objective_counts_samples_and_priors(posed: Posed) -> None:
     deflection = 1e-2 * w[unknowns.at_points[here, -1]]
     weights: csr_array = interpolation(np.asarray(posed.points.mesh.phase)[here], posed.samples.phase)
     left = (posed.samples.values - weights @ deflection - 1e-2 * zero) / posed.samples.sd
-    known = w[len(FREE) : unknowns.parameters]
+    known = w[: unknowns.parameters] / posed.task.problem.free.widths
     assert found == pytest.approx(0.5 * (left @ left + known @ known), rel=1e-10)
     assert quadratic.samples == 300

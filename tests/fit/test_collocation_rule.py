@@ -5,9 +5,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
-from savgs_ident.fit.collocation.radau import A, C, Points, radau_points, step_rule
-from savgs_ident.simulate.layout import Layout
-from savgs_ident.simulate.mesh import Mesh, uniform_mesh
+from savgs_ident.fit.collocation.transcription import A, C, Points, radau_points, step_rule
+from savgs_ident.simulate.mesh import Layout, Mesh, uniform_mesh
 
 
 def _uneven(layout: Layout) -> Mesh:

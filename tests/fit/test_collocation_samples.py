@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from savgs_ident.fit.collocation.samples import Samples, interpolation, misfit_of, samples_of
+from savgs_ident.fit.collocation.transcription import Samples, interpolation, misfit_of, samples_of
 from savgs_ident.recordings.recording import Channel, Recording
 
 

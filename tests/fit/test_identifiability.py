@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from savgs_ident.fit.covariance import UNTOLD, spread_of
 from savgs_ident.fit.identifiability import TOLD, known_combination, untold_groups, verdict_of
+from savgs_ident.fit.minimise import UNTOLD, spread_of
 
 NAMES = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
 VALUES = {"mu_r": 0.03, "mu_t": 0.3, "ydot_Hth": 0.06, "c_sd": 5400.0}

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from savgs_ident.fit.judge import EXPLAINED, judge
-from savgs_ident.fit.least_squares import FREE
+from savgs_ident.fit.identifiability import EXPLAINED, judge
+from savgs_ident.plants.quarter_car.model import FREE
 
 from .bench import TRUTH, Bench, silent
 

@@ -4,13 +4,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from savgs_ident.core.rig import Rig
 from savgs_ident.core.status import Status
-from savgs_ident.effects.registry import MODELS
-from savgs_ident.fit.least_squares import FREE
 from savgs_ident.fit.minimise import Minimiser, Minimum
-from savgs_ident.fit.settings import FitSettings
-from savgs_ident.fit.task import plan_task
+from savgs_ident.inference.problem import ProblemSettings, plan_task
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import FREE, RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import simulate_periodic
 
@@ -46,30 +45,34 @@ def test_the_jacobian_is_that_of_the_residuals(bench: Bench) -> None:
     _check_columns(bench.minimiser, bench.minimiser.evaluate(u, bench.first), 1e-5)
 
 
+@pytest.mark.slow
 def test_the_jacobian_holds_with_tolerances_and_priors_too(few: HarmonicResponse, rig: Rig) -> None:
     three = only(few, np.isin(np.round(few.frequency, 2), (1.4, 2.35, 6.0)))
-    task = plan_task(three, rig, MODELS["simtr"], FREE, FitSettings())
+    task = plan_task(three, RigModel(rig, MODELS["simtr"]), FREE, ProblemSettings())
     problem = task.problem
     first = simulate_periodic(problem.model, problem.fixed, task.excitation)
     minimiser = Minimiser(problem)
-    count, priors = len(problem.free.names), len(problem.free.tolerated)
+    count, widths = len(problem.free.names), problem.free.widths
     assert {"k_sd", "k_t", "m_s", "C_y", "k_pre"} <= set(problem.free.tolerated)
     u = jnp.asarray(np.random.default_rng(3).uniform(-0.5, 0.5, count))
     at = minimiser.evaluate(u, first)
     assert at.jacobian.shape == (at.residual.size, count)
-    assert np.array_equal(at.residual[-priors:], np.asarray(u)[-priors:])
-    assert np.array_equal(at.jacobian[-priors:], np.eye(count)[-priors:])
+    np.testing.assert_allclose(at.residual[-count:], np.asarray(u) / widths, rtol=1e-14)
+    np.testing.assert_allclose(at.jacobian[-count:], np.diag(1.0 / widths), rtol=1e-14)
     _check_columns(minimiser, at, 1e-4)
 
 
 def test_clean_data_give_the_truth_back(bench: Bench) -> None:
     found = bench.fit(bench.predicted(TRUTH))
     assert found.status is Status.CONVERGED
-    assert found.cost < 1e-8
+    assert found.cost == pytest.approx(
+        float(found.residual[-len(FREE) :] @ found.residual[-len(FREE) :]), abs=1e-4
+    )
     values = bench.task.problem.parameters(found.u)
-    assert [float(values[name]) for name in FREE] == pytest.approx([TRUTH[name] for name in FREE], rel=1e-7)
+    assert [float(values[name]) for name in FREE] == pytest.approx([TRUTH[name] for name in FREE], rel=2e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", AWAY, ids=str)
 def test_it_comes_back_from_far_away(bench: Bench, start: dict[str, float]) -> None:
     data = bench.predicted(TRUTH) + bench.noise(1)
@@ -100,6 +103,7 @@ def test_data_that_are_not_numbers_are_not_convergence(bench: Bench) -> None:
     assert bench.fit(broken).status is Status.NOT_FINITE
 
 
+@pytest.mark.slow
 def test_estimates_are_unbiased_and_their_errors_right(bench: Bench) -> None:
     """Forty draws of the noise: pulls of mean zero and variance one, chi2 as many as degrees of freedom."""
     draws, clean = 40, bench.predicted(TRUTH)

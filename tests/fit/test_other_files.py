@@ -5,12 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
-from savgs_ident.fit.least_squares import FREE, fit_least_squares
+from savgs_ident.fit.least_squares import fit_least_squares
 from savgs_ident.fit.result import Fit
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import FREE, RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.read import read_campaign
-from savgs_ident.responses.estimate import estimate_response
+from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 from .bench import TRUTH
@@ -24,7 +25,7 @@ def test_the_same_samples_in_json_give_the_same_fit(
     response = estimate_response(campaign, 9)
     sd = np.sqrt(np.trace(measured.covariance, axis1=-2, axis2=-1))
     assert np.max(np.abs(response.harmonics - measured.harmonics)[measured.valid] / sd[measured.valid]) < 1e-4
-    fit = fit_least_squares(response, rig, effects=MODELS["simtr"], free=FREE)
+    fit = fit_least_squares(response, RigModel(rig, MODELS["simtr"]), free=FREE)
     for estimate in nominal.estimates:
         other = fit.by_name[estimate.name]
         assert other.value == pytest.approx(estimate.value, rel=1e-6, abs=1e-6 * estimate.stderr)
@@ -37,7 +38,7 @@ def test_other_clocks_rates_and_noise_give_the_same_parameters_within_their_erro
     nominal: Fit, shared_rig: Path, rig: Rig
 ) -> None:
     response = estimate_response(read_campaign(shared_rig / "nominal" / "campaign_ros2.mcap"), 9)
-    fit = fit_least_squares(response, rig, effects=MODELS["simtr"], free=FREE)
+    fit = fit_least_squares(response, RigModel(rig, MODELS["simtr"]), free=FREE)
     assert fit.trusted
     assert fit.chi2 / fit.dof < 1.6
     for name, share in {"mu_r": 0.01, "c_sd": 0.01, "mu_t": 0.03, "ydot_Hth": 0.03}.items():

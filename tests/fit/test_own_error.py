@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from savgs_ident.fit.own_error import common_share
-from savgs_ident.fit.trend import follow
+from savgs_ident.campaigns.trends import common_share, follow
 
 PRIOR = np.array([0.5, 2.0])
 SLOPES = 3.0 * np.array([[1.0, 0.9, 0.8], [0.4, 0.5, 0.3], [1.2, 1.0, 0.9], [0.3, 0.2, 0.4]])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from savgs_ident.fit.least_squares import FREE
+from savgs_ident.fit.identifiability import CHI2_95, PIN, held_at, lower_bound, profile_likelihood
 from savgs_ident.fit.minimise import Minimum
-from savgs_ident.fit.profile import CHI2_95, PIN, held_at, lower_bound, profile_likelihood
+from savgs_ident.plants.quarter_car.model import FREE
 
 from .bench import TRUTH, Bench, silent
 

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
-from savgs_ident.fit.least_squares import FREE
 from savgs_ident.fit.result import Fit
-from savgs_ident.model.sensors import RESPONSE_CHANNELS
-from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.responses.peak_to_peak import peak_to_peak
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import FREE
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
+from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
 
 from .bench import FEW, TRUTH, Bench
 
@@ -109,6 +108,7 @@ def test_it_is_far_better_than_what_it_started_from(nominal: Fit, measured: Harm
     assert after < 1e-3 * before < 1e-3 * without
 
 
+@pytest.mark.slow
 def test_fixed_tolerances_on_a_rig_that_is_as_drawn(bench: Bench, few: HarmonicResponse) -> None:
     """With spring and tyre as they truly are and all else exact, few dwells tell the four parameters."""
     problem = bench.task.problem

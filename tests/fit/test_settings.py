@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
-from savgs_ident.fit.least_squares import FREE, fit_least_squares
-from savgs_ident.fit.settings import FitSettings
-from savgs_ident.fit.task import plan_task
+from savgs_ident.fit.least_squares import FitSettings, fit_least_squares
+from savgs_ident.inference.problem import ProblemSettings, plan_task
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import FREE, RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import simulate_periodic
@@ -19,10 +19,11 @@ from savgs_ident.simulate.periodic import simulate_periodic
 from .bench import TRUTH, true_rig
 
 
+@pytest.mark.slow
 def test_peak_to_peak_alone_tells_them_too_as_in_the_paper(measured: HarmonicResponse, rig: Rig) -> None:
     """28 dwells and two channels, phases and waveforms unseen: wider errors about the same truth."""
     settings = FitSettings(quantity="peak_to_peak", fixed_tolerances=True)
-    fit = fit_least_squares(measured, true_rig(rig), effects=MODELS["simtr"], free=FREE, settings=settings)
+    fit = fit_least_squares(measured, RigModel(true_rig(rig), MODELS["simtr"]), free=FREE, settings=settings)
     assert fit.trusted
     assert fit.quantity == "peak_to_peak"
     assert fit.dof == 28 * 2 - 4
@@ -35,7 +36,9 @@ def test_peak_to_peak_alone_tells_them_too_as_in_the_paper(measured: HarmonicRes
 
 def _simqc_data(response: HarmonicResponse, rig: Rig, damping: float) -> HarmonicResponse:
     """What SimQC would have given in the same dwells at ``damping``, without noise."""
-    task = plan_task(response, rig, MODELS["simqc"], ("c_sd",), FitSettings(fixed_tolerances=True))
+    task = plan_task(
+        response, RigModel(rig, MODELS["simqc"]), ("c_sd",), ProblemSettings(fixed_tolerances=True)
+    )
     p = dict(task.problem.fixed) | {"c_sd": jnp.asarray(damping)}
     solution = simulate_periodic(task.problem.model, p, task.excitation)
     assert all(status.ok for status in solution.status())
@@ -45,10 +48,11 @@ def _simqc_data(response: HarmonicResponse, rig: Rig, damping: float) -> Harmoni
     return replace(response, harmonics=found)
 
 
+@pytest.mark.slow
 def test_simqc_finds_the_damping_of_a_rig_without_friction(few: HarmonicResponse, rig: Rig) -> None:
     data = _simqc_data(few, rig, 5000.0)
     settings = FitSettings(fixed_tolerances=True)
-    fit = fit_least_squares(data, rig, effects=MODELS["simqc"], free=("c_sd",), settings=settings)
+    fit = fit_least_squares(data, RigModel(rig, MODELS["simqc"]), free=("c_sd",), settings=settings)
     assert fit.trusted
     assert fit.effects == ()
     assert fit.free_names == ("c_sd",)
@@ -57,10 +61,11 @@ def test_simqc_finds_the_damping_of_a_rig_without_friction(few: HarmonicResponse
     assert fit.predicted == pytest.approx(fit.frictionless, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_simqc_takes_the_friction_of_the_real_rig_for_damping(few: HarmonicResponse, rig: Rig) -> None:
     """What it cannot explain stays in chi2, thousands of times what noise would leave."""
     settings = FitSettings(fixed_tolerances=True)
-    fit = fit_least_squares(few, rig, effects=MODELS["simqc"], free=("c_sd",), settings=settings)
+    fit = fit_least_squares(few, RigModel(rig, MODELS["simqc"]), free=("c_sd",), settings=settings)
     assert fit.by_name["c_sd"].value > 1.2 * TRUTH["c_sd"]
     assert fit.chi2 / fit.dof > 1000.0
     assert len(fit.starts) == settings.starts
@@ -78,18 +83,18 @@ def test_a_name_that_cannot_be_fitted_is_refused_with_the_ones_that_can(
     few: HarmonicResponse, rig: Rig, model: str, free: tuple[str, ...], what: str
 ) -> None:
     with pytest.raises(InputError, match=what) as caught:
-        fit_least_squares(few, rig, effects=MODELS[model], free=free)
+        fit_least_squares(few, RigModel(rig, MODELS[model]), free=free)
     assert "c_sd" in caught.value.remedy
     assert free[-1] not in caught.value.remedy.replace(":", ",").split(", ")
 
 
 def test_a_name_given_twice_is_refused(few: HarmonicResponse, rig: Rig) -> None:
     with pytest.raises(InputError, match="'mu_r' is free twice"):
-        fit_least_squares(few, rig, effects=MODELS["simtr"], free=("mu_r", "mu_r"))
+        fit_least_squares(few, RigModel(rig, MODELS["simtr"]), free=("mu_r", "mu_r"))
 
 
 def test_a_known_parameter_may_be_free_and_then_has_no_prior(few: HarmonicResponse, rig: Rig) -> None:
-    task = plan_task(few, rig, MODELS["simtr"], ("k_t", "mu_r"), FitSettings())
+    task = plan_task(few, RigModel(rig, MODELS["simtr"]), ("k_t", "mu_r"), ProblemSettings())
     assert task.problem.free.identified == ("k_t", "mu_r")
     assert "k_t" not in task.problem.free.tolerated
     assert {"k_sd", "c_sd"} <= set(task.problem.free.tolerated)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.fit.target import Target, harmonic_target, peak_to_peak_target
-from savgs_ident.model.sensors import RESPONSE_CHANNELS
+from savgs_ident.inference.problem import Target, harmonic_target, peak_to_peak_target
+from savgs_ident.plants.quarter_car.plant import CHANNELS
+from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 
@@ -18,7 +19,7 @@ def _at(response: HarmonicResponse) -> np.ndarray:
 
 
 def test_what_was_measured_has_no_residual(few: HarmonicResponse) -> None:
-    target = harmonic_target(few, 9)
+    target = harmonic_target(few, CHANNELS, 9)
     assert np.max(np.abs(np.asarray(target(_at(few))))) == 0.0
     assert target.entries == len(few.tests) * 2 * 9 * 2
     assert np.asarray(target(_at(few))).size == target.size
@@ -29,7 +30,7 @@ def test_the_sum_of_squares_is_the_distance_in_the_covariance(few: HarmonicRespo
     rng = np.random.default_rng(0)
     shape = _at(few).shape
     miss = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
-    residual = np.asarray(harmonic_target(few, 9)(_at(few) + miss))
+    residual = np.asarray(harmonic_target(few, CHANNELS, 9)(_at(few) + miss))
     wanted = 0.0
     for dwell in range(shape[0]):
         for place, name in enumerate(RESPONSE_CHANNELS):
@@ -45,16 +46,16 @@ def test_what_is_not_valid_is_not_compared(few: HarmonicResponse) -> None:
     place = few.channel("sprung_accel")
     valid[2, place, 4:] = False
     partly = replace(few, valid=valid)
-    target = harmonic_target(partly, 9)
-    assert target.entries == harmonic_target(few, 9).entries - 2 * 6
+    target = harmonic_target(partly, CHANNELS, 9)
+    assert target.entries == harmonic_target(few, CHANNELS, 9).entries - 2 * 6
     moved = _at(few).copy()
     moved[2, 0, 4:] += 1.0
     assert np.max(np.abs(np.asarray(target(moved)))) == 0.0
 
 
 def test_fewer_orders_may_be_compared_than_were_measured(few: HarmonicResponse) -> None:
-    assert harmonic_target(few, 3).used.shape == (len(few.tests), 2, 4)
-    assert harmonic_target(few, 30).used.shape == (len(few.tests), 2, few.orders + 1)
+    assert harmonic_target(few, CHANNELS, 3).used.shape == (len(few.tests), 2, 4)
+    assert harmonic_target(few, CHANNELS, 30).used.shape == (len(few.tests), 2, few.orders + 1)
 
 
 def _without(response: HarmonicResponse, *names: str) -> HarmonicResponse:
@@ -68,16 +69,19 @@ def _without(response: HarmonicResponse, *names: str) -> HarmonicResponse:
 
 def test_one_channel_is_enough(few: HarmonicResponse) -> None:
     less = _without(few, "sprung_accel")
-    target = harmonic_target(less, 9)
-    assert target.entries == harmonic_target(few, 9).entries // 2
+    target = harmonic_target(less, CHANNELS, 9)
+    assert target.entries == harmonic_target(few, CHANNELS, 9).entries // 2
     assert not np.any(np.asarray(target.used)[:, 0])
     moved = _at(few).copy()
     moved[:, 0] += 1.0
     assert np.max(np.abs(np.asarray(target(moved)))) == 0.0
-    assert peak_to_peak_target(less).entries == len(few.tests)
+    assert peak_to_peak_target(less, CHANNELS).entries == len(few.tests)
 
 
-@pytest.mark.parametrize("make", [lambda each: harmonic_target(each, 9), peak_to_peak_target])
+@pytest.mark.parametrize(
+    "make",
+    [lambda each: harmonic_target(each, CHANNELS, 9), lambda each: peak_to_peak_target(each, CHANNELS)],
+)
 def test_without_both_there_is_nothing_to_fit(
     few: HarmonicResponse, make: Callable[[HarmonicResponse], Target]
 ) -> None:
@@ -85,7 +89,10 @@ def test_without_both_there_is_nothing_to_fit(
         make(_without(few, *RESPONSE_CHANNELS))
 
 
-@pytest.mark.parametrize("make", [lambda each: harmonic_target(each, 9), peak_to_peak_target])
+@pytest.mark.parametrize(
+    "make",
+    [lambda each: harmonic_target(each, CHANNELS, 9), lambda each: peak_to_peak_target(each, CHANNELS)],
+)
 def test_nothing_usable_is_refused(few: HarmonicResponse, make: Callable[[HarmonicResponse], Target]) -> None:
     with pytest.raises(InputError, match="can be used"):
         make(replace(few, valid=np.zeros_like(few.valid)))
@@ -93,7 +100,7 @@ def test_nothing_usable_is_refused(few: HarmonicResponse, make: Callable[[Harmon
 
 def test_peak_to_peak_counts_in_its_own_standard_deviations(few: HarmonicResponse) -> None:
     """Twice the waveform is off by its own peak-to-peak; a shifted mean changes nothing."""
-    target = peak_to_peak_target(few)
+    target = peak_to_peak_target(few, CHANNELS)
     base = np.asarray(target(_at(few))).reshape(-1, 2)
     double = np.asarray(target(2.0 * _at(few))).reshape(-1, 2)
     places = [few.channel(name) for name in RESPONSE_CHANNELS]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from savgs_ident.campaigns.trends import CONFIDENCE, Line, follow
 from savgs_ident.core.errors import InputError
-from savgs_ident.fit.trend import CONFIDENCE, Line, follow
 
 DRAWS = 2000
 X = np.array([0.0, 0.3, 1.0, 1.1, 2.0, 3.5, 3.6, 5.0, 6.0, 7.0])

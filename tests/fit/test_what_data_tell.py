@@ -5,14 +5,17 @@ import re
 import numpy as np
 import pytest
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS
 from savgs_ident.fit.identifiability import TOLD
-from savgs_ident.fit.least_squares import FREE, fit_least_squares
+from savgs_ident.fit.least_squares import fit_least_squares
 from savgs_ident.fit.result import Fit
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import FREE, RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 from .bench import TRUTH, only
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +23,7 @@ def slow_dwells(measured: HarmonicResponse, rig: Rig) -> Fit:
     """The paper's fit of the dwells up to 4 Hz."""
     response = only(measured, measured.frequency < 4.1)
     assert len(response.tests) == 24
-    return fit_least_squares(response, rig, effects=MODELS["simtr"], free=FREE)
+    return fit_least_squares(response, RigModel(rig, MODELS["simtr"]), free=FREE)
 
 
 def _number(fit: Fit, pattern: str) -> tuple[float, ...]:

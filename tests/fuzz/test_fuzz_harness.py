@@ -17,6 +17,7 @@ from fuzz.report import count, page
 from fuzz.trial import input_of, judge, original_of, place, run_trial
 from savgs_ident.core.errors import InputError
 
+from ..in_one_test import over
 from ..relaxed import as_users_have_it
 
 PACKAGE = Path(__file__).resolve().parents[2] / "savgs_ident"
@@ -32,12 +33,13 @@ PARSERS = (
 """Calls that make something of the content of a file."""
 
 NO_DATA = {
-    "cli.blind_trial.diagnose_folder": "reads back what it has just written, in memory",
+    "validation.blind_trial.diagnose_folder": "reads back what it has just written, in memory",
+    "export.public.diagnosis_document": "reads back what it has just written, in memory",
     "export.json_export.json_schema": "a file of the package",
-    "posterior.nuts_sampler._save": "writes",
-    "posterior.keep.Keep.publish": "writes to the scratch file of its own run",
-    "posterior.emcee_sampler.sample_by_emcee": "goes on from what open_keep took, as chain-emcee reads it",
-    "simulate.stored._read": "a program of the cache, kept with its digest",
+    "inference.samplers.nuts.save_state": "writes",
+    "inference.samplers.chains.Checkpoint.publish": "writes to the scratch file of its own run",
+    "inference.samplers.emcee.sample_by_emcee": "goes on from what open_checkpoint took, as chain-emcee reads it",
+    "simulate.program_cache._read": "a program of the cache, kept with its digest",
 }
 """Functions with such a call that read no file of a user's."""
 
@@ -111,7 +113,7 @@ def test_a_loader_that_does_not_end_is_stopped(tmp_path: Path) -> None:
     assert "takes more than" in outcome.reason
 
 
-@pytest.mark.parametrize("name", LOADERS)
+@over("name", LOADERS)
 def test_the_same_number_is_the_same_input(name: str) -> None:
     inputs = [input_of(LOADERS[name], SEED, number) for number in (1, 2, 3, 4)]
     assert inputs == [input_of(LOADERS[name], SEED, number) for number in (1, 2, 3, 4)]
@@ -135,7 +137,7 @@ def _called(work: Callable[[], object]) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("name", LOADERS)
+@over("name", LOADERS)
 def test_a_good_file_is_read_by_the_functions_that_it_is_to_cover(name: str, tmp_path: Path) -> None:
     loader, called = LOADERS[name], set()
     for number, content in enumerate(original_of(loader).contents):
@@ -157,6 +159,7 @@ def test_damaged_files_are_read_or_refused(name: str, tmp_path: Path) -> None:
     assert any(each.kind is Kind.refused for each in outcomes)
 
 
+@pytest.mark.slow
 def test_a_process_that_ends_costs_one_input(tmp_path: Path) -> None:
     batches = [Batch("no such loader", (7,)), Batch("weights", (0, 1, 2))]
     outcomes = list(run_side_by_side(batches, SEED, 2, tmp_path))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from savgs_ident.cli.main import app
+from savgs_ident.cli.app import app
 from savgs_ident.core.errors import InputError
 
 

@@ -15,7 +15,7 @@ import pytest
 import zstandard
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.recordings.channel_map import read_channel_map
+from savgs_ident.recordings.channels import read_channel_map
 from savgs_ident.recordings.mcap_records import LARGEST_CHUNK, MAGIC
 from savgs_ident.recordings.read import read_campaign
 

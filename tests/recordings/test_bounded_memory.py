@@ -30,6 +30,7 @@ def _peak(work: Callable[[], object]) -> int:
         tracemalloc.stop()
 
 
+@pytest.mark.slow
 def test_peak_is_the_result_and_a_few_buffers(long_mcap: tuple[Path, int]) -> None:
     path, samples = long_mcap
     buffers = 24 << 20

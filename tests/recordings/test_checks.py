@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from savgs_ident.recordings.checks_clipping import check_clipping
-from savgs_ident.recordings.checks_record import measured_frequency
+from savgs_ident.recordings.checks import measure_frequency
+from savgs_ident.recordings.checks_signal import check_clipping
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import Campaign, Channel, Recording
 
@@ -265,7 +265,7 @@ def test_an_end_that_another_test_exceeds_is_no_end_of_range() -> None:
 def test_the_frequency_of_the_road_is_measured(frequency: float, phase: float) -> None:
     time = np.arange(500) / 50.0
     road = Channel("road_height", "m", time, 0.014 * np.sin(2 * np.pi * frequency * time + phase) + 0.002)
-    assert measured_frequency(road) == pytest.approx(frequency, rel=0.02)
+    assert measure_frequency(road) == pytest.approx(frequency, rel=0.02)
 
 
 @pytest.mark.parametrize("condition", ["nominal", "stribeck_rail", "mount_compliance", "accel_lag"])

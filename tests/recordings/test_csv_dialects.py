@@ -8,12 +8,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from savgs_ident.recordings.channel_map import ChannelMap, ChannelRule
-from savgs_ident.recordings.kinds import kind_of
-from savgs_ident.recordings.names import ALIASES, Header, canonical_name, split_header
+from savgs_ident.recordings.channels import (
+    ALIASES,
+    DIMENSIONS,
+    UNITS,
+    ChannelMap,
+    ChannelRule,
+    Header,
+    canonical_name,
+    find_unit,
+    split_header,
+    unit_factor,
+)
 from savgs_ident.recordings.read import read_campaign
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign
-from savgs_ident.recordings.units import DIMENSIONS, UNITS, find_unit, unit_factor
+from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, classify_test
+
+from ..in_one_test import over
 
 Signals = dict[str, NDArray[np.float64]]
 Csv = Callable[..., bytes]
@@ -176,7 +186,7 @@ def test_a_file_much_larger_than_a_block(
     _same(read_campaign(tmp_path), long)
 
 
-@pytest.mark.parametrize(
+@over(
     ("name", "kind", "frequency"),
     [
         ("dwell_2.35Hz", "dwell", 2.35), ("dwell 0.5 Hz run 2", "dwell", 0.5), ("2p75hz", "dwell", 2.75),
@@ -186,7 +196,7 @@ def test_a_file_much_larger_than_a_block(
     ],
 )  # fmt: skip
 def test_names_tell_kind_and_frequency(name: str, kind: str, frequency: float | None) -> None:
-    assert kind_of(name) == (kind, frequency)
+    assert classify_test(name) == (kind, frequency)
 
 
 @pytest.mark.parametrize(
@@ -202,7 +212,7 @@ def test_headers_split_into_label_and_unit(text: str, header: Header) -> None:
     assert split_header(text) == header
 
 
-@pytest.mark.parametrize(
+@over(
     ("text", "channel", "factor"),
     [
         ("m/s²", "sprung_accel", 1.0), ("m/s**2", "sprung_accel", 1.0), ("m s^-2", "sprung_accel", 1.0),

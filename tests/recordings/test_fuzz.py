@@ -12,13 +12,12 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.recordings.cdr_layout import layout_of
-from savgs_ident.recordings.cdr_schema import SchemaError, parse_definition
+from savgs_ident.recordings.cdr import SchemaError, find_layout, parse_definition
 from savgs_ident.recordings.mcap_records import MAGIC
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign
 
-SHARED_FOLDER = settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SHARED_FOLDER = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 START = 1_763_715_600_000_000_000
 FLIPS = st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(1, 255)), min_size=1, max_size=6)
 
@@ -172,7 +171,6 @@ def test_random_cdr_messages(
     _survives(path, path.read_bytes())
 
 
-@settings(max_examples=300)
 @given(
     text=st.lists(
         st.sampled_from(
@@ -193,7 +191,7 @@ def test_random_cdr_messages(
 )
 def test_random_definitions(text: str, message: bytes) -> None:
     try:
-        layout = layout_of(b"\x00\x01\x00\x00" + message, parse_definition("a/A", text))
+        layout = find_layout(b"\x00\x01\x00\x00" + message, parse_definition("a/A", text))
     except SchemaError:
         return
-    assert all(spot.offset + int(spot.code[2]) <= len(message) + 4 for spot in layout.spots.values())
+    assert all(spot.offset + int(spot.code[2]) <= len(message) + 4 for spot in layout.numbers.values())

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.read import read_campaign
 
+from ..in_one_test import over
 from .refusal import check_refusal
 
 Signals = dict[str, NDArray[np.float64]]
@@ -175,7 +176,7 @@ CASES: dict[str, tuple[str, Build, str]] = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@over("case", CASES)
 def test_broken_table_is_refused_with_reason_place_and_remedy(
     case: str, tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Callable[..., bytes]
 ) -> None:
@@ -258,7 +259,7 @@ MAPS = {
 }
 
 
-@pytest.mark.parametrize("case", MAPS)
+@over("case", MAPS)
 def test_broken_channel_map(
     case: str, tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Callable[..., bytes]
 ) -> None:

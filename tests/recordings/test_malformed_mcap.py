@@ -13,6 +13,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.mcap_records import LARGEST_CHUNK, MAGIC
 from savgs_ident.recordings.read import read_campaign
 
+from ..in_one_test import over
 from .refusal import check_refusal
 
 START = 1_763_715_600_000_000_000
@@ -59,7 +60,7 @@ BYTES: dict[str, tuple[bytes, str]] = {
 }
 
 
-@pytest.mark.parametrize("case", BYTES)
+@over("case", BYTES)
 def test_broken_container_is_refused(case: str, tmp_path: Path) -> None:
     content, message = BYTES[case]
     path = tmp_path / "broken.mcap"
@@ -123,7 +124,7 @@ TOPICS: dict[str, tuple[tuple[str, str, str, bytes], bytes, str]] = {
 }
 
 
-@pytest.mark.parametrize("case", TOPICS)
+@over("case", TOPICS)
 def test_unreadable_topic_is_refused_with_its_reason(
     case: str, tmp_path: Path, write_mcap: Callable[..., Path]
 ) -> None:

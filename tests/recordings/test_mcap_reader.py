@@ -14,9 +14,8 @@ from mcap.writer import CompressionType
 from mcap_ros2.decoder import DecoderFactory
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.recordings.cdr_layout import layout_of
-from savgs_ident.recordings.cdr_schema import parse_definition
-from savgs_ident.recordings.clock import choose_clock, irregularity
+from savgs_ident.recordings.cdr import find_layout, parse_definition
+from savgs_ident.recordings.mcap_timing import choose_clock, irregularity
 from savgs_ident.recordings.read import read_campaign
 
 START = 1_763_715_600_000_000_000
@@ -281,8 +280,8 @@ def test_layouts_agree_with_the_ros2_decoder_on_every_type(shared_mcap: Path) ->
         reader = NonSeekingReader(stream, decoder_factories=[DecoderFactory()])
         for schema, _, message, decoded in reader.iter_decoded_messages():
             assert schema is not None
-            layout = layout_of(message.data, parse_definition(schema.name, schema.data.decode()))
-            for path, (offset, code) in layout.spots.items():
+            layout = find_layout(message.data, parse_definition(schema.name, schema.data.decode()))
+            for path, (offset, code) in layout.numbers.items():
                 if path.endswith("structure_needs_at_least_one_member"):
                     continue
                 value = float(np.frombuffer(message.data, code, 1, offset)[0])

@@ -1,19 +1,18 @@
 """A fit whose truth is known: measurements that scatter about a prediction as their covariance says."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from savgs_ident.core.rig import Rig
 from savgs_ident.core.status import Status
-from savgs_ident.diagnose.result import Diagnosis
+from savgs_ident.diagnosis.result import Diagnosis
 from savgs_ident.fit.result import Estimate, Fit, Verdict
-from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.responses.peak_to_peak import peak_to_peak
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
 
 from .diagnosis_synthetic import KINDS, synthetic_diagnosis
 from .posterior_synthetic import nominal_response
@@ -80,8 +79,9 @@ def fit(measured: HarmonicResponse, rig: Rig) -> Fit:
     used = np.ones((FREQUENCY.size, 2, ORDERS + 1), dtype=np.bool_)
     used[:, :, 0] = False
     return Fit(
-        rig=replace(rig, parameters=rig.parameters.with_values({e.name: e.value for e in estimates})),
-        effects=("rail_coulomb", "tyre_friction"),
+        estimated=RigModel(rig, ("rail_coulomb", "tyre_friction")).with_values(
+            {e.name: e.value for e in estimates}
+        ),
         estimates=estimates,
         covariance=covariance,
         chi2=163.0,

@@ -7,11 +7,11 @@ from typing import Any
 from rich.console import Console
 
 from savgs_ident.core.errors import DataWarning
-from savgs_ident.diagnose.result import Diagnosis
-from savgs_ident.report.diagnosis_record import diagnosis_record
-from savgs_ident.report.diagnosis_text import diagnosis_text
-from savgs_ident.report.files import to_json
-from savgs_ident.report.origin import Origin
+from savgs_ident.core.output import to_json
+from savgs_ident.core.presentation import Origin
+from savgs_ident.diagnosis.result import Diagnosis
+from savgs_ident.report.diagnosis.record import diagnosis_record
+from savgs_ident.report.diagnosis.text import diagnosis_text
 
 from .page_reader import HOSTILE
 

@@ -10,14 +10,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.rig import default_rig_path, read_rig
-from savgs_ident.diagnose.result import (
+from savgs_ident.diagnosis.result import (
+    NONE,
+    UNKNOWN,
     Candidate,
     Confusable,
     CyclePosition,
     Diagnosis,
     Estimate,
     ForceLoop,
+    Hypothesis,
     Kind,
     MapCell,
     NextTest,
@@ -28,8 +30,10 @@ from savgs_ident.diagnose.result import (
     SweepShrink,
     Verdict,
 )
-from savgs_ident.effects.registry import CATALOGUE
-from savgs_ident.report.readings import READINGS
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
+from savgs_ident.report.text import READINGS
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 KINDS: tuple[Kind, ...] = ("none", "effect", "several", "unknown")
@@ -87,11 +91,11 @@ def synthetic_diagnosis(measured: HarmonicResponse, kind: Kind = "effect") -> Di
     rig = read_rig(default_rig_path())
     verdict = VERDICTS[kind]
     responses = _responses(measured, 0.0 if kind == "none" else 1.0)
-    named = " + ".join(verdict.effects) or kind
+    named = Hypothesis(verdict.effects, unknown=kind == "unknown")
     return Diagnosis(
         model="simtr",
         effects=("rail_coulomb", "tyre_friction"),
-        rig=rig,
+        given=RigModel(rig),
         parameters=rig.parameters.as_dict() | {"c_sd": 5391.2, "k_t": 264_830.0, "mu_r": 0.0362},
         identified=rig.parameters.as_dict()
         | {"c_sd": 5386.1, "k_t": 264_100.0, "mu_r": 0.0300}
@@ -105,7 +109,7 @@ def synthetic_diagnosis(measured: HarmonicResponse, kind: Kind = "effect") -> Di
             CyclePosition("sprung_accel", 0.71, 0.11, 0.18),
             CyclePosition("susp_deflection", 0.42, 0.23, 0.35),
         ),
-        candidates=_candidates(named, verdict.effects),
+        candidates=_candidates(named),
         shrink=NO_SHRINK if kind == "none" else SHRINK,
         by_channel={name: NO_SHRINK if kind == "none" else each for name, each in BY_CHANNEL.items()},
         sweep=SweepShrink(0.0142, 0.0133, 0.0133, 0.0021)
@@ -145,7 +149,7 @@ def hostile(diagnosis: Diagnosis, text: str) -> Diagnosis:
         diagnosis,
         model=text,
         effects=(text,),
-        rig=table,
+        given=replace(diagnosis.given, rig=table),
         verdict=replace(
             diagnosis.verdict,
             effects=(text,),
@@ -158,7 +162,7 @@ def hostile(diagnosis: Diagnosis, text: str) -> Diagnosis:
         map=(*diagnosis.map, MapCell(text, 2.0, 1, 3.0, 4.0)),
         cycle=(*diagnosis.cycle, CyclePosition(text, 0.1, 0.2, 0.7)),
         candidates=(
-            replace(first, name=text, effects=(text,), parameters=(Estimate(text, 1.0, 0.9, 1.1, text),)),
+            replace(first, hypothesis=Hypothesis((text,)), parameters=(Estimate(text, 1.0, 0.9, 1.1, text),)),
             *others,
         ),
         by_channel={**diagnosis.by_channel, text: SHRINK},
@@ -211,22 +215,22 @@ def _map(measured: HarmonicResponse, predicted: NDArray[np.complex128]) -> tuple
     return tuple(cells)
 
 
-def _candidates(named: str, effects: tuple[str, ...]) -> tuple[Candidate, ...]:
-    first = Candidate(named, effects, 0.982, 61.2, 3.413, 0.9994, _parameters(effects), True)
-    taken = {named}
+def _candidates(named: Hypothesis) -> tuple[Candidate, ...]:
+    first = Candidate(named, 0.982, 61.2, 3.413, 0.9994, _parameters(named.effects), True)
     others = [
-        Candidate("rail_preload", ("rail_preload",), 0.017, 58.7, 3.391, 0.9712, (), True),
-        Candidate("none", (), 0.0007, 0.0, 0.0, 0.0, (), True),
-        Candidate("unknown", (), 0.0003, 22.4, 1.02, 0.741, (), True),
+        Candidate(Hypothesis(("rail_preload",)), 0.017, 58.7, 3.391, 0.9712, (), True),
+        Candidate(NONE, 0.0007, 0.0, 0.0, 0.0, (), True),
+        Candidate(UNKNOWN, 0.0003, 22.4, 1.02, 0.741, (), True),
     ]
     rest = [name for name in CATALOGUE if name not in {"rail_preload", "rail_coulomb", "tyre_friction"}]
-    found = [first, *(each for each in others if each.name not in taken)]
+    found = [first, *(each for each in others if each.hypothesis != named)]
     left = 1.0 - sum(each.probability for each in found)
     for place, name in enumerate(rest):
-        if name not in taken:
+        hypothesis = Hypothesis((name,))
+        if hypothesis != named:
             share = left if place == len(rest) - 1 else 0.0
             found.append(
-                Candidate(name, (name,), share, 9.0 / (1 + place), -0.01 * place, float("nan"), (), False)
+                Candidate(hypothesis, share, 9.0 / (1 + place), -0.01 * place, float("nan"), (), False)
             )
     return tuple(found)
 

@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.rig import Rig, default_rig_path, read_rig
-from savgs_ident.posterior.result import Convergence, Marginal, Posterior, Predictive, ProfileLine, Role
+from savgs_ident.inference.result import Convergence, Marginal, Posterior, Predictive, ProfileLine, Role
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig
 from savgs_ident.recordings.read import read_campaign
-from savgs_ident.report.readings import READINGS
-from savgs_ident.responses.estimate import estimate_response
+from savgs_ident.report.text import READINGS
+from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 IDENTIFIED = {
@@ -72,8 +73,7 @@ def synthetic_posterior(
         ),
     ]  # fmt: skip
     return Posterior(
-        rig=rig,
-        effects=("rail_coulomb", "tyre_friction"),
+        model=RigModel(rig, ("rail_coulomb", "tyre_friction")),
         sampler="nuts",
         marginals=tuple(marginals),
         draws=draws,

@@ -1,6 +1,5 @@
-"""The rig is drawn at its hardpoints, with the share of every port and the guilty ones in orange."""
+"""The rig is drawn at its hardpoints, with the share of every port and the named ones in orange."""
 
-from dataclasses import replace
 from itertools import combinations
 from math import hypot
 
@@ -10,13 +9,12 @@ from matplotlib.colors import to_rgba
 from matplotlib.patches import Circle, Rectangle
 from numpy.testing import assert_allclose
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.diagnose.result import Diagnosis
-from savgs_ident.model.effect import Port
-from savgs_ident.report.diagnosis_rig import port_marks, rig_figure
-from savgs_ident.report.diagnosis_rig_drawing import rig_points
-from savgs_ident.report.diagnosis_words import PORT_WORDS
-from savgs_ident.report.style import BLUE, ORANGE
+from savgs_ident.diagnosis.result import Diagnosis
+from savgs_ident.plants.quarter_car.ports import PORTS
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.report.diagnosis.drawing import port_marks, rig_figure, rig_points
+from savgs_ident.report.diagnosis.text import PORT_WORDS
+from savgs_ident.report.theme import BLUE, ORANGE
 
 from .diagnosis_synthetic import KINDS, SHARES
 
@@ -37,17 +35,8 @@ def test_the_linkage_is_drawn_at_the_hardpoints_of_the_rig(diagnosis: Diagnosis,
         assert joint in centres
 
 
-def test_a_rig_with_other_hardpoints_is_drawn_otherwise(diagnosis: Diagnosis) -> None:
-    table = diagnosis.rig.parameters
-    moved = replace(diagnosis, rig=replace(diagnosis.rig, parameters=table.with_values({"D_z": 0.48})))
-    centres = [
-        tuple(patch.get_center()) for patch in rig_figure(moved).axes[0].patches if isinstance(patch, Circle)
-    ]
-    assert (table["D_y"].value, 0.48) in centres
-
-
 def test_every_port_has_a_place_a_name_and_its_share(diagnosis: Diagnosis) -> None:
-    assert set(PORT_WORDS) == {port.value for port in Port}
+    assert set(PORT_WORDS) == {port.location for port in PORTS}
     marks = {mark.port: mark for mark in port_marks(diagnosis)}
     assert set(marks) == set(PORT_WORDS)
     for port, (share, _) in SHARES.items():
@@ -68,36 +57,30 @@ def test_every_port_has_a_place_a_name_and_its_share(diagnosis: Diagnosis) -> No
     assert_allclose(sorted(width / whole for width in bars), sorted(expected), atol=1e-9)
 
 
-@pytest.mark.parametrize(("kind", "guilty"), [("none", 0), ("effect", 1), ("several", 2), ("unknown", 1)])
-def test_the_guilty_ports_alone_are_orange(by_kind: dict[str, Diagnosis], kind: str, guilty: int) -> None:
-    diagnosis = by_kind[kind]
-    assert sum(mark.guilty for mark in port_marks(diagnosis)) == guilty
-    dots = [
-        patch.get_center()
-        for patch in rig_figure(diagnosis).axes[0].patches
-        if isinstance(patch, Circle) and patch.get_facecolor() == to_rgba(ORANGE)
-    ]
-    places = [mark.place for mark in port_marks(diagnosis) if mark.guilty]
-    assert sorted(map(tuple, dots)) == sorted(place for place in places if place is not None)
+def test_the_named_ports_alone_are_orange(by_kind: dict[str, Diagnosis]) -> None:
+    for kind, count in (("none", 0), ("effect", 1), ("several", 2), ("unknown", 1)):
+        diagnosis = by_kind[kind]
+        assert sum(mark.named for mark in port_marks(diagnosis)) == count
+        dots = [
+            patch.get_center()
+            for patch in rig_figure(diagnosis).axes[0].patches
+            if isinstance(patch, Circle) and patch.get_facecolor() == to_rgba(ORANGE)
+        ]
+        places = [mark.place for mark in port_marks(diagnosis) if mark.named]
+        assert sorted(map(tuple, dots)) == sorted(place for place in places if place is not None)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_no_two_texts_of_the_rig_touch_and_none_is_cut_off(by_kind: dict[str, Diagnosis], kind: str) -> None:
-    figure = rig_figure(by_kind[kind])
-    canvas = FigureCanvasAgg(figure)
-    boxes = [text.get_window_extent(canvas.get_renderer()) for text in figure.axes[0].texts]
-    assert len(boxes) > 20
-    for one, other in combinations(boxes, 2):
-        assert not one.overlaps(other)
-    width, height = figure.get_size_inches() * figure.dpi
-    for box in boxes:
-        assert box.x0 >= 0.0
-        assert box.y0 >= 0.0
-        assert box.x1 <= width
-        assert box.y1 <= height
-
-
-def test_a_port_whose_share_is_not_known_is_drawn_without_a_bar(diagnosis: Diagnosis) -> None:
-    few = replace(diagnosis, ports=diagnosis.ports[:1])
-    texts = [text.get_text() for text in rig_figure(few).axes[0].texts]
-    assert texts.count("\u2013") == len(PORT_WORDS) - 1
+def test_no_two_texts_of_the_rig_touch_and_none_is_cut_off(by_kind: dict[str, Diagnosis]) -> None:
+    for kind in KINDS:
+        figure = rig_figure(by_kind[kind])
+        canvas = FigureCanvasAgg(figure)
+        boxes = [text.get_window_extent(canvas.get_renderer()) for text in figure.axes[0].texts]
+        assert len(boxes) > 20
+        for one, other in combinations(boxes, 2):
+            assert not one.overlaps(other)
+        width, height = figure.get_size_inches() * figure.dpi
+        for box in boxes:
+            assert box.x0 >= 0.0
+            assert box.y0 >= 0.0
+            assert box.x1 <= width
+            assert box.y1 <= height

@@ -8,14 +8,21 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import norm
 
-from savgs_ident.posterior.result import Posterior
+from savgs_ident.inference.result import Posterior
 from savgs_ident.report.html import embed
-from savgs_ident.report.numerals import MINUS
-from savgs_ident.report.posterior_bode import predictive_band, predictive_figure
-from savgs_ident.report.posterior_corner import corner_figure
-from savgs_ident.report.posterior_density import joint_density, limits_of, region_levels, smooth_density
-from savgs_ident.report.posterior_profiles import profile_figure
-from savgs_ident.report.posterior_traces import MOST_TRACES, rank_surplus, trace_figure
+from savgs_ident.report.posterior.bode import predictive_band, predictive_figure
+from savgs_ident.report.posterior.figures import (
+    MOST_TRACES,
+    axis_limits,
+    corner_figure,
+    joint_density,
+    profile_figure,
+    rank_surplus,
+    region_levels,
+    smooth_density,
+    trace_figure,
+)
+from savgs_ident.report.text import MINUS
 
 from .posterior_synthetic import (
     AUTOCORRELATION,
@@ -34,7 +41,7 @@ def posterior(nominal_campaign: Path) -> Posterior:
 
 def test_a_smooth_density_has_area_one_and_is_that_of_the_draws() -> None:
     draws = 3.0 + 0.5 * np.random.default_rng(1).standard_normal(200_000)
-    points, density = smooth_density(draws, limits_of(draws), 200_000.0)
+    points, density = smooth_density(draws, axis_limits(draws), 200_000.0)
     assert np.sum(density) * (points[1] - points[0]) == pytest.approx(1.0)
     assert_allclose(density, norm.pdf(points, 3.0, 0.5), atol=0.02)
 
@@ -54,7 +61,7 @@ def test_regions_of_a_pair_hold_their_share_of_new_draws() -> None:
     rng = np.random.default_rng(3)
     factor = np.linalg.cholesky([[1.0, 0.8], [0.8, 1.0]])
     seen, new = (factor @ rng.standard_normal((2, 40_000)) for _ in range(2))
-    limits = (limits_of(seen[0]), limits_of(seen[1]))
+    limits = (axis_limits(seen[0]), axis_limits(seen[1]))
     x, y, shares = joint_density(seen[0], seen[1], limits, 40_000.0)
     outer, inner = region_levels(shares, (0.95, 0.5))
     column = np.clip(np.searchsorted(x, new[0]), 0, x.size - 1)

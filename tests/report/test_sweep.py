@@ -7,32 +7,25 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from savgs_ident.core.rig import Rig
+from savgs_ident.core.output import to_json, write_table
 from savgs_ident.core.status import Status
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.read import read_campaign
-from savgs_ident.report.files import to_json, write_table
-from savgs_ident.report.picture import write_figure
-from savgs_ident.report.sweep import (
-    DURATION_S,
-    HIGHEST_HZ,
-    Sweep,
-    solve_sweep,
-    sweep_columns,
-    sweep_figure,
-    sweep_record,
-)
+from savgs_ident.report.model import sweep_columns, sweep_figure, sweep_record
+from savgs_ident.report.theme import write_figure
+from savgs_ident.simulate.frequency_response import DURATION_S, HIGHEST_HZ, SimulatedSweep, integrate_sweep
 
 
 @pytest.fixture
-def sweep() -> Sweep:
+def sweep() -> SimulatedSweep:
     """A chirp with a bump at 40 s, where the cam turns at 2 Hz."""
     time = np.linspace(0.0, DURATION_S, 6001)
     wave = np.sin(np.pi * HIGHEST_HZ / DURATION_S * time**2)
     accel = 5.0 * np.exp(-(((time - 40.0) / 5.0) ** 2)) * np.abs(wave)
-    return Sweep(time, 0.01375 * wave, np.stack([accel, -1e-3 * accel]), Status.CONVERGED)
+    return SimulatedSweep(time, 0.01375 * wave, np.stack([accel, -1e-3 * accel]), Status.CONVERGED)
 
 
-def test_the_peak_is_found_at_the_frequency_of_the_cam(sweep: Sweep) -> None:
+def test_the_peak_is_found_at_the_frequency_of_the_cam(sweep: SimulatedSweep) -> None:
     channels = json.loads(to_json(sweep_record(sweep)))["channels"]
     assert channels["sprung_accel"]["largest"] == pytest.approx(5.0, rel=0.02)
     assert channels["sprung_accel"]["peak_frequency_hz"] == pytest.approx(2.0, abs=0.02)
@@ -40,21 +33,21 @@ def test_the_peak_is_found_at_the_frequency_of_the_cam(sweep: Sweep) -> None:
     assert channels["susp_deflection"]["peak_frequency_hz"] == channels["sprung_accel"]["peak_frequency_hz"]
 
 
-def test_the_series_is_read_back_as_a_recording(sweep: Sweep, tmp_path: Path) -> None:
+def test_the_series_is_read_back_as_a_recording(sweep: SimulatedSweep, tmp_path: Path) -> None:
     write_table(tmp_path / "sweep.csv", sweep_columns(sweep))
     (recording,) = read_campaign(tmp_path / "sweep.csv").recordings
     assert_allclose(recording.channels["sprung_accel"].values, sweep.readings[0], atol=1e-8)
     assert_allclose(recording.channels["road_height"].values, sweep.road, atol=1e-10)
 
 
-def test_a_motion_that_was_lost_claims_no_peak(sweep: Sweep) -> None:
-    lost = Sweep(sweep.time, sweep.road, sweep.readings, Status.NOT_FINITE)
+def test_a_motion_that_was_lost_claims_no_peak(sweep: SimulatedSweep) -> None:
+    lost = SimulatedSweep(sweep.time, sweep.road, sweep.readings, Status.NOT_FINITE)
     record = json.loads(to_json(sweep_record(lost)))
     assert record["status"] == "not_finite"
     assert record["channels"]["sprung_accel"]["peak_frequency_hz"] is None
 
 
-def test_the_picture_has_units(sweep: Sweep, tmp_path: Path) -> None:
+def test_the_picture_has_units(sweep: SimulatedSweep, tmp_path: Path) -> None:
     figure = sweep_figure(sweep)
     assert ["[m/s²]" in figure.axes[0].get_ylabel(), "[mm]" in figure.axes[1].get_ylabel()] == [True, True]
     assert figure.axes[1].get_xlabel() == "time [s]"
@@ -63,6 +56,6 @@ def test_the_picture_has_units(sweep: Sweep, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_frictionless_rig_peaks_soon_after_its_resonance(rig: Rig) -> None:
-    record = json.loads(to_json(sweep_record(solve_sweep(rig, ()))))
+    record = json.loads(to_json(sweep_record(integrate_sweep(rig, ()))))
     assert record["status"] == "converged"
     assert 1.9 < record["channels"]["sprung_accel"]["peak_frequency_hz"] < 2.3

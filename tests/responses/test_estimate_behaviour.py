@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.stats
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.recording import Campaign, Channel, Recording
-from savgs_ident.responses.estimate import estimate_response
-from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.responses.signal_to_noise import signal_to_noise
+from savgs_ident.responses.dwells import estimate_response
+from savgs_ident.responses.harmonic_response import HarmonicResponse, signal_to_noise
 
 
 def codes(response: HarmonicResponse) -> set[str]:
@@ -136,7 +135,6 @@ def test_starting_the_record_later_in_the_cycle_keeps_the_harmonics(synthetic: A
     np.testing.assert_allclose(response.harmonics[:, 1], np.tile(harmonics[:16], (8, 1)), atol=1e-9)
 
 
-@settings(max_examples=15, deadline=None)
 @given(scale=st.floats(1e-6, 1e6), sign=st.sampled_from([-1.0, 1.0]), tempo=st.floats(0.05, 20.0))
 def test_scales_carry_through(synthetic: Any, scale: float, sign: float, tempo: float) -> None:
     """Another unit scales harmonics, covariance and peak-to-peak; another time unit scales the frequency."""

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from savgs_ident.responses.estimate import estimate_response
-from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.responses.peak_to_peak import peak_to_peak
+from savgs_ident.responses.dwells import estimate_response
+from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
 
 DRAWS = 120
 FREQUENCY = 2.013
@@ -110,6 +109,7 @@ def test_peak_to_peak_is_unbiased_and_covered(drawn: tuple[HarmonicResponse, Any
     assert low <= np.count_nonzero(np.abs(pull) < 1.96) <= high
 
 
+@pytest.mark.slow
 def test_noise_bias_of_peak_to_peak_is_removed_where_it_matters(synthetic: Any) -> None:
     """A flat-topped wave in heavy noise: the raw peak-to-peak is too large, the one given is not."""
     harmonics = np.array([0.0, 1.0, 0.0, -0.12], dtype=np.complex128)
@@ -122,6 +122,7 @@ def test_noise_bias_of_peak_to_peak_is_removed_where_it_matters(synthetic: Any) 
     assert abs(response.peak_to_peak[:, c].mean() - truth) < 0.4 * (raw.mean() - truth)
 
 
+@pytest.mark.slow
 def test_orders_cut_off_neither_bias_nor_count_as_noise(synthetic: Any) -> None:
     """A signal with 50 strong orders, 9 kept: the noise is the noise, in density and in one sample."""
     harmonics = synthetic.stepped(20.0, 50)

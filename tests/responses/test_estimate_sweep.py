@@ -9,7 +9,7 @@ import scipy.signal
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.recording import Channel, Recording
-from savgs_ident.responses.estimate_sweep import estimate_sweep_response
+from savgs_ident.responses.sweeps import estimate_sweep_response
 
 RATE = 0.05
 NATURAL, DAMPING = 2 * np.pi * 2.1, 0.25

@@ -7,9 +7,9 @@ import pytest
 import scipy.stats
 
 from savgs_ident.recordings.read import read_campaign
-from savgs_ident.responses.estimate import estimate_response
-from savgs_ident.responses.estimate_sweep import estimate_sweep_response
+from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.sweeps import estimate_sweep_response
 
 
 @pytest.fixture(scope="module")

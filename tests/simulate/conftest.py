@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS, build_model, model_parameters
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values, as_values
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 
 from ..relaxed import with_kept_programs

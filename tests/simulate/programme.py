@@ -5,11 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values, as_values
-from savgs_ident.simulate.excitation import Excitation, cam_excitation
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.plants.base import Excitation
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.road import cam_excitation
 from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.layout import Layout
+from savgs_ident.simulate.mesh import Layout
 from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, adapt
 
 STROKE = 0.0275

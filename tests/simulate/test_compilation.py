@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from savgs_ident.simulate import compilation
-from savgs_ident.simulate.compilation import cache_folder, use_persistent_cache
+from savgs_ident.simulate import program_cache as compilation
+from savgs_ident.simulate.program_cache import cache_folder, use_persistent_cache
 
 
 def _homeless() -> Path:

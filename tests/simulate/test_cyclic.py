@@ -12,7 +12,7 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.simulate import cyclic
-from savgs_ident.simulate.layout import CHUNK, Layout
+from savgs_ident.simulate.mesh import CHUNK, Layout
 
 LAYOUTS = (
     Layout((CHUNK,)),

@@ -4,12 +4,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS, build_model, model_parameters
-from savgs_ident.model.drive import holding_drive
-from savgs_ident.model.road import flat_road
-from savgs_ident.model.values import as_values
+from savgs_ident.core.values import as_values
+from savgs_ident.plants.quarter_car.actuation import RigSource
+from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.drive import holding_drive
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.road import flat_road
 from savgs_ident.simulate.transient import rest_state, state_rates
+
+pytestmark = pytest.mark.slow
 
 NOMINAL = np.pi / 2.0
 
@@ -23,8 +26,8 @@ def test_a_link_mounted_off_by_an_angle_is_that_of_another_drawing(rig: Rig, mov
     ways = ((build_model(rig, offset), given), (build_model(rig, MODELS["simtr"]), drawn))
     states, rates = [], []
     for model, p in ways:
-        states.append(rest_state(model, p, road, drive, zero))
-        rates.append(state_rates(model, p, road, drive, zero, states[-1]))
-    assert np.max(np.abs(states[0].actuation)) > 0.01
+        states.append(rest_state(model, p, RigSource(road, drive), zero))
+        rates.append(state_rates(model, p, RigSource(road, drive), zero, states[-1]))
+    assert np.max(np.abs(states[0].source)) > 0.01
     for one, other in (states, rates):
-        assert np.asarray(one.actuation) == pytest.approx(np.asarray(other.actuation), rel=1e-9, abs=1e-9)
+        assert np.asarray(one.source) == pytest.approx(np.asarray(other.source), rel=1e-9, abs=1e-9)

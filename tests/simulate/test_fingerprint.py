@@ -1,23 +1,34 @@
 """A fingerprint tells apart whatever shapes a program, and nothing that does not."""
 
+import re
+import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jaxtyping import Array
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.rail_coulomb import RailCoulomb
-from savgs_ident.effects.registry import MODELS, build_model
-from savgs_ident.effects.tyre_friction import TyreFriction
-from savgs_ident.model.damper import damper_curve
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.simulate.fingerprint import fingerprint
+import savgs_ident
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.core.values import Values
+from savgs_ident.effects.base import AbstractNumberLaw, Port, Role
+from savgs_ident.effects.effect import effect_at
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
+from savgs_ident.plants.quarter_car.damper import damper_curve
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.ports import INERTIA
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.layout import Layout
-from savgs_ident.simulate.mesh import uniform_mesh
+from savgs_ident.simulate.mesh import Layout, uniform_mesh
 from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.program_cache import TRACED, digest_of_sources, fingerprint
+
+PACKAGE = Path(savgs_ident.__file__).parent
 
 
 def _of(*args: object) -> str:
@@ -52,7 +63,7 @@ def test_numbers_that_are_built_in_count() -> None:
 
 def test_models_differ_by_their_effects_their_order_and_their_damper(rig: Rig) -> None:
     plain = QuarterCar(damper_curve(rig))
-    rail, tyre = RailCoulomb(), TyreFriction()
+    rail, tyre = CATALOGUE["rail_coulomb"], CATALOGUE["tyre_friction"]
     harder = replace(
         rig, damper_force=tuple(np.asarray(rig.damper_force) * np.linspace(1.0, 2.0, len(rig.damper_force)))
     )
@@ -77,18 +88,49 @@ def test_functions_differ() -> None:
     assert fingerprint(simulate_periodic, ()) != fingerprint(harmonics.__wrapped__, ())
 
 
+def test_a_change_counts_where_programs_are_traced_and_nowhere_else(tmp_path: Path) -> None:
+    """A comment counts too: what is hashed is the text."""
+    package = shutil.copytree(PACKAGE, tmp_path / "package", ignore=shutil.ignore_patterns("__pycache__"))
+    before = digest_of_sources(package)
+    for folder, counts in (("report", False), ("cli", False), ("plants", True), ("core", True)):
+        with next((package / folder).glob("*.py")).open("a") as file:
+            file.write("# another comment\n")
+        after = digest_of_sources(package)
+        assert (after != before) == counts, folder
+        before = after
+
+
+def test_no_program_is_defined_elsewhere() -> None:
+    defining = re.compile(r"@eqx\.|@(jax|partial\(jax)\.|filter_jit|jax\.jit|stored\(")
+    elsewhere = [path for path in PACKAGE.rglob("*.py") if path.relative_to(PACKAGE).parts[0] not in TRACED]
+    assert elsewhere
+    assert [path for path in elsewhere if defining.search(path.read_text(encoding="utf-8"))] == []
+
+
 @dataclass(frozen=True)
 class _Foreign:
     value: float
 
 
-class _ForeignEffect(RailCoulomb):
+class _ForeignLaw(AbstractNumberLaw):
     """Its source is not part of the package: a change of it would go unnoticed."""
+
+    name: ClassVar[str] = "foreign"
+    roles: ClassVar[tuple[Role, ...]] = (Role("number"),)
+
+    def typical(self, port: Port) -> Mapping[str, Parameter | float]:
+        return {}
+
+    def changed(self, v: Values) -> Array:
+        return v["number"]
+
+
+_FOREIGN = effect_at("foreign", INERTIA, _ForeignLaw(), {"number": "m_s"})
 
 
 @pytest.mark.parametrize(
     "unknown",
-    [_Foreign(1.0), _ForeignEffect(), object(), {1, 2}, eqx.nn.Identity(), abs, Rig],
+    [_Foreign(1.0), _FOREIGN, object(), {1, 2}, eqx.nn.Identity(), abs, Rig],
     ids=["dataclass", "effect", "object", "set", "module", "function", "class"],
 )
 def test_what_cannot_be_described_has_no_fingerprint(unknown: object) -> None:

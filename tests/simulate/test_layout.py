@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from savgs_ident.simulate.layout import CHUNK, Layout, layout_for
+from savgs_ident.simulate.mesh import CHUNK, Layout, layout_for
 
 _layouts = st.lists(st.integers(1, 6), min_size=1, max_size=8).map(
     lambda chunks: Layout(tuple(CHUNK * count for count in chunks))

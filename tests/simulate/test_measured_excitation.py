@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.parameter import Parameter, ParameterTable
+from savgs_ident.plants.base import Excitation
+from savgs_ident.plants.quarter_car.plant import INPUTS, QuarterCar
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.excitation import inputs_at
-from savgs_ident.simulate.layout import Layout
-from savgs_ident.simulate.measured import LINK_ORDERS, SIGNIFICANT, measured_excitation
-from savgs_ident.simulate.mesh import uniform_mesh
+from savgs_ident.simulate.excitation import SIGNIFICANT, inputs_at, measured_excitation
+from savgs_ident.simulate.mesh import Layout, uniform_mesh
 
 CHANNELS = ("road_height", "sprung_accel", "susp_deflection", "link_angle")
 LINK = np.pi / 2.0
+LINK_ORDERS = INPUTS[1].orders or 0
 SD = 1e-6
 """Standard deviation of each harmonic's modulus: the trace of its covariance is SD^2."""
 
@@ -45,10 +47,14 @@ def _response(channels: tuple[str, ...] = CHANNELS, orders: int = 12) -> Harmoni
     )
 
 
+def _imposed(response: HarmonicResponse, link: float) -> Excitation:
+    return measured_excitation(QuarterCar, response, ParameterTable((Parameter("psi_nominal", link, "rad"),)))
+
+
 def test_noise_is_not_imposed_and_what_stands_out_is() -> None:
     response = _response()
-    found = measured_excitation(response, LINK)
-    road, link = np.asarray(found.road), np.asarray(found.link)
+    found = _imposed(response, LINK)
+    road, link = np.asarray(found.harmonics["road_height"]), np.asarray(found.harmonics["link_angle"])
     wanted = np.zeros_like(road)
     wanted[:, 1] = 0.01375
     wanted[1, 3] = 2e-4 * np.exp(1.1j)
@@ -60,8 +66,8 @@ def test_noise_is_not_imposed_and_what_stands_out_is() -> None:
 
 
 def test_link_orders_above_the_resolution_of_the_encoder_are_left_out() -> None:
-    assert np.asarray(measured_excitation(_response(), LINK).link).shape == (2, LINK_ORDERS + 1)
-    assert np.asarray(measured_excitation(_response(orders=5), LINK).link).shape == (2, 6)
+    assert np.asarray(_imposed(_response(), LINK).harmonics["link_angle"]).shape == (2, LINK_ORDERS + 1)
+    assert np.asarray(_imposed(_response(orders=5), LINK).harmonics["link_angle"]).shape == (2, 6)
 
 
 @pytest.mark.parametrize(("size", "imposed"), [(0.99 * SIGNIFICANT, False), (1.01 * SIGNIFICANT, True)])
@@ -69,7 +75,7 @@ def test_the_limit_is_in_standard_deviations(size: float, imposed: bool) -> None
     response = _response()
     harmonics = response.harmonics.copy()
     harmonics[0, 0, 2] = size * SD * np.exp(-2.0j)
-    road = np.asarray(measured_excitation(replace(response, harmonics=harmonics), LINK).road)
+    road = np.asarray(_imposed(replace(response, harmonics=harmonics), LINK).harmonics["road_height"])
     assert bool(road[0, 2] != 0.0) is imposed
 
 
@@ -77,14 +83,14 @@ def test_what_the_sampling_does_not_support_is_not_imposed() -> None:
     response = _response()
     valid = response.valid.copy()
     valid[1, 0, 3] = False
-    road = np.asarray(measured_excitation(replace(response, valid=valid), LINK).road)
+    road = np.asarray(_imposed(replace(response, valid=valid), LINK).harmonics["road_height"])
     assert road[1, 3] == 0.0
     assert road[1, 1] == 0.01375
 
 
-def test_a_link_that_was_not_recorded_is_rigid() -> None:
-    found = measured_excitation(_response(CHANNELS[:3]), 1.2)
-    inputs = inputs_at(found, uniform_mesh(Layout((16, 32))))
+def test_a_link_that_was_not_recorded_is_rigid(frictionless: QuarterCar) -> None:
+    found = _imposed(_response(CHANNELS[:3]), 1.2)
+    inputs = inputs_at(frictionless, found, uniform_mesh(Layout((16, 32))))
     assert np.all(np.asarray(inputs.link.angle) == 1.2)
     assert np.all(np.asarray(inputs.link.velocity) == 0.0)
 
@@ -93,7 +99,7 @@ def test_a_link_whose_mean_is_not_told_rests_where_it_is_said_to() -> None:
     response = _response()
     valid = response.valid.copy()
     valid[0, 3] = False
-    link = np.asarray(measured_excitation(replace(response, valid=valid), 1.2).link)
+    link = np.asarray(_imposed(replace(response, valid=valid), 1.2).harmonics["link_angle"])
     assert link[0, 0] == 1.2
     assert np.all(link[0, 1:] == 0.0)
     assert link[1, 0] == 1.57
@@ -101,16 +107,16 @@ def test_a_link_whose_mean_is_not_told_rests_where_it_is_said_to() -> None:
 
 def test_without_a_road_there_is_nothing_to_drive_the_rig() -> None:
     with pytest.raises(InputError, match="the road was not recorded") as caught:
-        measured_excitation(_response(CHANNELS[1:]), LINK)
+        _imposed(_response(CHANNELS[1:]), LINK)
     assert caught.value.channel == "road_height"
     assert "channels.toml" in caught.value.remedy
 
 
-def test_the_nodes_see_the_waveform_and_its_rate() -> None:
+def test_the_nodes_see_the_waveform_and_its_rate(frictionless: QuarterCar) -> None:
     """Road and link at the nodes are the Fourier series and their time derivatives, worked out here by hand."""
-    found = measured_excitation(_response(), LINK)
+    found = _imposed(_response(), LINK)
     mesh = uniform_mesh(Layout((32, 64)))
-    inputs = inputs_at(found, mesh)
+    inputs = inputs_at(frictionless, found, mesh)
     fast = mesh.layout.dwell == 1
     phase, omega = np.asarray(mesh.phase)[fast], 2.0 * np.pi * 2.0
     height = 0.01375 * np.cos(phase) + 2e-4 * np.cos(3.0 * phase + 1.1)

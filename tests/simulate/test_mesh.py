@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from savgs_ident.simulate.layout import layout_for
-from savgs_ident.simulate.mesh import Mesh, adapted_mesh, uniform_mesh
+from savgs_ident.simulate.mesh import Mesh, adapted_mesh, layout_for, uniform_mesh
 
 FREQUENCY = np.array([0.5, 2.0, 6.0])
 JUMPS = np.array([1.0, 1.0 + np.pi])

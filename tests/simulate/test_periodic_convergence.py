@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.status import Status
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values
+from savgs_ident.core.values import Values
+from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
@@ -24,6 +24,7 @@ def _same_nodes(model: QuarterCar, p: Values, solution: PeriodicSolution) -> Per
     return solve_on_mesh(model, p, solution.excitation, solution.mesh, rest, limit)
 
 
+@pytest.mark.slow
 def test_a_dwell_cut_off_at_the_iteration_limit_says_so(
     friction: QuarterCar, numbers: Values, few: PeriodicSolution
 ) -> None:
@@ -33,6 +34,7 @@ def test_a_dwell_cut_off_at_the_iteration_limit_says_so(
     assert np.min(distance(orders(friction, numbers, cut), orders(friction, numbers, few))) > 1e-3
 
 
+@pytest.mark.slow
 def test_dwells_end_each_in_their_own_way(
     friction: QuarterCar, numbers: Values, few: PeriodicSolution
 ) -> None:
@@ -47,6 +49,7 @@ def test_dwells_end_each_in_their_own_way(
         assert np.max(each) < 1e-12 if status.ok else np.max(each) > 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "absurd",
     [{"k_sd": 1576.14}, {"k_sd": 15761.4}, {"m_s": -320.0}, {"l_free": 0.3}, {"k_t": 275.0}],
@@ -61,6 +64,7 @@ def test_an_absurd_rig_has_no_motion_and_says_so(
         assert not any(status.ok for status in found.status())
 
 
+@pytest.mark.slow
 def test_a_stuck_rig_is_a_solution_too(friction: QuarterCar, numbers: Values) -> None:
     """With so much rail friction the sprung mass never slides, it only moves as its bristle stretches."""
     p = altered(numbers, {"mu_r": 0.5})
@@ -70,6 +74,7 @@ def test_a_stuck_rig_is_a_solution_too(friction: QuarterCar, numbers: Values) ->
     assert np.all(swing < 2000.0 / float(p["k_pre"]))
 
 
+@pytest.mark.slow
 def test_a_warm_start_finds_what_a_cold_one_finds(
     friction: QuarterCar, numbers: Values, few: PeriodicSolution
 ) -> None:
@@ -82,6 +87,7 @@ def test_a_warm_start_finds_what_a_cold_one_finds(
     assert np.max(distance(orders(friction, p, warm), orders(friction, p, anew))) < 1e-3
 
 
+@pytest.mark.slow
 def test_the_order_of_the_dwells_does_not_matter(
     friction: QuarterCar, numbers: Values, few: PeriodicSolution
 ) -> None:
@@ -90,6 +96,7 @@ def test_the_order_of_the_dwells_does_not_matter(
     assert np.max(distance(here, there)) < 1e-11
 
 
+@pytest.mark.slow
 def test_a_dwell_does_not_depend_on_its_company(
     friction: QuarterCar, numbers: Values, few: PeriodicSolution, programme: PeriodicSolution
 ) -> None:

@@ -9,15 +9,18 @@ import pytest
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.kinematics import strut_length
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values
+from savgs_ident.core.values import Values
+from savgs_ident.plants.base import Motion
+from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.inputs import Inputs
+from savgs_ident.plants.quarter_car.kinematics import strut_length
+from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.simulate.excitation import inputs_at
 from savgs_ident.simulate.periodic import PeriodicSolution
 
 from .programme import finer
+
+pytestmark = pytest.mark.slow
 
 
 class Works(NamedTuple):
@@ -49,7 +52,7 @@ def _powers(model: QuarterCar, p: Values, x: Array, y: Array, inputs: Inputs) ->
 
 def _works(model: QuarterCar, p: Values, solution: PeriodicSolution) -> Works:
     mesh = solution.mesh
-    inputs = inputs_at(solution.excitation, mesh)
+    inputs = inputs_at(model, solution.excitation, mesh)
     along = jax.jit(jax.vmap(lambda *at: _powers(model, p, *at), in_axes=(1, 1, 0), out_axes=1))
     powers = np.asarray(along(solution.trajectory.x, solution.trajectory.y, inputs))
     period = 1.0 / np.asarray(solution.excitation.frequency)

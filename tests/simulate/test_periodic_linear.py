@@ -9,17 +9,18 @@ import pytest
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import build_model
-from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.sensors import read_sensors
-from savgs_ident.model.strut import Link
-from savgs_ident.model.tyre import Road
-from savgs_ident.model.values import Values
-from savgs_ident.responses.peak_to_peak import peak_to_peak
-from savgs_ident.simulate.excitation import cam_excitation
+from savgs_ident.core.values import Values
+from savgs_ident.plants.base import Motion
+from savgs_ident.plants.quarter_car.catalogue import build_model
+from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.inputs import Inputs
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.road import cam_excitation
+from savgs_ident.plants.quarter_car.sensors import read_sensors
+from savgs_ident.plants.quarter_car.strut import Link
+from savgs_ident.plants.quarter_car.tyre import Road
+from savgs_ident.responses.harmonic_response import peak_to_peak
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 
 from .programme import LINK, PROGRAMME, cam, orders
@@ -71,6 +72,7 @@ def _transfer(
     return np.array(out)
 
 
+@pytest.mark.slow
 def test_a_tiny_motion_has_the_transfer_function_of_the_linearised_rig(
     straight: QuarterCar, numbers: Values, linearised: tuple[NDArray[np.float64], float]
 ) -> None:
@@ -83,6 +85,7 @@ def test_a_tiny_motion_has_the_transfer_function_of_the_linearised_rig(
     assert np.max(np.abs(found / wanted - 1.0)) < 1e-4
 
 
+@pytest.mark.slow
 def test_equal_steps_warp_the_frequency_exactly_as_the_trapezoidal_rule_does(
     straight: QuarterCar, numbers: Values, linearised: tuple[NDArray[np.float64], float]
 ) -> None:

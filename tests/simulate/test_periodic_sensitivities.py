@@ -3,15 +3,17 @@
 import numpy as np
 import pytest
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS, model_parameters
-from savgs_ident.fit.problem import used_parameters
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values
+from savgs_ident.core.values import Values
+from savgs_ident.inference.problem import used_parameters
+from savgs_ident.plants.quarter_car.catalogue import MODELS, model_parameters
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.periodic import PeriodicSolution, resolve
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 
 from .programme import altered, orders
+
+pytestmark = pytest.mark.slow
 
 STEP = 1e-5
 """Relative: long enough for the digits of a small sensitivity, short enough not to meet another branch."""

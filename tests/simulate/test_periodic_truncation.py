@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values
+from savgs_ident.core.values import Values
+from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.simulate.harmonics import truncation_error
 from savgs_ident.simulate.periodic import PeriodicSolution
 
@@ -19,14 +19,17 @@ def actual(friction: QuarterCar, numbers: Values, programme: PeriodicSolution) -
     return distance(orders(friction, numbers, programme), orders(friction, numbers, solution))
 
 
+@pytest.mark.slow
 def test_every_dwell_converges_from_a_cold_start(programme: PeriodicSolution) -> None:
     assert [status.name for status in programme.status()] == ["CONVERGED"] * 28
 
 
+@pytest.mark.slow
 def test_default_nodes_are_good_to_a_thousandth_of_the_first_harmonic(actual: np.ndarray) -> None:
     assert np.max(actual) < 1e-3
 
 
+@pytest.mark.slow
 def test_the_stated_truncation_error_is_the_real_one(
     friction: QuarterCar, numbers: Values, programme: PeriodicSolution, actual: np.ndarray
 ) -> None:

@@ -8,18 +8,20 @@ import pytest
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import CATALOGUE, MODELS, build_model, model_parameters
-from savgs_ident.model.dynamics import Motion
-from savgs_ident.model.effect import AbstractSeries
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values, as_values
-from savgs_ident.simulate.rates import Rates, solve_rates
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.effects.base import AbstractSeriesLaw
+from savgs_ident.plants.base import Motion
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.simulate.transient import Rates, solve_rates
 
-from ..model.instants import draw_instants, inputs_of, motion_of
+from ..plants.instants import draw_instants, inputs_of, motion_of
+
+pytestmark = pytest.mark.slow
 
 COUNT = 30
-SERIES = tuple(name for name, effect in CATALOGUE.items() if isinstance(effect, AbstractSeries))
+SERIES = tuple(name for name, effect in CATALOGUE.items() if isinstance(effect.law, AbstractSeriesLaw))
 NAMES = (*MODELS["simtr"], *SERIES)
 WITH_VELOCITY = ("carcass_deflection", "frame_height")
 NULL = {name: value for effect in SERIES for name, value in CATALOGUE[effect].null.items()}
@@ -45,7 +47,7 @@ def solve(yielding: QuarterCar) -> Solve:
 
     @jax.jit
     def at(p: Values, instants: Array, s: Array) -> tuple[Rates, Array]:
-        curves = yielding.curves(p)
+        curves = yielding.prepare(p)
 
         def one(at: tuple[Array, Array]) -> tuple[Rates, Array]:
             motion, inputs = motion_of(at[0]), inputs_of(at[0])
@@ -95,7 +97,7 @@ def test_without_compliance_the_rig_moves_as_if_nothing_gave_way(
     def bare(p: Values, instants: Array, anchor: Array) -> Rates:
         def one(at: tuple[Array, Array]) -> Rates:
             motion = motion_of(at[0])
-            return solve_rates(simtr, p, motion.q, motion.qd, at[1], inputs_of(at[0]), simtr.curves(p))
+            return solve_rates(simtr, p, motion.q, motion.qd, at[1], inputs_of(at[0]), simtr.prepare(p))
 
         return jax.lax.map(one, (instants, anchor))
 

@@ -8,14 +8,16 @@ import sys
 
 import pytest
 
-from savgs_ident.simulate.compilation import mapped_regions
+from savgs_ident.simulate.program_cache import mapped_regions
+
+pytestmark = pytest.mark.slow
 
 PROGRAMS = 30
 
 _COUNT = """
 import jax
 import jax.numpy as jnp
-from savgs_ident.simulate import compilation
+from savgs_ident.simulate import program_cache as compilation
 
 before = compilation.mapped_regions()
 for number in range({programs}):

@@ -3,19 +3,31 @@
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import jax
+import jax.numpy as jnp
+import numpy as np
 import pytest
+from jax import export
+from numpy.typing import NDArray
+
+from savgs_ident.core.small_root import solve_dense
+from savgs_ident.simulate import program_cache
+from savgs_ident.simulate.program_cache import stored
 
 _SOLVE = """
 import jax.monitoring
 import numpy as np
 
-from savgs_ident.core.rig import default_rig_path, read_rig
-from savgs_ident.effects.registry import MODELS, build_model, model_parameters
-from savgs_ident.model.values import as_values
-from savgs_ident.simulate.compilation import use_persistent_cache
-from savgs_ident.simulate.excitation import cam_excitation
+from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
+from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.core.values import as_values
+from savgs_ident.simulate.program_cache import use_persistent_cache
+from savgs_ident.plants.quarter_car.road import cam_excitation
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 
@@ -57,16 +69,19 @@ def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return folder, numbers
 
 
+@pytest.mark.slow
 def test_a_later_run_does_not_trace_and_finds_the_same(first: tuple[Path, str]) -> None:
     folder, numbers = first
     assert _run(folder) == (False, numbers)
 
 
+@pytest.mark.slow
 def test_without_a_cache_the_numbers_are_the_same(first: tuple[Path, str], tmp_path: Path) -> None:
     assert _run(tmp_path, kept=False) == (False, first[1])
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("left", [0.5, 0.0], ids=["half", "empty"])
 def test_a_file_that_is_not_whole_is_made_anew(first: tuple[Path, str], left: float) -> None:
     folder, numbers = first
@@ -75,3 +90,43 @@ def test_a_file_that_is_not_whole_is_made_anew(first: tuple[Path, str], left: fl
     file.write_bytes(whole[: int(left * len(whole))])
     assert _run(folder) == (True, numbers)
     assert len(file.read_bytes()) == len(whole)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[Path]:
+    """An empty folder for programs."""
+    before = jax.config.values["jax_compilation_cache_dir"]
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path))
+    yield tmp_path
+    jax.config.update("jax_compilation_cache_dir", before)
+
+
+def test_a_program_is_traced_once_and_again_where_its_file_is_not_whole(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    matrix, right = jnp.asarray([[2.0, 1.0], [0.0, 3.0]]), jnp.asarray([4.0, 9.0])
+    wanted = np.array([0.5, 3.0])
+    traced: list[None] = []
+
+    def counted(*args: Any, **options: Any) -> Any:
+        traced.append(None)
+        return export.export(*args, **options)
+
+    monkeypatch.setattr(
+        program_cache, "export", SimpleNamespace(export=counted, deserialize=export.deserialize)
+    )
+
+    def solved() -> NDArray[np.float64]:
+        return np.asarray(stored(solve_dense, matrix, right))
+
+    np.testing.assert_allclose(solved(), wanted)
+    (file,) = folder.glob("traced-*")
+    np.testing.assert_allclose(solved(), wanted)
+    assert len(traced) == 1
+    for count, left in enumerate((0.5, 0.0), start=2):
+        whole = file.read_bytes()
+        file.write_bytes(whole[: int(left * len(whole))])
+        np.testing.assert_allclose(solved(), wanted)
+        assert len(traced) == count
+        np.testing.assert_allclose(solved(), wanted)
+        assert len(traced) == count

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from jaxtyping import Array
 
-from savgs_ident.core.rig import Rig
 from savgs_ident.core.status import Status
-from savgs_ident.effects.registry import MODELS, build_model, model_parameters
-from savgs_ident.model.actuation import harmonic_link, held_link
-from savgs_ident.model.drive import holding_drive
-from savgs_ident.model.dynamics import upright_mass
-from savgs_ident.model.equilibrium import static_equilibrium
-from savgs_ident.model.kinematics import Values, linkage, strut_length, suspension_travel
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.road import cam_road, flat_road
-from savgs_ident.model.section import section_curves
+from savgs_ident.plants.base import state_sizes
+from savgs_ident.plants.quarter_car.actuation import RigSource, harmonic_link, held_link
+from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.drive import holding_drive
+from savgs_ident.plants.quarter_car.dynamics import section_curves, upright_mass
+from savgs_ident.plants.quarter_car.equilibrium import static_equilibrium
+from savgs_ident.plants.quarter_car.inputs import Inputs
+from savgs_ident.plants.quarter_car.kinematics import Values, linkage, strut_length, suspension_travel
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.road import cam_excitation, cam_road, flat_road
 from savgs_ident.simulate import transient
-from savgs_ident.simulate.excitation import cam_excitation
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.transient import (
@@ -66,12 +66,12 @@ def steady_period(bench: Bench, frequency: float, tolerance: float = 1e-8) -> Tr
     for turn in range(120):
         end = begin + period if turn else period * np.ceil(1.0 / period)
         times = np.linspace(begin, end, count + 1)
-        solution = simulate_transient(bench.model, bench.p, road, link, times, state, tolerance)
+        solution = simulate_transient(bench.model, bench.p, RigSource(road, link), times, state, tolerance)
         assert solution.status() is Status.CONVERGED
         now = solution.state_at(-1)
         if state is not None:
             moved = [abs(float(a - b)) for a, b in zip((*now.q, *now.qd), (*state.q, *state.qd), strict=True)]
-            if max(np.array(moved) / np.array(transient.STATE_SCALE)) < 1e-5:
+            if max(np.array(moved) / np.array(state_sizes(bench.model)[:4])) < 1e-5:
                 return solution
         begin, state = end, now
     pytest.fail(f"the dwell at {frequency} Hz does not become periodic")
@@ -92,6 +92,7 @@ def largest_difference(bench: Bench, frequencies: tuple[float, ...]) -> np.ndarr
     return np.max(np.abs(found - expected), axis=2) / np.abs(found[:, :, 0])
 
 
+@pytest.mark.slow
 def test_transients_end_in_the_periodic_motion(simtr: Bench) -> None:
     assert np.max(largest_difference(simtr, (1.4, 2.35, 6.0))) < 1e-3
 
@@ -139,11 +140,12 @@ def _power(bench: Bench, solution: TransientSolution) -> dict[str, np.ndarray]:
     return {name: np.asarray(value) for name, value in power.items()}
 
 
+@pytest.mark.slow
 def test_the_energy_of_the_rig_is_accounted_for(simtr: Bench) -> None:
     """Road and link work, the losses and what is stored balance over a second with stick and slip."""
     road, link = cam_road(LIFT, 2.35, settle=0.5), harmonic_link(NOMINAL, 0.2, 1.5, settle=0.5)
     times = np.linspace(0.0, 1.0, 40_001)
-    solution = simulate_transient(simtr.model, simtr.p, road, link, times, tolerance=1e-10)
+    solution = simulate_transient(simtr.model, simtr.p, RigSource(road, link), times, tolerance=1e-10)
     assert solution.status().ok
     energy = jax.jit(jax.vmap(lambda *at: _energy(simtr.p, *at)))
     road_height, angle = solution.inputs.road.height, solution.inputs.link.angle
@@ -157,32 +159,35 @@ def test_the_energy_of_the_rig_is_accounted_for(simtr: Bench) -> None:
     assert abs(work["link"]) > 1e-2 * size
 
 
+@pytest.mark.slow
 def test_the_rig_stays_at_rest_on_a_flat_road(simtr: Bench) -> None:
     times = np.linspace(0.0, 0.5, 2049)
-    solution = simulate_transient(simtr.model, simtr.p, flat_road(), held_link(NOMINAL), times)
+    solution = simulate_transient(simtr.model, simtr.p, RigSource(flat_road(), held_link(NOMINAL)), times)
     # A tolerated error of 1e-9 m in the anchor of the bristle is 3e-5 m/s^2 at 1e7 N/m.
     assert np.max(np.abs(solution.readings.sprung_accel)) < 3e-5
     assert np.max(np.abs(solution.readings.susp_deflection)) < 1e-9
 
 
+@pytest.mark.slow
 def test_a_motion_can_be_cut_and_continued(simtr: Bench) -> None:
     road, link = cam_road(LIFT, 2.0, settle=0.5), held_link(NOMINAL)
     times = np.linspace(0.0, 1.0, 2049)
-    whole = simulate_transient(simtr.model, simtr.p, road, link, times, tolerance=1e-9)
-    half = simulate_transient(simtr.model, simtr.p, road, link, times / 2.0, tolerance=1e-9)
+    whole = simulate_transient(simtr.model, simtr.p, RigSource(road, link), times, tolerance=1e-9)
+    half = simulate_transient(simtr.model, simtr.p, RigSource(road, link), times / 2.0, tolerance=1e-9)
     rest = simulate_transient(
-        simtr.model, simtr.p, road, link, 0.5 + times / 2.0, half.state_at(-1), tolerance=1e-9
+        simtr.model, simtr.p, RigSource(road, link), 0.5 + times / 2.0, half.state_at(-1), tolerance=1e-9
     )
     for one, other in ((whole.motion.q, rest.motion.q), (whole.motion.qd, rest.motion.qd)):
         np.testing.assert_allclose(one.z_s[-1], other.z_s[-1], atol=1e-7)
         np.testing.assert_allclose(one.theta_LW[-1], other.theta_LW[-1], atol=3e-7)
 
 
+@pytest.mark.slow
 def test_the_error_follows_the_tolerance(simtr: Bench) -> None:
     road, link, times = cam_road(LIFT, 2.35, settle=0.5), held_link(NOMINAL), np.linspace(0.0, 1.0, 2049)
 
     def motion(tolerance: float) -> np.ndarray:
-        solution = simulate_transient(simtr.model, simtr.p, road, link, times, tolerance=tolerance)
+        solution = simulate_transient(simtr.model, simtr.p, RigSource(road, link), times, tolerance=tolerance)
         return np.asarray(solution.motion.q.z_s)
 
     def error(tolerance: float) -> np.floating:
@@ -202,7 +207,7 @@ def test_derivatives_are_those_of_finite_differences(simtr: Bench) -> None:
 
     def acceleration(shift: Array) -> Array:
         p = dict(simtr.p) | {name: simtr.p[name] * (1.0 + shift) for name in ("c_sd", "mu_r", "D_z")}
-        solution = simulate_transient(simtr.model, p, road, link, times, tolerance=1e-10)
+        solution = simulate_transient(simtr.model, p, RigSource(road, link), times, tolerance=1e-10)
         return solution.readings.sprung_accel
 
     step = 1e-4
@@ -214,31 +219,36 @@ def test_derivatives_are_those_of_finite_differences(simtr: Bench) -> None:
     assert np.mean(error < 1e-3) > 0.99
 
 
+@pytest.mark.slow
 def test_a_rig_out_of_range_is_named(simtr: Bench) -> None:
     times, link = np.linspace(0.0, 0.5, 2049), held_link(NOMINAL)
     ill = dict(simtr.p) | {"k_t": jnp.asarray(jnp.nan)}
-    state = rest_state(simtr.model, simtr.p, flat_road(), link, jnp.asarray(0.0))
-    solution = simulate_transient(simtr.model, ill, flat_road(), link, times, state)
+    state = rest_state(simtr.model, simtr.p, RigSource(flat_road(), link), jnp.asarray(0.0))
+    solution = simulate_transient(simtr.model, ill, RigSource(flat_road(), link), times, state)
     assert solution.status() is Status.NOT_FINITE
-    wild = simulate_transient(simtr.model, simtr.p, cam_road(1.0, 4.0, settle=0.2), link, times)
+    wild = simulate_transient(simtr.model, simtr.p, RigSource(cam_road(1.0, 4.0, settle=0.2), link), times)
     assert wild.status() is Status.NOT_FINITE
 
 
+@pytest.mark.slow
 def test_a_limit_of_steps_is_named(simtr: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(transient, "MOST_STEPS", 20)
     times = np.linspace(0.0, 0.5, 11)
-    solution = simulate_transient(simtr.model, simtr.p, cam_road(LIFT, 3.0), held_link(NOMINAL), times)
+    solution = simulate_transient(
+        simtr.model, simtr.p, RigSource(cam_road(LIFT, 3.0), held_link(NOMINAL)), times
+    )
     assert solution.status() is Status.MAX_ITERATIONS
 
 
+@pytest.mark.slow
 def test_the_solved_rates_leave_no_residual(simtr: Bench) -> None:
     road, link = cam_road(LIFT, 3.0, settle=0.1), held_link(NOMINAL)
     times = np.linspace(0.0, 0.5, 2049)
-    solution = simulate_transient(simtr.model, simtr.p, road, link, times)
+    solution = simulate_transient(simtr.model, simtr.p, RigSource(road, link), times)
 
     @jax.jit
     @jax.vmap
-    def residual(motion: transient.Motion, s: Array, sd: Array, inputs: transient.Inputs) -> Array:
+    def residual(motion: transient.Motion, s: Array, sd: Array, inputs: Inputs) -> Array:
         return simtr.model.residual(simtr.p, motion, s, sd, inputs)
 
     left = residual(solution.motion, solution.s, solution.sd, solution.inputs)
@@ -264,6 +274,7 @@ def test_static_equilibrium_holds_and_carries_the_weight(simtr: Bench) -> None:
         assert float(p["k_t"] * compression / jnp.cos(tilt)) == pytest.approx(float(weight), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_equilibrium_is_differentiable(simtr: Bench) -> None:
     def travel(shift: Array) -> Array:
         p = dict(simtr.p) | {"k_sd": simtr.p["k_sd"] * (1.0 + shift), "E_y": simtr.p["E_y"] * (1.0 + shift)}
@@ -277,27 +288,31 @@ def test_equilibrium_is_differentiable(simtr: Bench) -> None:
     assert float(value_and_slope(0.0 * one)[1]) == pytest.approx((above - below) / (2.0 * step), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_deflection_counts_from_standstill_at_the_nominal_angle(simtr: Bench) -> None:
     stiff = dict(simtr.p) | {"k_sd": simtr.p["k_sd"] * 1.05}
     times, still = np.linspace(0.0, 0.5, 2049), cam_road(0.0, 1.0, settle=1.0)
-    solution = simulate_transient(simtr.model, stiff, still, held_link(NOMINAL), times)
+    solution = simulate_transient(simtr.model, stiff, RigSource(still, held_link(NOMINAL)), times)
     assert abs(float(solution.motion.q.theta_LW[0])) > 1e-3
     assert np.max(np.abs(solution.readings.susp_deflection)) < 1e-8
 
 
+@pytest.mark.slow
 def test_a_drive_holds_the_link_through_a_dwell(simtr: Bench) -> None:
     """The link gives way a little; the energy that it takes from the rig is what the drive's shaft gets."""
     drive, road = holding_drive(NOMINAL), cam_road(LIFT, 2.35, settle=0.5)
     times = np.linspace(0.0, 1.5, 32_769)
-    solution = simulate_transient(simtr.model, simtr.p, road, drive, times, tolerance=1e-9)
+    solution = simulate_transient(simtr.model, simtr.p, RigSource(road, drive), times, tolerance=1e-9)
     assert solution.status().ok
     away = np.abs(np.asarray(solution.inputs.link.angle) - NOMINAL)
     assert away[0] == 0.0
     assert 2e-4 < np.max(away) < 5e-3
-    rigid = simulate_transient(simtr.model, simtr.p, road, held_link(NOMINAL), times[::16], tolerance=1e-9)
+    rigid = simulate_transient(
+        simtr.model, simtr.p, RigSource(road, held_link(NOMINAL)), times[::16], tolerance=1e-9
+    )
     accel, stiff = solution.readings.sprung_accel[::16], rigid.readings.sprung_accel
     assert 1e-4 < np.std(accel - stiff) / np.std(stiff) < 0.05
-    still = simulate_transient(simtr.model, simtr.p, cam_road(0.0, 2.35, settle=0.5), drive, times)
+    still = simulate_transient(simtr.model, simtr.p, RigSource(cam_road(0.0, 2.35, settle=0.5), drive), times)
     assert np.max(np.abs(np.asarray(still.inputs.link.angle) - NOMINAL)) < 1e-7
     power = _power(simtr, solution)
     energy = jax.jit(jax.vmap(lambda *at: _energy(simtr.p, *at)))

@@ -6,15 +6,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import MODELS, build_model, model_parameters
-from savgs_ident.model.actuation import held_link, recorded_link
-from savgs_ident.model.kinematics import Values
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.road import recorded_road, sweep_road
+from savgs_ident.plants.quarter_car.actuation import RigSource, held_link, recorded_link
+from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.kinematics import Values
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.road import cam_excitation, recorded_road, sweep_road
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.simulate.excitation import cam_excitation
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.transient import simulate_transient
@@ -47,7 +46,7 @@ def test_the_recorded_sweep_is_met_within_its_noise(
     (sweep,), (still,) = campaign.of_kind("sweep"), campaign.of_kind("standstill")
     times = sweep.channels["sprung_accel"].time
     solution = simulate_transient(
-        simtr, truth, recorded_road(sweep), recorded_link(sweep), times, tolerance=1e-6
+        simtr, truth, RigSource(recorded_road(sweep), recorded_link(sweep)), times, tolerance=1e-6
     )
     assert solution.status().ok
     for name, allowed in zip(CHANNELS, (0.005, 0.002), strict=True):
@@ -63,7 +62,9 @@ def test_the_recorded_sweep_is_met_within_its_noise(
 def test_a_slow_sweep_passes_through_the_dwells(simtr: QuarterCar, truth: Values) -> None:
     """Near 2 Hz the sweep's own fundamental is within a few per cent that of the dwell."""
     road, times = sweep_road(0.0275, 0.0, 3.0, 60.0), np.linspace(0.0, 60.0, 30_001)
-    solution = simulate_transient(simtr, truth, road, held_link(np.pi / 2.0), times, tolerance=1e-6)
+    solution = simulate_transient(
+        simtr, truth, RigSource(road, held_link(np.pi / 2.0)), times, tolerance=1e-6
+    )
     assert solution.status().ok
     near = np.abs(times - 40.0) < 1.0
     phase = 2.0 * np.pi * 0.025 * times[near] ** 2

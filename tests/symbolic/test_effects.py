@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from jaxtyping import Array
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.model.effect import AbstractChange, AbstractEffect, AbstractRoadFault
+from savgs_ident.effects.base import AbstractInputLaw, AbstractNumberLaw
+from savgs_ident.effects.effect import Effect
+from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.symbolic.translate import to_casadi
 
 from ..effects.kinds import MECHANISMS, effects_of, outcome, outcomes, seen_by
-from ..model.instants import all_parameters, as_values
+from ..in_one_test import over
+from ..plants.instants import all_parameters, as_values
 
 COUNT = 400
 
@@ -26,9 +28,9 @@ def numbers(rig: Rig) -> Mapping[str, float]:
     return all_parameters(rig).as_dict()
 
 
-@pytest.mark.parametrize("place", ["value", "null"])
-@pytest.mark.parametrize("effect", effects_of(*MECHANISMS, AbstractChange, AbstractRoadFault))
-def test_its_law_is_the_same(effect: AbstractEffect, numbers: Mapping[str, float], place: str) -> None:
+@over("place", ["value", "null"])
+@over("effect", effects_of(*MECHANISMS, AbstractNumberLaw, AbstractInputLaw))
+def test_its_law_is_the_same(effect: Effect, numbers: Mapping[str, float], place: str) -> None:
     """Along a cycle, and from the hardly moving to the sliding, at loads of either sign."""
     values = dict(numbers) | (dict(effect.null) if place == "null" else {})
     names, rng = list(values), np.random.default_rng(9)
@@ -42,8 +44,8 @@ def test_its_law_is_the_same(effect: AbstractEffect, numbers: Mapping[str, float
         return outcome(effect, dict(zip(names, jnp.unstack(parameters), strict=True)), seen)
 
     expected = outcomes(effect, as_values(values), seen)
-    told = to_casadi("law", law, {"seen": seen[0], "p": p}, ["law"])
-    found = np.array(told.map(COUNT)(seen.T, np.tile(p[:, None], (1, COUNT)))).T
+    translated = to_casadi("law", law, {"seen": seen[0], "p": p}, ["law"])
+    found = np.array(translated.map(COUNT)(seen.T, np.tile(p[:, None], (1, COUNT)))).T
     largest = np.max(np.abs(expected), axis=0)
     assert np.isfinite(expected).all()
     assert np.max(np.abs(found - expected) - 1e-12 * (np.abs(expected) + largest)) <= 0.0

@@ -11,17 +11,17 @@ import pytest
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.effects.registry import CATALOGUE, MODELS, build_model, model_parameters
-from savgs_ident.model.sensors import read_sensors
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.sensors import read_sensors
 from savgs_ident.symbolic.translate import to_casadi
 
-from ..model.instants import draw_instants, inputs_of, motion_of, shifted
+from ..plants.instants import draw_instants, inputs_of, motion_of, shifted
 
 COUNT = 200
 
 
-class Told(NamedTuple):
+class Translation(NamedTuple):
     """A model's residual in both languages, and arguments to try: instants, states, their rates, parameters.
 
     ``jax`` takes all of them at once, ``casadi`` as columns.
@@ -36,8 +36,14 @@ TRIED = {frozenset(effects): name for name, effects in {"catalogue": CATALOGUE, 
 """The models of the paper, and the rig with every effect there is where that is not one of them."""
 
 
-@pytest.fixture(scope="module", params=TRIED, ids=TRIED.values())
-def told(rig: Rig, request: pytest.FixtureRequest) -> Told:
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(effects, id=name, marks=() if name == "catalogue" else pytest.mark.slow)
+        for effects, name in TRIED.items()
+    ],
+)
+def translated(rig: Rig, request: pytest.FixtureRequest) -> Translation:
     """A model in both languages."""
     effects = tuple(name for name in CATALOGUE if name in request.param)
     model, table = build_model(rig, effects), model_parameters(rig, effects)
@@ -58,24 +64,27 @@ def told(rig: Rig, request: pytest.FixtureRequest) -> Told:
     parameters = np.array([list(shifted(table.as_dict(), seed).values()) for seed in range(COUNT)])
     examples = dict(zip(("instant", "s", "sd", "p"), (instants[0], s[0], sd[0], parameters[0]), strict=True))
     casadi = to_casadi("residual", residual, examples, ["residual"])
-    return Told(casadi, jax.jit(jax.vmap(residual)), (instants, s, sd, parameters))
+    return Translation(casadi, jax.jit(jax.vmap(residual)), (instants, s, sd, parameters))
 
 
-def test_the_residual_is_the_same(told: Told) -> None:
-    expected = np.asarray(told.jax(*told.tried))
-    found = np.array(told.casadi.map(COUNT)(*(each.T for each in told.tried))).T
+def test_the_residual_is_the_same(translated: Translation) -> None:
+    expected = np.asarray(translated.jax(*translated.tried))
+    found = np.array(translated.casadi.map(COUNT)(*(each.T for each in translated.tried))).T
     assert np.isfinite(expected).all()
     largest = np.max(np.abs(expected), axis=0)
     assert np.max(np.abs(found - expected) / (np.abs(expected) + largest)) < 1e-12
 
 
-def test_its_slopes_are_the_same(told: Told) -> None:
+@pytest.mark.slow
+def test_its_slopes_are_the_same(translated: Translation) -> None:
     """Along one direction a place, in the motion, the states and all parameters at once."""
     rng = np.random.default_rng(6)
-    along = tuple(rng.standard_normal(each.shape) * np.abs(each) for each in told.tried)
-    expected = np.asarray(jax.jvp(told.jax, told.tried, along)[1])
-    rows = told.casadi.size1_out(0)
-    jacobian = told.casadi.jacobian().map(COUNT)(*(each.T for each in told.tried), np.zeros((rows, COUNT)))
+    along = tuple(rng.standard_normal(each.shape) * np.abs(each) for each in translated.tried)
+    expected = np.asarray(jax.jvp(translated.jax, translated.tried, along)[1])
+    rows = translated.casadi.size1_out(0)
+    jacobian = translated.casadi.jacobian().map(COUNT)(
+        *(each.T for each in translated.tried), np.zeros((rows, COUNT))
+    )
     found, sizes = np.zeros_like(expected), np.zeros_like(expected)
     for slopes, direction in zip(jacobian, along, strict=True):
         matrices = np.array(slopes).reshape(rows, COUNT, direction.shape[1]).swapaxes(0, 1)
@@ -84,12 +93,14 @@ def test_its_slopes_are_the_same(told: Told) -> None:
     assert np.max(np.abs(found - expected) / (sizes + np.max(sizes, axis=0))) < 1e-12
 
 
-def test_what_lies_beyond_the_linkage_is_not_a_number(told: Told) -> None:
+def test_what_lies_beyond_the_linkage_is_not_a_number(translated: Translation) -> None:
     """Where JAX says so, and only there."""
-    instants = told.tried[0].copy()
+    instants = translated.tried[0].copy()
     instants[:, 1] = np.linspace(-3.0, 3.0, COUNT)
-    expected = np.isnan(np.asarray(told.jax(instants, *told.tried[1:])))
-    found = np.isnan(np.array(told.casadi.map(COUNT)(*(each.T for each in (instants, *told.tried[1:])))).T)
+    expected = np.isnan(np.asarray(translated.jax(instants, *translated.tried[1:])))
+    found = np.isnan(
+        np.array(translated.casadi.map(COUNT)(*(each.T for each in (instants, *translated.tried[1:])))).T
+    )
     assert np.array_equal(found, expected)
     assert 0 < np.sum(expected) < expected.size
 

@@ -9,17 +9,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from jax import lax
 from jaxtyping import Array
 
-from savgs_ident.symbolic.elementwise import BY_EQUATION, ELEMENTWISE
-from savgs_ident.symbolic.interpret import NESTING, RULES
-from savgs_ident.symbolic.translate import to_casadi
+from savgs_ident.symbolic.operations import BY_EQUATION, ELEMENTWISE
+from savgs_ident.symbolic.translate import NESTING, RULES, to_casadi
 
-from ..model.primitives import primitives_of
+from ..in_one_test import over
+from ..plants.primitives import primitives_of
 
 SHAPE = (2, 3)
 TABLE = np.array([[3.0, -1.0, 4.0, 1.0, -5.0], [9.0, 2.0, -6.0, 5.0, 3.5]])
@@ -159,30 +159,29 @@ ALIASES = {"checkpoint": "remat2", "jit": "pjit"}
 def _both(name: str) -> tuple[ca.Function, Callable[..., Array]]:
     case = CASES[name]
     inputs = {f"x{place}": np.zeros(SHAPE) for place in range(len(case.ranges))}
-    return to_casadi("told", case.function, inputs, ["y"]), case.function
+    return to_casadi("translated", case.function, inputs, ["y"]), case.function
 
 
-@pytest.mark.parametrize("name", CASES)
+@over("name", CASES)
 def test_it_says_what_jax_says(name: str) -> None:
     case = CASES[name]
-    told, function = _both(name)
+    translated, function = _both(name)
     drawn = [
         arrays(np.float64, SHAPE, elements=st.floats(*limits, allow_subnormal=False))
         for limits in case.ranges
     ]
 
-    @settings(max_examples=20)
     @given(st.tuples(*drawn))
     def check(values: tuple[np.ndarray, ...]) -> None:
         expected = np.asarray(function(*values), np.float64).ravel()
-        found = np.array(told(*(value.ravel() for value in values))).ravel()
+        found = np.array(translated(*(value.ravel() for value in values))).ravel()
         assert found.shape == expected.shape
         np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-13)
 
     check()
 
 
-@pytest.mark.parametrize("name", CASES)
+@over("name", CASES)
 def test_the_case_uses_its_primitive(name: str) -> None:
     case = CASES[name]
     used = primitives_of(case.function, *[np.zeros(SHAPE)] * len(case.ranges))
@@ -200,15 +199,15 @@ SMOOTH = sorted({*ELEMENTWISE, *BY_EQUATION, "dot_general", "reduce_prod"} - JUM
 """What computes without jumps; what moves elements about has the slopes of what it moves."""
 
 
-@pytest.mark.parametrize("name", SMOOTH)
+@over("name", SMOOTH)
 def test_its_slopes_are_those_of_jax(name: str) -> None:
     """At one place, off all kinks, along one direction."""
     case = CASES[name]
-    told, function = _both(name)
+    translated, function = _both(name)
     rng = np.random.default_rng(5)
     values = tuple(rng.uniform(low, high, SHAPE) for low, high in case.ranges)
     along = tuple(rng.standard_normal(SHAPE) for _ in values)
-    slopes = told.jacobian()(*(value.ravel() for value in values), np.zeros(told.size1_out(0)))
+    slopes = translated.jacobian()(*(value.ravel() for value in values), np.zeros(translated.size1_out(0)))
     matrix = np.hstack([np.array(each) for each in (slopes if isinstance(slopes, tuple) else (slopes,))])
     expected = np.asarray(jax.jvp(function, values, along)[1]).ravel()
     found = matrix @ np.concatenate([direction.ravel() for direction in along])
@@ -219,10 +218,10 @@ def test_a_place_that_an_input_decides_is_held_in_the_table_as_jax_holds_it() ->
     def look_up(table: Array, at: Array) -> Array:
         return table[jnp.floor(at).astype(jnp.int64)]
 
-    told = to_casadi("told", look_up, {"table": np.zeros(6), "at": np.zeros(())}, ["found"])
+    translated = to_casadi("translated", look_up, {"table": np.zeros(6), "at": np.zeros(())}, ["found"])
     by_jax, table = jax.jit(look_up), np.random.default_rng(0).standard_normal(6)
     for place in range(-9, 12):
-        assert float(told(table, place)) == float(by_jax(table, np.float64(place)))
+        assert float(translated(table, place)) == float(by_jax(table, np.float64(place)))
 
 
 @pytest.mark.parametrize("filling", [None, 7.0])
@@ -230,9 +229,9 @@ def test_out_of_place_stands_what_jax_puts_there(filling: float | None) -> None:
     def look_up(at: Array) -> Array:
         return jnp.asarray(TABLE[0]).at[jnp.floor(at).astype(jnp.int64)].get(mode="fill", fill_value=filling)
 
-    told = to_casadi("told", look_up, {"at": np.zeros(17)}, ["found"])
+    translated = to_casadi("translated", look_up, {"at": np.zeros(17)}, ["found"])
     at = np.arange(-8.0, 9.0)
-    np.testing.assert_array_equal(np.array(told(at)).ravel(), np.asarray(jax.jit(look_up)(at)))
+    np.testing.assert_array_equal(np.array(translated(at)).ravel(), np.asarray(jax.jit(look_up)(at)))
 
 
 @given(st.integers(0, 3))
@@ -242,6 +241,8 @@ def test_one_case_of_many(which: int) -> None:
     def switched(which: Array, x: Array) -> Array:
         return lax.switch(jnp.floor(which).astype(jnp.int32), cases, x)
 
-    told = to_casadi("told", switched, {"which": np.zeros(()), "x": np.zeros(2)}, ["y"])
+    translated = to_casadi("translated", switched, {"which": np.zeros(()), "x": np.zeros(2)}, ["y"])
     x = np.array([0.3, -0.7])
-    np.testing.assert_allclose(np.array(told(which, x)).ravel(), np.asarray(cases[which](x)), rtol=1e-14)
+    np.testing.assert_allclose(
+        np.array(translated(which, x)).ravel(), np.asarray(cases[which](x)), rtol=1e-14
+    )

@@ -9,29 +9,29 @@ import numpy as np
 import pytest
 from jaxtyping import Array
 
-from savgs_ident.symbolic.grid import TranslationError
+from savgs_ident.symbolic.operations import TranslationError
 from savgs_ident.symbolic.translate import to_casadi, translate
 
 
 def test_inputs_and_outputs_have_the_names_given() -> None:
-    told = to_casadi(
-        "told",
+    translated = to_casadi(
+        "translated",
         lambda mass, place: (mass * place, jnp.sum(place)),
         {"mass": np.zeros(()), "place": np.zeros((2, 2))},
         ["momentum", "sum"],
     )
-    assert told.name() == "told"
-    assert [told.name_in(i) for i in range(told.n_in())] == ["mass", "place"]
-    assert [told.name_out(i) for i in range(told.n_out())] == ["momentum", "sum"]
-    assert [told.numel_in(i) for i in range(told.n_in())] == [1, 4]
-    found = told(mass=2.0, place=[1.0, 2.0, 3.0, 4.0])
+    assert translated.name() == "translated"
+    assert [translated.name_in(i) for i in range(translated.n_in())] == ["mass", "place"]
+    assert [translated.name_out(i) for i in range(translated.n_out())] == ["momentum", "sum"]
+    assert [translated.numel_in(i) for i in range(translated.n_in())] == [1, 4]
+    found = translated(mass=2.0, place=[1.0, 2.0, 3.0, 4.0])
     assert np.array(found["momentum"]).ravel().tolist() == [2.0, 4.0, 6.0, 8.0]
     assert float(found["sum"]) == 10.0
 
 
 def test_arrays_become_columns_with_their_last_index_fastest() -> None:
-    told = to_casadi("told", jnp.transpose, {"x": np.zeros((2, 3))}, ["y"])
-    assert np.array(told(np.arange(6.0))).ravel().tolist() == [0.0, 3.0, 1.0, 4.0, 2.0, 5.0]
+    translated = to_casadi("translated", jnp.transpose, {"x": np.zeros((2, 3))}, ["y"])
+    assert np.array(translated(np.arange(6.0))).ravel().tolist() == [0.0, 3.0, 1.0, 4.0, 2.0, 5.0]
 
 
 def test_trees_are_taken_leaf_by_leaf() -> None:
@@ -39,38 +39,38 @@ def test_trees_are_taken_leaf_by_leaf() -> None:
         return {"later": p["b"] * x[1], "first": p["a"] + x[0]}
 
     zero = np.zeros(())
-    told = translate(function, {"b": zero, "a": zero}, (zero, np.zeros(2)))
+    translated = translate(function, {"b": zero, "a": zero}, (zero, np.zeros(2)))
     a, b, x = ca.SX.sym("a"), ca.SX.sym("b"), ca.SX.sym("x")
     y = ca.SX.sym("y", 2)
-    first, later = told(a, b, x, y)
+    first, later = translated(a, b, x, y)
     values = ca.Function("values", [a, b, x, y], [first, later])(1.0, 2.0, 3.0, [4.0, 5.0])
     assert float(values[0]) == 4.0
     assert np.array(values[1]).ravel().tolist() == [8.0, 10.0]
 
 
 def test_empty_arrays_and_results_that_depend_on_nothing() -> None:
-    told = to_casadi(
-        "told",
+    translated = to_casadi(
+        "translated",
         lambda x, y: (jnp.concatenate([x, y]), jnp.ones(2)),
         {"x": np.zeros(0), "y": np.zeros(1)},
         ["both", "ones"],
     )
-    both, ones = told(np.zeros(0), 3.0)
+    both, ones = translated(np.zeros(0), 3.0)
     assert float(both) == 3.0
     assert np.array(ones).ravel().tolist() == [1.0, 1.0]
 
 
 def test_a_result_that_vanishes_is_there_all_the_same() -> None:
-    told = to_casadi("told", lambda x: jnp.stack([x, 0.0 * x]), {"x": np.zeros(())}, ["y"])
-    assert told.sparsity_out(0).is_dense()
+    translated = to_casadi("translated", lambda x: jnp.stack([x, 0.0 * x]), {"x": np.zeros(())}, ["y"])
+    assert translated.sparsity_out(0).is_dense()
 
 
 def test_what_is_known_beforehand_may_be_computed_by_anything() -> None:
     def function(x: Array) -> Array:
         return x * jnp.sort(jnp.asarray([3.0, 1.0, 2.0])) + jnp.linalg.inv(2.0 * jnp.eye(3))[0]
 
-    told = to_casadi("told", function, {"x": np.zeros(())}, ["y"])
-    assert np.array(told(2.0)).ravel() == pytest.approx([2.5, 4.0, 6.0])
+    translated = to_casadi("translated", function, {"x": np.zeros(())}, ["y"])
+    assert np.array(translated(2.0)).ravel() == pytest.approx([2.5, 4.0, 6.0])
 
 
 def test_an_unknown_primitive_is_named_with_its_place() -> None:
@@ -80,7 +80,7 @@ def test_an_unknown_primitive_is_named_with_its_place() -> None:
     with pytest.raises(
         TranslationError, match=r"'sort' has no translation.*test_translate\.py:\d+.*sorted_doubly"
     ):
-        to_casadi("told", jax.jit(sorted_doubly), {"x": np.zeros(3)}, ["y"])
+        to_casadi("translated", jax.jit(sorted_doubly), {"x": np.zeros(3)}, ["y"])
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_an_unknown_primitive_is_named_with_its_place() -> None:
 )
 def test_what_casadi_cannot_do_is_refused(function: Any, message: str) -> None:
     with pytest.raises(TranslationError, match=message + r".*test_translate\.py:\d+"):
-        to_casadi("told", function, {"x": np.zeros(3)}, ["y"])
+        to_casadi("translated", function, {"x": np.zeros(3)}, ["y"])
 
 
 def test_columns_of_another_length_are_refused() -> None:
@@ -107,9 +107,9 @@ def test_a_branch_not_taken_spoils_no_slope() -> None:
     def function(x: Array) -> Array:
         return jnp.where(x[1] > 0.0, jnp.sqrt(x[0] * x[2]) + 1.0 / x[0] + jnp.log(x[2]), x[1] ** 2)
 
-    told = to_casadi("told", function, {"x": np.zeros(3)}, ["y"])
+    translated = to_casadi("translated", function, {"x": np.zeros(3)}, ["y"])
     x = ca.SX.sym("x", 3)
-    y = told(x)
+    y = translated(x)
     nowhere = np.array([0.0, -1.0, 0.0])
     forward = ca.Function("forward", [x], [ca.jtimes(y, x, ca.SX([1.0, 1.0, 1.0]))])
     reverse = ca.Function("reverse", [x], [ca.jtimes(y, x, ca.SX(1.0), True)])

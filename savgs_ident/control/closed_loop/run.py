@@ -1,9 +1,10 @@
 """One closed-loop run: rig, drive, instruments and law in one diffrax solve.
 
-The law samples the instruments at its rate; what it asks for is held from the next sample on, since the computer
-needs the time between two. Between samples the rig and the drive move continuously, by steps of
-:mod:`savgs_ident.control.closed_loop.stabilised`, as many as what decays fastest asks for. A step of the solve is a
-frame of :data:`FRAME` samples; what happened at each of them is kept.
+The law samples the instruments at its rate; its command is held from the next sample on, because the computer needs
+the time in between. Between samples the rig and the drive are integrated by steps of
+:mod:`savgs_ident.control.closed_loop.stabilised`, as many as the fastest decay requires. A step of the solve is a
+frame of :data:`FRAME` samples (a plain scan over the samples takes a fifth longer); the signals of every sample are
+stored.
 """
 
 from functools import partial
@@ -17,64 +18,57 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from savgs_ident.control.closed_loop.failure import Failure
-from savgs_ident.control.closed_loop.instruments import NUMBER, Instruments
-from savgs_ident.control.closed_loop.laws import AbstractLaw
+from savgs_ident.control.closed_loop.laws import NUMBER, AbstractControlLaw, Instruments, LoopFailure
 from savgs_ident.control.closed_loop.stabilised import STABLE, stabilised_step
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.status import Status
-from savgs_ident.model.bristle import DRAG_TIME
-from savgs_ident.model.drive import Drive, VelocityReference, drive_state
-from savgs_ident.model.dynamics import Coordinates, Motion
-from savgs_ident.model.effect import SETTLING, AbstractRoadFault, AbstractSensorFault, AbstractSeries
-from savgs_ident.model.equilibrium import deflection_zero
-from savgs_ident.model.inputs import Inputs
-from savgs_ident.model.kinematics import suspension_travel
-from savgs_ident.model.profile import Constant
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.road import RoadMotion
-from savgs_ident.model.section import TRAVEL, SectionCurves
-from savgs_ident.model.values import Values
+from savgs_ident.core.values import Values
+from savgs_ident.effects.base import SETTLING, AbstractInputLaw, AbstractSensorLaw, AbstractSeriesLaw
+from savgs_ident.effects.bristle import DRAG_TIME
+from savgs_ident.plants.base import Motion
+from savgs_ident.plants.profiles import Constant
+from savgs_ident.plants.quarter_car.actuation import RigSource
+from savgs_ident.plants.quarter_car.drive import Drive, VelocityReference, drive_state
+from savgs_ident.plants.quarter_car.dynamics import TRAVEL, Coordinates, SectionCurves
+from savgs_ident.plants.quarter_car.equilibrium import deflection_zero
+from savgs_ident.plants.quarter_car.inputs import Inputs
+from savgs_ident.plants.quarter_car.kinematics import suspension_travel
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.road import RoadMotion
 from savgs_ident.simulate.transient import pack_state, rest_state, state_rates, unpack_state
 
 FRAME = 20
 """Samples of the law in one step of the solve."""
-
 LONGEST = 1e-3
-"""Longest step [s]: what is not stiff is followed within 0.01 % by it."""
-
+"""Longest step [s]: components that are not stiff are integrated within 0.01 %."""
 SEED = 1
-"""Of the instruments' noise."""
+"""Seed of the instruments' noise."""
 
 
 class Loop(NamedTuple):
-    """All that closes the loop around a rig: ``rate`` [1/s] is the law's."""
+    """What closes the loop around a rig: law, instruments, failure, and the ``rate`` [1/s] of the law."""
 
-    law: AbstractLaw
+    law: AbstractControlLaw
     instruments: Instruments
-    failure: Failure
+    failure: LoopFailure
     rate: float
 
 
 class Signals(NamedTuple):
-    """What happened at every sample, each (n,); SI.
+    """The signals at every sample, each (n,); SI.
 
     Attributes:
-        time: [s].
-        road: height of the plate [m].
-        sprung_accel: true acceleration of the sprung mass [m/s^2].
-        susp_deflection: true deflection from standstill at the nominal link angle [m].
-        tyre_load: F_tz [N].
-        wishbone_angle: theta_LW [rad].
-        link_angle: [rad].
-        link_velocity: [rad/s].
-        asked: link velocity that the law asks for [rad/s].
-        motor_torque: of the motor [N m]; against integration with error control 3 % off in rms, since a step follows
-            the current's decay (0.3 ms) only roughly. So is what is derived from it: at 2 Hz the net electric energy
-            comes out 2 % low, at 3 Hz the peak power 3 % high. Positions and velocities are right to 0.01 %.
-        shaft_power: that the motor gives to its shaft [W].
-        electric_power: that the motor takes [W]; negative while it gives back.
-        doubted: 1 from the time on at which the law does not believe the link angle any more, 0 before [1].
+        time: [s]. road: height of the plate [m]. sprung_accel: true acceleration of the sprung mass [m/s^2].
+        susp_deflection: true deflection from standstill at the nominal link angle [m]. tyre_load: F_tz [N].
+        wishbone_angle: theta_LW [rad]. link_angle: [rad]. link_velocity: [rad/s]. asked: link velocity commanded
+        by the law [rad/s]. motor_torque: of the motor [N m]; 3 % off in rms against integration with error
+        control, because a step resolves
+            the decay of the current (0.3 ms) only roughly. So are quantities derived from it: at 2 Hz the net
+            electric energy is 2 % low, at 3 Hz the peak power 3 % high. Positions and velocities are accurate to
+            0.01 %.
+        shaft_power: mechanical power of the motor [W].
+        electric_power: electric power of the motor [W]; negative while it generates.
+        doubted: 1 once the law has rejected the link angle, 0 before [1].
     """
 
     time: Array
@@ -93,14 +87,17 @@ class Signals(NamedTuple):
 
 
 class ClosedLoopRun(NamedTuple):
-    """A run: its signals as arrays, and how it ended."""
+    """A run: its signals as arrays, and its status."""
 
     signals: Signals
     status: Status
 
 
 class _LoopState(NamedTuple):
-    """State of rig and drive, their last rates, the law's state, what it asked for and what is held; the frame."""
+    """State of rig and drive, their last rates, the state of the law, and its command [rad/s], which is held.
+
+    ``kept`` are the signals of the frame.
+    """
 
     rig: Float[Array, " x"]
     rates: Float[Array, " x"]
@@ -110,7 +107,7 @@ class _LoopState(NamedTuple):
 
 
 class LoopCase(NamedTuple):
-    """What a run is of: rig, road, loop, the deflection's zero [m], and the noise of its frames, standard normal."""
+    """A run to be simulated: rig, road, loop, the zero of the deflection [m], and standard normal noise."""
 
     model: QuarterCar
     p: Values
@@ -121,78 +118,80 @@ class LoopCase(NamedTuple):
     noise: Float[Array, "frames frame 3"]
 
 
-def _drive_of(case: LoopCase, asked: Array) -> Drive:
-    return Drive(VelocityReference(Constant(asked)), case.p["psi_nominal"])
+def run_loop(model: QuarterCar, p: Values, road: RoadMotion, loop: Loop, duration: float) -> ClosedLoopRun:
+    """A run of ``duration`` [s], a whole number of frames, from rest at the nominal link angle.
 
-
-def _values_at(case: LoopCase, t: Array) -> Values:
-    share = case.loop.failure.drive_at(t)
-    limits = {name: share * case.p[name] for name in ("motor_peak_torque", "motor_peak_power")}
-    return {**case.p, **limits}
-
-
-def loop_field(case: LoopCase, asked: Array, t: Array, x: Array, near: Array) -> Array:
-    """Rates (x,) of rig and drive at ``t`` [s] in the state ``x`` while the law's command [rad/s] is held.
-
-    ``near`` are the rates of a moment ago, zeros if they are not known.
+    It fails where a signal is not finite or the motion leaves the travel of the linkage. Raises
+    :class:`InputError` as :func:`loop_case` does.
     """
-    start = near[2 : 4 + len(case.model.states)]
-    now = unpack_state(case.model, x)
-    drive = _drive_of(case, asked)
-    return pack_state(
-        state_rates(case.model, _values_at(case, t), case.road, drive, t, now, case.curves, start)
+    case = loop_case(model, p, road, loop, duration)
+    frames = case.noise.shape[0]
+    rows, result = _solve(case, jnp.arange(frames + 1) * (FRAME / loop.rate))
+    signals = Signals(*np.asarray(rows).T)
+    finite = all(np.isfinite(each).all() for each in signals)
+    within = bool(np.max(np.abs(signals.wishbone_angle)) <= TRAVEL)
+    ended = bool(result == dfx.RESULTS.successful) and finite and within
+    return ClosedLoopRun(signals, Status.CONVERGED if ended else Status.NOT_FINITE)
+
+
+def loop_case(model: QuarterCar, p: Values, road: RoadMotion, loop: Loop, duration: float) -> LoopCase:
+    """The case of a run of ``duration`` [s], a whole number of frames.
+
+    Raises :class:`InputError` for an effect of the test bench (sensor, cam), which cannot be in a closed loop.
+    """
+    kinds = AbstractSensorLaw | AbstractInputLaw
+    of_bench = [effect.name for effect in model.effects if isinstance(effect.law, kinds)]
+    if of_bench:
+        raise InputError(
+            f"an error of the test bench cannot be part of a closed loop: {', '.join(of_bench)}",
+            remedy="choose a model without it by --model, or take it out of the rig file's effects",
+        )
+    frames = round(duration * loop.rate / FRAME)
+    curves = model.prepare(p)
+    noise = np.random.default_rng(SEED).standard_normal((frames, FRAME, NUMBER))
+    return LoopCase(model, p, curves, road, loop, _zero(model, p, curves), jnp.asarray(noise))
+
+
+_zero = eqx.filter_jit(deflection_zero)
+
+
+def loop_rest(case: LoopCase) -> Float[Array, " x"]:
+    """State of rig and drive at rest at the nominal link angle, at time 0, in SI."""
+    still = jnp.zeros(())
+    drive = _drive_of(case, still)
+    return pack_state(rest_state(case.model, case.p, RigSource(case.road, drive), still, case.curves))
+
+
+@eqx.filter_jit
+def _solve(case: LoopCase, ends: Float[Array, " frames"]) -> tuple[Array, dfx.RESULTS]:
+    still = jnp.zeros(())
+    begin = loop_rest(case)
+    width = len(Signals._fields)
+    start = _LoopState(begin, jnp.zeros_like(begin), case.loop.law.start(), still, jnp.zeros((FRAME, width)))
+
+    def rates(t: object, y: _LoopState, args: None) -> _LoopState:
+        rig = loop_field(case, y.asked, jnp.asarray(t), y.rig, y.rates)
+        return jax.tree.map(jnp.zeros_like, y)._replace(rig=rig)
+
+    found = dfx.diffeqsolve(
+        dfx.ODETerm(rates),
+        _Sampled(case, steps_within(case.model, 1.0 / case.loop.rate)),
+        ends[0],
+        ends[-1],
+        None,
+        start,
+        saveat=dfx.SaveAt(steps=True, fn=lambda t, y, args: y.kept),
+        stepsize_controller=dfx.StepTo(ends),
+        adjoint=dfx.ForwardMode(),
+        max_steps=ends.shape[0],
+        throw=False,
     )
-
-
-def loop_sample(case: LoopCase, t: Array, x: Array, rates: Array, held: Array) -> tuple[Array, Signals]:
-    """What the instruments measure (3,), gains included, and the signals of a sample, in a state with its rates.
-
-    At time ``t`` [s]; all in SI. What the law makes of the measurements is not known yet: ``doubted`` is 0.
-    """
-    now, change = unpack_state(case.model, x), unpack_state(case.model, rates)
-    drive = _drive_of(case, held)
-    inputs = Inputs(case.road.at(t), drive.link(t, now.actuation), case.road.cam_at(t))
-    motion = Motion(now.q, now.qd, Coordinates(*change.qd))
-    loads = case.model.loads(case.p, motion, now.s, change.s, inputs, case.curves)
-    rig = case.model.effective(case.p)
-    deflection = suspension_travel(rig, now.q.theta_LW) - case.zero
-    acceleration, motor = change.qd.z_s, drive_state(now.actuation)
-    p = _values_at(case, t)
-    inside = drive.signals(p, t, now.actuation, loads.link_torque)
-    speed = p["motor_gear_ratio"] * motor.velocity
-    voltage, current = jnp.stack(inside.voltage), jnp.stack(motor.current)
-    row = Signals(
-        t,
-        inputs.road.height,
-        acceleration,
-        deflection,
-        loads.vertical,
-        now.q.theta_LW,
-        motor.angle,
-        motor.velocity,
-        held,
-        inside.torque,
-        inside.torque * speed,
-        1.5 * voltage @ current,
-        jnp.zeros_like(t),
-    )
-    measured = [rig["accel_gain"] * acceleration, rig["deflection_gain"] * deflection, motor.angle]
-    return jnp.stack(measured), row
-
-
-def steps_within(model: QuarterCar, period: float) -> int:
-    """Steps [1] for which a ``period`` [s] between two samples of the law is short enough.
-
-    An anchor of a sliding bristle decays faster than the current of the motor, and what gives way in the path of a
-    load faster still.
-    """
-    series = any(isinstance(effect, AbstractSeries) for effect in model.effects)
-    longest = min(LONGEST, STABLE * (SETTLING if series else DRAG_TIME))
-    return max(1, ceil(period / longest - 1e-9))
+    kept = found.ys[: ends.shape[0] - 1]
+    return kept.reshape(-1, width), found.result
 
 
 class _Sampled(dfx.AbstractSolver[None]):
-    """Steps of one frame: sample, ask, and move on by the stabilised method, :data:`FRAME` times."""
+    """Steps of one frame: measure, command, and integrate to the next sample, :data:`FRAME` times."""
 
     case: LoopCase
     steps: int = eqx.field(static=True)
@@ -204,7 +203,7 @@ class _Sampled(dfx.AbstractSolver[None]):
         return 2
 
     def init(self, terms: object, t0: object, t1: object, y0: object, args: object) -> None:
-        """Nothing is carried along but the state."""
+        """No solver state."""
         return None
 
     def func(self, terms: Any, t0: Any, y0: Any, args: Any) -> Any:
@@ -246,72 +245,70 @@ class _Sampled(dfx.AbstractSolver[None]):
         return end, None, {"y0": y0, "y1": end}, None, dfx.RESULTS.successful
 
 
-def loop_rest(case: LoopCase) -> Float[Array, " x"]:
-    """State of rig and drive at rest at the nominal link angle, at time 0, in SI."""
-    still = jnp.zeros(())
-    drive = _drive_of(case, still)
-    return pack_state(rest_state(case.model, case.p, case.road, drive, still, case.curves))
+def steps_within(model: QuarterCar, period: float) -> int:
+    """Number of steps [1] in a ``period`` [s] between two samples of the law, short enough to be stable.
+
+    The anchor of a sliding bristle decays faster than the current of the motor, and a series compliance faster still.
+    """
+    series = any(isinstance(effect.law, AbstractSeriesLaw) for effect in model.effects)
+    longest = min(LONGEST, STABLE * (SETTLING if series else DRAG_TIME))
+    return max(1, ceil(period / longest - 1e-9))
 
 
-@eqx.filter_jit
-def _solve(case: LoopCase, ends: Float[Array, " frames"]) -> tuple[Array, dfx.RESULTS]:
-    still = jnp.zeros(())
-    begin = loop_rest(case)
-    width = len(Signals._fields)
-    start = _LoopState(begin, jnp.zeros_like(begin), case.loop.law.start(), still, jnp.zeros((FRAME, width)))
+def loop_field(case: LoopCase, asked: Array, t: Array, x: Array, near: Array) -> Array:
+    """Rates (x,) of rig and drive at ``t`` [s] in the state ``x`` while the law's command [rad/s] is held.
 
-    def rates(t: object, y: _LoopState, args: None) -> _LoopState:
-        rig = loop_field(case, y.asked, jnp.asarray(t), y.rig, y.rates)
-        return jax.tree.map(jnp.zeros_like, y)._replace(rig=rig)
-
-    found = dfx.diffeqsolve(
-        dfx.ODETerm(rates),
-        _Sampled(case, steps_within(case.model, 1.0 / case.loop.rate)),
-        ends[0],
-        ends[-1],
-        None,
-        start,
-        saveat=dfx.SaveAt(steps=True, fn=lambda t, y, args: y.kept),
-        stepsize_controller=dfx.StepTo(ends),
-        adjoint=dfx.ForwardMode(),
-        max_steps=ends.shape[0],
-        throw=False,
+    ``near`` are the rates at a previous instant, zeros if they are unknown.
+    """
+    start = near[len(case.model.coordinates) : 2 * len(case.model.coordinates) + len(case.model.states)]
+    now = unpack_state(case.model, x)
+    drive = _drive_of(case, asked)
+    return pack_state(
+        state_rates(case.model, _values_at(case, t), RigSource(case.road, drive), t, now, case.curves, start)
     )
-    kept = found.ys[: ends.shape[0] - 1]
-    return kept.reshape(-1, width), found.result
 
 
-def loop_case(model: QuarterCar, p: Values, road: RoadMotion, loop: Loop, duration: float) -> LoopCase:
-    """The case of a run of ``duration`` [s], a whole number of frames.
+def loop_sample(case: LoopCase, t: Array, x: Array, rates: Array, held: Array) -> tuple[Array, Signals]:
+    """The measured quantities (3,), sensor gains included, and the signals of a sample at ``t`` [s]; all in SI.
 
-    Raises :class:`InputError` for a rig with an effect that belongs to the recordings and not to the loop.
+    The law has not seen the measurements yet: ``doubted`` is 0.
     """
-    kinds = AbstractSensorFault | AbstractRoadFault
-    foreign = [effect.name for effect in model.effects if isinstance(effect, kinds)]
-    if foreign:
-        raise InputError(
-            f"an error of the test bench cannot be part of a closed loop: {', '.join(foreign)}",
-            remedy="choose a model without it by --model, or take it out of the rig file's effects",
-        )
-    frames = round(duration * loop.rate / FRAME)
-    curves = model.curves(p)
-    noise = np.random.default_rng(SEED).standard_normal((frames, FRAME, NUMBER))
-    return LoopCase(model, p, curves, road, loop, _zero(model, p, curves), jnp.asarray(noise))
+    now, change = unpack_state(case.model, x), unpack_state(case.model, rates)
+    drive = _drive_of(case, held)
+    inputs = Inputs(case.road.at(t), drive.link(t, now.source), case.road.cam_at(t))
+    motion = Motion(now.q, now.qd, Coordinates(*change.qd))
+    loads = case.model.loads(case.p, motion, now.s, change.s, inputs, case.curves)
+    rig = case.model.effective(case.p)
+    deflection = suspension_travel(rig, now.q.theta_LW) - case.zero
+    acceleration, motor = change.qd.z_s, drive_state(now.source)
+    p = _values_at(case, t)
+    inside = drive.signals(p, t, now.source, loads.link_torque)
+    speed = p["motor_gear_ratio"] * motor.velocity
+    voltage, current = jnp.stack(inside.voltage), jnp.stack(motor.current)
+    row = Signals(
+        t,
+        inputs.road.height,
+        acceleration,
+        deflection,
+        loads.vertical,
+        now.q.theta_LW,
+        motor.angle,
+        motor.velocity,
+        held,
+        inside.torque,
+        inside.torque * speed,
+        1.5 * voltage @ current,
+        jnp.zeros_like(t),
+    )
+    measured = [rig["accel_gain"] * acceleration, rig["deflection_gain"] * deflection, motor.angle]
+    return jnp.stack(measured), row
 
 
-def run_loop(model: QuarterCar, p: Values, road: RoadMotion, loop: Loop, duration: float) -> ClosedLoopRun:
-    """A run of ``duration`` [s], a whole number of frames, from rest at the nominal link angle.
-
-    A motion beyond the linkage's travel counts as none. Raises :class:`InputError` as :func:`loop_case` does.
-    """
-    case = loop_case(model, p, road, loop, duration)
-    frames = case.noise.shape[0]
-    rows, result = _solve(case, jnp.arange(frames + 1) * (FRAME / loop.rate))
-    signals = Signals(*np.asarray(rows).T)
-    finite = all(np.isfinite(each).all() for each in signals)
-    within = bool(np.max(np.abs(signals.wishbone_angle)) <= TRAVEL)
-    ended = bool(result == dfx.RESULTS.successful) and finite and within
-    return ClosedLoopRun(signals, Status.CONVERGED if ended else Status.NOT_FINITE)
+def _drive_of(case: LoopCase, asked: Array) -> Drive:
+    return Drive(VelocityReference(Constant(asked)), case.p["psi_nominal"])
 
 
-_zero = eqx.filter_jit(deflection_zero)
+def _values_at(case: LoopCase, t: Array) -> Values:
+    share = case.loop.failure.drive_at(t)
+    limits = {name: share * case.p[name] for name in ("motor_peak_torque", "motor_peak_power")}
+    return {**case.p, **limits}

@@ -1,10 +1,10 @@
-"""Runge, Kutta and Chebyshev: explicit steps that stay stable where a rig with a drive is stiff.
+"""Runge-Kutta-Chebyshev steps: explicit, and stable for the stiffness of a rig with a drive.
 
-Between two samples of the controller everything is smooth at the scale of a millisecond, but for two fast decays that
-accuracy does not ask to be followed: the current loop (0.3 ms) and the anchor of a sliding bristle (0.2 ms). A method
-of s stages and order two after Sommeijer, Shampine and Verwer (1997) is stable for decays as fast as 2/3 (s^2 - 1)
-per step, less 2 % for damping; with four stages that are 9 800/s at steps of 1 ms, at half the cost of a common
-method in steps of 0.5 ms.
+Between two samples of the controller the motion is smooth at the scale of a millisecond, except for two fast
+decays that accuracy does not require to resolve: the current loop (0.3 ms) and the anchor of a sliding bristle
+(0.2 ms). A method of s stages and order two after Sommeijer, Shampine and Verwer (1997) is stable for decays as
+fast as 2/3 (s^2 - 1) per step, less 2 % for damping; with four stages that are 9 800/s at steps of 1 ms, at half
+the cost of a common method in steps of 0.5 ms.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,7 @@ DAMPING = 2.0 / 13.0
 Vector = Float[Array, " x"]
 
 Field = Callable[[Float[Array, ""], Vector, Vector], Vector]
-"""Time [s], state and the rates of a moment ago to rates."""
+"""Rates from time [s], state and the rates at a previous instant."""
 
 
 class _Stage(NamedTuple):
@@ -42,7 +42,7 @@ class _Stage(NamedTuple):
 
 
 def _coefficients(stages: int) -> tuple[float, np.ndarray]:
-    """Step of the first stage as a share of the whole, and rows of :class:`_Stage`."""
+    """Step of the first stage as a share of the whole, and rows of ``_Stage``."""
     w0 = 1.0 + DAMPING / stages**2
     t, t1, t2 = (
         np.array(
@@ -70,7 +70,7 @@ _FIRST, _LATER = _coefficients(STAGES)
 def stabilised_step(
     field: Field, t: Float[Array, ""], state: Vector, rates: Vector, step: Float[Array, ""]
 ) -> tuple[Vector, Vector]:
-    """State after a ``step`` [s] from ``t`` [s], where the rates are ``rates``; and the last rates on the way."""
+    """State after a ``step`` [s] from ``t`` [s], where the rates are ``rates``; and the rates of the last stage."""
     coefficients = _Stage(*jnp.asarray(_LATER))
 
     def stage(

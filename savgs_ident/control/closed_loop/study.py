@@ -1,39 +1,56 @@
-"""A test of the closed loop as a whole: passive and active, failures, other rigs, causes."""
+"""A test of the closed loop as a whole: passive and active, failures, other rigs, causes.
 
-from collections.abc import Callable
-from dataclasses import dataclass
+Friction, the limits of the drive, the instruments and the changing alpha separate a linear prediction from the
+rig. To measure how much each matters, :func:`measure_causes` repeats the test without one of them at a time,
+passive and active, with the same controller.
+"""
 
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 
-from savgs_ident.control.closed_loop.causes import Cause, measure_causes
-from savgs_ident.control.closed_loop.failure import KINDS, NOTHING, failing
-from savgs_ident.control.closed_loop.instruments import sheet_instruments
-from savgs_ident.control.closed_loop.laws import hinf_law, hold_law
+from savgs_ident.control.closed_loop.laws import (
+    KINDS,
+    NOTHING,
+    HinfLaw,
+    hinf_law,
+    hold_law,
+    ideal_instruments,
+    make_failure,
+    sheet_instruments,
+)
 from savgs_ident.control.closed_loop.metrics import (
     DriveUse,
-    Gain,
     Ride,
+    RideGain,
+    compare_rides,
     doubted_from,
     drive_use,
-    gain_of,
+    measure_ride,
     ride_after,
-    ride_of,
 )
 from savgs_ident.control.closed_loop.programme import LoopTest
 from savgs_ident.control.closed_loop.run import ClosedLoopRun, Loop, run_loop
-from savgs_ident.control.controller_file import DigitalController
+from savgs_ident.control.design import DigitalController
 from savgs_ident.control.rigs import Rigs
 from savgs_ident.core.errors import InputError
-from savgs_ident.model.quarter_car import QuarterCar
-from savgs_ident.model.values import Values, as_values
+from savgs_ident.core.presentation import Result
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.plants.quarter_car.catalogue import EFFECTS
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.plant import QuarterCar
 
 SAME_ANGLE = 0.01
-"""Within this two nominal link angles are the same [deg]."""
+"""Tolerance between the nominal link angles of rig and controller [deg]."""
 
 
 @dataclass(frozen=True)
-class Failed:
-    """A run in which something failed, and how the rig rode from then on."""
+class FailedRun:
+    """A run with a failure, and the ride from the failure on."""
 
     kind: str
     run: ClosedLoopRun
@@ -41,29 +58,41 @@ class Failed:
 
 
 @dataclass(frozen=True)
-class OnRig:
-    """What the loop gains on one rig of a set, and whether it is stable there, passive and active."""
+class RigOutcome:
+    """The gain of the loop on one rig of a set, and whether both runs are stable."""
 
-    gain: Gain
+    gain: RideGain
     stable: bool
 
 
 @dataclass(frozen=True)
-class LoopStudy:
-    """A test with all that was found.
+class Cause:
+    """A variant and the gain of the loop in it."""
+
+    variant: str
+    gain: RideGain
+
+
+@dataclass(frozen=True)
+class LoopStudy(Result):
+    """The results of a test.
 
     Attributes:
         test: the test.
         passive, active: the runs.
-        passive_ride, active_ride: how the rig rode in them.
-        passive_after, active_after: how it rode from the time on at which something fails in other runs.
+        passive_ride, active_ride: the ride in them.
+        passive_after, active_after: the ride after the instant at which something fails in other runs.
         gain: the active rig against the passive one.
-        drive: what the drive did.
+        drive: the use of the drive.
         failures: one run for each kind of failure.
-        rigs: the set of rigs that the loop was tried on; None if on no other.
-        on_rigs: how it did there.
-        causes: what stands between prediction and rig; empty if that was not asked for.
+        rigs: the other rigs on which the loop was run; None for none.
+        on_rigs: the results there.
+        causes: the gains without one imperfection at a time; empty if not requested.
+        model: what it was run on.
+        controller: which controller it was, in words.
     """
+
+    presenter: ClassVar[str] = "LOOP_STUDY"
 
     test: LoopTest
     passive: ClosedLoopRun
@@ -72,34 +101,30 @@ class LoopStudy:
     active_ride: Ride
     passive_after: Ride
     active_after: Ride
-    gain: Gain
+    gain: RideGain
     drive: DriveUse
-    failures: tuple[Failed, ...]
+    failures: tuple[FailedRun, ...]
     rigs: Rigs | None
-    on_rigs: tuple[OnRig, ...]
+    on_rigs: tuple[RigOutcome, ...]
     causes: tuple[Cause, ...]
+    model: RigModel | None = field(default=None, kw_only=True)
+    controller: str = field(default="", kw_only=True)
 
     @property
     def stable(self) -> bool:
-        """Whether the loop is stable on the rig and on all others that it was tried on, passive and active."""
+        """Whether the loop is stable on the rig and on all other rigs, passive and active."""
         both = self.passive_ride.stable and self.active_ride.stable
         return both and all(each.stable for each in self.on_rigs)
 
     @property
     def trusted(self) -> bool:
-        """Whether it is stable, and the law was at work all of the time."""
+        """Whether it is stable, and the law was active all the time."""
         return self.stable and self.doubted_from is None
 
     @property
     def doubted_from(self) -> float | None:
-        """When the law ceased to believe the link angle although nothing failed [s]; None if it never did."""
+        """When the law rejected the link angle although nothing failed [s]; None if it never did."""
         return doubted_from(self.active)
-
-
-def loop_around(p: Values, controller: DigitalController) -> Loop:
-    """A controller with the instruments of the sheet, nothing failing."""
-    instruments = sheet_instruments(float(p["motor_gear_ratio"]))
-    return Loop(hinf_law(controller), instruments, failing(NOTHING, 0.0), controller.rate)
 
 
 def study_loop(
@@ -113,35 +138,35 @@ def study_loop(
 ) -> LoopStudy:
     """Run a test of a controller on a rig, with each failure, and on ``rigs``.
 
-    Raises :class:`InputError` if the controller was designed for another link angle than the rig stands at, and as
+    Raises :class:`InputError` if the controller was designed for another nominal link angle, and as
     :func:`savgs_ident.control.closed_loop.run.loop_case` does.
     """
-    stands, designed = (float(np.degrees(each)) for each in (p["psi_nominal"], controller.alpha.nominal))
-    if abs(stands - designed) > SAME_ANGLE:
+    nominal, designed = (float(np.degrees(each)) for each in (p["psi_nominal"], controller.alpha.nominal))
+    if abs(nominal - designed) > SAME_ANGLE:
         raise InputError(
-            f"the controller was designed for a link at {designed:g} deg, and the rig's stands at {stands:g} deg",
+            f"the controller was designed for a link at {designed:g} deg, and the rig's stands at {nominal:g} deg",
             remedy="design a controller for this rig",
         )
     loop = loop_around(p, controller)
     hold = loop._replace(law=hold_law(p["psi_nominal"], loop.rate))
 
-    def ran(values: Values, around: Loop) -> ClosedLoopRun:
+    def simulate(values: Values, around: Loop) -> ClosedLoopRun:
         return run_loop(model, values, test.road, around, test.duration)
 
     progress(f"passive: {test.title}")
-    passive = ran(p, hold)
+    passive = simulate(p, hold)
     progress(f"active: {test.title}")
-    active = ran(p, loop)
-    before, after = ride_of(passive, test), ride_of(active, test)
+    active = simulate(p, loop)
+    before, after = measure_ride(passive, test), measure_ride(active, test)
     failures = []
     for kind in (kind for kind in KINDS if kind != NOTHING):
         progress(f"failure: {KINDS[kind].about}")
-        run = ran(p, loop._replace(failure=failing(kind, test.fails_at)))
-        failures.append(Failed(kind, run, ride_after(run, test)))
+        run = simulate(p, loop._replace(failure=make_failure(kind, test.fails_at)))
+        failures.append(FailedRun(kind, run, ride_after(run, test)))
     others = []
     for number, values in enumerate(rigs.values if rigs else ()):
         progress(f"rig {number + 1} of {len(rigs.values) if rigs else 0}")
-        others.append(_on_rig(as_values(values), ran, hold, loop, test))
+        others.append(_on_rig(as_values(values), simulate, hold, loop, test))
     found: list[Cause] = []
     if causes:
         for cause in measure_causes(model, p, hinf_law(controller), loop, test):
@@ -155,7 +180,7 @@ def study_loop(
         after,
         ride_after(passive, test),
         ride_after(active, test),
-        gain_of(before, after),
+        compare_rides(before, after),
         drive_use(active, test, p),
         tuple(failures),
         rigs,
@@ -165,7 +190,51 @@ def study_loop(
 
 
 def _on_rig(
-    values: Values, ran: Callable[[Values, Loop], ClosedLoopRun], hold: Loop, loop: Loop, test: LoopTest
-) -> OnRig:
-    passive, active = (ride_of(ran(values, around), test) for around in (hold, loop))
-    return OnRig(gain_of(passive, active), passive.stable and active.stable)
+    values: Values, simulate: Callable[[Values, Loop], ClosedLoopRun], hold: Loop, loop: Loop, test: LoopTest
+) -> RigOutcome:
+    passive, active = (measure_ride(simulate(values, around), test) for around in (hold, loop))
+    return RigOutcome(compare_rides(passive, active), passive.stable and active.stable)
+
+
+def loop_around(p: Values, controller: DigitalController) -> Loop:
+    """A controller with the instruments of the data sheet, without failures."""
+    instruments = sheet_instruments(float(p["motor_gear_ratio"]))
+    return Loop(hinf_law(controller), instruments, make_failure(NOTHING, 0.0), controller.rate)
+
+
+UNLIMITED = 10.0
+"""Factor on the limits of the drive in the variant without limits [1]."""
+_LIMITS = ("motor_speed_limit", "motor_peak_torque", "motor_peak_power", "motor_dc_bus")
+
+
+def measure_causes(model: QuarterCar, p: Values, law: HinfLaw, loop: Loop, test: LoopTest) -> Iterator[Cause]:
+    """Run the variants one after the other; ``loop`` is that of the rig as it is, ``law`` its law."""
+    for variant, values, changed in _variants(model, p, law, loop):
+        hold = changed._replace(law=hold_law(p["psi_nominal"], loop.rate))
+        passive, active = (
+            measure_ride(run_loop(model, values, test.road, each, test.duration), test)
+            for each in (hold, changed)
+        )
+        yield Cause(variant, compare_rides(passive, active))
+
+
+def _variants(model: QuarterCar, p: Values, law: HinfLaw, loop: Loop) -> Iterator[tuple[str, Values, Loop]]:
+    # Effects at their null and limits out of reach rather than other models: one compiled program serves all
+    # variants.
+    nulls = {effect.name: EFFECTS[effect.name].null for effect in model.effects}
+    every = {name: jnp.asarray(value, jnp.float64) for null in nulls.values() for name, value in null.items()}
+    unlimited = {name: UNLIMITED * p[name] for name in _LIMITS}
+    nominal = law.alpha.alpha(law.alpha.nominal)
+    constant = jnp.zeros_like(law.alpha.coefficients).at[0].set(nominal)
+    with_constant = eqx.tree_at(lambda each: each.alpha.coefficients, law, constant)
+    ideal = loop._replace(instruments=ideal_instruments())
+    yield "the rig as it is", p, loop
+    for name, null in nulls.items():
+        without = {key: jnp.asarray(value, jnp.float64) for key, value in null.items()}
+        yield f"without {name}", {**p, **without}, loop
+    if len(nulls) > 1:
+        yield "without all of these", {**p, **every}, loop
+    yield "a drive without limits", {**p, **unlimited}, loop
+    yield "ideal instruments", p, ideal
+    yield "alpha taken as constant by the law", p, loop._replace(law=with_constant)
+    yield "without effects, limits and noise", {**p, **every, **unlimited}, ideal

@@ -1,33 +1,242 @@
 """The identified parameters by direct collocation, from the samples of all dwells at once.
 
-    found = fit_by_collocation(campaign, measured, rig, effects=MODELS["simtr"], free=FREE)
+    found = fit_by_collocation(campaign, measured, model, free=FREE)
     found.by_name["mu_r"].value, found.by_name["mu_r"].stderr
 
 It starts from the rig file's values and the periodic motions there. Parameters known to a tolerance are
 estimated along under their priors, as in the fit.
+
+IPOPT on a program, and how it ended.
+
+What the samples tell about the parameters, from the solved program.
+
+The constraints fix the motions once the parameters are given: J_z dz = -J_u du. So the objective's curvature,
+taken along, is the information on parameters and sensors' zeros; the latter are eliminated.
+
+What the cross-check found, with what the samples tell about it.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
+import casadi as ca
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
+from numpy.typing import NDArray
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
-from savgs_ident.core.rig import Rig
-from savgs_ident.fit.collocation.objective import assemble_objective
-from savgs_ident.fit.collocation.program import Program, assemble_program
-from savgs_ident.fit.collocation.radau import Points, radau_points
-from savgs_ident.fit.collocation.result import CollocationFit, assemble_result
-from savgs_ident.fit.collocation.samples import Misfit, find_recordings, misfit_of, samples_of
-from savgs_ident.fit.collocation.solve import solve_program
-from savgs_ident.fit.collocation.start import start_vector
-from savgs_ident.fit.collocation.unknowns import unknowns_of
-from savgs_ident.fit.settings import FitSettings
-from savgs_ident.fit.task import Task, plan_task
-from savgs_ident.model.sensors import RESPONSE_CHANNELS
+from savgs_ident.core.status import Status
+from savgs_ident.core.transforms import FreeVector
+from savgs_ident.fit.collocation.program import (
+    Program,
+    as_casadi,
+    assemble_objective,
+    assemble_program,
+    start_vector,
+)
+from savgs_ident.fit.collocation.transcription import (
+    Misfit,
+    Points,
+    find_recordings,
+    misfit_of,
+    radau_points,
+    samples_of,
+    unknowns_of,
+)
+from savgs_ident.fit.least_squares import INFORMED
+from savgs_ident.fit.minimise import Spread, spread_of
+from savgs_ident.fit.result import Estimate
+from savgs_ident.inference.problem import ProblemSettings, Task, plan_task
+from savgs_ident.plants.model import Model
+from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
+
+AMD = 0
+"""The ordering of unknowns that MUMPS is to use: approximate minimum degree. It takes half the time of the one
+that it would choose here, and loses less to rounding, which IPOPT would take for a wrong curvature."""
+
+OBJECTIVE_UNIT = 1e4
+"""The objective is given to IPOPT in these: so its slopes are of the order of those of the constraints."""
+
+_OUTCOMES = {
+    "Solve_Succeeded": Status.CONVERGED,
+    "Maximum_Iterations_Exceeded": Status.MAX_ITERATIONS,
+    "Invalid_Number_Detected": Status.NOT_FINITE,
+}
+
+
+class Solution(NamedTuple):
+    """Scaled unknowns ``w`` [1], (n,), where IPOPT ended, the objective there [1], and its iterations."""
+
+    w: NDArray[np.float64]
+    objective: float
+    status: Status
+    iterations: int
+
+
+def solve_program(
+    program: Program, start: NDArray[np.float64], iterations: int, tolerance: float
+) -> Solution:
+    """IPOPT from scaled unknowns ``start`` [1], (n,), until constraints and scaled slopes are within ``tolerance``.
+
+    Look at ``status`` of the solution: any end but the one asked for is a failure, and where IPOPT does not say
+    more the problem counts as stalled.
+    """
+    solver = _solver(program, iterations, tolerance)
+    found = solver(x0=start, lbg=0.0, ubg=0.0)
+    w, said = np.array(found["x"]).ravel(), solver.stats()
+    status = _OUTCOMES.get(said["return_status"], Status.STALLED)
+    if not np.isfinite(w).all():
+        status = Status.NOT_FINITE
+    return Solution(w, float(found["f"]), status, int(said["iter_count"]))
+
+
+def _solver(program: Program, iterations: int, tolerance: float) -> ca.Function:
+    quadratic, size = program.quadratic, program.unknowns.size
+    curvature = as_casadi(quadratic.curvature)
+    w, nothing = ca.MX.sym("w", size), ca.MX.sym("nothing", 0)
+    weight, prices = ca.MX.sym("weight"), ca.MX.sym("prices", program.constraints.size1_out(0))
+    slope = ca.mtimes(curvature, w) - quadratic.slope
+    value = 0.5 * ca.dot(w, slope - quadratic.slope) + quadratic.rest
+    within = program.constraints(w)
+    options: dict[str, Any] = {
+        "grad_f": ca.Function("gradient", [w, nothing], [value, slope]),
+        "jac_g": ca.Function("slopes", [w, nothing], [within, program.jacobian(w)]),
+        "hess_lag": ca.Function("curvature", [w, nothing, weight, prices], [weight * ca.triu(curvature)]),
+        "no_nlp_grad": True,
+        "calc_lam_p": False,
+        "show_eval_warnings": False,
+        "print_time": False,
+        "ipopt": {
+            "max_iter": iterations,
+            "tol": tolerance,
+            "acceptable_iter": 0,
+            "nlp_scaling_method": "none",
+            "obj_scaling_factor": 1.0 / OBJECTIVE_UNIT,
+            "hessian_constant": "yes",
+            "mumps_pivot_order": AMD,
+            "print_level": 0,
+            "sb": "yes",
+        },
+    }
+    return ca.nlpsol("crosscheck", "ipopt", {"x": w, "f": value, "g": within}, options)
+
+
+def information(program: Program, w: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Information matrix (n, n) of the parameters' coordinates at the solution ``w`` [1], (m,), priors included.
+
+    Raises :class:`RuntimeError` where the constraints do not fix the motions.
+    """
+    unknowns = program.unknowns
+    n, first_zero = unknowns.parameters, unknowns.size - unknowns.zeros.size
+    found = program.jacobian(w)
+    colind, row = found.sparsity().get_ccs()
+    jacobian = csc_array((np.array(found.nonzeros()), row, colind), shape=found.shape)
+    motion = splu(csc_array(jacobian[:, n:first_zero]))
+    follow = motion.solve(-jacobian[:, :n].toarray())
+    along = np.zeros((unknowns.size, n + unknowns.zeros.size))
+    along[:n, :n] = np.eye(n)
+    along[n:first_zero, :n] = follow
+    along[first_zero:, n:] = np.eye(unknowns.zeros.size)
+    whole = along.T @ (program.quadratic.curvature @ along)
+    coupling, of_zeros = whole[:n, n:], whole[n:, n:]
+    reduced: NDArray[np.float64] = whole[:n, :n] - coupling @ np.linalg.solve(of_zeros, coupling.T)
+    return reduced
+
+
+def spread_at(program: Program, w: NDArray[np.float64]) -> Spread:
+    """The spread of the parameters' coordinates; directions that the samples do not tell as in a fit.
+
+    ``w`` [1], (m,), are the scaled unknowns of the solution.
+    """
+    values, axes = np.linalg.eigh(information(program, w))
+    return spread_of((axes * np.sqrt(np.maximum(values, 0.0))).T)
+
+
+@dataclass(frozen=True)
+class CollocationFit:
+    """What the cross-check found; arrays are read-only.
+
+    Attributes:
+        estimates: all estimated parameters, free ones first.
+        covariance: of the estimates in their order [products of their units], (n, n).
+        chi2: weighted sum of squared residuals of the samples.
+        dof: samples less free parameters and zeros of sensors.
+        prior_chi2: squared deviations of the tolerance parameters in their standard deviations.
+        status: how IPOPT ended.
+        iterations: how many it took.
+        tests: names of the dwells.
+        unknowns: variables of the optimisation.
+        wall_s: time taken [s].
+    """
+
+    estimates: tuple[Estimate, ...]
+    covariance: NDArray[np.float64]
+    chi2: float
+    dof: int
+    prior_chi2: float
+    status: Status
+    iterations: int
+    tests: tuple[str, ...]
+    unknowns: int
+    wall_s: float
+
+    def __post_init__(self) -> None:
+        self.covariance.flags.writeable = False
+
+    @property
+    def by_name(self) -> Mapping[str, Estimate]:
+        """The estimates by parameter name."""
+        return {estimate.name: estimate for estimate in self.estimates}
+
+
+def assemble_result(task: Task, program: Program, end: Solution, wall_s: float) -> CollocationFit:
+    """The whole, frozen result; without a solution there is no covariance."""
+    problem, n = task.problem, program.unknowns.parameters
+    u = jnp.asarray(end.w[:n])
+    spread = spread_at(program, end.w) if end.status.ok else Spread(np.full((n, n), np.nan))
+    slope = np.asarray(problem.slopes(u))
+    prior = float(np.sum(np.asarray(problem.free.prior_residuals(u)) ** 2))
+    told = len(problem.free.identified) + program.unknowns.zeros.size
+    return CollocationFit(
+        estimates=_estimates(task, u, slope * _told(spread, problem.free)),
+        covariance=np.asarray(spread.covariance * np.outer(slope, slope), np.float64),
+        chi2=2.0 * end.objective - prior,
+        dof=program.quadratic.samples - told,
+        prior_chi2=prior,
+        status=end.status,
+        iterations=end.iterations,
+        tests=task.measured.tests,
+        unknowns=program.unknowns.size,
+        wall_s=wall_s,
+    )
+
+
+def _told(spread: Spread, free: FreeVector) -> NDArray[np.float64]:
+    """Standard deviations of the coordinates, infinite where the data do not identify what they are asked for."""
+    asked = np.arange(len(free.names)) < len(free.identified)
+    return np.where(asked & (spread.sd >= INFORMED * free.widths), np.inf, spread.sd)
+
+
+def _estimates(task: Task, u: Array, stderr: NDArray[np.float64]) -> tuple[Estimate, ...]:
+    free, values = task.problem.free, task.problem.parameters(u)
+    estimates = []
+    for name, sd in zip(free.names, stderr, strict=True):
+        known = task.table[name]
+        identified = name in free.identified
+        estimates.append(
+            Estimate(
+                name, float(values[name]), float(sd), known.unit, identified, known.value, known.tolerance
+            )
+        )
+    return tuple(estimates)
+
 
 Progress = Callable[[str], None]
 
@@ -52,14 +261,13 @@ class CollocationSettings:
 def fit_by_collocation(
     campaign: Campaign,
     measured: HarmonicResponse,
-    rig: Rig,
+    model: Model,
     *,
-    effects: tuple[str, ...],
     free: tuple[str, ...],
     settings: CollocationSettings | None = None,
     progress: Progress | None = None,
 ) -> CollocationFit:
-    """Estimate ``free`` parameters of a rig with ``effects`` from the samples of the dwells of ``measured``.
+    """Estimate ``free`` parameters of a model from the samples of the dwells of ``measured``.
 
     The response gives frequencies, noise, and the harmonics of road and link; the samples of acceleration and
     deflection come from ``campaign``. ``progress`` is told what is going on. Raises :class:`InputError` for
@@ -68,8 +276,8 @@ def fit_by_collocation(
     """
     began, tell = time.perf_counter(), progress or _silent
     settings = settings or CollocationSettings()
-    planned = FitSettings(fixed_tolerances=settings.fixed_tolerances, periodic=settings.periodic)
-    task = plan_task(measured, rig, effects, free, planned)
+    planned = ProblemSettings(fixed_tolerances=settings.fixed_tolerances, periodic=settings.periodic)
+    task = plan_task(measured, model, free, planned)
     tell("solving the model as given")
     near = simulate_periodic(task.problem.model, task.problem.fixed, task.excitation, settings.periodic)
     points = radau_points(near.mesh)
@@ -106,6 +314,5 @@ def _misfits(campaign: Campaign, measured: HarmonicResponse, points: Points) -> 
 def _program(task: Task, points: Points, misfits: list[dict[int, Misfit]]) -> Program:
     free, layout = task.problem.free, points.mesh.layout
     unknowns = unknowns_of(task.problem.model, len(free.names), layout.total, len(layout.counts))
-    priors = np.arange(len(free.identified), len(free.names))
-    quadratic = assemble_objective(unknowns, points, misfits, priors)
+    quadratic = assemble_objective(unknowns, points, misfits, free.widths)
     return assemble_program(task.problem, unknowns, points, task.excitation, quadratic)

@@ -3,21 +3,115 @@
 Constraints are the equations of the points, and the rule of the steps, which is linear. The equations of a point
 know the parameters and the unknowns of that point only: so one small dense Jacobian, told to CasADi once and
 evaluated at all points, is put in its places of the large sparse one.
+
+What is minimised: samples and priors, quadratic in the unknowns.
+
+As Hessian IPOPT is given that of the objective alone (Gauss-Newton): where residuals are noise, the curvature of
+the constraints weighs little, and along the constraints the objective is convex from the start, so that every
+step leads downhill.
+
+The equations of one point, told to CasADi: the model's residual, and what the sensors read.
+
+Where the optimisation starts: the rig file's values, and the periodic motions there.
 """
 
 from typing import NamedTuple
 
 import casadi as ca
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 
-from savgs_ident.fit.collocation.objective import Objective
-from savgs_ident.fit.collocation.point import point_equations
-from savgs_ident.fit.collocation.radau import Points, step_rule
-from savgs_ident.fit.collocation.unknowns import Unknowns
-from savgs_ident.fit.problem import Problem
-from savgs_ident.simulate.excitation import Excitation, inputs_at
+from savgs_ident.fit.collocation.transcription import READINGS, Misfit, Points, Unknowns, step_rule
+from savgs_ident.inference.problem import Problem, Task
+from savgs_ident.plants.base import Excitation, Motion
+from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.inputs import Inputs
+from savgs_ident.plants.quarter_car.strut import Link
+from savgs_ident.plants.quarter_car.tyre import Road
+from savgs_ident.simulate.excitation import inputs_at
+from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.symbolic.translate import to_casadi
+
+
+class Objective(NamedTuple):
+    """1/2 w' H w - c' w + rest over all unknowns w: half of chi2 of data and priors.
+
+    ``slope`` c is (n,), for n unknowns.
+    """
+
+    curvature: csc_array
+    slope: NDArray[np.float64]
+    rest: float
+    samples: int
+
+
+def assemble_objective(
+    unknowns: Unknowns, points: Points, misfits: list[dict[int, Misfit]], widths: NDArray[np.float64]
+) -> Objective:
+    """The objective of the misfits of all dwells by channel, and of the priors of the parameters.
+
+    ``widths`` (n,) are the standard deviations of their coordinates before the data [1].
+    """
+    first = unknowns.states + unknowns.partners
+    places = np.arange(widths.size)
+    rows, columns, values = [places], [places], [widths**-2.0]
+    slope, rest, count = np.zeros(unknowns.size), 0.0, 0
+    for dwell, channels in enumerate(misfits):
+        here = np.flatnonzero(points.mesh.layout.dwell == dwell)
+        for channel, misfit in channels.items():
+            zero = unknowns.zeros[dwell, channel]
+            places = np.append(unknowns.at_points[here, first + channel], zero)
+            entries = coo_array(misfit.curvature)
+            rows.append(places[entries.row])
+            columns.append(places[entries.col])
+            values.append(READINGS[channel] ** 2 * entries.data)
+            slope[places] += READINGS[channel] * misfit.slope
+            rest += misfit.rest
+            count += misfit.samples
+    unused = _unseen(unknowns, misfits)
+    rows, columns, values = [*rows, unused], [*columns, unused], [*values, np.ones(unused.size)]
+    joined = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    size = (unknowns.size, unknowns.size)
+    return Objective(csc_array(coo_array(joined, shape=size)), slope, rest, count)
+
+
+def _unseen(unknowns: Unknowns, misfits: list[dict[int, Misfit]]) -> NDArray[np.intp]:
+    """Zeros of sensors that were not recorded: nothing else would hold them."""
+    return np.array(
+        [
+            zero
+            for channels, zeros in zip(misfits, unknowns.zeros, strict=True)
+            for channel, zero in enumerate(zeros)
+            if channel not in channels
+        ],
+        np.intp,
+    )
+
+
+def point_equations(problem: Problem, unknowns: Unknowns) -> ca.Function:
+    """(z, u, drive) -> equations, all in units of their typical sizes.
+
+    ``z`` are the unknowns of a point, ``u`` the parameters' coordinates, ``drive`` road height [m] and velocity
+    [m/s], link angle [rad] and velocity [rad/s].
+    """
+    states, partners = unknowns.states, unknowns.partners
+
+    def equations(z: Array, u: Array, drive: Array) -> Array:
+        here = jnp.asarray(unknowns.scale) * z
+        x, y, readings = jnp.split(here, [states, states + partners])
+        p = problem.parameters(u)
+        motion = Motion(Coordinates(x[0], x[1]), Coordinates(x[2], x[3]), Coordinates(y[0], y[1]))
+        inputs = Inputs(Road(drive[0], drive[1]), Link(drive[2], drive[3]))
+        balance = problem.model.residual(p, motion, x[4:], y[2:], inputs)
+        seen = jnp.stack(problem.model.read(p, motion, x[4:], y[2:], inputs))
+        return jnp.concatenate([balance, seen - readings]) / jnp.asarray(unknowns.residual_scale)
+
+    inputs = {"z": np.zeros(unknowns.width), "u": np.zeros(unknowns.parameters), "drive": np.zeros(4)}
+    return to_casadi("point", equations, inputs, ["equations"])
+
 
 THREADS = 2
 """The points are evaluated in so many threads."""
@@ -36,7 +130,7 @@ def assemble_program(
     problem: Problem, unknowns: Unknowns, points: Points, excitation: Excitation, quadratic: Objective
 ) -> Program:
     """Constraints and their Jacobian for all points."""
-    drive = _drive(points, excitation)
+    drive = _drive(problem, points, excitation)
     rule = _scaled_rule(unknowns, points, np.asarray(excitation.frequency))
     point = point_equations(problem, unknowns)
     w = ca.MX.sym("w", unknowns.size)
@@ -55,8 +149,8 @@ def assemble_program(
     return Program(unknowns, quadratic, constraints, jacobian)
 
 
-def _drive(points: Points, excitation: Excitation) -> NDArray[np.float64]:
-    at = inputs_at(excitation, points.mesh)
+def _drive(problem: Problem, points: Points, excitation: Excitation) -> NDArray[np.float64]:
+    at = inputs_at(problem.model, excitation, points.mesh)
     return np.stack([np.asarray(part) for part in (*at.road, *at.link)])
 
 
@@ -109,3 +203,31 @@ def as_casadi(matrix: csc_array) -> ca.DM:
     rows, columns = matrix.shape
     sparsity = ca.Sparsity(rows, columns, matrix.indptr.tolist(), matrix.indices.tolist())
     return ca.DM(sparsity, matrix.data)
+
+
+def start_vector(task: Task, program: Program, points: Points, near: PeriodicSolution) -> NDArray[np.float64]:
+    """All unknowns, scaled [1], (n,).
+
+    The rig's values, the motions ``near`` them, and what the sensors would read of these.
+    """
+    unknowns = program.unknowns
+    w = np.zeros(unknowns.size)
+    w[: unknowns.parameters] = task.problem.free.to_unconstrained(task.table.as_dict())
+    known = unknowns.states + unknowns.partners
+    at = unknowns.at_points
+    w[at[:, :known]] = _at_points(points, near) / unknowns.scale[:known]
+    missed = np.array(program.constraints(w)).ravel()[: unknowns.points * unknowns.residual_scale.size]
+    w[at[:, known:]] = missed.reshape(unknowns.points, -1)[:, unknowns.partners :]
+    return w
+
+
+def _at_points(points: Points, near: PeriodicSolution) -> NDArray[np.float64]:
+    """The motions at the points by straight lines, (P, states and their partners)."""
+    values = np.concatenate([near.trajectory.x, near.trajectory.y]).T
+    found = np.empty_like(values)
+    for dwell in range(len(near.mesh.layout.counts)):
+        mine = near.mesh.layout.dwell == dwell
+        nodes, wanted = np.asarray(near.mesh.phase)[mine], np.asarray(points.mesh.phase)[mine]
+        columns = [np.interp(wanted, nodes, column, period=2.0 * np.pi) for column in values[mine].T]
+        found[mine] = np.stack(columns, axis=1)
+    return found

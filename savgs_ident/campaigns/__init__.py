@@ -1,0 +1,1 @@
+"""Many campaigns: parameters and their trends."""

@@ -1,0 +1,347 @@
+"""Many campaigns: found, those without a result identified side by side, each kept at once, and all put together.
+
+    study = run_campaigns(["recordings/"], "out/campaign", free=("mu_r", "c_sd"))
+    print(study.trends["mu_r"].line)
+
+A campaign is identified by itself, in whichever process and on whichever machine: texts in, texts out
+(:func:`identify_one`). What becomes of it is kept before the next one is waited for, so that a run that was stopped
+goes on where it was.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from savgs_ident import __version__
+from savgs_ident.campaigns.search import Found, check_apart, find_campaigns, in_natural_order
+from savgs_ident.campaigns.store import (
+    Kept,
+    MadeFrom,
+    forget_parts,
+    has_result,
+    keep_result,
+    kept_result,
+    made_from,
+)
+from savgs_ident.campaigns.study import CampaignRow, CampaignStudy, RowStatus, row_of, study_campaigns
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.executor import Lost, cores, run_tasks
+from savgs_ident.core.files import spelled_out
+from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.presentation import Progress, no_progress
+from savgs_ident.fit.least_squares import FitSettings
+from savgs_ident.fit.public import fit_with
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig, rig_content, rig_text
+from savgs_ident.recordings.channels import read_channel_map
+from savgs_ident.recordings.read import map_digest, read_campaign
+from savgs_ident.simulate.program_cache import (
+    compute_on_one_core,
+    make_room_for_programs,
+    use_persistent_cache,
+)
+
+FILE_NAMES = (
+    "campaign.json", "campaigns.csv", "campaigns.parquet", "campaign.png", "campaign.pdf", "campaign.html"
+)  # fmt: skip
+"""The files of a study, which no campaign may be named like."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A campaign to identify, and how.
+
+    Attributes:
+        campaign: its file or folder.
+        rig: the rig file.
+        channels: the map of the campaign's channels.
+        model: "simtr" or "simqc".
+        free: parameters to identify; the paper's if empty.
+        settings: of the fit.
+        max_frequency: leave out faster dwells [Hz].
+        command: the command line, for the provenance.
+    """
+
+    campaign: Path
+    rig: Path
+    channels: Path | None
+    model: str
+    free: tuple[str, ...]
+    settings: FitSettings
+    max_frequency: float | None
+    command: tuple[str, ...]
+
+    def model_of(self, rig: bytes) -> RigModel:
+        """The model, with ``rig`` in the rig file; raises :class:`InputError` if that is none."""
+        return RigModel(parse_rig(rig, self.rig), MODELS[self.model])
+
+
+@dataclass(frozen=True)
+class Task:
+    """A campaign to identify as it was when the run began.
+
+    Attributes:
+        job: what.
+        source: what to call the campaign.
+        rig: content of the rig file when the run began; its path in ``job`` is only its name.
+        data_sha256: digest of the recordings when the run began.
+        channels_sha256: the same of the map of their channels, None if there was none.
+        version: of this package where the run began.
+    """
+
+    job: Job
+    source: str
+    rig: bytes
+    data_sha256: str
+    channels_sha256: str | None
+    version: str
+
+
+@dataclass(frozen=True)
+class Failure:
+    """No result, and why, in one line; ``unreadable`` if the campaign itself could not be used."""
+
+    reason: str
+    unreadable: bool = False
+
+
+Outcome = Kept | Failure
+"""What becomes of a campaign."""
+
+Work = Callable[[Task], Outcome]
+Spread = Callable[[Work, Sequence[Task]], Iterator[tuple[int, Outcome | Lost]]]
+"""Does the work on all tasks; gives their numbers and results as they come."""
+
+
+@dataclass(frozen=True)
+class Jobs:
+    """What to identify: ``one`` says how each, its campaign left open; ``arguments`` where they are."""
+
+    arguments: tuple[Path, ...]
+    one: Job
+    scheduler: str | None
+    workers: int
+
+
+def run_campaigns(
+    folders: str | Path | Sequence[str | Path],
+    out: str | Path,
+    *,
+    rig: str | Path | None = None,
+    model: str = "simtr",
+    free: Sequence[str] = (),
+    channels: str | Path | None = None,
+    orders: int = 9,
+    fixed_tolerances: bool = False,
+    max_frequency: float | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    command: Sequence[str] = (),
+    progress: Progress = no_progress,
+) -> CampaignStudy:
+    """Identify many campaigns side by side, and say whether the parameters agree and whether they change.
+
+    Args:
+        folders: campaigns as :func:`savgs_ident.recordings.read.read_campaign` takes them, and folders of several:
+            one in each file or subfolder.
+        out: folder in which each campaign's result is kept; a run that was stopped goes on from there.
+        rig: rig file to start from; the shipped one if left out.
+        model: "simtr", with rail and tyre friction, or "simqc", without.
+        free: names of the parameters to identify; the paper's if empty.
+        channels: the map of the channels.
+        orders: highest harmonic order to fit.
+        fixed_tolerances: hold what is known to a tolerance at its value.
+        max_frequency: leave out faster dwells [Hz].
+        workers: campaigns at a time on this machine, each on one core; as many as there are cores if left out.
+        scheduler: address of a Dask cluster to work on instead.
+        command: what the results say that they were made by.
+        progress: is told what is being done.
+
+    A campaign that fails is a row that says why, the others go on. Raises :class:`InputError` for what concerns all:
+    an argument, the rig, the settings, the folder, the cluster.
+    """
+    one = Job(
+        Path(),
+        Path(rig) if rig is not None else default_rig_path(),
+        None if channels is None else Path(channels),
+        model,
+        tuple(free),
+        FitSettings(orders=orders, fixed_tolerances=fixed_tolerances),
+        max_frequency,
+        tuple(command),
+    )
+    given = [folders] if isinstance(folders, str | Path) else folders
+    jobs = Jobs(tuple(map(Path, given)), one, scheduler, workers or cores())
+    return identify_all(jobs, identify_one, spread_of(jobs), Path(out), progress)
+
+
+def spread_of(jobs: Jobs) -> Spread:
+    """The executor with what the jobs say of it."""
+    return partial(run_tasks, workers=jobs.workers, scheduler=jobs.scheduler)
+
+
+def identify_all(
+    jobs: Jobs, work: Work, spread: Spread, out: Path, progress: Progress = no_progress
+) -> CampaignStudy:
+    """Identify what has no result in the folder ``out`` yet, and put all together.
+
+    ``work`` makes the result of a task and ``spread`` does it on all, see :func:`spread_of`. Raises as
+    :func:`run_campaigns` does.
+    """
+    # As it is now: a change during the run concerns no campaign.
+    rig = rig_content(jobs.one.rig)
+    settings = _settings(jobs.one, rig)
+    found = find_campaigns(jobs.arguments, FILE_NAMES)
+    check_apart(out, jobs.arguments, found, FILE_NAMES)
+    prepare_folder(out)
+    forget_parts(out, FILE_NAMES)
+    rows, pending = _what_is_there(jobs.one.channels, found, rig, settings, out, progress)
+    if pending:
+        progress(f"identifying {_campaigns(len(pending))}")
+        for number, outcome in spread(work, [_task(jobs, each, rig) for each in pending]):
+            rows.append(_conclude(pending[number], outcome, out))
+            progress(f"{len(rows)} of {len(found)} done; {rows[-1]}")
+    study = study_campaigns(rows, in_natural_order)
+    return replace(study, settings=settings).made_by(jobs.one.command)
+
+
+def identify_one(task: Task) -> Outcome:
+    """Fit the campaign; whatever goes wrong with it is its result and ends nothing else."""
+    try:
+        # There are as many of these as there are cores.
+        compute_on_one_core()
+        use_persistent_cache()
+        make_room_for_programs()
+        with threadpool_limits(1, "blas"):
+            return _identified(task)
+    except InputError as error:
+        return Failure(one_line(error), unreadable=True)
+    except OSError as error:
+        return Failure(one_line(f"{task.source}: {error.strerror or error}"), unreadable=True)
+    except Exception as error:
+        return Failure(one_line(f"{type(error).__name__}: {error}"))
+
+
+def one_line(text: object) -> str:
+    """``text`` in one line that can be written anywhere."""
+    return spelled_out(" ".join(str(text).split()))
+
+
+def _identified(task: Task) -> Kept:
+    if task.version != __version__:
+        raise InputError(
+            f"a worker has version {__version__} of savgs-ident, the run began with {task.version}",
+            source=task.source,
+            remedy="install the same version for every worker",
+        )
+    job = task.job
+    campaign = read_campaign(job.campaign, job.channels)
+    if campaign.sha256 != task.data_sha256:
+        raise InputError(
+            "is not what it was when the run began",
+            source=task.source,
+            remedy="let the recording end, and run again",
+        )
+    if map_digest(job.campaign, job.channels) != task.channels_sha256:
+        raise InputError(
+            "the map of its channels is not what it was when the run began",
+            source=task.source,
+            remedy="run again",
+        )
+    found = fit_with(job.model_of(task.rig), campaign, job.free, job.settings, job.max_frequency)
+    named = replace(found, origin=replace(found.origin, data=task.source, command=job.command))
+    return Kept(named.to_json(), rig_text(named.model.rig), campaign.start)
+
+
+@dataclass(frozen=True)
+class _Pending:
+    """A campaign without a result, and what its result will be made from."""
+
+    found: Found
+    origin: MadeFrom
+
+
+def _settings(one: Job, content: bytes) -> dict[str, Any]:
+    """What a result depends on besides data and rig, this program's version among it; checks them, too."""
+    if one.channels is not None:
+        read_channel_map(one.channels)
+    model = one.model_of(content)
+    return {
+        "model": one.model,
+        "free": list(model.before.free(one.free)),
+        "max_frequency_hz": one.max_frequency,
+        "fit": asdict(one.settings),
+        "version": __version__,
+    }
+
+
+def _what_is_there(
+    channels: Path | None,
+    found: Sequence[Found],
+    rig: bytes,
+    settings: dict[str, Any],
+    out: Path,
+    progress: Progress,
+) -> tuple[list[CampaignRow], list[_Pending]]:
+    """The campaigns with a result from the same data, rig and settings, and the others."""
+    rows, pending, others = [], [], 0
+    for each in found:
+        progress(f"looking at {each.name}")
+        try:
+            origin = made_from(each.path, channels, rig, settings)
+        except (InputError, OSError) as error:
+            told = error if isinstance(error, InputError) else f"{each.source}: {error.strerror or error}"
+            rows.append(_failed(each, one_line(told), unreadable=True))
+            continue
+        kept = kept_result(out / each.name, origin.digest)
+        if kept is None:
+            pending.append(_Pending(each, origin))
+            others += has_result(out / each.name)
+        else:
+            rows.append(_fitted(each, kept, origin))
+    there = len(found) - len(pending) - sum(each.unreadable for each in rows)
+    if there:
+        progress(
+            f"{_campaigns(there)} identified in an earlier run, from the same data, rig and settings: kept"
+        )
+    if others:
+        progress(f"{_campaigns(others)} identified from other data, another rig or other settings: done anew")
+    return rows, pending
+
+
+def _task(jobs: Jobs, pending: _Pending, rig: bytes) -> Task:
+    path, channels = pending.found.path, jobs.one.channels
+    if jobs.scheduler is not None:
+        # Workers of a cluster run in other folders.
+        path, channels = path.absolute(), None if channels is None else channels.absolute()
+    one = replace(jobs.one, campaign=path, channels=channels)
+    origin = pending.origin
+    return Task(one, pending.found.source, rig, origin.data_sha256, origin.channels_sha256, __version__)
+
+
+def _conclude(pending: _Pending, outcome: Outcome | Lost, out: Path) -> CampaignRow:
+    """Keep a result; a campaign without one is a failed one."""
+    if isinstance(outcome, Kept):
+        keep_result(out / pending.found.name, outcome, pending.origin)
+        return _fitted(pending.found, outcome, pending.origin)
+    unreadable = isinstance(outcome, Failure) and outcome.unreadable
+    return _failed(pending.found, one_line(outcome.reason), unreadable)
+
+
+def _fitted(found: Found, kept: Kept, origin: MadeFrom) -> CampaignRow:
+    return row_of(found.name, found.source, kept.record, kept.start, origin.data_sha256)
+
+
+def _failed(found: Found, reason: str, unreadable: bool) -> CampaignRow:
+    return CampaignRow(
+        found.name, found.source, RowStatus.failed, reason, None, None, {}, unreadable=unreadable
+    )
+
+
+def _campaigns(count: int) -> str:
+    return "1 campaign" if count == 1 else f"{count} campaigns"

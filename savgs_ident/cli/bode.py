@@ -1,0 +1,45 @@
+"""``savgs-ident bode``: a model against a campaign, without fitting."""
+
+from pathlib import Path
+
+from savgs_ident.cli.console import Reporter, ends_with_code
+from savgs_ident.cli.options import (
+    CampaignArgument,
+    ChannelsOption,
+    JsonOption,
+    ModelArgument,
+    OrdersOption,
+    OutOption,
+    QuietOption,
+    read_campaign,
+)
+
+
+@ends_with_code
+def bode(
+    model: ModelArgument,
+    campaign: CampaignArgument,
+    channels: ChannelsOption = None,
+    orders: OrdersOption = 9,
+    out: OutOption = Path("out/bode"),
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> int:
+    """Draw the response of a model against a campaign: magnitude, phase, peak to peak, residuals. No fitting.
+
+    Writes bode.png, bode.pdf and bode.json.
+
+    Exit code 1 if a periodic motion was not found.
+
+    Example: savgs-ident bode out/fit/model.toml campaign.csv.gz
+    """
+    import savgs_ident as si
+    from savgs_ident.core.output import prepare_folder
+
+    reporter = Reporter(json, quiet)
+    prepare_folder(out)
+    shown = si.load_model(model)
+    with reporter.working() as progress:
+        compared = si.compare(shown, read_campaign(campaign, channels, progress), orders, progress)
+        files = compared.save(out, progress)
+    return reporter.conclude(compared, files)

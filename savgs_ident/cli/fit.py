@@ -1,0 +1,71 @@
+"""``savgs-ident fit``: identify the rig."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from savgs_ident.cli.console import Reporter, ends_with_code
+from savgs_ident.cli.options import (
+    CampaignArgument,
+    ChannelsOption,
+    FitOrdersOption,
+    FixedTolerancesOption,
+    FreeOption,
+    JsonOption,
+    MaxFrequencyOption,
+    ModelName,
+    ModelOption,
+    OutOption,
+    QuietOption,
+    RigOption,
+    command_line,
+    effects_of,
+    read_campaign,
+)
+
+
+@ends_with_code
+def fit(
+    campaign: CampaignArgument,
+    rig: RigOption = None,
+    model: ModelOption = ModelName.simtr,
+    free: FreeOption = None,
+    channels: ChannelsOption = None,
+    orders: FitOrdersOption = 9,
+    fixed_tolerances: FixedTolerancesOption = False,
+    peak_to_peak: Annotated[
+        bool, typer.Option("--peak-to-peak", help="Fit peak-to-peak values only, as the paper did.")
+    ] = False,
+    max_frequency: MaxFrequencyOption = None,
+    out: OutOption = Path("out/fit"),
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> int:
+    """Identify the rig from a campaign: parameters with errors, how well they fit, what the data can tell.
+
+    Writes fit.json, model.toml (the identified rig), bode.png and bode.pdf.
+
+    Exit code 1 if the fit did not converge or the data cannot tell every parameter.
+
+    Example: savgs-ident fit campaign.csv.gz --free mu_r c_sd --max-frequency 4
+    """
+    import savgs_ident as si
+    from savgs_ident.core.output import prepare_folder
+
+    reporter = Reporter(json, quiet)
+    prepare_folder(out)
+    start = si.load_model(rig, effects_of(model))
+    with reporter.working() as progress:
+        found = si.fit(
+            start,
+            read_campaign(campaign, channels, progress),
+            free or (),
+            orders=orders,
+            peak_to_peak=peak_to_peak,
+            fixed_tolerances=fixed_tolerances,
+            max_frequency=max_frequency,
+            progress=progress,
+        ).made_by(command_line())
+        files = found.save(out, progress)
+    return reporter.conclude(found, files)

@@ -1,0 +1,38 @@
+"""``savgs-ident inspect``: what is in a campaign."""
+
+from pathlib import Path
+
+from savgs_ident.cli.console import Reporter, ends_with_code
+from savgs_ident.cli.options import (
+    CampaignArgument,
+    ChannelsOption,
+    JsonOption,
+    OutOption,
+    QuietOption,
+    read_campaign,
+)
+
+
+@ends_with_code
+def inspect(
+    campaign: CampaignArgument,
+    channels: ChannelsOption = None,
+    out: OutOption = Path("out/inspect"),
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> int:
+    """Show what is in a campaign: tests, channels, amplitudes, signal-to-noise, noise, warnings.
+
+    Writes inspect.json, inspect.png and inspect.pdf.
+
+    Example: savgs-ident inspect campaign.csv.gz
+    """
+    import savgs_ident as si
+    from savgs_ident.core.output import prepare_folder
+
+    reporter = Reporter(json, quiet)
+    prepare_folder(out)
+    with reporter.working() as progress:
+        summary = si.inspect(read_campaign(campaign, channels, progress), progress=progress)
+        files = summary.save(out, progress)
+    return reporter.conclude(summary, files)

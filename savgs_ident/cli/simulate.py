@@ -1,0 +1,69 @@
+"""``savgs-ident simulate``: what a model does on a cam, at frequencies or along a sweep."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from savgs_ident.cli.console import Reporter, ends_with_code
+from savgs_ident.cli.options import (
+    EffectsOption,
+    JsonOption,
+    ModelArgument,
+    OutOption,
+    QuietOption,
+    read_campaign,
+    read_model,
+)
+
+
+@ends_with_code
+def simulate(
+    model_file: ModelArgument,
+    frequency: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--frequency", metavar="HZ ...", help="Frequencies of the cam; 28 from 0.5 to 6 by default."
+        ),
+    ] = None,
+    sweep: Annotated[
+        bool, typer.Option("--sweep", help="A sweep from 0 to 3 Hz in 60 s instead, from standstill.")
+    ] = False,
+    campaign: Annotated[
+        Path | None,
+        typer.Option("--campaign", metavar="CAMPAIGN", help="Road and link as in the dwells of a campaign."),
+    ] = None,
+    model: EffectsOption = None,
+    orders: Annotated[int, typer.Option("--orders", min=1, help="Highest harmonic order.")] = 15,
+    out: OutOption = Path("out/simulate"),
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> int:
+    """Simulate a model on the cam: its periodic responses at given frequencies, or one sweep.
+
+    Writes simulate.json, simulate.csv, simulate.png and simulate.pdf.
+
+    Exit code 1 if a motion was not found.
+
+    Example: savgs-ident simulate out/fit/model.toml --frequency 1 2 2.35
+    """
+    import savgs_ident as si
+    from savgs_ident.core.output import prepare_folder
+
+    if sum((bool(frequency), sweep, campaign is not None)) > 1:
+        raise typer.BadParameter("choose one of --frequency, --sweep and --campaign")
+    for value in frequency or ():
+        if not 0.0 < value < float("inf"):
+            raise typer.BadParameter(f"--frequency {value:g}: give a frequency above 0 Hz")
+    reporter = Reporter(json, quiet)
+    prepare_folder(out)
+    shown = read_model(model_file, model)
+    with reporter.working() as progress:
+        found: si.SimulatedResponse | si.SimulatedSweep
+        if sweep:
+            found = si.simulate_sweep(shown, progress)
+        else:
+            recorded = None if campaign is None else read_campaign(campaign, None, progress)
+            found = si.simulate(shown, frequency or (), recorded, orders, progress)
+        files = found.save(out, progress)
+    return reporter.conclude(found, files)

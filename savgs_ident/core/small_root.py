@@ -1,0 +1,97 @@
+"""Roots of small systems of equations, a few unknowns each, inside larger computations.
+
+Newton's method with the exact Jacobian. The forces of the rig are piecewise smooth in the unknowns (a friction
+changes sign), so a step may land on another piece: steps are repeated until the next one is negligible. A root that
+was not found is NaN, never a plausible number.
+
+Derivatives, of any order and in either direction, come from the implicit function theorem at the root, not
+from the iterations.
+
+    >>> root = find_root(lambda x: x**2 - 2.0, jnp.ones(1), jnp.ones(1))
+    >>> round(float(root[0]), 9)
+    1.414213562
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+PRECISION = 1e-11
+"""Largest remaining Newton step at a root, relative to the typical size of its unknown."""
+
+LIMIT = 30
+"""Most iterations."""
+
+Vector = Float[Array, " n"]
+
+
+class _NewtonState(NamedTuple):
+    root: Vector
+    step_left: Float[Array, ""]
+    iterations: Array
+
+
+def _columns(slope: Callable[[Vector], Vector], like: Vector) -> Float[Array, "n n"]:
+    """The matrix of a linear function, column by column: for few unknowns cheaper than all at once."""
+    return jnp.stack([slope(unit) for unit in jnp.unstack(jnp.eye(like.shape[0]))], axis=1)
+
+
+def solve_dense(matrix: Float[Array, "n n"], right: Vector) -> Vector:
+    """Solve a small linear system by Gaussian elimination with scalars, unrolled.
+
+    Rows are taken in the order given: for matrices whose leading minors do not vanish, such as mass
+    matrices. Numbers are in scaled coordinates or in any consistent units of SI.
+    """
+    size = matrix.shape[0]
+    rows = [[*jnp.unstack(matrix[i]), right[i]] for i in range(size)]
+    for i in range(size):
+        rows[i] = [value / rows[i][i] for value in rows[i]]
+        for j in range(size):
+            if j != i:
+                factor = rows[j][i]
+                rows[j] = [mine - factor * other for mine, other in zip(rows[j], rows[i], strict=True)]
+    return jnp.stack([row[size] for row in rows])
+
+
+LinearSolver = Callable[[Float[Array, "n n"], Vector], Vector]
+"""Solves a matrix for a right side."""
+
+
+def find_root(
+    function: Callable[[Vector], Vector],
+    start: Vector,
+    scale: Vector,
+    precision: float = PRECISION,
+    solve: LinearSolver = solve_dense,
+) -> Vector:
+    """The root (n,) of ``function`` to which Newton's method converges from ``start``; NaN if it does not converge.
+
+    ``scale`` (n,) is the typical size of each unknown [its unit], ``precision`` [1] that of the root in it;
+    ``solve`` must suit the function's Jacobian. The function may be closed over traced values; derivatives with
+    respect to these are exact.
+    """
+
+    def newton(function: Callable[[Vector], Vector], start: Vector) -> Vector:
+        def advance(now: _NewtonState) -> _NewtonState:
+            residual, slope = jax.linearize(function, now.root)
+            jacobian = _columns(slope, now.root)
+            root = now.root - solve(jacobian, residual)
+            # Where the same piece holds at the new point, the old Jacobian gives the remaining step.
+            step_left = jnp.max(jnp.abs(solve(jacobian, function(root))) / scale)
+            return _NewtonState(root, step_left, now.iterations + 1)
+
+        def unfinished(now: _NewtonState) -> Array:
+            return (now.step_left > precision) & (now.iterations < LIMIT)
+
+        begin = _NewtonState(start, jnp.asarray(jnp.inf, start.dtype), jnp.asarray(0))
+        end = jax.lax.while_loop(unfinished, advance, begin)
+        return jnp.where(end.step_left <= precision, end.root, jnp.nan)
+
+    def linear(function: Callable[[Vector], Vector], right: Vector) -> Vector:
+        return solve(_columns(function, right), right)
+
+    root: Vector = jax.lax.custom_root(function, start, newton, linear)
+    return root

@@ -1,1 +1,0 @@
-"""The blind trial: campaigns with a hidden effect, and how well the diagnosis finds it."""

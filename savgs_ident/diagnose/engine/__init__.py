@@ -1,1 +1,0 @@
-"""The engine of a diagnosis: it knows a differentiable prediction, data with covariance and candidate terms only."""

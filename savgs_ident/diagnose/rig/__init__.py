@@ -1,1 +1,0 @@
-"""The quarter-car rig as a plant of the engine."""

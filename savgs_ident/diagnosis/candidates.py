@@ -1,0 +1,97 @@
+"""Hypotheses as a report shows them: with probabilities, parameters and what they gain on tests left out."""
+
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+
+from savgs_ident.diagnosis.held_out import HeldOut
+from savgs_ident.diagnosis.result import NONE, Candidate, Confusable, Estimate, Hypothesis, NotJudgeable
+from savgs_ident.diagnosis.score_test import Score, cosine
+from savgs_ident.diagnosis.search import Findings, excess, left_over
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.diagnosis.verdict import WeighedHypothesis, probabilities
+from savgs_ident.inference.find_map import LaplaceFit, Search
+
+WITHIN = 1.959964
+"""Standard deviations of a 95 % interval."""
+
+NEARLY = 1e-3
+"""Two candidates whose cosine is nearer to 1 are one."""
+
+
+def candidates_of(
+    findings: Findings,
+    weighed: Sequence[WeighedHypothesis],
+    held: Mapping[Hypothesis, HeldOut],
+    search: Search,
+    constants: DecisionConstants = DEFAULTS,
+) -> tuple[Candidate, ...]:
+    """All hypotheses, the most probable first, with what they predict of tests left out where that was ``held``."""
+    scores = {score.term.name: score for score in findings.scores}
+    gap, found = excess(search, findings.base), []
+    for each, share in zip(weighed, probabilities(weighed), strict=True):
+        hypothesis, mode = each.hypothesis, each.mode
+        gain = held[hypothesis].mean - held[NONE].mean if hypothesis in held else float("nan")
+        closed = float("nan")
+        if mode is not None and gap > constants.negligible_misfit:
+            left = left_over(search, findings.base, mode, constants)
+            closed = 1.0 - left if hypothesis.effects else 0.0
+        found.append(
+            Candidate(
+                hypothesis=hypothesis,
+                probability=float(share),
+                score_sigma=joint_sigma([scores[name] for name in hypothesis.effects if name in scores]),
+                heldout_gain=float(gain),
+                share_closed=closed,
+                parameters=() if mode is None else estimates_of(mode, scores),
+                refitted=mode is not None,
+            )
+        )
+    return tuple(found)
+
+
+def joint_sigma(scores: Sequence[Score]) -> float:
+    """Significance of candidates together: what they share counts once. 0 for none of them."""
+    if not scores:
+        return 0.0
+    sigma = np.array([each.sigma for each in scores])
+    alike = np.array([[1.0 if one is other else cosine(one, other) for other in scores] for one in scores])
+    return max(float(sigma.max()), float(np.sqrt(sigma @ np.linalg.pinv(alike, rcond=NEARLY) @ sigma)))
+
+
+def estimates_of(mode: LaplaceFit, scores: Mapping[str, Score]) -> tuple[Estimate, ...]:
+    """The parameters of a hypothesis's terms with their 95 % intervals."""
+    return estimates_among(mode, {c.name for name in mode.terms for c in scores[name].term.coordinates})
+
+
+def estimates_among(mode: LaplaceFit, names: Collection[str]) -> tuple[Estimate, ...]:
+    """The named parameters of a hypothesis with their 95 % intervals."""
+    sd = np.sqrt(np.diag(mode.covariance()))
+    found = []
+    for each, x, s in zip(mode.coordinates, mode.x.tolist(), sd.tolist(), strict=True):
+        if each.name in names:
+            low, high = each.value(x - WITHIN * s), each.value(x + WITHIN * s)
+            found.append(Estimate(each.name, each.value(x), low, high, each.unit))
+    return tuple(found)
+
+
+def not_judgeable_of(findings: Findings, constants: DecisionConstants = DEFAULTS) -> tuple[NotJudgeable, ...]:
+    """Effects that this campaign could not have shown at any size that they may have."""
+    found = []
+    for score in findings.scores:
+        amplitude = score.term.amplitudes[0]
+        room = max(abs(amplitude.upper - amplitude.centre), abs(amplitude.lower - amplitude.centre))
+        if score.smallest > min(room, constants.judgeable_sizes * amplitude.scale / 2.0):
+            found.append(NotJudgeable(score.term.name, amplitude.name, float(score.smallest), amplitude.unit))
+    return tuple(found)
+
+
+def confusable_of(findings: Findings, constants: DecisionConstants = DEFAULTS) -> tuple[Confusable, ...]:
+    """Pairs of effects that look alike in this campaign, the most alike first."""
+    found = []
+    for index, one in enumerate(findings.scores):
+        for other in findings.scores[index + 1 :]:
+            alike = abs(cosine(one, other))
+            if alike > constants.lookalike_cosine:
+                found.append(Confusable((one.term.name, other.term.name), alike))
+    return tuple(sorted(found, key=lambda each: -each.cosine))

@@ -1,0 +1,333 @@
+"""The diagnosis of a campaign: recalibrate, locate, select, hold out, and say what is missing.
+
+The stages in order, each a whole record:
+
+1. the baseline recalibrated (:func:`~savgs_ident.diagnosis.model_selection.recalibrate`);
+2. hypotheses and ports compared (:func:`~savgs_ident.diagnosis.model_selection.select_model`);
+3. what is named found again on a finer mesh, while the next tests are looked for and the rivals predict tests that
+   were left out;
+4. the corrected model: the named effects, or a law learned at the port of something unknown;
+5. the result, put together once from all of these.
+"""
+
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.parallel import in_parallel, side_by_side
+from savgs_ident.core.parameter import ParameterTable
+from savgs_ident.core.presentation import Progress, no_progress
+from savgs_ident.diagnosis.candidates import candidates_of, confusable_of, estimates_among, not_judgeable_of
+from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
+from savgs_ident.diagnosis.gap import Rows, cycle_positions, gap_map, shrinks
+from savgs_ident.diagnosis.held_out import HeldOut, held_out_by_law, hold_out
+from savgs_ident.diagnosis.learning import LearnedLaw, learn
+from savgs_ident.diagnosis.location_hypotheses import force_port
+from savgs_ident.diagnosis.loops import force_loops
+from savgs_ident.diagnosis.model_selection import (
+    DiagnosisEvidence,
+    DiagnosisProblem,
+    recalibrate,
+    refit_named,
+    select_model,
+)
+from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
+from savgs_ident.diagnosis.next_test import next_tests
+from savgs_ident.diagnosis.result import (
+    NONE,
+    UNKNOWN,
+    Diagnosis,
+    DiagnosisSettings,
+    ForceLoop,
+    Hypothesis,
+    Learned,
+    NextTest,
+    PortShare,
+    Responses,
+    SweepShrink,
+)
+from savgs_ident.diagnosis.search import hypothesis_of
+from savgs_ident.diagnosis.sweep import ModelPoint, sweep_shrink
+from savgs_ident.diagnosis.verdict import indistinguishable, most_probable
+from savgs_ident.effects.effect import Effect
+from savgs_ident.effects.learned import coefficients_at
+from savgs_ident.inference.find_map import LaplaceFit
+from savgs_ident.inference.observations import Data
+from savgs_ident.plants.base import AbstractPlant
+from savgs_ident.plants.model import Model
+from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
+
+
+def baseline_problem(
+    measured: HarmonicResponse,
+    plant: AbstractPlant,
+    parameters: ParameterTable,
+    catalogue: Mapping[str, Effect],
+    settings: DiagnosisSettings,
+    models: Iterable[tuple[str, ...]] = (),
+) -> tuple[DwellProblem, Data]:
+    """A plant without effects, its catalogue less the effects that are left out, and the response as data.
+
+    ``models`` are sets of effects that such plants are known to have together. Raises :class:`InputError` for effects
+    that do not exist, for effects of the baseline that are to be left out, and for a response that cannot be used.
+    """
+    absent = sorted({*settings.without, *settings.baseline} - set(catalogue))
+    if absent:
+        raise InputError(
+            f"there is no effect '{absent[0]}'", remedy="choose among: " + ", ".join(sorted(catalogue))
+        )
+    needed = sorted({*settings.without} & {*settings.baseline})
+    if needed:
+        raise InputError(
+            f"the effect '{needed[0]}' is part of the baseline",
+            remedy="leave out effects that the baseline lacks",
+        )
+    offered = {name: each for name, each in catalogue.items() if name not in settings.without}
+    return dwell_problem(
+        measured,
+        plant,
+        parameters,
+        offered,
+        settings.baseline,
+        settings.free,
+        settings.orders,
+        settings.periodic,
+        models,
+    )
+
+
+def diagnose_dwells(
+    plant: DwellProblem,
+    data: Data,
+    measured: HarmonicResponse,
+    given: Model,
+    settings: DiagnosisSettings,
+    values: Mapping[str, float],
+    progress: Progress = no_progress,
+    sweep: SweepResponse | None = None,
+) -> Diagnosis:
+    """Diagnose the gap between the baseline of a plant in dwells and the measured response.
+
+    ``plant`` and ``data`` are what is compared, ``values`` (SI, by name) those that the baseline is given with. A
+    ``sweep`` is no part of the diagnosis: it is predicted, and compared. ``given``, the model as known before any
+    fit, is handed on to the result.
+
+    Look at ``converged`` of the result. Raises :class:`InputError` for a plant whose baseline has no periodic motion.
+    """
+    # Threads of the linear algebra only get in each other's way: its matrices are small, and there are many.
+    with threadpool_limits(1, "blas"):
+        return _diagnose(plant, data, measured, given, settings, values, progress, sweep)
+
+
+def _diagnose(
+    plant: DwellProblem,
+    data: Data,
+    measured: HarmonicResponse,
+    given: Model,
+    settings: DiagnosisSettings,
+    values: Mapping[str, float],
+    progress: Progress,
+    sweep: SweepResponse | None,
+) -> Diagnosis:
+    began = time.perf_counter()
+    problem = recalibrate(plant, data, values, progress, settings.constants)
+    selected = select_model(problem, progress)
+    others = [each for each in _compared(problem, selected) if each is not selected.chosen.mode]
+    (refitted, evidence), (tests, held) = side_by_side(
+        lambda: refit_named(problem, selected, progress),
+        lambda: (_next_tests(problem, selected, progress), _held_out(problem, others, progress)),
+    )
+    law = _learned(refitted, evidence, held, progress) if evidence.kind == "unknown" else None
+    chosen = [] if evidence.chosen.mode is None else [evidence.chosen.mode]
+    last, swept = side_by_side(
+        lambda: _held_out(refitted, chosen, progress),
+        lambda: _predict_sweep(refitted, evidence, law, values, sweep, progress),
+    )
+    linear = held_out_by_law(refitted.search, evidence.localisation.held_out)
+    held = {**held, **last, UNKNOWN: linear if law is None else law.held}
+
+    base, model = problem.base, _corrected_model(refitted, evidence, law)
+    rows = Rows(
+        before=problem.given,
+        recalibrated=held[NONE].rows,
+        after=held[model.hypothesis].rows,
+        channel=plant.channel,
+        channels=plant.channels,
+    )
+    together, by_channel = shrinks(data, rows)
+    # Before what is named was refitted: the alternatives were not.
+    alternatives = indistinguishable(selected.weighed, selected.chosen, problem.constants)
+    verdict = write_verdict(refitted, evidence, alternatives, together)
+    return Diagnosis(
+        model=settings.model,
+        effects=settings.baseline,
+        given=given,
+        parameters=base.values,
+        identified=model.fit.values,
+        verdict=verdict,
+        ports=tuple(
+            PortShare(each.name, each.share, each.free_input_share) for each in evidence.localisations
+        ),
+        map=gap_map(plant, data, base.prediction.rows),
+        cycle=cycle_positions(plant, data, base.prediction.rows),
+        candidates=candidates_of(
+            evidence.findings, evidence.weighed, held, refitted.search, problem.constants
+        ),
+        shrink=together,
+        by_channel=by_channel,
+        sweep=swept,
+        next_tests=tests,
+        not_judgeable=not_judgeable_of(evidence.findings, problem.constants),
+        confusable=confusable_of(evidence.findings, problem.constants),
+        loops=_loops(refitted, model, evidence, verdict.ports, progress),
+        responses=_responses(plant, problem.given, base.prediction.rows, model.rows),
+        measured=measured,
+        converged=all(each.status.ok for each in _decisive_fits(problem, selected, evidence, law)),
+        warnings=write_warnings(refitted, evidence, model.fit, together),
+        learned=None if law is None else _offered(law),
+        wall_s=time.perf_counter() - began,
+    )
+
+
+@dataclass(frozen=True)
+class _CorrectedModel:
+    """The model with what the verdict puts into it.
+
+    Attributes:
+        hypothesis: what that is.
+        fit: the fit of the named effects; of the baseline where none are named.
+        rows: of the response that it predicts [unit of each reading], (m,).
+    """
+
+    hypothesis: Hypothesis
+    fit: LaplaceFit
+    rows: NDArray[np.float64]
+
+
+def _corrected_model(
+    problem: DiagnosisProblem, evidence: DiagnosisEvidence, law: LearnedLaw | None
+) -> _CorrectedModel:
+    if evidence.kind == "unknown":
+        rows = evidence.localisation.held_out if law is None else law.mode.prediction.rows
+        return _CorrectedModel(UNKNOWN, problem.base, rows)
+    fit = evidence.chosen.mode or problem.base
+    return _CorrectedModel(hypothesis_of(fit), fit, fit.prediction.rows)
+
+
+def _decisive_fits(
+    problem: DiagnosisProblem,
+    selected: DiagnosisEvidence,
+    evidence: DiagnosisEvidence,
+    law: LearnedLaw | None,
+) -> list[LaplaceFit]:
+    """The fits that the verdict stands on."""
+    heaviest = most_probable(selected.findings, problem.constants)
+    fits = [problem.base, heaviest, selected.chosen.mode, evidence.chosen.mode]
+    return [each for each in (*fits, None if law is None else law.mode) if each is not None]
+
+
+def _compared(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> list[LaplaceFit]:
+    """The baseline and the two best fitted hypotheses: those that predict tests that were left out."""
+    return [problem.base, *sorted(evidence.findings.modes, key=lambda each: -each.evidence)[:2]]
+
+
+def _held_out(
+    problem: DiagnosisProblem, modes: Sequence[LaplaceFit], progress: Progress
+) -> dict[Hypothesis, HeldOut]:
+    """Predictions of tests left out, by hypothesis."""
+
+    def without_parts(mode: LaplaceFit) -> tuple[Hypothesis, HeldOut]:
+        hypothesis = hypothesis_of(mode)
+        progress(f"leaving tests out: {hypothesis}")
+        return hypothesis, hold_out(problem.search, mode, problem.terms(hypothesis), problem.constants)
+
+    return dict(in_parallel(without_parts, modes))
+
+
+def _learned(
+    problem: DiagnosisProblem,
+    evidence: DiagnosisEvidence,
+    held: Mapping[Hypothesis, HeldOut],
+    progress: Progress,
+) -> LearnedLaw | None:
+    """The law at the port of something unknown, on the nonlinear plant; None where that does not help."""
+    port = force_port(problem.plant.plant, evidence.port)
+    if port is None:
+        return None
+    progress(f"learning a force at the port {evidence.port}")
+    law = learn(problem.plant, problem.data, problem.base, port)
+    return law if law.mode.status.ok and law.held.mean > held[NONE].mean else None
+
+
+def _offered(law: LearnedLaw) -> Learned:
+    coefficients = coefficients_at(law.port)
+    return Learned(law.name, law.port.location, estimates_among(law.mode, coefficients), law.values)
+
+
+def _predict_sweep(
+    problem: DiagnosisProblem,
+    evidence: DiagnosisEvidence,
+    law: LearnedLaw | None,
+    values: Mapping[str, float],
+    sweep: SweepResponse | None,
+    progress: Progress,
+) -> SweepShrink | None:
+    """The gap of a recorded sweep: of the baseline as given, recalibrated, and with what is named.
+
+    Nothing comes after where a law is known to first order alone: no model can be solved with that.
+    """
+    if sweep is None:
+        return None
+    progress("predicting the sweep")
+    base = problem.base
+    points: list[ModelPoint] = [((), values), ((), base.values)]
+    if law is not None:
+        return sweep_shrink(law.problem, sweep, [*points, ((law.name,), law.values)])
+    if evidence.kind == "unknown":
+        return sweep_shrink(problem.plant, sweep, points)
+    fit = evidence.chosen.mode or base
+    return sweep_shrink(problem.plant, sweep, [*points, (fit.terms, fit.values)])
+
+
+def _responses(plant: DwellProblem, *rows: NDArray[np.float64]) -> Responses:
+    return Responses(*(plant.likelihood.harmonics(each[None], plant.shape)[0] for each in rows))
+
+
+def _loops(
+    problem: DiagnosisProblem,
+    model: _CorrectedModel,
+    evidence: DiagnosisEvidence,
+    ports: Sequence[str],
+    progress: Progress,
+) -> tuple[ForceLoop, ...]:
+    """The signal inferred at the first named port, beside the law of the effect that is named there."""
+    found = next((each for each in evidence.localisations if each.name in ports[:1]), None)
+    if found is None:
+        return ()
+    progress("inferring the signal at the port")
+    named = model.hypothesis.effects
+    here = next((problem.plant.catalogue[name] for name in named if problem.location(name) == ports[0]), None)
+    p = problem.plant.values(problem.base.values | model.fit.values)
+    return force_loops(problem.plant, p, problem.base.prediction.warm_start, found, here)
+
+
+def _next_tests(
+    problem: DiagnosisProblem, evidence: DiagnosisEvidence, progress: Progress
+) -> tuple[NextTest, ...]:
+    """Tests that separate the chosen hypothesis from the best fitted one that looks like it."""
+    chosen = evidence.chosen.mode
+    if chosen is None or len(chosen.terms) != 1:
+        return ()
+    pairs = [each.effects for each in confusable_of(evidence.findings, problem.constants)]
+    alike = {name for pair in pairs if chosen.terms[0] in pair for name in pair} - {*chosen.terms}
+    rivals = [mode for mode in evidence.findings.modes if len(mode.terms) == 1 and mode.terms[0] in alike]
+    if not rivals:
+        return ()
+    rival = max(rivals, key=lambda each: each.evidence)
+    progress(f"looking for a test that separates {chosen.terms[0]} from {rival.terms[0]}")
+    return next_tests(problem.search, problem.plant, chosen, rival)

@@ -1,0 +1,414 @@
+"""The problem of a diagnosis on dwells: a plant, what may be missing in it, what drives it and what was measured.
+
+    problem, data = dwell_problem(measured, TwoMass(), PARAMETERS, generic_effects(TwoMass.ports), free=("k", "c"))
+
+One model has every effect without states at its null: such an effect costs next to nothing there, so that one
+compiled program serves the baseline and all of them; only an effect with states of its own asks for another.
+Parameters that are not given are those of the plant, effects at their null.
+
+Parameters of the plant have the coordinates and priors that they have in a fit
+(:mod:`savgs_ident.inference.prior`). The amplitude of an effect begins at its null, two typical sizes wide; what
+shapes an effect is log-normal about its typical value, to a factor of two.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.parameter import Parameter, ParameterTable, merge_parameters
+from savgs_ident.core.status import joint_status
+from savgs_ident.core.transforms import known_to_tolerance
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.diagnosis.effect_sensitivities import columns_with_states, rehearse
+from savgs_ident.effects.base import AbstractFrictionLimitLaw
+from savgs_ident.effects.effect import Effect
+from savgs_ident.inference.likelihood import Likelihood, likelihood_of
+from savgs_ident.inference.observations import Data, Prediction, Term
+from savgs_ident.inference.prior import Coordinates, Linear, Logarithmic, sheet_coordinate
+from savgs_ident.inference.problem import harmonic_target, used_parameters
+from savgs_ident.plants.base import AbstractPlant, Excitation
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.collocation import Trajectory
+from savgs_ident.simulate.excitation import measured_excitation
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.mesh import Layout, layout_for
+from savgs_ident.simulate.periodic import (
+    PeriodicSettings,
+    PeriodicSolution,
+    adapt,
+    resolve,
+    simulate_periodic,
+)
+from savgs_ident.simulate.program_cache import placed, stored
+from savgs_ident.simulate.sensitivity import directional
+
+
+@eqx.filter_jit
+def rows_of(
+    model: AbstractPlant, likelihood: Likelihood, p: Values, solution: PeriodicSolution, orders: int
+) -> Array:
+    """Rows of a motion [unit of the reading], (m,)."""
+    return likelihood.rows(harmonics(model, p, solution, orders))
+
+
+@eqx.filter_jit
+def slopes_of(*args: Any) -> tuple[Array, ...]:
+    """Their slopes along directions (k, n) of named parameters, (k, m) [unit of the reading]."""
+    return stored(_directional_rows, *args)
+
+
+def _directional_rows(
+    model: AbstractPlant,
+    likelihood: Likelihood,
+    p: Values,
+    solution: PeriodicSolution,
+    directions: Array,
+    names: tuple[str, ...],
+    orders: int,
+) -> tuple[Array]:
+    along = directional(model, p, solution, names, orders)
+    return (jax.lax.map(lambda direction: likelihood.rows(along(direction)), directions),)
+
+
+TYPICAL = 2.0
+"""Width of an amplitude's prior in typical sizes."""
+
+SHAPE = 0.7
+"""Width of the logarithm of what shapes an effect."""
+
+
+def term_of(effect: Effect) -> Term:
+    """An effect as a candidate; what it shares with the plant's sheet (a tolerance) is not its own."""
+    own = [each for each in effect.parameters if each.tolerance == 0.0]
+    amplitudes = tuple(_amplitude(each, effect.null[each.name]) for each in own if each.name in effect.null)
+    shapes = tuple(_shape(each) for each in own if each.name not in effect.null)
+    return Term(effect.name, effect.port.location, amplitudes, shapes, effect.tried)
+
+
+def _amplitude(each: Parameter, null: float) -> Linear:
+    return Linear(each.name, each.unit, null, TYPICAL * abs(each.value - null), each.lower, each.upper)
+
+
+def _shape(each: Parameter) -> Logarithmic:
+    return Logarithmic(each.name, each.unit, each.value, SHAPE, each.lower, each.upper)
+
+
+WIDTH = 52
+"""Directions that are solved for at a time: a program for each number would have to be compiled."""
+
+ITERATIONS = 25
+"""Most Newton steps from one point of a search to the next."""
+
+
+@dataclass(frozen=True)
+class DwellProblem:
+    """A plant, the effects that it may have, and what drives it.
+
+    Attributes:
+        plant: the plant without any of the effects.
+        parameters: its parameters as known before the data.
+        catalogue: all effects by name.
+        baseline: names of those that the baseline has.
+        free: names of the parameters that the baseline identifies.
+        excitation: the plant's inputs in the dwells.
+        likelihood: what is compared, as rows.
+        shape: tests, channels and orders of the harmonics that the likelihood takes.
+        settings: how finely to solve.
+        models: sets of effects that such plants are known to have together.
+        corrections: by terms, what is added to the rows [unit of each], (m,), for the motions that are
+            found on finitely many nodes.
+    """
+
+    plant: AbstractPlant
+    parameters: ParameterTable
+    catalogue: Mapping[str, Effect]
+    baseline: tuple[str, ...]
+    free: tuple[str, ...]
+    excitation: Excitation
+    likelihood: Likelihood
+    shape: tuple[int, int, int]
+    settings: PeriodicSettings
+    models: tuple[tuple[str, ...], ...] = ()
+    corrections: Mapping[tuple[str, ...], NDArray[np.float64]] = field(default_factory=dict)
+
+    @cached_property
+    def layout(self) -> Layout:
+        """How nodes share arrays."""
+        return layout_for(np.asarray(self.excitation.frequency), self.settings.nodes, self.settings.slow)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the plant's channels."""
+        return tuple(each.name for each in self.plant.channels)
+
+    @property
+    def orders(self) -> int:
+        """Highest order of the harmonics."""
+        return self.shape[2] - 1
+
+    @property
+    def channel(self) -> NDArray[np.intp]:
+        """The channel of each row, an index of the plant's channels, (m,)."""
+        tests, channels, orders = self.shape
+        every = np.broadcast_to(np.arange(channels)[None, :, None, None], (tests, channels, orders, 2))
+        return np.asarray(every.ravel()[self.likelihood.place])
+
+    @cached_property
+    def table(self) -> ParameterTable:
+        """All parameters, effects that the baseline does not have at their null."""
+        brought = (ParameterTable(effect.parameters) for effect in self.catalogue.values())
+        table = merge_parameters(self.parameters, *brought)
+        absent = [each for name, each in self.catalogue.items() if name not in self.baseline]
+        return table.with_values({name: null for each in absent for name, null in each.null.items()})
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of all parameters, sorted."""
+        return tuple(sorted(self.table))
+
+    @cached_property
+    def nuisances(self) -> Coordinates:
+        """The free parameters of the baseline, then those known to a tolerance that matter.
+
+        What is identified and known to a tolerance all the same, as the damping is, is held against it.
+        """
+        used = used_parameters(self.model(()), self.table)
+        known = [name for name in known_to_tolerance(self.table, self.free) if name in used]
+        return tuple(sheet_coordinate(self.table[name]) for name in (*self.free, *known))
+
+    @cached_property
+    def candidates(self) -> tuple[Term, ...]:
+        """All effects that the baseline does not have."""
+        terms = [term_of(effect) for name, effect in self.catalogue.items() if name not in self.baseline]
+        return tuple(term for term in terms if term.amplitudes)
+
+    @property
+    def known(self) -> tuple[tuple[str, ...], ...]:
+        """What the known sets of effects have beyond the baseline, if more than one effect."""
+        mine, can = set(self.baseline), {term.name for term in self.candidates}
+        beyond = (
+            tuple(name for name in each if name not in mine) for each in self.models if mine < set(each)
+        )
+        return tuple(each for each in beyond if len(each) > 1 and can >= set(each))
+
+    def model(self, terms: Sequence[str]) -> AbstractPlant:
+        """The baseline with ``terms``.
+
+        With all effects without states too, at their null, unless a term with states asks for a program of its own
+        anyway: then the smaller model is the sooner compiled. The anchor of a contact is a state of all models or of
+        none.
+        """
+        special = [name for name in terms if self.catalogue[name].states and name not in self.baseline]
+        wanted = {
+            name
+            for name, effect in self.catalogue.items()
+            if name in self.baseline or (not effect.states and (not special or name in terms))
+        }
+        for limits in self._friction_limits.values():
+            if not wanted.intersection(limits):
+                wanted.add(limits[0])
+        model = self.plant
+        for name, effect in self.catalogue.items():
+            if name in wanted:
+                model = model + effect
+        for name in special:
+            model = model + self.catalogue[name]
+        return model
+
+    @cached_property
+    def _friction_limits(self) -> Mapping[str, list[str]]:
+        """Names of the effects that load the bristle of a contact, by the name of its port."""
+        found: dict[str, list[str]] = {}
+        for name, effect in self.catalogue.items():
+            if isinstance(effect.law, AbstractFrictionLimitLaw):
+                found.setdefault(effect.port.name, []).append(name)
+        return found
+
+    def complete(self, terms: Sequence[str]) -> AbstractPlant:
+        """The baseline with ``terms`` and all effects without states, those at their null."""
+        model = self.model(())
+        for name in terms:
+            if self.catalogue[name].states and name not in self.baseline:
+                model = model + self.catalogue[name]
+        return model
+
+    def values(self, given: Mapping[str, float]) -> Values:
+        """All parameters, SI, with the given ones."""
+        return as_values(self.table.as_dict() | dict(given))
+
+    def start(self, values: Mapping[str, float]) -> PeriodicSolution:
+        """Periodic motions of the baseline from a cold start at ``values`` [SI].
+
+        Raises :class:`InputError` if there are none.
+        """
+        model, p = self.model(()), self.values(values)
+        solution = simulate_periodic(model, p, self.excitation, self.settings, self.layout)
+        if not all(status.ok for status in solution.status()):
+            lost = [
+                f"{f:.4g} Hz"
+                for f, status in zip(np.asarray(self.excitation.frequency), solution.status(), strict=True)
+                if not status.ok
+            ]
+            raise InputError(
+                "the baseline has no periodic motion at " + ", ".join(lost),
+                remedy="leave these dwells out with --max-frequency, or mend the parameters",
+            )
+        return solution
+
+    def rehearse(self) -> None:
+        """Have compiled what scores of candidates with states will ask for."""
+        with_states = [
+            self.catalogue[term.name] for term in self.candidates if self.catalogue[term.name].states
+        ]
+        rehearse(self.values({}), with_states, self.shape[0])
+
+    def refined(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
+    ) -> PeriodicSolution:
+        """The same motions on nodes that follow them. ``values`` are in SI."""
+        return adapt(
+            self.model(terms),
+            self.values(values),
+            warm_start,
+            warm_start.mesh.layout,
+            self.settings.iterations,
+        )
+
+    def predict(
+        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
+    ) -> Prediction:
+        """Rows with ``terms`` at ``values`` [SI], with slopes in ``names``, on the nodes of ``warm_start``."""
+        model, p = self.model(terms), placed(self.values(values))
+        solution = resolve(model, p, warm_start, ITERATIONS, self._fitting(model, warm_start))
+        rows = np.asarray(rows_of(model, self.likelihood, p, solution, self.orders))
+        rows = rows + self.corrections.get(terms, 0.0)
+        status = joint_status(solution.status())
+        return Prediction(rows, self.slopes(model, p, solution, names), status, solution)
+
+    def corrected(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
+    ) -> "DwellProblem":
+        """The problem with rows as they would be on nodes without end, about ``values`` [SI].
+
+        The rule of the collocation is of second order: four thirds of what twice the nodes change. The problem as it
+        is where they do not lead to a motion.
+        """
+        model, p, layout = self.model(terms), placed(self.values(values)), warm_start.mesh.layout
+        doubled = Layout(tuple(2 * count for count in layout.counts))
+        coarse = resolve(model, p, warm_start, ITERATIONS)
+        fine = adapt(model, p, coarse, doubled, self.settings.iterations)
+        if not all(status.ok for each in (coarse, fine) for status in each.status()):
+            return self
+        less, more = (
+            np.asarray(rows_of(model, self.likelihood, p, each, self.orders)) for each in (coarse, fine)
+        )
+        return replace(self, corrections={**self.corrections, terms: 4.0 / 3.0 * (more - less)})
+
+    def columns(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
+    ) -> list[NDArray[np.float64]]:
+        """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""
+        model = self.complete(terms)
+        found: dict[str, list[NDArray[np.float64]]] = {term.name: [] for term in candidates}
+        for one in range(max((len(term.tried) for term in candidates), default=0)):
+            some = [term for term in candidates if len(term.tried) > one]
+            shapes = {name: value for term in some for name, value in term.tried[one].items()}
+            p = placed(self.values(dict(values) | shapes))
+            for term, columns in self._columns(model, p, warm_start, some).items():
+                found[term].append(columns)
+        return [np.stack(found[term.name]) for term in candidates]
+
+    def _columns(
+        self, model: AbstractPlant, p: Values, warm_start: PeriodicSolution, candidates: Sequence[Term]
+    ) -> dict[str, NDArray[np.float64]]:
+        """The same for the shapes in ``p``, by name, (m, amplitudes)."""
+        without = [term for term in candidates if not self.catalogue[term.name].states]
+        names = [each.name for term in without for each in term.amplitudes]
+        slopes = self.slopes(model, p, warm_start, names)
+        found = {
+            term.name: slopes[:, [names.index(each.name) for each in term.amplitudes]] for term in without
+        }
+        with_states = [term for term in candidates if self.catalogue[term.name].states]
+        typical = [
+            {each.name: each.centre + 0.5 * each.scale for each in term.amplitudes} for term in with_states
+        ]
+        effects = [self.catalogue[term.name] for term in with_states]
+        moved = columns_with_states(model, self.likelihood, self.orders, p, warm_start, effects, typical)
+        for term, rows in zip(with_states, moved, strict=True):
+            found[term.name] = rows[:, None] / (0.5 * term.amplitudes[0].scale)
+        return found
+
+    def slopes(
+        self, model: AbstractPlant, p: Values, solution: PeriodicSolution, names: Sequence[str]
+    ) -> NDArray[np.float64]:
+        """Slopes of the rows in the named parameters of ``model`` [units of the rows per SI unit], (m, n)."""
+        parts = [np.zeros((0, self.likelihood.measured.size))]
+        for first in range(0, len(names), WIDTH):
+            some = names[first : first + WIDTH]
+            directions = np.zeros((WIDTH, len(self.names)))
+            directions[np.arange(len(some)), [self.names.index(name) for name in some]] = 1.0
+            (slopes,) = slopes_of(
+                model, self.likelihood, p, solution, placed(jnp.asarray(directions)), self.names, self.orders
+            )
+            parts.append(np.asarray(slopes)[: len(some)])
+        return np.concatenate(parts).T
+
+    def _fitting(self, model: AbstractPlant, warm_start: PeriodicSolution) -> Trajectory:
+        """The motions of ``warm_start`` with as many states as ``model`` has, further ones at rest."""
+        x, y = warm_start.trajectory
+        lacking = 2 * len(model.coordinates) + len(model.states) - x.shape[0]
+        if lacking == 0:
+            return warm_start.trajectory
+        if lacking < 0:
+            return Trajectory(x[:lacking], y[:lacking])
+        rest = jnp.zeros((lacking, x.shape[1]))
+        return Trajectory(jnp.concatenate([x, rest]), jnp.concatenate([y, rest]))
+
+
+def dwell_problem(
+    measured: HarmonicResponse,
+    plant: AbstractPlant,
+    parameters: ParameterTable,
+    catalogue: Mapping[str, Effect],
+    baseline: tuple[str, ...] = (),
+    free: tuple[str, ...] = (),
+    orders: int = 9,
+    settings: PeriodicSettings | None = None,
+    models: Iterable[tuple[str, ...]] = (),
+) -> tuple[DwellProblem, Data]:
+    """The problem of a measured response, and the response as data.
+
+    Raises :class:`InputError` for a response that cannot be used.
+    """
+    target = harmonic_target(measured, plant.channels, orders)
+    likelihood = likelihood_of(target)
+    tests, channels, kept = (int(count) for count in target.used.shape)
+    problem = DwellProblem(
+        plant=plant,
+        parameters=parameters,
+        catalogue=catalogue,
+        baseline=baseline,
+        free=free,
+        excitation=measured_excitation(plant, measured, parameters),
+        likelihood=likelihood,
+        shape=(tests, channels, kept),
+        settings=settings or PeriodicSettings(),
+        models=tuple(models),
+    )
+    test = np.repeat(np.arange(tests), 2 * channels * kept)[likelihood.place]
+    data = Data(
+        np.asarray(likelihood.measured),
+        np.asarray(likelihood.variance),
+        np.asarray(likelihood.discrepancy_scale),
+        test,
+    )
+    return problem, data

@@ -1,0 +1,140 @@
+"""The signal inferred at a port against the motion there, with the force of a named effect along the same motion.
+
+A friction is a loop over the displacement, a stiffness a line, a damper a line over the velocity. The force of the
+named effect is that of the model itself: the force at the port with the effect, less that without it, evaluated
+along the motion of the baseline. Nothing of the rig's laws is written here.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from numpy.typing import NDArray
+
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.diagnosis.dwell_problem import DwellProblem
+from savgs_ident.diagnosis.effect_sensitivities import (
+    marched_contact,
+    marched_effect,
+    node_loads,
+)
+from savgs_ident.diagnosis.localisation import Localisation
+from savgs_ident.diagnosis.location_hypotheses import force_port, free_signal, signal_port
+from savgs_ident.diagnosis.result import ForceLoop
+from savgs_ident.effects.base import (
+    AbstractForceLaw,
+    AbstractFrictionLimitLaw,
+    AbstractNumberLaw,
+    AbstractSeriesLaw,
+    Port,
+    PortKind,
+)
+from savgs_ident.effects.effect import Effect
+from savgs_ident.plants.base import AbstractPlant
+from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.sensitivity import ports_at_nodes
+
+QUANTILES = (0.1, 0.5, 0.9)
+"""The tests that have a loop, by their rank in frequency: a slow, a middle and a fast one."""
+
+SAMPLES = 256
+"""Samples of a loop."""
+
+
+def force_loops(
+    problem: DwellProblem,
+    p: Values,
+    solution: PeriodicSolution,
+    found: Localisation,
+    effect: Effect | None,
+) -> tuple[ForceLoop, ...]:
+    """Loops at a port for a slow, a middle and a fast test, with the force of a named ``effect`` beside them.
+
+    ``solution`` is the motion of the baseline; ``p`` are its parameters, SI, and those of the effect.
+    """
+    port = signal_port(problem.plant, found.name)
+    if port is None:
+        return ()
+    ports, _ = node_loads(problem.complete(()), p, solution)
+    signals = ports[motion_port(problem.plant, port)]
+    force = None if effect is None else effect_force(problem.complete(()), p, solution, effect)
+    order = np.argsort(np.asarray(solution.excitation.frequency))
+    layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
+    grid = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+    loops = []
+    for test in dict.fromkeys(int(order[int(share * (len(order) - 1))]) for share in QUANTILES):
+        nodes = layout.dwell == test
+
+        def sample(
+            values: Float[Array | np.ndarray, " P"], nodes: NDArray[np.bool_] = nodes
+        ) -> NDArray[np.float64]:
+            return np.interp(grid, phase[nodes], np.asarray(values)[nodes], period=2.0 * np.pi)
+
+        loops.append(
+            ForceLoop(
+                port=found.name,
+                frequency_hz=float(solution.excitation.frequency[test]),
+                displacement=sample(signals.displacement),
+                velocity=sample(signals.velocity),
+                inferred=free_signal(found.free_input[test], grid),
+                law=np.zeros(0) if force is None else _without_mean(sample(force)),
+                unit=_unit(problem.plant, port),
+            )
+        )
+    return tuple(loops)
+
+
+def _unit(plant: AbstractPlant, port: Port) -> str:
+    """Unit of the signal that is inferred at a port."""
+    if port.kind is PortKind.SENSOR:
+        return next(each.unit for each in plant.channels if port.location == f"sensor.{each.name}")
+    return port.force_unit if port.kind is PortKind.FORCE else port.displacement_unit
+
+
+def motion_port(plant: AbstractPlant, port: Port) -> str:
+    """Name of the force port whose motion is drawn for a port: its own where it has one."""
+    if port.kind is PortKind.FORCE or port.motion:
+        return port.motion or port.name
+    forces = [each for each in plant.ports if each.kind is PortKind.FORCE]
+    beside = [each for each in forces if each.location == port.location]
+    return (beside or forces)[0].name
+
+
+def effect_force(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, effect: Effect
+) -> NDArray[np.float64] | None:
+    """What an effect with parameters among ``p`` adds to the signal at its port along a motion without it, (P,).
+
+    A force [N] with the sign of the port; at a port that is not one of force, by how much it gives way [m or rad];
+    None for an error of a sensor or of the road, which has neither. ``model`` has the effect if that has no states.
+    """
+    null = as_values({name: float(value) for name, value in p.items()} | dict(effect.null))
+    law, port = effect.law, force_port(model, effect.port.location)
+    if isinstance(law, AbstractFrictionLimitLaw):
+        own, without = (marched_contact(model, each, solution, effect.port) for each in (p, null))
+        return own - without
+    if isinstance(law, AbstractForceLaw) and effect.states:
+        return marched_effect(model, p, solution, effect)
+    forces = _forces(model, p, solution)
+    if isinstance(law, AbstractSeriesLaw):
+        deflection = marched_effect(model, p, solution, effect)
+        if port is None:
+            return np.asarray(deflection[:, 0])
+        imposed = {effect.port.name: jnp.asarray(deflection)}
+        return np.asarray(_forces(model, p, solution, imposed)[port.name] - forces[port.name])
+    if isinstance(law, AbstractForceLaw | AbstractNumberLaw) and port is not None:
+        return np.asarray(forces[port.name] - _forces(model, null, solution)[port.name])
+    return None
+
+
+@eqx.filter_jit
+def _forces(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, imposed: dict[str, Array] | None = None
+) -> dict[str, Float[Array, " P"]]:
+    """The whole force at each port along a motion [N]."""
+    return ports_at_nodes(model, p, solution, imposed).forces
+
+
+def _without_mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The inferred signal has no mean either."""
+    return np.asarray(values - values.mean())

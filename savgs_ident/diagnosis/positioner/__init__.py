@@ -1,0 +1,1 @@
+"""Diagnosis of a servo axis from its published recordings."""

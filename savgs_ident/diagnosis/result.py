@@ -1,0 +1,379 @@
+"""The result of a diagnosis, frozen: what reports and later stages read; and the settings of one.
+
+A hypothesis is an object, a key of mappings; its text is for reports and files:
+
+>>> pair = Hypothesis(("rail_stribeck", "accel_lag"))
+>>> str(pair), str(NONE), str(UNKNOWN)
+('rail_stribeck + accel_lag', 'none', 'unknown')
+>>> pair == Hypothesis(("accel_lag", "rail_stribeck"))
+True
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.presentation import Result
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.plants.model import Model
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.periodic import PeriodicSettings
+
+Kind = Literal["none", "effect", "several", "unknown"]
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """What is missing in a baseline: effects of the catalogue, or something that the catalogue does not have.
+
+    Hypotheses of the same effects are equal, in whatever order these are given.
+
+    Attributes:
+        effects: names of the effects; none of them if nothing is missing.
+        unknown: whether it is something else. Then there are no effects.
+    """
+
+    effects: tuple[str, ...] = ()
+    unknown: bool = False
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the other one has the same effects."""
+        return isinstance(other, Hypothesis) and self._key == other._key
+
+    def __hash__(self) -> int:
+        """Of what is compared."""
+        return hash(self._key)
+
+    def __str__(self) -> str:
+        """The effects joined by plus signs, "none" or "unknown"."""
+        return "unknown" if self.unknown else " + ".join(self.effects) or "none"
+
+    def with_effect(self, name: str) -> Self:
+        """The hypothesis with one more effect."""
+        return type(self)((*self.effects, name))
+
+    @property
+    def _key(self) -> tuple[frozenset[str], bool]:
+        return frozenset(self.effects), self.unknown
+
+
+NONE = Hypothesis()
+"""Nothing is missing."""
+
+UNKNOWN = Hypothesis(unknown=True)
+"""Something is missing that the catalogue does not have."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is missing in the model.
+
+    Attributes:
+        kind: nothing, one effect, several, or something that the catalogue does not have.
+        effects: their names.
+        ports: where they act; for an unknown one, the port that explains it best.
+        confusable_with: effects that this campaign cannot tell from those named.
+        sentence: the verdict in one sentence.
+        confusable_ports: of something unknown, ports that this campaign cannot tell from the one named.
+        another_law: whether what is named acts by another law than the catalogue's.
+    """
+
+    kind: Kind
+    effects: tuple[str, ...]
+    ports: tuple[str, ...]
+    confusable_with: tuple[str, ...]
+    sentence: str
+    confusable_ports: tuple[str, ...] = ()
+    another_law: bool = False
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+@dataclass(frozen=True)
+class PortShare:
+    """How much of the recalibrated gap something at a port explains.
+
+    Attributes:
+        port: name of the port.
+        share: share of the gap (in squared sd) in tests left out that the law learned from the others explains.
+        free_input_share: share that any input at this port, free in every test, would explain.
+    """
+
+    port: str
+    share: float
+    free_input_share: float
+
+
+@dataclass(frozen=True)
+class MapCell:
+    """The gap of one harmonic, recalibrated baseline: in per cent of the channel's response and in noise sd."""
+
+    channel: str
+    frequency_hz: float
+    order: int
+    gap_percent: float
+    gap_sigma: float
+
+
+@dataclass(frozen=True)
+class CyclePosition:
+    """Where in the cycle of the body's velocity the gap of a channel lies, as shares of its square."""
+
+    channel: str
+    reversal: float
+    mid_stroke: float
+    between: float
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter of an effect with its 95 % interval, SI."""
+
+    name: str
+    value: float
+    lo: float
+    hi: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Learned:
+    """A correction for something unknown: a force at a port, fitted on the nonlinear rig.
+
+    Attributes:
+        effect: its name as an effect of a model.
+        port: name of the port.
+        parameters: its coefficients with their 95 % intervals.
+        identified: all its numbers, and those of the rig that were fitted beside it, SI, by name.
+    """
+
+    effect: str
+    port: str
+    parameters: tuple[Estimate, ...]
+    identified: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A hypothesis about what is missing.
+
+    Attributes:
+        hypothesis: the hypothesis.
+        probability: its probability, all hypotheses sum to 1.
+        score_sigma: significance at the null, nuisances projected out.
+        heldout_gain: rise of the log predictive density of left-out tests over the baseline, per datum [nat].
+        share_closed: share that it explains of what the recalibrated baseline leaves beyond the noise, all
+            tests; NaN where it leaves nothing.
+        parameters: those of its effects.
+        refitted: whether it was fitted in full, or judged by its score alone.
+    """
+
+    hypothesis: Hypothesis
+    probability: float
+    score_sigma: float
+    heldout_gain: float
+    share_closed: float
+    parameters: tuple[Estimate, ...]
+    refitted: bool
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of its effects; none of them for none and unknown."""
+        return self.hypothesis.effects
+
+
+@dataclass(frozen=True)
+class Shrink:
+    """Relative rms gap [1] over held-out tests (0.1 is 10 %): before, recalibrated, after, and of the noise alone.
+
+    ``share_closed`` is 1 - (after^2 - floor^2) / (before^2 - floor^2), ``interval`` its 95 % interval by
+    resampling the tests.
+    """
+
+    before: float
+    recalibrated: float
+    after: float
+    floor: float
+    share_closed: float
+    interval: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class SweepShrink:
+    """The same [1] of the first harmonic along the recorded sweep; NaN where nothing was computed."""
+
+    before: float
+    recalibrated: float
+    after: float
+    floor: float
+
+
+@dataclass(frozen=True)
+class NextTest:
+    """A test that would separate effects, with the significance to expect from it."""
+
+    test: str
+    separates: tuple[str, str]
+    expected_sigma: float
+
+
+@dataclass(frozen=True)
+class NotJudgeable:
+    """An effect that this campaign cannot show, and the smallest size of its parameter that it could have shown.
+
+    It is in ``unit``, SI.
+    """
+
+    effect: str
+    parameter: str
+    smallest: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Confusable:
+    """Two effects and the cosine between what they do to this campaign, nuisances projected out."""
+
+    effects: tuple[str, str]
+    cosine: float
+
+
+@dataclass(frozen=True)
+class ForceLoop:
+    """A signal inferred at a port along one test, over one period of n instants, against its conjugate motion.
+
+    Attributes:
+        port: name of the port.
+        frequency_hz: of the test.
+        displacement: [m], (n,).
+        velocity: [m/s], (n,).
+        inferred: inferred signal [``unit``], (n,).
+        law: the named effect's law along the same motion [``unit``], (n,); empty if none is named.
+        unit: N for a force, m or rad for what gives way, the channel's unit for a sensor.
+    """
+
+    port: str
+    frequency_hz: float
+    displacement: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    inferred: NDArray[np.float64]
+    law: NDArray[np.float64]
+    unit: str
+
+
+@dataclass(frozen=True)
+class Responses:
+    """Harmonics of the plant's channels, complex, (D, C, K) each.
+
+    Each is in the unit of its reading.
+    """
+
+    before: NDArray[np.complex128]
+    recalibrated: NDArray[np.complex128]
+    after: NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Diagnosis(Result):
+    """A whole diagnosis.
+
+    Attributes:
+        model: name of the baseline, "simqc" or "simtr", or the name of the rig file's own.
+        effects: names of the effects in the baseline.
+        given: the model as known before any fit.
+        parameters: parameters of the recalibrated baseline, SI, by name.
+        identified: parameters of the rig with the named effects, SI, by name.
+        verdict: the verdict.
+        ports: shares of all ports, largest first.
+        map: the gap by channel, frequency and order.
+        cycle: where in the cycle it lies.
+        candidates: all hypotheses, most probable first.
+        shrink: the gap over held-out tests, both channels together.
+        by_channel: the same by channel.
+        sweep: the gap of the sweep, if one was recorded.
+        next_tests: tests that would tell apart what this campaign cannot.
+        not_judgeable: effects that this campaign cannot show.
+        confusable: pairs of effects that look alike in this campaign.
+        loops: inferred signals at the named port.
+        responses: the three models' responses.
+        measured: what they are held against.
+        converged: whether every search that the verdict stands on converged: the recalibrated baseline, the fitted
+            hypothesis with the greatest weight, what is named and its refit, the learned correction.
+        warnings: what a reader must know, a sentence each.
+        wall_s: how long it took [s].
+        learned: the correction for something unknown, where it is a force and could be fitted.
+    """
+
+    presenter: ClassVar[str] = "DIAGNOSIS"
+
+    model: str
+    effects: tuple[str, ...]
+    given: Model
+    parameters: Mapping[str, float]
+    identified: Mapping[str, float]
+    verdict: Verdict
+    ports: tuple[PortShare, ...]
+    map: tuple[MapCell, ...]
+    cycle: tuple[CyclePosition, ...]
+    candidates: tuple[Candidate, ...]
+    shrink: Shrink
+    by_channel: Mapping[str, Shrink]
+    sweep: SweepShrink | None
+    next_tests: tuple[NextTest, ...]
+    not_judgeable: tuple[NotJudgeable, ...]
+    confusable: tuple[Confusable, ...]
+    loops: tuple[ForceLoop, ...]
+    responses: Responses
+    measured: HarmonicResponse
+    converged: bool
+    warnings: tuple[str, ...]
+    wall_s: float
+    learned: Learned | None = None
+
+    @property
+    def rig(self) -> Rig:
+        """The quarter car as known before any fit; raises :class:`InputError` where another plant was diagnosed."""
+        if not isinstance(self.given, RigModel):
+            raise InputError(
+                f"{self.given.name} is no rig with a file", remedy="take diagnosis.given instead"
+            )
+        return self.given.rig
+
+    @property
+    def trusted(self) -> bool:
+        """Whether every search that the verdict stands on ended well."""
+        return self.converged
+
+
+FREE = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
+"""Parameters that the baseline identifies where it has them."""
+
+
+@dataclass(frozen=True)
+class DiagnosisSettings:
+    """How a diagnosis is done.
+
+    Attributes:
+        model: name of the baseline, for the report.
+        baseline: effects in the baseline.
+        free: parameters that recalibration identifies.
+        orders: highest order of the harmonics that are compared.
+        without: effects that are left out of the catalogue.
+        periodic: how finely periodic motions are solved.
+        constants: what the verdict is decided by.
+    """
+
+    model: str = "simtr"
+    baseline: tuple[str, ...] = ("rail_coulomb", "tyre_friction")
+    free: tuple[str, ...] = FREE
+    orders: int = 9
+    without: tuple[str, ...] = ()
+    periodic: PeriodicSettings = field(default_factory=PeriodicSettings)
+    constants: DecisionConstants = DEFAULTS

@@ -1,0 +1,196 @@
+"""Score tests: what an effect would explain beyond the baseline's parameters, and whether a tolerance holds.
+
+The score of an effect is taken at its null. Its first-order change of the rows stands beside that of the parameters
+in the model, so that it gets no credit for what these can explain. Two numbers come out: the significance at the
+weights of the fit, and the log evidence of the linearised hypothesis, noise scale and discrepancy estimated anew.
+
+A prior conflict is a parameter that the data pull further from its sheet than its tolerance allows. A model may
+explain everything and still be wrong, if it does so with a spring ten standard deviations off its sheet. The
+alternative to all tolerances as they are is that one of them does not hold: its prior is ``broken_tolerance_width``
+times as wide. To first order about a fit, with coordinate x ~ N(0, 1) before the data and posterior variance v, the
+data alone estimate x / (1 - v) with variance v / (1 - v), from which both evidences follow.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import exp, inf, log, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.status import Status
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.noise_scales import linearised_optimum, log_determinant
+from savgs_ident.inference.observations import Term
+from savgs_ident.inference.prior import Coordinates, Sheet, bounds_of
+
+
+@dataclass(frozen=True)
+class Score:
+    """A candidate's score.
+
+    Attributes:
+        term: the candidate.
+        sigma: significance in standard deviations, nuisances projected out.
+        evidence: log evidence of the linearised hypothesis; minus infinity where it was not evaluated.
+        start: parameters at its best point, SI, by name.
+        smallest: the first amplitude that would stand out of the noise by ``visible_sigma`` sd, nuisances projected
+            out [its unit]; infinite if none would.
+        direction: what it does to the rows there, nuisances projected out, in units of their sd, (m,): of unit
+            length, or nothing.
+        status: whether what it does to the rows could be evaluated.
+    """
+
+    term: Term
+    sigma: float
+    evidence: float
+    start: dict[str, float]
+    smallest: float
+    direction: NDArray[np.float64]
+    status: Status = Status.CONVERGED
+
+
+def score_terms(
+    search: Search, mode: LaplaceFit, terms: list[Term], constants: DecisionConstants = DEFAULTS
+) -> list[Score]:
+    """Scores of candidates about a fit, best first."""
+    columns = search.plant.columns(mode.terms, mode.values, mode.prediction.warm_start, terms)
+    return scores_of(search, mode, terms, columns, constants)
+
+
+def scores_of(
+    search: Search,
+    mode: LaplaceFit,
+    terms: Sequence[Term],
+    columns: Sequence[NDArray[np.float64]],
+    constants: DecisionConstants = DEFAULTS,
+) -> list[Score]:
+    """The same with known ``columns``, (tries, m, amplitudes) of each term, best first.
+
+    Columns are in the units of the rows per unit of the amplitude.
+    """
+    sigma = constants.visible_sigma
+    found = [_score(search, mode, term, each, sigma) for term, each in zip(terms, columns, strict=True)]
+    return sorted(found, key=lambda each: -each.evidence)
+
+
+def _score(
+    search: Search, mode: LaplaceFit, term: Term, columns: NDArray[np.float64], visible: float
+) -> Score:
+    residual = search.residual(mode.prediction)
+    count = len(term.amplitudes)
+    bounds = tuple(
+        np.concatenate(pair)
+        for pair in zip(bounds_of(mode.coordinates), bounds_of(term.amplitudes), strict=True)
+    )
+    scales = np.array([each.scale for each in term.amplitudes])
+    best: Score | None = None
+    for shapes, column in zip(term.tried, columns, strict=True):
+        if not np.isfinite(column).all():
+            continue
+        moved = column * scales
+        slopes = np.concatenate([mode.slopes, moved], axis=1)
+        x = np.concatenate([mode.x, np.zeros(count)])
+        top = linearised_optimum(search.data, residual, slopes, x, (bounds[0], bounds[1]), search.mask)
+        halved = log(2.0) * sum(each.halved for each in mode.coordinates + term.amplitudes)
+        evidence = top.value - 0.5 * log_determinant(top.precision) + halved
+        if best is None or evidence > best.evidence:
+            found = dict(zip((c.name for c in term.amplitudes), top.x[-count:], strict=True))
+            start = {each.name: each.value(float(found[each.name])) for each in term.amplitudes} | shapes
+            direction = _direction(search, mode, moved @ _some(top.x[-count:]))
+            sigma = _significance(search, mode, moved)
+            smallest = scales[0] * visible * _per_sigma(search, mode, moved[:, 0])
+            best = Score(term, sigma, evidence, start, smallest, direction)
+    return best or Score(term, 0.0, -np.inf, {}, np.inf, np.zeros(residual.size), Status.NOT_FINITE)
+
+
+def cosine(one: Score, other: Score) -> float:
+    """The cosine between what two candidates do, -1 to 1."""
+    return float(one.direction @ other.direction)
+
+
+def _some(amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The amplitudes, or a unit of each where all vanish."""
+    return amplitudes if np.any(amplitudes) else np.ones_like(amplitudes)
+
+
+def _direction(search: Search, mode: LaplaceFit, moved: NDArray[np.float64]) -> NDArray[np.float64]:
+    weight = np.zeros(moved.size)
+    weight[search.mask] = 1.0 / np.sqrt(mode.noise_scales.spread)
+    inside = mode.slopes * weight[:, None]
+    left = moved * weight
+    left = left - inside @ np.linalg.solve(mode.precision, inside.T @ left)
+    length = float(np.linalg.norm(left))
+    return left / length if length > 0.0 else left
+
+
+def _per_sigma(search: Search, mode: LaplaceFit, moved: NDArray[np.float64]) -> float:
+    """How many units of a column stand out of the noise by one standard deviation; infinite if none do."""
+    kept, noise = search.mask, search.data.variance[search.mask]
+    inside, column = mode.slopes[kept], moved[kept]
+    precision = np.eye(mode.x.size) + (inside.T / noise) @ inside
+    cross = inside.T @ (column / noise)
+    visible = float(column @ (column / noise) - cross @ np.linalg.solve(precision, cross))
+    whole = float(column @ (column / noise))
+    return 1.0 / sqrt(visible) if visible > 1e-9 * whole > 0.0 else np.inf
+
+
+def _significance(search: Search, mode: LaplaceFit, moved: NDArray[np.float64]) -> float:
+    """Square root of the drop of chi2 that the candidate brings, at the weights of the mode."""
+    kept, spread = search.mask, mode.noise_scales.spread
+    residual = search.residual(mode.prediction)[kept]
+    weighted = moved[kept] / spread[:, None]
+    inside = mode.slopes[kept]
+    cross = inside.T @ weighted
+    held = np.linalg.solve(mode.precision, cross)
+    score = weighted.T @ residual - held.T @ (inside.T @ (residual / spread) - mode.x)
+    information = weighted.T @ moved[kept] - cross.T @ held
+    size = np.trace(information) / len(information)
+    if size <= 0.0:
+        return 0.0
+    drop = score @ np.linalg.solve(information + 1e-10 * size * np.eye(len(score)), score)
+    return sqrt(max(float(drop), 0.0))
+
+
+class PriorConflict(NamedTuple):
+    """What speaks for a tolerance that does not hold.
+
+    Attributes:
+        gain: rise of the log evidence of a fit if one of the tolerances may not hold, each with equal probability.
+        parameter: the one whose tolerance gains most; empty where none is known to a tolerance.
+        tolerances: how many of its tolerances (standard deviations) it is off its sheet.
+    """
+
+    gain: float
+    parameter: str
+    tolerances: float
+
+
+def prior_conflict(
+    mode: LaplaceFit, nuisances: Coordinates, constants: DecisionConstants = DEFAULTS
+) -> PriorConflict:
+    """The conflict of a fit with the tolerances of its ``nuisances``."""
+    known = {each.name for each in nuisances if isinstance(each, Sheet) and each.known}
+    variance = np.diag(mode.covariance())
+    gains = {
+        each.name: (_gain(float(x), float(v), constants.broken_tolerance_width), float(x))
+        for each, x, v in zip(mode.coordinates, mode.x, variance, strict=True)
+        if each.name in known
+    }
+    if not gains:
+        return PriorConflict(-inf, "", 0.0)
+    name, (best, off) = max(gains.items(), key=lambda each: each[1][0])
+    mean = best + log(sum(exp(each - best) for each, _ in gains.values()) / len(gains))
+    return PriorConflict(mean, name, off)
+
+
+def _gain(x: float, variance: float, width: float) -> float:
+    """Rise of the log evidence by a prior of ``width`` in place of 1, from mode and posterior variance below 1."""
+    information = 1.0 - variance
+    if information <= 0.0:
+        return 0.0
+    estimate, spread = x / information, variance / information
+    narrow, wide = spread + 1.0, spread + width**2
+    return 0.5 * (estimate**2 * (1.0 / narrow - 1.0 / wide) + log(narrow / wide))

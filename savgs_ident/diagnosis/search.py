@@ -1,0 +1,320 @@
+"""The search for what is missing: scores, then full fits of the promising, then pairs where one is not enough.
+
+Forward selection. The linear evidence of the scores says which single effects are worth a full fit. If the best of
+them leaves more than the noise, or pulls a parameter away from its tolerance, pairs are fitted:
+
+1. the best single effects, each with the partners that score best beside it;
+2. members of the best pairs that are no single effect of step 1, with other partners: the other may be a stand-in;
+3. the best pair with either member exchanged for its lookalikes.
+
+Every hypothesis that is fitted in full comes out with its evidence; one whose fit found no solution of the plant is
+named in :attr:`Findings.lost`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.parallel import in_parallel
+from savgs_ident.core.presentation import Progress
+from savgs_ident.core.status import Status
+from savgs_ident.diagnosis.result import Hypothesis
+from savgs_ident.diagnosis.score_test import Score, cosine, prior_conflict, score_terms, scores_of
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, refine
+from savgs_ident.inference.observations import Term
+
+
+class LostHypothesis(NamedTuple):
+    """A hypothesis that was not evaluated, and how the solution of the plant ended."""
+
+    hypothesis: Hypothesis
+    status: Status
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All hypotheses that were tried.
+
+    Attributes:
+        base: the baseline, recalibrated.
+        scores: scores of all effects at the baseline, best first.
+        modes: hypotheses that were fitted in full, the best first; the baseline is not among them.
+        lost: hypotheses whose fit found no solution of the plant, and how that ended.
+    """
+
+    base: LaplaceFit
+    scores: tuple[Score, ...]
+    modes: tuple[LaplaceFit, ...]
+    lost: tuple[LostHypothesis, ...] = ()
+
+    @property
+    def best(self) -> LaplaceFit:
+        """The hypothesis with the greatest evidence."""
+        return max((self.base, *self.modes), key=lambda mode: mode.evidence)
+
+
+def hypothesis_of(mode: LaplaceFit) -> Hypothesis:
+    """What a fit assumes to be missing."""
+    return Hypothesis(mode.terms)
+
+
+def excess(search: Search, mode: LaplaceFit) -> float:
+    """The misfit [1]: mean square of the residuals in noise variances, less one, and not below zero."""
+    mask = search.mask
+    residual = search.residual(mode.prediction)[mask]
+    return max(float(np.mean(residual**2 / search.data.variance[mask])) - 1.0, 0.0)
+
+
+def left_over(
+    search: Search, base: LaplaceFit, mode: LaplaceFit, constants: DecisionConstants = DEFAULTS
+) -> float:
+    """Share of the baseline's misfit that a hypothesis leaves; 0 where that is hardly more than the noise.
+
+    Infinite where the baseline left nothing.
+    """
+    left, whole = excess(search, mode), excess(search, base)
+    if left <= constants.negligible_misfit:
+        return 0.0
+    return left / whole if whole > 0.0 else np.inf
+
+
+def forward_selection(
+    search: Search,
+    base: LaplaceFit,
+    terms: Sequence[Term],
+    progress: Progress,
+    known: Sequence[tuple[str, ...]] = (),
+    constants: DecisionConstants = DEFAULTS,
+) -> Findings:
+    """Hypotheses about what is missing in the recalibrated baseline ``base``.
+
+    ``known`` are sets of terms that are often missing together. They are fitted from their typical sizes, because a
+    search from a baseline that lacks all of them, and misses by as much as it moves, would not arrive.
+    """
+    fits = _Fits(search, base, {term.name: term for term in terms}, progress, constants)
+    together = fits.refined([fits.fitted_together(names) for names in known])
+    if any(fits.explains_all(mode) for mode in together):
+        progress(f"{hypothesis_of(together[0])}: nothing is left")
+        return _findings(base, score_terms(search, base, list(terms), constants), together)
+    progress(f"scores of {len(terms)} effects")
+    sensitivities = search.plant.columns((), base.values, base.prediction.warm_start, list(terms))
+    scores = scores_of(search, base, terms, sensitivities, constants)
+    singles = _single_effects(fits, scores)
+    pairs: list[LaplaceFit] = []
+    if singles and singles[0].evidence > base.evidence + constants.pair_log_evidence:
+        by_name = dict(zip((term.name for term in terms), sensitivities, strict=True))
+        pairs = _pairs(fits, singles, scores, by_name)
+    return _findings(base, scores, [*together, *singles, *pairs])
+
+
+def pairs_with(
+    search: Search,
+    findings: Findings,
+    best: LaplaceFit,
+    partners: Sequence[Term],
+    terms: Sequence[Term],
+    progress: Progress,
+    constants: DecisionConstants = DEFAULTS,
+) -> Findings:
+    """The findings, and pairs of each member of the hypothesis ``best`` with each of the ``partners``.
+
+    Beside a stand-in the right partner explains little: it has to be fitted beside the right member alone.
+    """
+    fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
+    tried = {hypothesis_of(mode) for mode in findings.modes}
+    pairs: list[LaplaceFit] = []
+    for parent in findings.modes:
+        if len(parent.terms) == 1 and parent.terms[0] in best.terms:
+            others = [
+                term
+                for term in partners
+                if term.name not in parent.terms and hypothesis_of(parent).with_effect(term.name) not in tried
+            ]
+            pairs += fits.extended(parent, score_terms(search, parent, others))
+    more = _findings(findings.base, findings.scores, fits.refined([*findings.modes, *pairs]))
+    return replace(more, lost=(*findings.lost, *more.lost))
+
+
+def _findings(base: LaplaceFit, scores: Sequence[Score], modes: Sequence[LaplaceFit]) -> Findings:
+    found = sorted((mode for mode in modes if mode.solved), key=lambda mode: -mode.evidence)
+    lost = tuple(LostHypothesis(hypothesis_of(mode), mode.status) for mode in modes if not mode.solved)
+    return Findings(base, tuple(scores), tuple(found), lost)
+
+
+@dataclass(frozen=True)
+class _Fits:
+    """Full fits of hypotheses to the same data: what all steps of a search share."""
+
+    search: Search
+    base: LaplaceFit
+    terms: Mapping[str, Term]
+    progress: Progress
+    constants: DecisionConstants
+
+    def explains_all(self, mode: LaplaceFit) -> bool:
+        """Whether a hypothesis leaves next to nothing of the baseline's misfit."""
+        return mode.solved and self._left(mode) <= self.constants.explained_share
+
+    def is_spotless(self, mode: LaplaceFit) -> bool:
+        """Whether a hypothesis leaves hardly more than the noise, and every parameter within its tolerance."""
+        return self._left(mode) == 0.0 and not self.conflicts(mode)
+
+    def conflicts(self, mode: LaplaceFit) -> bool:
+        """Whether the data speak for a tolerance that does not hold beside this hypothesis."""
+        found = prior_conflict(mode, self.search.plant.nuisances, self.constants)
+        return found.gain > self.constants.promising_log_evidence
+
+    def lookalikes(self, scores: Sequence[Score], of: Sequence[Score]) -> list[Score]:
+        """Those scores whose effect does nearly the same as any of the others."""
+        least = self.constants.lookalike_cosine
+        return [each for each in scores if any(abs(cosine(each, other)) > least for other in of)]
+
+    def fitted_together(self, names: tuple[str, ...]) -> LaplaceFit:
+        """The fit of several terms together, from their typical sizes."""
+        self.progress(f"fitting {Hypothesis(names)} from typical sizes")
+        chosen, typical = tuple(self.terms[name] for name in names), self.constants.typical_coordinate
+        start = {each.name: each.value(typical) for term in chosen for each in term.amplitudes}
+        start |= {each.name: each.centre for term in chosen for each in term.shapes}
+        return find_map(self.search, chosen, self.base.values | start, self.base.prediction.warm_start)
+
+    def fitted_alone(self, name: str, pair: LaplaceFit) -> LaplaceFit:
+        """The fit of one member of a pair, from where it is beside the other."""
+        self.progress(f"fitting {name} from its value in {hypothesis_of(pair)}")
+        return find_map(self.search, (self.terms[name],), pair.values, pair.prediction.warm_start)
+
+    def extended(self, parent: LaplaceFit, scores: Sequence[Score]) -> list[LaplaceFit]:
+        """Fits of the scored terms, each added to those of ``parent``."""
+        inherited = tuple(self.terms[name] for name in parent.terms)
+
+        def fit(score: Score) -> LaplaceFit:
+            self.progress(f"fitting {hypothesis_of(parent).with_effect(score.term.name)}")
+            start = parent.values | score.start
+            return find_map(self.search, (*inherited, score.term), start, parent.prediction.warm_start)
+
+        return in_parallel(fit, scores)
+
+    def exchanged(self, pair: LaplaceFit, kept: str, score: Score) -> LaplaceFit:
+        """The fit of a pair with the member that is not ``kept`` exchanged for the scored term."""
+        self.progress(f"fitting {Hypothesis((kept, score.term.name))}")
+        start = pair.values | score.start
+        return find_map(self.search, (self.terms[kept], score.term), start, pair.prediction.warm_start)
+
+    def refined(self, modes: Sequence[LaplaceFit]) -> list[LaplaceFit]:
+        """The hypotheses, best first, the best of them on a mesh adapted to their own motion."""
+        ranked = sorted(modes, key=lambda mode: -mode.evidence)
+
+        def again(mode: LaplaceFit) -> LaplaceFit:
+            self.progress(f"refining {hypothesis_of(mode)}")
+            better = refine(self.search, mode, tuple(self.terms[name] for name in mode.terms))
+            return better if better.solved else mode
+
+        solved = [mode for mode in ranked[: self.constants.refined_fits] if mode.solved]
+        least = ranked[0].evidence - self.constants.refined_log_evidence if ranked else 0.0
+        close = [mode for mode in solved if mode.evidence > least]
+        finer = in_parallel(again, [mode for mode in close if not mode.precise])
+        others = [mode for mode in ranked if not any(mode is each and not mode.precise for each in close)]
+        return sorted([*finer, *others], key=lambda mode: -mode.evidence)
+
+    def _left(self, mode: LaplaceFit) -> float:
+        return left_over(self.search, self.base, mode, self.constants)
+
+
+def _single_effects(fits: _Fits, scores: Sequence[Score]) -> list[LaplaceFit]:
+    """Fits of the single effects whose scores promise most, best first."""
+    constants, base = fits.constants, fits.base
+    worth = [each for each in scores if each.evidence > base.evidence + constants.promising_log_evidence]
+    first, second = constants.first_fits, constants.first_fits + constants.further_fits
+    begun = worth[:first] + fits.lookalikes(worth[first:second], worth[:1])
+    ranked = fits.refined(fits.extended(base, begun))
+    names = {each.term.name for each in begun}
+    later = [each for each in worth if each.term.name not in names]
+    if ranked and fits.explains_all(ranked[0]):
+        later = fits.lookalikes(later, [each for each in scores if each.term.name == ranked[0].terms[0]])
+    else:
+        later = later[: constants.further_fits]
+    return fits.refined([*ranked, *fits.extended(base, later)])
+
+
+def _pairs(
+    fits: _Fits,
+    singles: Sequence[LaplaceFit],
+    scores: Sequence[Score],
+    sensitivities: Mapping[str, NDArray[np.float64]],
+) -> list[LaplaceFit]:
+    """Fits of pairs, best first; ``sensitivities`` are those of all effects about the baseline, by name."""
+    best = singles[0]
+    wanting = not fits.explains_all(best)
+    if wanting or fits.conflicts(best):
+        parents = [mode for mode in singles[: fits.constants.parents if wanting else 1] if mode.solved]
+        pairs: list[LaplaceFit] = []
+        for parent in parents:
+            pairs += _with_partners(fits, parent, pairs)
+        pairs = fits.refined(pairs)
+        if pairs and not fits.is_spotless(pairs[0]):
+            pairs = _with_other_partners(fits, pairs, {hypothesis_of(mode) for mode in parents})
+    else:
+        pairs = fits.refined(_with_small_partners(fits, best, sensitivities))
+    if pairs and pairs[0].evidence > best.evidence:
+        pairs = _with_lookalikes(fits, pairs, scores)
+    return pairs
+
+
+def _with_partners(fits: _Fits, parent: LaplaceFit, known: Sequence[LaplaceFit]) -> list[LaplaceFit]:
+    """Pairs of a fitted term with the partners that score best beside it, less those that are ``known``."""
+    fits.progress(f"partners of {hypothesis_of(parent)}")
+    tried, alone = {hypothesis_of(mode) for mode in known}, hypothesis_of(parent)
+    others = [
+        term
+        for name, term in fits.terms.items()
+        if name not in parent.terms and alone.with_effect(name) not in tried
+    ]
+    scores = score_terms(fits.search, parent, others)
+    worth = [each for each in scores if each.evidence > parent.evidence]
+    return fits.extended(parent, worth[: fits.constants.partners])
+
+
+def _with_other_partners(fits: _Fits, pairs: list[LaplaceFit], parents: set[Hypothesis]) -> list[LaplaceFit]:
+    """The pairs, and those that keep a member of the best ones and exchange the other.
+
+    A member that shows only beside another one is no parent by itself: the other may have been a stand-in.
+    """
+    best = pairs[: fits.constants.parents]
+    members = {
+        name: pair for pair in reversed(best) for name in pair.terms if Hypothesis((name,)) not in parents
+    }
+    for parent in in_parallel(lambda name: fits.fitted_alone(name, members[name]), list(members)):
+        if parent.solved:
+            pairs = [*pairs, *_with_partners(fits, parent, pairs)]
+    return fits.refined(pairs)
+
+
+def _with_lookalikes(fits: _Fits, pairs: list[LaplaceFit], scores: Sequence[Score]) -> list[LaplaceFit]:
+    """The pairs, and the best one with either member exchanged for its lookalikes."""
+    by_name = {score.term.name: score for score in scores}
+    best, tried = pairs[0], {hypothesis_of(mode) for mode in pairs}
+    exchanges = [
+        (kept, lookalike)
+        for kept, gone in (best.terms, best.terms[::-1])
+        for lookalike in fits.lookalikes(scores, [by_name[gone]])
+        if lookalike.term.name not in best.terms and Hypothesis((kept, lookalike.term.name)) not in tried
+    ]
+    return fits.refined([*pairs, *in_parallel(lambda each: fits.exchanged(best, *each), exchanges)])
+
+
+def _with_small_partners(
+    fits: _Fits, parent: LaplaceFit, sensitivities: Mapping[str, NDArray[np.float64]]
+) -> list[LaplaceFit]:
+    """Pairs of a term that explains nearly all with partners so small that one alone does not show the other.
+
+    What a partner does is taken from the ``sensitivities`` about the baseline: near enough to say whether it is worth
+    a fit.
+    """
+    others = [term for name, term in fits.terms.items() if name not in parent.terms]
+    scores = scores_of(fits.search, parent, others, [sensitivities[term.name] for term in others])
+    least = parent.evidence + fits.constants.promising_log_evidence
+    worth = [each for each in scores if each.evidence > least]
+    return fits.extended(parent, worth[: fits.constants.partners])

@@ -1,0 +1,255 @@
+"""The constants that decide a diagnosis, in one frozen record, each with its origin.
+
+A diagnosis compares hypotheses by log weights: log evidence by Laplace's method plus log prior. The constants below
+turn those weights, and the change of the response that a hypothesis makes, into a verdict. They are of four kinds:
+
+- prior probabilities of hypotheses;
+- thresholds on log odds, and on the share of the response or of the misfit;
+- widths of priors that a linearised law is compared under;
+- limits of the search: how many hypotheses are fitted in full.
+
+The first three kinds can change a verdict about the same fits; the last can only miss a hypothesis.
+
+"Misfit" below is the mean square of the residuals in noise variances, less one: what the noise does not explain.
+"Response" is the measured response of a channel, all harmonics and tests together.
+
+Each docstring says where a value comes from, and what is known of the verdict when it is halved or doubled. Values
+"by judgement" were chosen by the authors and kept because the labelled recordings and blind trials came out right;
+blind trials had been looked at when some were chosen, so that these trials are no evidence for them.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class DecisionConstants:
+    """Constants that decide; probabilities, shares and cosines are relative [1], log odds in nat."""
+
+    # Priors
+
+    prior_none: float = 0.4
+    """Prior probability that nothing is missing.
+
+    Origin: by judgement, as probable as one effect. Halved or doubled: log odds of all else move by 0.7 nat.
+    """
+
+    prior_single: float = 0.4
+    """Prior probability that one effect is missing, shared equally by all effects of the catalogue.
+
+    Origin: by judgement. Halved or doubled: log odds of every single effect move by 0.7 nat.
+    """
+
+    prior_pair: float = 0.1
+    """Prior probability that two effects are missing, shared equally by all pairs.
+
+    Origin: by judgement, a quarter of one effect's. Halved or doubled: log odds of every pair move by 0.7 nat.
+    """
+
+    prior_unknown: float = 0.1
+    """Prior probability that something is missing which the catalogue does not have.
+
+    Origin: by judgement, the rest to one. Halved or doubled: log odds of *unknown* move by 0.7 nat.
+    """
+
+    prior_broken_tolerance: float = 0.01
+    """Prior probability that, beside what a hypothesis says, one tolerance of the sheet does not hold.
+
+    Origin: by judgement; before, it had the prior of something unknown, ten times as much. It bounds the
+    probability of *unknown* from below where nothing is missing. Halved or doubled: log odds of a broken tolerance
+    move by 0.7 nat.
+    """
+
+    # Thresholds on log odds
+
+    alarm_log_odds: float = 4.0
+    """Log odds against *none* from which on something is reported missing.
+
+    Origin: Markov's inequality. Where nothing is missing, and priors and noise are what they are taken for, the
+    odds reach exp(4) in at most exp(-4) = 1.8 % of all campaigns, or 2.7 % where "something" is given the prior
+    odds of 1.5 that it has here. Halved: at most 13.5 % (20 %). Doubled: at most 0.03 % (0.05 %). What that does
+    to missed effects is not measured.
+    """
+
+    indistinguishable_log_odds: float = 5.0
+    """Log odds within which two hypotheses, or two ports, are reported as not distinguishable by the campaign.
+
+    Origin: by judgement; exp(5) is about 150 to 1. Halved or doubled: not measured.
+    """
+
+    # Thresholds on the change of the response
+
+    material_share: float = 0.003
+    """Change of the response by an effect, as a share of it, from which on the effect matters.
+
+    Origin: by judgement, for campaigns whose noise is 0.14 % of the response. Halved or doubled: not measured.
+    """
+
+    material_share_of_test: float = 0.02
+    """The same within the one test where the effect changes most.
+
+    Origin: by judgement; a friction that shows in the slow tests alone reaches it. Halved or doubled: not measured.
+    """
+
+    trace_share: float = 0.0004
+    """Change of the response by a learned law below which the law is no evidence for something unknown.
+
+    It is evidence all the same where it reaches ``material_share_of_test``. Origin: two formulations of the same
+    rig differ by up to 0.03 %. Halved: those differences count. Doubled and more (0.1 %): the value of an earlier
+    version; verdicts between the two are not measured.
+    """
+
+    # Thresholds on the misfit
+
+    negligible_misfit: float = 0.3
+    """Misfit that counts as none [1].
+
+    Origin: by judgement, for noise known from few periods and the plant's own discretisation. Halved or doubled: not
+    measured.
+    """
+
+    explained_share: float = 0.01
+    """Share of the baseline's misfit that a hypothesis may leave and still count as explaining all.
+
+    It decides whether further effects and pairs are fitted, and whether a law is looked for beside one effect.
+    Origin: by judgement. Halved or doubled: not measured.
+    """
+
+    reported_share: float = 0.005
+    """Share of the baseline's misfit left by named effects from which on a warning says so.
+
+    Origin: by judgement. It changes no verdict.
+    """
+
+    unexplained_share: float = 0.05
+    """Share of the baseline's misfit left by the best effects beyond which the verdict is *unknown*.
+
+    Origin: by judgement. Halved or doubled: not measured.
+    """
+
+    unexplained_share_other_law: float = 0.1
+    """The same for one effect by another law than the catalogue's: what it leaves is explained at its own port.
+
+    Origin: by judgement, from a tyre that stiffens with the cube of its compression where the catalogue has the
+    square, and friction that falls otherwise with velocity. Halved or doubled: not measured.
+    """
+
+    # Localisation
+
+    location_folds: int = 4
+    """Parts into which tests are split where a law learned at a port predicts tests left out.
+
+    Origin: by judgement. Halved or doubled: not measured.
+    """
+
+    law_widths: tuple[float, ...] = (0.3, 3.0, 30.0)
+    """Prior widths of a law's coefficients, in rms of the residuals in their sd, over which evidence is averaged.
+
+    Origin: by judgement, a factor of ten apart. Halved or doubled: not measured.
+    """
+
+    free_input_width: float = 100.0
+    """The same of an input that is free in every test: wide, so that the share that it explains is an upper bound.
+
+    Origin: by judgement. It changes no verdict.
+    """
+
+    simple_law_prior: float = 0.1
+    """Prior probability of a family's simple laws together, relative to the sum of all its functions.
+
+    Origin: by judgement: most of what is so simple is in the catalogue. Halved or doubled: log odds between a
+    simple law and a general one move by 0.7 nat.
+    """
+
+    stand_in_share: float = 0.5
+    """Share of the best port's gain in log evidence from which on an effect elsewhere may imitate a law at a port.
+
+    Origin: by judgement, from blind trials in which an effect did nearly the same as something unknown at another
+    port. Halved or doubled: not measured.
+    """
+
+    # Scores
+
+    visible_sigma: float = 5.0
+    """Standard deviations by which an effect must change the response to be visible.
+
+    Origin: by judgement, the convention of five sigma. It changes no verdict: it says what cannot be judged.
+    """
+
+    judgeable_sizes: float = 10.0
+    """An effect that is visible only beyond so many typical sizes cannot be judged in this campaign.
+
+    Origin: by judgement. It changes no verdict.
+    """
+
+    broken_tolerance_width: float = 10.0
+    """Width of the prior of a parameter whose tolerance does not hold, in tolerances.
+
+    Origin: by judgement. Halved or doubled: Occam's factor moves by 0.7 nat; the fit of a parameter that is several
+    widths off its sheet moves the other way.
+    """
+
+    lookalike_cosine: float = 0.9
+    """Cosine between what two effects do to the campaign from which on they look alike.
+
+    Where one explains all, its lookalikes are fitted too. Origin: by judgement. Halved or doubled: not measured.
+    """
+
+    # Limits of the search
+
+    first_fits: int = 2
+    """Single effects that are fitted in full at first, besides lookalikes of the best. Origin: computing time."""
+
+    further_fits: int = 4
+    """Further ones, if the first leave something. Origin: computing time."""
+
+    promising_log_evidence: float = 2.0
+    """Rise of the log evidence, by the score, from which on an effect is fitted in full.
+
+    The same rise by a broken tolerance makes the search look for pairs. Origin: by judgement, well below the
+    threshold of an alarm. Halved or doubled: not measured.
+    """
+
+    pair_log_evidence: float = 10.0
+    """Rise of the log evidence by the best single effect from which on pairs are looked for.
+
+    Origin: by judgement. Halved or doubled: not measured.
+    """
+
+    partners: int = 3
+    """Partners fitted with an effect that leaves something. Origin: computing time."""
+
+    parents: int = 2
+    """Best single effects, or pairs, that get partners. Origin: computing time."""
+
+    typical_coordinate: float = 0.5
+    """Amplitude at which effects that are missing together are started, in widths of their prior.
+
+    Origin: priors of amplitudes are two typical sizes wide.
+    """
+
+    refined_fits: int = 3
+    """Best hypotheses that are fitted again on a mesh adapted to their own motion. Origin: computing time."""
+
+    refined_log_evidence: float = 300.0
+    """Log evidence below the best from which on a hypothesis is not refined.
+
+    Origin: by judgement, more than an unadapted mesh costs. Halved or doubled: not measured.
+    """
+
+    nearest_ports: int = 2
+    """Ports at which a law explains most of what a hypothesis leaves, whose effects are tried beside its members.
+
+    Origin: at the first may sit a stand-in of the hypothesis. Halved or doubled: not measured.
+    """
+
+    # Held-out tests
+
+    held_out_folds: int = 3
+    """Parts into which the tests are split: each is left out once. Origin: computing time; not measured."""
+
+    held_out_steps: int = 3
+    """Most steps of a fit without a part, from the fit to all tests. Origin: computing time; not measured."""
+
+
+DEFAULTS = DecisionConstants()
+"""The constants of every diagnosis that is not given others."""

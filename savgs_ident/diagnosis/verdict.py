@@ -1,0 +1,275 @@
+"""From fitted hypotheses to a verdict: log weights, probabilities, and what may be said.
+
+The log weight of a hypothesis is its log evidence plus the log of its prior probability. All hypotheses together have
+probability one:
+
+    none        the recalibrated baseline
+    one effect  fitted in full, or by its score where that promised too little for a fit
+    two effects fitted in full
+    unknown     a law learned at a port, alone or beside the best effects, or a tolerance that does not hold
+
+Something is missing where the best fitted hypothesis, or *unknown*, has log odds against *none* beyond the threshold
+of an alarm, and where it changes the response by enough to matter.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import log
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Kind
+from savgs_ident.diagnosis.score_test import PriorConflict
+from savgs_ident.diagnosis.search import Findings, hypothesis_of
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.inference.find_map import LaplaceFit
+
+
+@dataclass(frozen=True)
+class WeighedHypothesis:
+    """A hypothesis with its log weight, evidence and prior; ``mode`` is its fit, None where it was only scored."""
+
+    hypothesis: Hypothesis
+    weight: float
+    mode: LaplaceFit | None
+
+
+class Change(NamedTuple):
+    """A change of the response, as a share of it [1]: of all tests together, and of the test where it is greatest."""
+
+    overall: float
+    in_one_test: float
+
+    def matters(self, constants: DecisionConstants = DEFAULTS) -> bool:
+        """Whether it is large enough to be called an effect."""
+        local = self.in_one_test >= constants.material_share_of_test
+        return self.overall >= constants.material_share or local
+
+    def is_trace(self, constants: DecisionConstants = DEFAULTS) -> bool:
+        """Whether a law that changes no more is too small to be evidence for something unknown."""
+        local = self.in_one_test >= constants.material_share_of_test
+        return self.overall < constants.trace_share and not local
+
+
+Reason = Literal["law", "law beside effects", "tolerance"]
+"""What speaks for something unknown: a law at a port, one beside the best effects, a tolerance that does not hold."""
+
+
+class UnknownEvidence(NamedTuple):
+    """What speaks most for something that the catalogue does not have: its log weight, and which reason it is."""
+
+    weight: float
+    reason: Reason
+
+
+class BrokenTolerance(NamedTuple):
+    """A tolerance that does not hold.
+
+    Attributes:
+        weight: log weight, prior included.
+        conflict: which parameter is how far off its sheet.
+        beside: the hypothesis that is assumed besides.
+        port: the location at which the parameter acts; None where no port has it, or no tolerance was tested.
+    """
+
+    weight: float
+    conflict: PriorConflict
+    beside: Hypothesis
+    port: str | None
+
+
+def log_prior(hypothesis: Hypothesis, count: int, constants: DecisionConstants = DEFAULTS) -> float:
+    """Log prior probability of a hypothesis, where the catalogue has ``count`` effects that may be missing."""
+    if hypothesis.unknown:
+        return log(constants.prior_unknown)
+    if not hypothesis.effects:
+        return log(constants.prior_none)
+    if len(hypothesis.effects) == 1:
+        return log(constants.prior_single / max(count, 1))
+    return log(constants.prior_pair / max(count * (count - 1) / 2, 1))
+
+
+def most_probable(findings: Findings, constants: DecisionConstants = DEFAULTS) -> LaplaceFit:
+    """The fitted hypothesis with the greatest weight, evidence and prior."""
+    count = len(findings.scores)
+    return max(
+        (findings.base, *findings.modes),
+        key=lambda mode: mode.evidence + log_prior(hypothesis_of(mode), count, constants),
+    )
+
+
+def without_immaterial_members(
+    findings: Findings,
+    change: Callable[[LaplaceFit, Sequence[str]], Change],
+    constants: DecisionConstants = DEFAULTS,
+) -> Findings:
+    """The findings less the most probable ones that need an effect which does too little to matter.
+
+    What a wrong effect leaves, a trace of a second one often takes away: that does not make both of them right.
+    ``change`` is what some terms of a hypothesis do to the response.
+    """
+    best = most_probable(findings, constants)
+    while len(best.terms) > 1 and any(not change(best, (name,)).matters(constants) for name in best.terms):
+        findings = replace(findings, modes=tuple(each for each in findings.modes if each is not best))
+        best = most_probable(findings, constants)
+    return findings
+
+
+def broken_tolerance(
+    findings: Findings,
+    conflict: Callable[[LaplaceFit], PriorConflict],
+    port: Callable[[str], str | None],
+    constants: DecisionConstants = DEFAULTS,
+) -> BrokenTolerance:
+    """The most probable tolerance that does not hold.
+
+    Beside the most probable hypothesis; where this is a pair also beside none, because one broken tolerance is
+    simpler than two effects. ``conflict`` is that of a fit, ``port`` the location at which a parameter acts.
+    """
+    count = len(findings.scores)
+
+    def broken(mode: LaplaceFit) -> BrokenTolerance:
+        found, beside = conflict(mode), hypothesis_of(mode)
+        prior = log_prior(beside, count, constants) + log(constants.prior_broken_tolerance)
+        return BrokenTolerance(mode.evidence + found.gain + prior, found, beside, port(found.parameter))
+
+    best = most_probable(findings, constants)
+    modes = (best, findings.base) if len(best.terms) > 1 else (best,)
+    return max(map(broken, modes), key=lambda each: each.weight)
+
+
+def unknown_evidence(
+    findings: Findings, alone: float, beside: float, broken: float, constants: DecisionConstants = DEFAULTS
+) -> UnknownEvidence:
+    """What speaks most for something unknown.
+
+    ``alone`` is the log evidence of a law learned at some port, ``beside`` that of one beside the most probable
+    hypothesis, whose prior it shares; ``broken`` is the log weight of a broken tolerance.
+    """
+    prior = log_prior(hypothesis_of(most_probable(findings, constants)), len(findings.scores), constants)
+    unknown = log_prior(UNKNOWN, len(findings.scores), constants)
+    found = (
+        UnknownEvidence(alone + unknown, "law"),
+        UnknownEvidence(beside + unknown + prior, "law beside effects"),
+        UnknownEvidence(broken, "tolerance"),
+    )
+    return max(found, key=lambda each: each.weight)
+
+
+def weigh(
+    findings: Findings, unknown: UnknownEvidence, constants: DecisionConstants = DEFAULTS
+) -> tuple[WeighedHypothesis, ...]:
+    """All hypotheses by falling weight, but for those whose fit was lost."""
+    count = len(findings.scores)
+
+    def weighed(hypothesis: Hypothesis, evidence: float, mode: LaplaceFit | None) -> WeighedHypothesis:
+        return WeighedHypothesis(hypothesis, evidence + log_prior(hypothesis, count, constants), mode)
+
+    fits = [(hypothesis_of(mode), mode) for mode in findings.modes]
+    decided = {*(hypothesis for hypothesis, _ in fits), *(each.hypothesis for each in findings.lost)}
+    scored = [(Hypothesis((score.term.name,)), score.evidence) for score in findings.scores]
+    return _by_weight(
+        [
+            weighed(NONE, findings.base.evidence, findings.base),
+            WeighedHypothesis(UNKNOWN, unknown.weight, None),
+            *(weighed(hypothesis, mode.evidence, mode) for hypothesis, mode in fits),
+            *(weighed(each, evidence, None) for each, evidence in scored if each not in decided),
+        ]
+    )
+
+
+def reweighed(
+    weighed: Sequence[WeighedHypothesis], mode: LaplaceFit, own: float, unknown: float
+) -> tuple[WeighedHypothesis, ...]:
+    """All hypotheses by falling weight, with other log weights of the one fitted by ``mode`` and of *unknown*."""
+    found = [
+        replace(each, weight=own)
+        if each.mode is mode
+        else replace(each, weight=unknown)
+        if each.hypothesis == UNKNOWN
+        else each
+        for each in weighed
+    ]
+    return _by_weight(found)
+
+
+def _by_weight(weighed: Sequence[WeighedHypothesis]) -> tuple[WeighedHypothesis, ...]:
+    return tuple(sorted(weighed, key=lambda each: -each.weight))
+
+
+def probabilities(weighed: Sequence[WeighedHypothesis]) -> NDArray[np.float64]:
+    """Their probabilities, (n,), which sum to 1."""
+    weights = np.array([each.weight for each in weighed])
+    shares = np.exp(weights - weights.max())
+    return np.asarray(shares / shares.sum())
+
+
+def alarm_odds(weighed: Sequence[WeighedHypothesis]) -> float:
+    """Log odds that something is missing, the best fitted hypothesis or an unknown one, against nothing."""
+    missing = [
+        each.weight
+        for each in weighed
+        if each.hypothesis.unknown or (each.hypothesis.effects and each.mode is not None)
+    ]
+    return max(missing) - next(each.weight for each in weighed if each.hypothesis == NONE)
+
+
+def decide(
+    weighed: Sequence[WeighedHypothesis],
+    change: Change,
+    left: float,
+    constants: DecisionConstants = DEFAULTS,
+) -> tuple[Kind, WeighedHypothesis]:
+    """What may be said, and the hypothesis that it rests on.
+
+    ``change`` is what the best fitted hypothesis does to the response; ``left`` the share of the baseline's misfit
+    that it leaves.
+    """
+    none, unknown = (
+        next(each for each in weighed if each.hypothesis == hypothesis) for hypothesis in (NONE, UNKNOWN)
+    )
+    fitted = [each for each in weighed if each.mode is not None and each.hypothesis.effects]
+    best = fitted[0] if fitted else none
+    if alarm_odds(weighed) < constants.alarm_log_odds:
+        return "none", none
+    if unknown.weight > best.weight:
+        return "unknown", unknown
+    if not change.matters(constants):
+        return "none", none
+    if left > constants.unexplained_share:
+        return "unknown", unknown
+    return ("effect" if len(best.hypothesis.effects) == 1 else "several"), best
+
+
+def indistinguishable(
+    weighed: Sequence[WeighedHypothesis],
+    chosen: WeighedHypothesis,
+    constants: DecisionConstants = DEFAULTS,
+) -> tuple[str, ...]:
+    """Effects that the campaign cannot distinguish from those of the chosen hypothesis, in place of one of them.
+
+    A hypothesis that is much less probable by its prior alone is one of them: the campaign does not speak against it.
+    """
+    mine = chosen.hypothesis.effects
+    near = [
+        each.hypothesis.effects
+        for each in weighed
+        if len(each.hypothesis.effects) == len(mine)
+        and (
+            each.weight > chosen.weight - constants.indistinguishable_log_odds
+            or _fits_as_well(each, chosen, constants)
+        )
+    ]
+    others = (tuple(name for name in effects if name not in mine) for effects in near)
+    return tuple(dict.fromkeys(names[0] for names in others if len(names) == 1))
+
+
+def _fits_as_well(each: WeighedHypothesis, chosen: WeighedHypothesis, constants: DecisionConstants) -> bool:
+    """Whether the data alone, without the priors, do not distinguish a hypothesis from the chosen one."""
+    if each.mode is None or chosen.mode is None:
+        return False
+    return (
+        each.mode.noise_scales.value > chosen.mode.noise_scales.value - constants.indistinguishable_log_odds
+    )

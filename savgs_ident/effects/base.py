@@ -1,0 +1,308 @@
+"""Ports, what a law sees there, and the kinds of laws.
+
+A plant without effects has ports where something more may act. A port is of one of a few kinds, and so is a law:
+
+    port      law                        what the law does
+    force     AbstractForceLaw           adds a force, beside what the plant has there  (a spring, a damper)
+    force     AbstractFrictionLimitLaw   adds to what a contact holds before it slides  (Coulomb, Stribeck)
+    series    AbstractSeriesLaw          gives way in the path of a load                (a mount, a gear, a frame)
+    number    AbstractNumberLaw          changes a number of the plant                  (a mass, a spring rate)
+    input     AbstractInputLaw           adds to what a recorded input says             (a cam of another shape)
+    sensor    AbstractSensorLaw          shows other than what is there                 (a gain, a lag)
+
+A law knows neither parameters by name nor plants: its numbers have *roles*. An effect is a law at a port under a
+name, with a parameter for every role (:mod:`savgs_ident.effects.effect`):
+
+    rail_stribeck = Stribeck at the rail, rise = stribeck_rise, velocity = stribeck_velocity, coefficient = mu_r
+
+Every law has a *null*: values of some roles at which it vanishes and is differentiable. So it can be tested for, at
+no more cost than a gradient, on a model that does not have it.
+"""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import ClassVar, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Complex, Float
+
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.core.values import Values
+
+
+class PortKind(Enum):
+    """What can act at a port; the value is the name in files and reports."""
+
+    FORCE = "force"
+    SERIES = "series"
+    NUMBER = "number"
+    INPUT = "input"
+    SENSOR = "sensor"
+
+
+class Number(NamedTuple):
+    """A parameter of the plant that may be another than its sheet says; ``change`` is a typical one [``unit``]."""
+
+    name: str
+    unit: str
+    change: float
+
+
+class Inertia(NamedTuple):
+    """A mass of the plant as a force.
+
+    If it is greater than the sheet's, a force in proportion to its acceleration is missing at the port ``force``; its
+    velocity is the sum of those at the ports ``velocity``.
+    """
+
+    force: str
+    velocity: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Port:
+    """Where a law can act.
+
+    Sizes are typical for a law that matters there, and generic laws take their own from them.
+
+    Attributes:
+        name: unique within a plant.
+        kind: what can act there.
+        location: its name in files and reports; several ports may share one, as the force along a strut and the
+            mount in series with it.
+        about: what displacement, force and load are, and which sign is positive.
+        displacement_unit: of displacement, of an input's value, or of what gives way.
+        force_unit: of the force, or of the load in which something gives way.
+        displacement: a typical size [``displacement_unit``].
+        velocity: a typical size [``displacement_unit``/s].
+        force: a typical size [``force_unit``].
+        sense: power into the plant per force and velocity of the port, 1 or -1.
+        loaded: whether the port carries a load to which a friction there is proportional.
+        damped: whether that load is the force of a damper that the plant has there.
+        contact: names of the stiffness and damping with which a contact sticks before it slides; only there is a
+            limit of friction, and all such limits load one bristle.
+        numbers: parameters that may be others than the sheet's, at a number port.
+        inertias: at a number port, the masses among the numbers as forces at other ports.
+        resonant: whether what is in series there has a mass of its own: then it swings under its load.
+        motion: name of the force port whose motion a report draws where the port has none of its own; where it is
+            empty, the force port at the same location or else the first of the plant.
+    """
+
+    name: str
+    kind: PortKind
+    location: str
+    about: str = ""
+    displacement_unit: str = "m"
+    force_unit: str = "N"
+    displacement: float = 1e-2
+    velocity: float = 0.3
+    force: float = 30.0
+    sense: float = 1.0
+    loaded: bool = False
+    damped: bool = False
+    contact: tuple[str, str] | None = None
+    numbers: tuple[Number, ...] = ()
+    inertias: tuple[Inertia, ...] = ()
+    resonant: bool = False
+    motion: str = ""
+
+
+class PortSignals(NamedTuple):
+    """What a force sees at its port, in the port's units.
+
+    ``displacement`` and ``velocity`` are the pair conjugate to the force; ``load`` is what the port carries, zero
+    where it carries nothing; ``rest`` is the displacement in the plant's nominal state.
+    """
+
+    displacement: Float[Array, ""]
+    velocity: Float[Array, ""]
+    load: Float[Array, ""]
+    rest: Float[Array, ""]
+
+
+class Load(NamedTuple):
+    """A load in which something may give way, and what of it is there when the plant stands in its nominal state.
+
+    What gives way was set up under the load at rest. Both are in the port's unit of force.
+    """
+
+    total: Float[Array, ""]
+    rest: Float[Array, ""]
+
+    @property
+    def beyond_rest(self) -> Float[Array, ""]:
+        """The load less that at rest [the port's unit of force]."""
+        return self.total - self.rest
+
+
+class FrictionLimit(NamedTuple):
+    """Friction with which a contact resists sliding either way before it slides, both positive [N]."""
+
+    against_up: Float[Array, ""]
+    against_down: Float[Array, ""]
+
+
+class InputSignal(NamedTuple):
+    """An input: its value in the port's unit and its rate in that per second."""
+
+    value: Float[Array, ""]
+    rate: Float[Array, ""]
+
+
+class Fundamental(NamedTuple):
+    """Angle [rad] and speed [rad/s] of the fundamental of a periodic input; at 0 that is highest."""
+
+    angle: Float[Array, ""]
+    speed: Float[Array, ""]
+
+
+class InternalState(NamedTuple):
+    """An internal state of an effect.
+
+    ``scale`` is a typical size [``unit``], for tolerances. ``slips`` marks a state that follows a
+    rate-independent law (the anchor of a friction bristle): periodic solutions integrate it by backward
+    Euler, which is the exact play operator, and all others by the trapezoidal rule.
+    """
+
+    name: str
+    unit: str
+    scale: float
+    slips: bool = False
+
+
+class Family(Enum):
+    """What kind of thing a law is; several laws of a family say the same by other formulas."""
+
+    FRICTION = "friction"
+    DAMPING = "damping"
+    STIFFNESS = "stiffness"
+    STOP = "stop"
+    COMPLIANCE = "compliance"
+    PLAY = "play"
+    OSCILLATOR = "oscillator"
+    NUMBER = "number"
+    GAIN = "gain"
+    DYNAMICS = "dynamics"
+    SHAPE = "shape"
+    LEARNED = "learned"
+
+
+class Role(NamedTuple):
+    """A number that a law takes; where all roles with a ``null`` are at it the law vanishes, the others shape it."""
+
+    name: str
+    null: float | None = None
+
+
+class AbstractLaw(eqx.Module):
+    """Base of all laws; each one is final, of one of the kinds below, and lives in its own file.
+
+    ``tried`` are values [SI] of shaping roles at which a diagnosis looks for the law, where multiples of the typical
+    ones would leave some out: natural frequencies, say.
+    """
+
+    kind: eqx.AbstractClassVar[PortKind]
+    name: eqx.AbstractClassVar[str]
+    family: eqx.AbstractClassVar[Family]
+    roles: eqx.AbstractClassVar[tuple[Role, ...]]
+    tried: ClassVar[tuple[tuple[str, float], ...]] = ()
+
+    @abstractmethod
+    def typical(self, port: Port) -> Mapping[str, Parameter | float]:
+        """By role, a parameter of a typical size at a port, or a number that stays as it is; SI."""
+
+    def states(self, port: Port) -> tuple[InternalState, ...]:
+        """Its internal states at a port."""
+        return ()
+
+    def suits(self, port: Port) -> bool:
+        """Whether it can act at a port without more than the port tells."""
+        return port.kind is self.kind
+
+
+class AbstractForceLaw(AbstractLaw):
+    """A force along the displacement of its port: force times velocity is power into the plant."""
+
+    kind: ClassVar[PortKind] = PortKind.FORCE
+
+    @abstractmethod
+    def force(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, ""]:
+        """The force [the port's unit], with numbers ``v`` by role, SI."""
+
+    def rate(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:
+        """Time derivatives of the internal states, shape (s,) [unit of each per second]; none without states."""
+        return jnp.zeros(0)
+
+
+class AbstractFrictionLimitLaw(AbstractLaw):
+    """A share of the friction that a contact holds before it slides.
+
+    All of a contact load one bristle (:mod:`savgs_ident.effects.bristle`).
+    """
+
+    kind: ClassVar[PortKind] = PortKind.FORCE
+    family: ClassVar[Family] = Family.FRICTION
+
+    @abstractmethod
+    def limit(self, v: Values, signals: PortSignals) -> FrictionLimit:
+        """The share [N]; it may be negative, the sum of all is held at zero or above."""
+
+    def suits(self, port: Port) -> bool:
+        """Only where something sticks."""
+        return port.kind is self.kind and port.contact is not None
+
+
+class AbstractSeriesLaw(AbstractLaw):
+    """Something that gives way in the path of a load: its first state is by how much, counted from rest."""
+
+    kind: ClassVar[PortKind] = PortKind.SERIES
+
+    @abstractmethod
+    def balance(
+        self, v: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
+    ) -> Float[Array, " s"]:
+        """What vanishes for the right ``rate`` of the states, shape (s,) [unit of each state], growing with it."""
+
+
+class AbstractNumberLaw(AbstractLaw):
+    """A number of the plant, in the role ``number``, that is another than the sheet's."""
+
+    kind: ClassVar[PortKind] = PortKind.NUMBER
+    family: ClassVar[Family] = Family.NUMBER
+
+    @abstractmethod
+    def changed(self, v: Values) -> Float[Array, ""]:
+        """The number as it is [its unit]."""
+
+
+class AbstractInputLaw(AbstractLaw):
+    """An input that does not do what its recording says."""
+
+    kind: ClassVar[PortKind] = PortKind.INPUT
+
+    @abstractmethod
+    def shift(self, v: Values, signal: InputSignal, fundamental: Fundamental) -> InputSignal:
+        """What comes on top of the recorded value and rate, in their units."""
+
+
+class AbstractSensorLaw(AbstractLaw):
+    """A sensor that does not show what is there; linear in what it measures."""
+
+    kind: ClassVar[PortKind] = PortKind.SENSOR
+
+    @abstractmethod
+    def transfer(self, v: Values, frequency: Float[Array, "*f"]) -> Complex[Array, "*f"]:
+        """Reading over truth at frequencies [Hz]."""
+
+
+SETTLING = 2e-5
+"""Least time [s] in which a series element gives way: far shorter than any motion of the plant. It keeps the
+element's law regular where its compliance vanishes."""
+
+
+def per(unit: str, other: str) -> str:
+    """One unit over another, as it is written: ``m/N``, ``rad/(N m)``."""
+    return f"{unit}/({other})" if " " in other else f"{unit}/{other}"

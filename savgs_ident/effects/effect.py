@@ -1,0 +1,143 @@
+"""An effect: a law at a port, under a name, with a parameter for every number that the law takes."""
+
+from collections.abc import Mapping
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Complex, Float
+
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.core.values import Values
+from savgs_ident.effects.base import (
+    AbstractForceLaw,
+    AbstractFrictionLimitLaw,
+    AbstractInputLaw,
+    AbstractLaw,
+    AbstractNumberLaw,
+    AbstractSensorLaw,
+    AbstractSeriesLaw,
+    FrictionLimit,
+    Fundamental,
+    InputSignal,
+    InternalState,
+    Load,
+    Port,
+    PortSignals,
+)
+
+
+class Effect(eqx.Module):
+    """A law at a port under a name.
+
+    Attributes:
+        name: in files and reports, unique within a catalogue.
+        port: where the law acts.
+        law: what it does.
+        parameters: that come with the effect, in SI.
+        numbers: by role of the law, the name of a parameter, be it the effect's or the plant's, or a number [SI] that
+            stays as it is.
+        state_names: of the law's internal states; those of the law where there are none.
+        symptom: by what it shows in measurements.
+        reference: where the law is from.
+    """
+
+    name: str = eqx.field(static=True)
+    port: Port = eqx.field(static=True)
+    law: AbstractLaw
+    parameters: tuple[Parameter, ...] = eqx.field(static=True)
+    numbers: tuple[tuple[str, str | float], ...] = eqx.field(static=True)
+    state_names: tuple[str, ...] = eqx.field(static=True, default=())
+    symptom: str = eqx.field(static=True, default="")
+    reference: str = eqx.field(static=True, default="")
+
+    def __check_init__(self) -> None:
+        if self.law.kind is not self.port.kind:
+            raise ValueError(f"'{self.name}': {self.law.name} is no law of a {self.port.kind.value} port")
+        if [role for role, _ in self.numbers] != [role.name for role in self.law.roles]:
+            raise ValueError(f"'{self.name}' does not give {self.law.name} the numbers that it takes")
+
+    @property
+    def null(self) -> Mapping[str, float]:
+        """Values of its parameters, by name, at which it vanishes."""
+        names = dict(self.numbers)
+        found = {names[role.name]: role.null for role in self.law.roles if role.null is not None}
+        return {name: null for name, null in found.items() if isinstance(name, str)}
+
+    @property
+    def states(self) -> tuple[InternalState, ...]:
+        """Internal states under the names of this effect."""
+        own = self.law.states(self.port)
+        names = self.state_names or tuple(state.name for state in own)
+        return tuple(state._replace(name=name) for state, name in zip(own, names, strict=True))
+
+    @property
+    def tried(self) -> tuple[Mapping[str, float], ...]:
+        """Values [SI] of its shapes at which a diagnosis looks for it, if not at multiples of the typical ones."""
+        names = dict(self.numbers)
+        return tuple({str(names[role]): value} for role, value in self.law.tried)
+
+    def force(self, p: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, ""]:
+        """Its force in the sense of the port [the port's unit], with parameters ``p``."""
+        assert isinstance(self.law, AbstractForceLaw), self.name
+        return self.port.sense * self.law.force(self._values(p), signals, state)
+
+    def rate(self, p: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:
+        """Time derivatives of its states where it is a force, (s,) [unit of each per second]."""
+        assert isinstance(self.law, AbstractForceLaw), self.name
+        return self.law.rate(self._values(p), signals, state)
+
+    def friction_limit(self, p: Values, signals: PortSignals) -> FrictionLimit:
+        """Its share of what a contact holds [N]."""
+        assert isinstance(self.law, AbstractFrictionLimitLaw), self.name
+        return self.law.limit(self._values(p), signals)
+
+    def balance(
+        self, p: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
+    ) -> Float[Array, " s"]:
+        """What vanishes for the right rates where it gives way, (s,) [unit of each state]."""
+        assert isinstance(self.law, AbstractSeriesLaw), self.name
+        return self.law.balance(self._values(p), load, state, rate)
+
+    def changes(self, p: Values) -> Mapping[str, Float[Array, ""]]:
+        """The plant's number that it changes, by name, SI."""
+        assert isinstance(self.law, AbstractNumberLaw), self.name
+        return {str(dict(self.numbers)["number"]): self.law.changed(self._values(p))}
+
+    def shift(self, p: Values, signal: InputSignal, fundamental: Fundamental) -> InputSignal:
+        """What comes on top of a recorded input, value and rate."""
+        assert isinstance(self.law, AbstractInputLaw), self.name
+        return self.law.shift(self._values(p), signal, fundamental)
+
+    def transfer(self, p: Values, frequency: Float[Array, "*f"]) -> Complex[Array, "*f"]:
+        """Reading over truth of the sensor at frequencies [Hz]."""
+        assert isinstance(self.law, AbstractSensorLaw), self.name
+        return self.law.transfer(self._values(p), frequency)
+
+    def _values(self, p: Values) -> Values:
+        """The law's numbers by role."""
+        return {
+            role: p[given] if isinstance(given, str) else jnp.asarray(given) for role, given in self.numbers
+        }
+
+
+def effect_at(
+    name: str,
+    port: Port,
+    law: AbstractLaw,
+    numbers: Mapping[str, Parameter | str | float],
+    *,
+    brings: tuple[Parameter, ...] = (),
+    states: tuple[str, ...] = (),
+    symptom: str = "",
+    reference: str = "",
+) -> Effect:
+    """A law at a port: for every role a parameter of its own, the name of one of the plant, or a number [SI].
+
+    ``brings`` are parameters of the contact or of the plant that come with it. Raises :class:`ValueError` for a law
+    that is of another kind than the port, or that is not given the numbers that it takes.
+    """
+    own = tuple(each for each in numbers.values() if isinstance(each, Parameter))
+    named = tuple(
+        (role, given.name if isinstance(given, Parameter) else given) for role, given in numbers.items()
+    )
+    return Effect(name, port, law, (*own, *brings), named, states, symptom, reference)

@@ -1,0 +1,1 @@
+"""The laws, one a file; each can act at any port of its kind."""

@@ -1,0 +1,65 @@
+"""A mode of what carries a load: a frame, a bracket.
+
+    xdd + 2 zeta w xd + w^2 x = beta (F - F_0),        w = 2 pi f
+
+with the displacement x [m], the load F [N], F_0 at rest in the nominal state, the natural frequency f [Hz], the
+damping ratio zeta [1] and the mobility beta [1/kg]: one over the mass that moves.
+
+Source: Ewins 2000, Modal Testing, ch. 2, single degree of freedom.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.core.values import Values
+from savgs_ident.effects.base import AbstractSeriesLaw, Family, InternalState, Load, Port, Role, per
+
+
+class Resonance(AbstractSeriesLaw):
+    """Something that swings under the load."""
+
+    name: ClassVar[str] = "resonance"
+    family: ClassVar[Family] = Family.OSCILLATOR
+    roles: ClassVar[tuple[Role, ...]] = (Role("mobility", 0.0), Role("frequency"), Role("damping_ratio"))
+    tried: ClassVar[tuple[tuple[str, float], ...]] = tuple(
+        ("frequency", frequency) for frequency in np.geomspace(4.0, 60.0, 16).tolist()
+    )
+
+    def typical(self, port: Port) -> Mapping[str, Parameter | float]:
+        """A mode at 12 Hz that gives the typical displacement under the typical load at rest."""
+        frequency = 12.0
+        mobility = port.displacement * (2.0 * np.pi * frequency) ** 2 / port.force
+        unit = per(f"{port.displacement_unit}/s^2", port.force_unit)
+        return {
+            "mobility": Parameter(
+                "mobility", mobility, unit, lower=0.0, upper=100.0 * mobility, about="mobility of the mode"
+            ),
+            "frequency": Parameter(
+                "frequency", frequency, "Hz", lower=2.0, upper=80.0, about="natural frequency"
+            ),
+            "damping_ratio": Parameter(
+                "damping_ratio", 0.05, "1", lower=0.005, upper=1.0, about="damping ratio"
+            ),
+        }
+
+    def states(self, port: Port) -> tuple[InternalState, ...]:
+        """The displacement and its velocity."""
+        unit = port.displacement_unit
+        return (
+            InternalState("displacement", unit, port.displacement),
+            InternalState("velocity", f"{unit}/s", port.velocity),
+        )
+
+    def balance(
+        self, v: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
+    ) -> Float[Array, " s"]:
+        """Velocity and acceleration out of balance [m/s], [m/s^2]."""
+        omega = 2.0 * jnp.pi * v["frequency"]
+        damping = 2.0 * v["damping_ratio"] * omega * state[1]
+        acceleration = v["mobility"] * load.beyond_rest - damping - omega**2 * state[0]
+        return rate - jnp.stack([state[1], acceleration])

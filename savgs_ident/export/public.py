@@ -1,0 +1,150 @@
+"""What ``import savgs_ident`` offers of exports: a model in the forms that other tools read."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+from savgs_ident.core.errors import InputError, SavgsIdentError, blamed_on
+from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.presentation import Progress, Result, no_progress
+from savgs_ident.diagnosis.result import Diagnosis
+from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.gather import DIAGNOSIS_REMEDY, Gathered, gather, read_diagnosis
+from savgs_ident.export.json_export import covariance_record
+from savgs_ident.export.registry import EXPORTS
+from savgs_ident.inference.draws import DrawSource
+from savgs_ident.inference.result import Posterior
+from savgs_ident.plants.quarter_car.model import RigModel, load_rig, model_of
+from savgs_ident.simulate.program_cache import use_persistent_cache
+
+
+@dataclass(frozen=True)
+class Exported(Result):
+    """What an export wrote.
+
+    Attributes:
+        gathered: the model, where its numbers come from, and why it is not to be trusted.
+        written: the files by format.
+    """
+
+    presenter: ClassVar[str] = "EXPORTED"
+
+    gathered: Gathered
+    written: Mapping[str, tuple[Path, ...]]
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files, each once."""
+        return tuple(dict.fromkeys(file for files in self.written.values() for file in files))
+
+    @property
+    def trusted(self) -> bool:
+        """Whether fit, diagnosis and posterior are sound and belong together."""
+        return not self.gathered.doubts
+
+
+def export(
+    model: RigModel,
+    formats: str | Sequence[str],
+    folder: str | Path,
+    *,
+    posterior: Posterior | str | Path | None = None,
+    samples: int = 500,
+    diagnosis: Diagnosis | str | Path | None = None,
+    progress: Progress = no_progress,
+) -> Exported:
+    """Export a model: parameters with covariance, draws, linear models, equations.
+
+    Args:
+        model: the rig with its effects, identified or drawn.
+        formats: one or several of "json", "mat", "python-control", "casadi", "c" and "fmu".
+        folder: where the files are written.
+        posterior: a posterior or a ``posterior.nc`` whose draws travel along.
+        samples: how many of them, evenly spread over all.
+        diagnosis: a diagnosis or a ``diagnosis.json``: the effects that it names, or the force that it learned, join
+            the model with the numbers of its fit.
+        progress: is told what is being done.
+
+    Look at ``trusted`` of the result. Raises :class:`InputError` for an unknown format, for what a format cannot
+    hold, and for files that cannot be used or do not belong together.
+    """
+    names = (formats,) if isinstance(formats, str) else tuple(dict.fromkeys(formats))
+    check_formats(names)
+    out = prepare_folder(Path(folder))
+    found = gathered(model, posterior, samples, diagnosis)
+    _check_covariance(found.model, model.rig.source)
+    use_persistent_cache()
+    written = {}
+    for name in names:
+        progress(f"writing {name}")
+        # What names no file of its own is a fault of the rig's numbers.
+        with blamed_on(model.rig.source):
+            written[name] = _write(name, found.model, out)
+    origin = replace(model.origin(), effects=found.model.effects)
+    return Exported(found, written, origin=origin)
+
+
+def check_formats(names: Sequence[str]) -> None:
+    """Raise :class:`InputError` for a format that does not exist."""
+    for name in names:
+        if name not in EXPORTS:
+            raise InputError(
+                f"there is no format '{name}'", source="--to", remedy="choose among: " + ", ".join(EXPORTS)
+            )
+
+
+def model_to_export(
+    path: str | Path, effects: Sequence[str] | None = None, diagnosis: str | Path | None = None
+) -> RigModel:
+    """The model of a rig file: with ``effects``, else its own, else, for a drawing, those that were diagnosed."""
+    rig = load_rig(path)
+    if effects is None and "effects" not in rig.provenance:
+        effects = diagnosis_document(diagnosis).get("baseline", {}).get("effects")
+    return model_of(rig, effects)
+
+
+def gathered(
+    model: RigModel,
+    posterior: Posterior | str | Path | None = None,
+    samples: int = 500,
+    diagnosis: Diagnosis | str | Path | None = None,
+) -> Gathered:
+    """A model with what a posterior and a diagnosis say of it; raises as :func:`export` does."""
+    source: DrawSource | None = Path(posterior) if isinstance(posterior, str) else posterior
+    try:
+        return gather(model.rig, model.effects, diagnosis_document(diagnosis), source, samples)
+    except InputError as error:
+        # What has no source is a fault of the diagnosis: the rig has been read, and draws name their file.
+        blamed = diagnosis if isinstance(diagnosis, str | Path) else ""
+        raise InputError(
+            error.what, source=error.source or blamed, remedy=error.remedy or DIAGNOSIS_REMEDY
+        ) from None
+
+
+def diagnosis_document(diagnosis: Diagnosis | str | Path | None) -> dict[str, Any]:
+    """What ``diagnosis.json`` says; empty without a diagnosis. Raises :class:`InputError` for a file that is none."""
+    if diagnosis is None:
+        return {}
+    if isinstance(diagnosis, Diagnosis):
+        document: dict[str, Any] = json.loads(diagnosis.to_json())
+        return document
+    return read_diagnosis(Path(diagnosis))
+
+
+def _check_covariance(model: ExportedModel, source: str) -> None:
+    try:
+        covariance_record(model)
+    except InputError as error:
+        raise InputError(error.what, source=source, remedy="identify the rig again") from None
+
+
+def _write(name: str, model: ExportedModel, out: Path) -> tuple[Path, ...]:
+    try:
+        return EXPORTS[name].write(model, out)
+    except InputError:
+        raise
+    except SavgsIdentError as error:
+        # An effect whose law the format cannot hold.
+        raise InputError(str(error), source=f"--to {name}", remedy="leave this format out") from error

@@ -1,0 +1,1 @@
+"""Parameters from data: priors, likelihood, maximum a posteriori, Laplace approximation, sampling."""

@@ -1,0 +1,328 @@
+"""Whether chains have converged, and what their draws say beside what was known before.
+
+R-hat and effective sample sizes are rank-normalised (Vehtari, Gelman, Simpson, Carpenter and Buerkner, Bayesian
+Analysis 16, 2021); the autocorrelation time is emcee's, of all chains together; the Pareto index of the weights tells
+whether the surrogate covers the posterior. Beside the marginals of the draws stand the prior, the Laplace
+approximation and the profile of the density, both of the surrogate, which is exact at its centre and of second order
+about it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from arviz_stats.base.array import array_stats
+from emcee.autocorr import integrated_time
+from jaxtyping import Array, Float
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from savgs_ident.core.status import Status
+from savgs_ident.core.transforms import FreeVector
+from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.inference.likelihood import values_of
+from savgs_ident.inference.observations import Prediction, Term
+from savgs_ident.inference.posterior_mode import Case
+from savgs_ident.inference.prior import NUISANCE, Coordinates, sheet_coordinate
+from savgs_ident.inference.result import Convergence, Marginal, ProfileLine, Role
+from savgs_ident.inference.samplers.chains import Chains
+from savgs_ident.inference.surrogate import Surrogate
+
+LEAST_DRAWS = 8
+"""Steps of a chain below which nothing can be said."""
+
+TAILS = (0.05, 0.95)
+"""Quantiles of which the tail's effective sample size is the lesser."""
+
+R_HAT = 1.01
+"""R-hat up to which an identified parameter counts as mixed."""
+
+R_HAT_OTHERS = 1.05
+"""The same for the tolerated parameters and the nuisance scales, of which nobody reads quantiles."""
+
+PRECISE = 0.025
+"""Monte-Carlo error of a median, in standard deviations of the posterior, below which more draws are no use."""
+
+PARETO_K = 0.7
+"""Pareto index of the weights up to which the surrogate covers the posterior."""
+
+DIVERGING = 0.01
+"""Share of trajectories that may diverge."""
+
+
+class Mixing(NamedTuple):
+    """How well one parameter's draws mix.
+
+    NaN where chains are too short or do not move; all in draws or without dimension [1].
+    """
+
+    ess_bulk: float
+    ess_tail: float
+    r_hat: float
+    autocorrelation: float
+
+
+def mixing_of(draws: Float[np.ndarray, "S C"]) -> Mixing:
+    """The mixing of one parameter's draws [its unit], steps by chains."""
+    if draws.shape[0] < LEAST_DRAWS or np.ptp(draws) == 0.0:
+        return Mixing(np.nan, np.nan, np.nan, np.nan)
+    axes = {"chain_axis": 1, "draw_axis": 0}
+    bulk = float(array_stats.ess(draws, method="bulk", **axes))
+    tail = float(array_stats.ess(draws, method="tail", prob=TAILS, **axes))
+    return Mixing(bulk, tail, float(array_stats.rhat(draws, **axes)), _autocorrelation(draws))
+
+
+def least_ess(mixing: Sequence[Mixing]) -> float:
+    """The least effective sample size of bulk and tail over several parameters; 0 where nothing can be said."""
+    # NumPy's minimum is NaN if one of them is; Python's depends on their order.
+    least = np.min([(each.ess_bulk, each.ess_tail) for each in mixing]) if mixing else np.nan
+    return float(least) if np.isfinite(least) else 0.0
+
+
+def enough(mixing: Sequence[Mixing], target: float) -> bool:
+    """Whether identified parameters have mixed and reached the effective sample size asked for."""
+    return least_ess(mixing) >= target and all(each.r_hat <= R_HAT for each in mixing)
+
+
+def others_mixed(chains: Chains, count: int) -> bool:
+    """Whether all coordinates but the first ``count``, those of the identified parameters, have mixed."""
+    # The discrepancy is the size of the last coordinate, whose sign means nothing.
+    sized = np.concatenate([chains.points[:, :, count:-1], np.abs(chains.points[:, :, -1:])], axis=2)
+    return all(mixing_of(each).r_hat <= R_HAT_OTHERS for each in np.moveaxis(sized, 2, 0))
+
+
+def precise(mixing: Sequence[Mixing]) -> bool:
+    """Whether medians are known to :data:`PRECISE`: that of a normal has the error sqrt(pi / 2) / sqrt(ess)."""
+    return least_ess(mixing) >= 0.5 * np.pi / PRECISE**2
+
+
+def judge_chains(
+    chains: Chains,
+    identified: Sequence[Mixing],
+    others: Sequence[Mixing],
+    target: float,
+    doubts: Sequence[str],
+) -> Convergence:
+    """Whether the draws may be used; ``doubts`` are reasons against it that are known already.
+
+    ``target`` is the effective sample size asked for.
+    """
+    ess = least_ess(identified)
+    r_hat = _greatest_r_hat(identified) if identified else np.nan
+    r_hat_others = _greatest_r_hat(others) if others else 1.0
+    # ArviZ takes log likelihoods, of which the logarithms of the weights are the negatives.
+    k = float(array_stats.psislw(-chains.log_ratio)[1]) if chains.log_ratio.size > 20 else np.nan
+    diverging = chains.divergences / max(chains.evaluations, 1)
+    acceptance = float(np.mean(chains.accepted)) if chains.accepted.size else 0.0
+    reasons = list(doubts)
+    if not ess >= target:
+        reasons.append(f"the least effective sample size is {ess:.0f}, {target:.0f} were asked for")
+    if not r_hat <= R_HAT:
+        reasons.append(f"the chains disagree: R-hat is {r_hat:.3f}, above {R_HAT}")
+    if not r_hat_others <= R_HAT_OTHERS:
+        reasons.append(
+            f"the chains disagree in a tolerated parameter: R-hat is {r_hat_others:.3f}, above {R_HAT_OTHERS}"
+        )
+    if k > PARETO_K:
+        reasons.append(f"the surrogate does not cover the posterior: Pareto k is {k:.2f}, above {PARETO_K}")
+    if diverging > DIVERGING:
+        reasons.append(f"{chains.divergences} trajectories diverged")
+    return Convergence(
+        converged=not reasons,
+        reasons=tuple(reasons),
+        target_ess=target,
+        ess_min=ess,
+        r_hat_max=float(np.fmax(r_hat, r_hat_others)),
+        acceptance=acceptance,
+        divergences=chains.divergences,
+        pareto_k=k,
+        evaluations=chains.evaluations,
+        unsolved=chains.unsolved,
+    )
+
+
+def _greatest_r_hat(mixing: Sequence[Mixing]) -> float:
+    """NaN if one of them is."""
+    return float(np.max([each.r_hat for each in mixing]))
+
+
+def _autocorrelation(draws: Float[np.ndarray, "S C"]) -> float:
+    # Short chains are said to be so by the effective sample size; a warning here would only repeat it. One that
+    # has not moved has no autocorrelation.
+    with np.errstate(invalid="ignore"):
+        return float(integrated_time(draws[:, :, None], tol=0, quiet=True)[0])
+
+
+SPAN = 3.0
+"""How far profiles reach to either side [standard deviations]."""
+
+STEPS = 6
+"""Points of a profile to either side."""
+
+SURROGATE_STEPS = 60
+SURROGATE_LEVEL = 1e-5
+
+
+@dataclass(frozen=True)
+class SurrogatePlant:
+    """A surrogate, as the search for a mode asks for it: nothing has to be solved, and it is solved everywhere."""
+
+    surrogate: Surrogate
+
+    @property
+    def nuisances(self) -> Coordinates:
+        """The free parameters."""
+        return tuple(sheet_coordinate(parameter) for parameter in self.surrogate.prior.free.parameters)
+
+    def predict(
+        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: None
+    ) -> Prediction:
+        """Rows at ``values`` [SI] with their slopes. There are no ``terms``."""
+        surrogate, free = self.surrogate, self.surrogate.prior.free
+        u = np.asarray(free.to_unconstrained(values))
+        axes = np.asarray(surrogate.scale)[: u.size, : u.size]
+        v = np.linalg.solve(axes, u - np.asarray(surrogate.centre)[: u.size])
+        rows, slopes = (np.asarray(each) for each in _rows_and_slopes(surrogate, jnp.asarray(v)))
+        by_value = np.linalg.solve(axes.T, slopes.T).T / np.asarray(free.jacobian_diag(jnp.asarray(u)))
+        return Prediction(rows, by_value, Status.CONVERGED, None)
+
+    def refined(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: None) -> None:
+        """Nothing is started from nearby. Values are in SI."""
+        return
+
+    def columns(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
+    ) -> list[NDArray[np.float64]]:
+        """Nothing may be added."""
+        return []
+
+
+def surrogate_mode(surrogate: Surrogate, held: Mapping[str, float] | None = None) -> LaplaceFit:
+    """Where a surrogate is highest, with the parameters ``held`` [SI] where they are said to be."""
+    free, size = surrogate.prior.free, len(surrogate.prior.free.names)
+    centre = {name: float(value) for name, value in free.to_constrained(surrogate.centre[:size]).items()}
+    search = search_of(SurrogatePlant(surrogate), surrogate.likelihood.data)
+    return find_map(search, (), centre, None, SURROGATE_STEPS, SURROGATE_LEVEL, held)
+
+
+def profile_of(surrogate: Surrogate, name: str) -> ProfileLine:
+    """The profile of a parameter; a point at which the search failed is left out."""
+    free = surrogate.prior.free
+    place = free.names.index(name)
+    best, coordinate = surrogate_mode(surrogate), sheet_coordinate(free.parameters[place])
+    sd = float(np.linalg.norm(np.asarray(surrogate.scale)[place])) / free.widths[place]
+    found = {best.values[name]: 0.0}
+    for deviation in np.linspace(-SPAN, SPAN, 2 * STEPS + 1):
+        value = coordinate.value(float(best.x[place]) + float(deviation) * sd)
+        held = surrogate_mode(surrogate, {name: value}) if deviation else best
+        if held.status.ok:
+            found[value] = 2.0 * (best.value - held.value)
+    values = np.array(sorted(found))
+    return ProfileLine(values, np.array([found[each] for each in values]))
+
+
+_ABOUT = {
+    "noise_scale": "factor on the measured noise",
+    "discrepancy": "relative rms by which the model misses, beyond the noise",
+}
+
+_STEP = 1e-5
+"""Step of a coordinate for the slope of a value."""
+
+
+def names_by_role(free: FreeVector) -> dict[str, Role]:
+    """All names with their roles: identified, nuisance, tolerated."""
+    roles: dict[str, Role] = dict.fromkeys(free.identified, "identified")
+    roles |= dict.fromkeys(NUISANCE, "nuisance")
+    return roles | dict.fromkeys(free.tolerated, "tolerated")
+
+
+def marginals_of(
+    case: Case, surrogate: Surrogate, chains: Chains, mixing: Mapping[str, Mixing]
+) -> tuple[Marginal, ...]:
+    """The marginal of every parameter, identified ones with their profiles."""
+    free, scales = case.problem.free, case.likelihood.scales
+    draws = values_of(free, scales, chains.points)
+    low, high = (_prior_values(case, share) for share in (0.025, 0.975))
+    top = surrogate_mode(surrogate)
+    point = np.concatenate(
+        [top.x * free.widths, scales.coordinates(top.noise_scales.noise, top.noise_scales.discrepancy)]
+    )
+    mode = values_of(free, scales, point[None])
+    laplace = _laplace_sd(case, surrogate, point)
+    about = {each.name: (each.unit, each.about) for each in free.parameters}
+    about |= {name: ("1", text) for name, text in _ABOUT.items()}
+    found = []
+    for name, role in names_by_role(free).items():
+        q025, median, q975 = np.quantile(draws[name], [0.025, 0.5, 0.975])
+        unit, text = about[name]
+        found.append(
+            Marginal(
+                name=name,
+                unit=unit,
+                about=text,
+                role=role,
+                median=float(median),
+                sd=float(np.std(draws[name], ddof=1)),
+                q025=float(q025),
+                q975=float(q975),
+                prior=(low[name], high[name]),
+                contraction=float(1.0 - (q975 - q025) / (high[name] - low[name])),
+                laplace_value=float(mode[name][0]),
+                laplace_sd=laplace[name],
+                **mixing[name]._asdict(),
+                profile=profile_of(surrogate, name) if role == "identified" else None,
+            )
+        )
+    return tuple(found)
+
+
+def _prior_values(case: Case, share: float) -> dict[str, float]:
+    """The value of every parameter below which ``share`` of its prior lies."""
+    normal = float(ndtri(share))
+    # The discrepancy is half-normal: its quantile is one of the upper half of the normal.
+    half = float(ndtri(0.5 + 0.5 * share))
+    point = np.concatenate([case.prior.quantile(share), [normal, half]])
+    return {
+        name: float(value[0])
+        for name, value in values_of(case.problem.free, case.likelihood.scales, point[None]).items()
+    }
+
+
+def _laplace_sd(case: Case, surrogate: Surrogate, point: Float[np.ndarray, " n+2"]) -> dict[str, float]:
+    """Standard deviations from the curvature at the surrogate's highest point, each in its unit."""
+    # Where no discrepancy is best, beside the symmetry plane: the magnitude has no second derivative there.
+    point = np.append(point[:-1], max(point[-1], _STEP))
+    t = jnp.asarray(surrogate.coordinates(point[None])[0])
+    information, slopes = -np.asarray(_hessian(surrogate, t)), np.asarray(_point_slopes(surrogate, t))
+    sizes, axes = np.linalg.eigh(information)
+    spread = slopes @ (axes / np.sqrt(np.where(sizes > 0.0, sizes, np.nan)))
+    deviation = np.sqrt(np.sum(spread**2, axis=1))
+    found = {}
+    for place, name in enumerate((*case.problem.free.names, *NUISANCE)):
+        # Away from zero, where the discrepancy, a magnitude, has a kink.
+        step = np.copysign(_STEP, point[place]) * np.eye(1, point.size, place)
+        moved = values_of(
+            case.problem.free, case.likelihood.scales, np.concatenate([point[None], point + step])
+        )
+        found[name] = float(abs(np.diff(moved[name])[0]) / _STEP * deviation[place])
+    return found
+
+
+@eqx.filter_jit
+def _rows_and_slopes(surrogate: Surrogate, v: Array) -> tuple[Array, Array]:
+    return surrogate.rows_at(v), jax.jacfwd(surrogate.rows_at)(v)
+
+
+@eqx.filter_jit
+def _hessian(surrogate: Surrogate, t: Array) -> Array:
+    return jax.hessian(surrogate)(t)
+
+
+@eqx.filter_jit
+def _point_slopes(surrogate: Surrogate, t: Array) -> Array:
+    return jax.jacfwd(surrogate.point)(t)

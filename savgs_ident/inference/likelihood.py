@@ -1,0 +1,132 @@
+"""How likely measured harmonics are, given a model that is not perfect.
+
+A harmonic X_k (Re, Im) of a channel in a dwell is taken as normal about the model's H_k, with covariance
+
+    s^2 C_k + (d a_k)^2 I,      a_k = |X_1| / (sqrt(2) k^m),
+
+where C_k is its measured noise covariance, s the noise scale and d the model discrepancy: the relative rms
+error of the model's first harmonic. Higher orders err less, with a power m that the plant declares for each channel:
+m = 1 for an acceleration, which follows a force that jumps, and m = 2 for a deflection, which lies between following
+it and being moved by it. Errors
+of different orders, channels and dwells count as independent: a discrepancy that many dwells share is not
+covered by the intervals, it is what a diagnosis looks for. With d = 0 the intervals are those of the noise
+alone, which for a model that misses by more than the noise are absurdly narrow.
+
+In the principal axes of C_k every real part is a row of its own, independent of all others.
+
+Both scales are estimated, see :class:`savgs_ident.inference.prior.Scales`: here as coordinates of a point that a
+sampler moves, in :mod:`savgs_ident.inference.noise_scales` at their best values for given residuals.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Complex, Float
+from numpy.typing import NDArray
+
+from savgs_ident.core.transforms import FreeVector
+from savgs_ident.inference.observations import Data
+from savgs_ident.inference.prior import NUISANCE, Scales
+from savgs_ident.inference.problem import HarmonicTarget
+
+
+class Likelihood(eqx.Module):
+    """Measured harmonics as m independent rows.
+
+    ``axes`` (D, C, K, 2, 2) turns (Re, Im) of every harmonic into its principal axes, ``place`` (m,) picks
+    the rows that are compared; ``measured`` (m,) is what they are, ``variance`` (m,) their noise,
+    ``discrepancy_scale`` (m,) their a_k. ``scales`` says what a point's last two coordinates mean. Rows are in the
+    unit of their reading, ``variance`` in its square, ``axes`` and ``place`` without dimension.
+    """
+
+    axes: Float[Array, "D C K 2 2"]
+    place: np.ndarray
+    measured: Float[Array, " m"]
+    variance: Float[Array, " m"]
+    discrepancy_scale: Float[Array, " m"]
+    scales: Scales
+
+    def rows(self, harmonics: Complex[Array, "D C K"]) -> Float[Array, " m"]:
+        """Predicted harmonics as rows [units of the channels], (m,)."""
+        parts = jnp.stack([harmonics.real, harmonics.imag], axis=-1)
+        return jnp.einsum("dckij,dckj->dcki", self.axes, parts).ravel()[self.place]
+
+    def spread(self, point: Float[Array, " n+2"]) -> Float[Array, " m"]:
+        """Variance of the rows [unit^2] about the model's, noise and discrepancy together."""
+        noise, miss = self.scales.noise_scale(point), self.scales.miss(point)
+        return noise**2 * self.variance + (miss * self.discrepancy_scale) ** 2
+
+    def __call__(self, rows: Float[Array, " m"], point: Float[Array, " n+2"]) -> Float[Array, ""]:
+        """Log likelihood of the model's ``rows``, up to a constant. Rows are in the unit of their reading."""
+        spread = self.spread(point)
+        return -0.5 * jnp.sum((rows - self.measured) ** 2 / spread + jnp.log(spread / self.variance))
+
+    @property
+    def data(self) -> Data:
+        """The measured rows, as of one test."""
+        one_test = np.zeros(len(self.place), dtype=np.intp)
+        measured, variance, discrepancy_scale = (
+            np.asarray(each) for each in (self.measured, self.variance, self.discrepancy_scale)
+        )
+        return Data(measured, variance, discrepancy_scale, one_test, self.scales)
+
+    def harmonics(
+        self, rows: Float[np.ndarray, "S m"], shape: tuple[int, ...]
+    ) -> Complex[np.ndarray, "S D C K"]:
+        """Rows [unit of the reading] as complex harmonics ``(S, *shape)``; zero where nothing is compared."""
+        parts = np.zeros((rows.shape[0], 2 * int(np.prod(shape))))
+        parts[:, self.place] = rows
+        turned = np.einsum("dckij,sdcki->sdckj", np.asarray(self.axes), parts.reshape(-1, *shape, 2))
+        return np.asarray(turned[..., 0] + 1j * turned[..., 1])
+
+
+def likelihood_of(target: HarmonicTarget, scales: Scales | None = None) -> Likelihood:
+    """The likelihood of the harmonics that a fit compares."""
+    used = np.asarray(target.used)
+    whitening = np.asarray(target.whitening)
+    precision = np.einsum("dckji,dckjl->dckil", whitening, whitening)
+    values, vectors = np.linalg.eigh(np.where(used[..., None, None], precision, np.eye(2)))
+    axes = np.swapaxes(vectors, -1, -2)
+    place = np.flatnonzero(np.repeat(used.ravel(), 2))
+    harmonics = np.asarray(target.measured)
+    parts = np.stack([harmonics.real, harmonics.imag], axis=-1)
+    rows = np.einsum("dckij,dckj->dcki", axes, parts).ravel()[place]
+    discrepancy_scale = np.repeat(
+        _discrepancy_scales(harmonics, used, target.decay)[..., None], 2, axis=-1
+    ).ravel()[place]
+    variance = (1.0 / values).ravel()[place]
+    return Likelihood(
+        axes=jnp.asarray(axes),
+        place=place,
+        measured=jnp.asarray(rows),
+        variance=jnp.asarray(variance),
+        discrepancy_scale=jnp.asarray(discrepancy_scale),
+        scales=scales or Scales(),
+    )
+
+
+def _discrepancy_scales(harmonics: np.ndarray, used: np.ndarray, decay: tuple[int, ...]) -> np.ndarray:
+    """a_k of every harmonic; the largest compared one stands in for a first one that is not compared."""
+    sizes = np.abs(harmonics) * used
+    first = np.where(used[..., 1], sizes[..., 1], sizes.max(axis=-1))
+    order = np.maximum(np.arange(harmonics.shape[-1]), 1)
+    power = np.array(decay)[:, None]
+    return np.asarray(first[..., None] / (np.sqrt(2.0) * order**power))
+
+
+def values_of(
+    free: FreeVector, scales: Scales, points: Float[np.ndarray, "*w n+2"]
+) -> dict[str, NDArray[np.float64]]:
+    """Points as SI values by name, ``(*w,)`` each, the nuisance scales after the parameters."""
+    flat = jnp.asarray(points.reshape(-1, points.shape[-1]))
+    values = {name: np.asarray(each) for name, each in _constrained(free, flat[:, :-2]).items()}
+    values |= dict(
+        zip(NUISANCE, (np.asarray(scales.noise_scale(flat)), np.asarray(scales.miss(flat))), strict=True)
+    )
+    return {name: each.reshape(points.shape[:-1]) for name, each in values.items()}
+
+
+@eqx.filter_jit
+def _constrained(free: FreeVector, us: Array) -> dict[str, Array]:
+    return jax.vmap(free.to_constrained)(us)

@@ -1,0 +1,258 @@
+"""The posterior's mode, and what a sampler proposes from: a surrogate to second order about it.
+
+The mode is found by the same search as the hypotheses of a diagnosis (:mod:`savgs_ident.inference.find_map`); at the
+mode the time nodes are adapted once more. Its normal approximation gives the scale of the posterior about a point,
+in which it is round for the samplers; second derivatives are differences of exact slopes.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from numpy.typing import NDArray
+
+from savgs_ident.core.status import Status, joint_status
+from savgs_ident.inference.exact import Anchor, ExactModel, anchor_at, in_parallel, rows_and_slopes
+from savgs_ident.inference.find_map import LaplaceFit, Progress, find_map, search_of
+from savgs_ident.inference.likelihood import Likelihood
+from savgs_ident.inference.observations import Prediction, Term
+from savgs_ident.inference.prior import Coordinates, Prior, sheet_coordinate
+from savgs_ident.inference.problem import Problem
+from savgs_ident.inference.surrogate import Surrogate, bend_of, identity_map, no_bend, triangular_map_of
+from savgs_ident.simulate.periodic import PeriodicSolution, adapt
+
+LONGEST = 1.0
+"""Longest axis [unconstrained coordinates]: an e-fold of an identified parameter, a tolerance of the others. A
+direction that the data do not tell is explored by as much."""
+
+LEAST = 1e-4
+"""Least standard deviation of a scale's coordinate."""
+
+_NOISE_GRID = np.linspace(-4.0, 4.0, 161)
+_MISS_GRID = np.concatenate([[0.0], np.geomspace(1e-5, 30.0, 300)])
+
+
+def parameter_scale(
+    likelihood: Likelihood, prior: Prior, point: Float[Array, " n+2"], slopes: Float[np.ndarray, "m n"]
+) -> Float[np.ndarray, "n n"]:
+    """Columns along the principal axes of the parameters' information at ``point``, one sd long each, or shorter."""
+    count = slopes.shape[1]
+    weight = 1.0 / np.sqrt(np.asarray(likelihood.spread(point)))
+    curvature = -np.diag(np.asarray(jax.hessian(prior)(point)))[:count]
+    stacked = np.concatenate([slopes * weight[:, None], np.diag(np.sqrt(np.maximum(curvature, 0.0)))])
+    _, sizes, axes = np.linalg.svd(stacked, full_matrices=False)
+    return np.asarray(axes.T / np.maximum(sizes, 1.0 / LONGEST))
+
+
+def nuisance_scale(
+    likelihood: Likelihood, prior: Prior, point: Float[Array, " n+2"], rows: Float[np.ndarray, " m"]
+) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]:
+    """Means and standard deviations of the noise's and the discrepancy's coordinate, given all others.
+
+    The discrepancy's density is even in its coordinate. Where it stands clear of zero one of its two halves
+    is taken, elsewhere both together.
+    """
+    modelled = jnp.asarray(rows)
+
+    def moments(place: int, grid: np.ndarray) -> tuple[float, float]:
+        logs = np.asarray(_log_densities(likelihood, prior, modelled, _along(point, place, grid)))
+        mass = np.exp(logs - logs.max()) * np.gradient(grid)
+        mass /= mass.sum()
+        mean = float(mass @ grid)
+        # A density narrower than the grid still has a width.
+        return mean, max(float(np.sqrt(mass @ (grid - mean) ** 2)), LEAST)
+
+    noise, miss = moments(-2, _NOISE_GRID), moments(-1, _MISS_GRID)
+    if miss[0] < 3.0 * miss[1]:
+        miss = (0.0, float(np.hypot(*miss)))
+    return np.array([noise[0], miss[0]]), np.array([noise[1], miss[1]])
+
+
+@eqx.filter_jit
+def _log_densities(likelihood: Likelihood, prior: Prior, rows: Array, points: Array) -> Array:
+    return jax.vmap(lambda point: likelihood(rows, point) + prior(point))(points)
+
+
+def _along(point: Array, place: int, grid: np.ndarray) -> Array:
+    """Copies of a point with one coordinate on a grid, (grid, n + 2)."""
+    return jnp.tile(point, (grid.size, 1)).at[:, place].set(jnp.asarray(grid))
+
+
+LEVEL = 0.01
+"""Rise of the log density that a further step promises below which the mode is found."""
+
+
+class LinearisationPoint(NamedTuple):
+    """The model at a point: rows (m,), their slopes (m, n) in u, motions, and the exact log density."""
+
+    point: Float[np.ndarray, " n+2"]
+    rows: Float[np.ndarray, " m"]
+    slopes: Float[np.ndarray, "m n"]
+    solution: PeriodicSolution
+    value: float
+
+
+class PosteriorMode(NamedTuple):
+    """The mode: what is known there, and how the search ended."""
+
+    linearisation_point: LinearisationPoint
+    status: Status
+
+
+class Case(NamedTuple):
+    """A problem with its likelihood and its prior."""
+
+    problem: Problem
+    likelihood: Likelihood
+    prior: Prior
+
+    def density(self, rows: Float[np.ndarray, " m"], point: Float[np.ndarray, " n+2"]) -> float:
+        """The log density of a point where the model has ``rows``."""
+        x = jnp.asarray(point)
+        return float(self.likelihood(jnp.asarray(rows), x) + self.prior(x))
+
+
+@dataclass(frozen=True)
+class CasePlant:
+    """The model of a case, as the search for a mode asks for it; its motions are what it starts from nearby."""
+
+    case: Case
+
+    @property
+    def nuisances(self) -> Coordinates:
+        """The free parameters."""
+        return tuple(sheet_coordinate(parameter) for parameter in self.case.problem.free.parameters)
+
+    def predict(
+        self,
+        terms: tuple[str, ...],
+        values: Mapping[str, float],
+        names: Sequence[str],
+        warm_start: PeriodicSolution,
+    ) -> Prediction:
+        """Rows at ``values`` [SI] with their slopes, on the nodes of ``warm_start``. There are no ``terms``."""
+        problem = self.case.problem
+        u = problem.free.to_unconstrained(values)
+        rows, slopes, solution = rows_and_slopes(problem, self.case.likelihood, u, warm_start)
+        status = joint_status(solution.status())
+        return Prediction(rows, slopes / np.asarray(problem.slopes(u)), status, solution)
+
+    def refined(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
+    ) -> PeriodicSolution:
+        """The same motions on nodes that follow them. ``values`` are in SI."""
+        problem = self.case.problem
+        p = problem.parameters(problem.free.to_unconstrained(values))
+        return adapt(problem.model, p, warm_start, warm_start.mesh.layout, problem.iterations)
+
+    def columns(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
+    ) -> list[NDArray[np.float64]]:
+        """Nothing may be added."""
+        return []
+
+
+def find_mode(
+    case: Case, u: Float[Array, " n"], warm_start: PeriodicSolution, tell: Progress
+) -> PosteriorMode:
+    """The mode from free coordinates ``u`` (n,), where the model has the motions ``warm_start``.
+
+    Its nodes are adapted there.
+    """
+    search = search_of(CasePlant(case), case.likelihood.data)
+    values = case.problem.parameters(u)
+    start = {name: float(values[name]) for name in case.problem.free.names}
+    found = find_map(search, (), start, warm_start, level=LEVEL, progress=tell)
+    if found.status.ok:
+        finer = search.plant.refined((), found.values, found.prediction.warm_start)
+        found = find_map(search, (), found.values, finer, level=LEVEL, progress=tell)
+    return PosteriorMode(_linearisation_point(case, found), found.status)
+
+
+def _linearisation_point(case: Case, found: LaplaceFit) -> LinearisationPoint:
+    widths = case.problem.free.widths
+    scales = case.likelihood.scales.coordinates(found.noise_scales.noise, found.noise_scales.discrepancy)
+    point = np.concatenate([found.x * widths, scales])
+    rows = found.prediction.rows
+    value = case.density(rows, point) if found.solved else -np.inf
+    return LinearisationPoint(point, rows, found.slopes / widths, found.prediction.warm_start, value)
+
+
+def linear_surrogate(case: Case, at: LinearisationPoint) -> Surrogate:
+    """The surrogate about a linearisation point, without second derivatives."""
+    point = jnp.asarray(at.point)
+    means, spreads = nuisance_scale(case.likelihood, case.prior, point, at.rows)
+    scale = np.zeros((point.size, point.size))
+    scale[:-2, :-2] = parameter_scale(case.likelihood, case.prior, point, at.slopes)
+    scale[[-2, -1], [-2, -1]] = spreads
+    slope = at.slopes @ scale[:-2, :-2]
+    return Surrogate(
+        likelihood=case.likelihood,
+        prior=case.prior,
+        centre=jnp.asarray(np.concatenate([at.point[:-2], means])),
+        scale=jnp.asarray(scale),
+        rows=jnp.asarray(at.rows),
+        slope=jnp.asarray(slope),
+        bend=no_bend(at.rows.size),
+        map=identity_map(slope.shape[1]),
+    )
+
+
+BENT = 0.5
+"""Second derivative [noise sd] beyond which an axis is explored to its other side too."""
+
+
+class Expansion(NamedTuple):
+    """The model about a point: exact near it, and a surrogate to second order."""
+
+    exact: ExactModel
+    surrogate: Surrogate
+
+
+def expand(case: Case, at: LinearisationPoint, tell: Progress) -> Expansion:
+    """The expansion about a linearisation point."""
+    linear = linear_surrogate(case, at)
+    axes = np.asarray(linear.scale)[:-2, :-2]
+    weight = 1.0 / np.sqrt(np.asarray(case.likelihood.spread(linear.centre)))
+    tell(f"second derivatives of the response along {axes.shape[1]} axes")
+    anchor = anchor_at(case.problem, jnp.asarray(at.point[:-2]), at.solution)
+    second = _second_derivatives(case, at, anchor, axes, weight)
+    bent = (bend_of(second, weight), triangular_map_of(second, np.asarray(linear.slope), weight))
+    surrogate = eqx.tree_at(lambda each: (each.bend, each.map), linear, bent)
+    return Expansion(ExactModel(case.problem, case.likelihood, anchor), surrogate)
+
+
+def _second_derivatives(
+    case: Case,
+    at: LinearisationPoint,
+    anchor: Anchor,
+    axes: Float[np.ndarray, "n n"],
+    weight: Float[np.ndarray, " m"],
+) -> Float[np.ndarray, "n n m"]:
+    """Differences of the slopes one standard deviation ahead; of both sides where an axis bends much.
+
+    An axis whose sides were not solved counts as straight: the exact model decides in the end.
+    """
+
+    def slopes_at(shift: np.ndarray) -> np.ndarray:
+        u = jnp.asarray(at.point[:-2] + shift)
+        _, slopes, solution = rows_and_slopes(
+            case.problem, case.likelihood, u, at.solution, anchor.predicted(u)
+        )
+        solved = all(status.ok for status in solution.status())
+        return np.asarray((slopes @ axes).T if solved else np.full((axes.shape[1], at.rows.size), np.nan))
+
+    here = (at.slopes @ axes).T
+    second = np.stack(in_parallel(slopes_at, axes.T)) - here
+    own = np.arange(len(second))
+    bent = np.flatnonzero(~(np.linalg.norm(second[own, own] * weight, axis=1) < BENT))
+    for axis, behind in zip(bent, in_parallel(slopes_at, -axes.T[bent]), strict=True):
+        one_sided = here - behind
+        both = 0.5 * (second[axis] + one_sided)
+        second[axis] = np.where(np.isfinite(both), both, one_sided)
+    return np.nan_to_num(second)

@@ -1,0 +1,346 @@
+"""What is compared with what: a model and its free parameters against a measured response.
+
+A :class:`Task` is a model with all its parameters, a response and how to compare them; it makes a
+:class:`Problem`, which a solver can evaluate. A target maps predicted harmonics (D, C, K) to residuals that are
+independent with unit variance if the model is true; below them stand the deviations of the parameters from what is
+known of them beforehand, in their standard deviations. The Jacobian is exact: sensitivities of the periodic solution
+by the implicit function theorem, chained through target and coordinates.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple, cast
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Complex, Float
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.parameter import ParameterTable
+from savgs_ident.core.transforms import FreeVector, known_to_tolerance
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.effects.base import InputSignal
+from savgs_ident.plants.base import AbstractPlant, Channel, Excitation, Motion
+from savgs_ident.plants.model import Model
+from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
+from savgs_ident.simulate.excitation import measured_excitation
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, resolve
+from savgs_ident.simulate.program_cache import placed, stored
+from savgs_ident.simulate.sensitivity import harmonic_sensitivities
+
+
+class HarmonicTarget(eqx.Module):
+    """Complex harmonics of orders 1..n with their 2 x 2 covariances.
+
+    ``whitening`` (D, C, n + 1, 2, 2) is the inverse Cholesky factor of the covariance, 0 where not
+    ``used``. Harmonics are in the unit of their reading, ``whitening`` in one over it. ``decay`` (C,) is the power
+    of the order with which a discrepancy of the model falls in each channel.
+    """
+
+    measured: Complex[Array, "D C K"]
+    whitening: Float[Array, "D C K 2 2"]
+    used: np.ndarray = eqx.field(static=False)
+    decay: tuple[int, ...] = eqx.field(static=True)
+
+    def __call__(self, predicted: Complex[Array, "D C K"]) -> Float[Array, " m"]:
+        """Residuals in standard deviations, (D * C * (n + 1) * 2,)."""
+        miss = predicted - self.measured
+        parts = jnp.stack([miss.real, miss.imag], axis=-1)
+        return jnp.einsum("dckij,dckj->dcki", self.whitening, parts).ravel()
+
+    @property
+    def size(self) -> int:
+        """Residuals, those of unused entries included."""
+        return 2 * int(np.size(self.used))
+
+    @property
+    def entries(self) -> int:
+        """Real numbers compared."""
+        return 2 * int(self.used.sum())
+
+
+class PeakToPeakTarget(eqx.Module):
+    """Peak-to-peak values of the waveforms, truncated on both sides to the orders that the sensor carries.
+
+    ``measured`` is in the unit of each reading, ``weight`` in one over it; ``used`` (D, C) says which
+    count.
+    """
+
+    measured: Float[Array, "D C"]
+    weight: Float[Array, "D C"]
+    used: np.ndarray = eqx.field(static=False)
+
+    def __call__(self, predicted: Complex[Array, "D C K"]) -> Float[Array, " m"]:
+        """Residuals in standard deviations, (D * C,)."""
+        # It is written against the array API, its types name NumPy's arrays.
+        discrepancy_scale = cast(Any, peak_to_peak)(predicted, jnp.asarray(self.used))
+        return jnp.ravel((discrepancy_scale - self.measured) * self.weight)
+
+    @property
+    def size(self) -> int:
+        """Residuals, those of unused entries included."""
+        return int(np.size(self.weight))
+
+    @property
+    def entries(self) -> int:
+        """Real numbers compared."""
+        return int((np.asarray(self.weight) > 0.0).sum())
+
+
+Target = HarmonicTarget | PeakToPeakTarget
+
+
+def response_channels(
+    measured: HarmonicResponse, channels: Sequence[Channel]
+) -> tuple[NDArray[np.bool_], list[int]]:
+    """Which of a plant's channels were recorded, (C,), and a stand-in index for those that were not.
+
+    Raises :class:`InputError` if none was.
+    """
+    names = [each.name for each in channels]
+    present = np.array([name in measured.channels for name in names])
+    if not present.any():
+        what = f"neither {' nor '.join(names)} was" if len(names) > 1 else f"{names[0]} was not"
+        raise InputError(f"{what} recorded", remedy="map at least one of them in channels.toml")
+    return present, [measured.channel(name) if name in measured.channels else 0 for name in names]
+
+
+def harmonic_target(measured: HarmonicResponse, channels: Sequence[Channel], orders: int) -> HarmonicTarget:
+    """Orders 1..``orders`` of those of a plant's channels that were recorded.
+
+    Raises :class:`InputError` if none can be used.
+    """
+    present, places = response_channels(measured, channels)
+    count = min(orders, measured.orders) + 1
+    covariance = measured.covariance[:, places, :count]
+    used = measured.valid[:, places, :count] & present[None, :, None]
+    used[:, :, 0] = False
+    used &= (np.linalg.det(covariance) > 0.0) & np.isfinite(covariance).all(axis=(-2, -1))
+    if not used.any():
+        raise InputError("no harmonic of the response can be used", remedy="record longer dwells")
+    safe = np.where(used[..., None, None], covariance, np.eye(2))
+    whitening = np.linalg.inv(np.linalg.cholesky(safe)) * used[..., None, None]
+    harmonics = np.where(used, measured.harmonics[:, places, :count], 0.0)
+    return HarmonicTarget(
+        jnp.asarray(harmonics), jnp.asarray(whitening), used, tuple(each.decay for each in channels)
+    )
+
+
+def peak_to_peak_target(measured: HarmonicResponse, channels: Sequence[Channel]) -> PeakToPeakTarget:
+    """Peak-to-peak values of those of a plant's channels that were recorded, all orders that the measurement holds.
+
+    Raises :class:`InputError` if none can be used.
+    """
+    present, places = response_channels(measured, channels)
+    sd = measured.peak_to_peak_sd[:, places]
+    used = measured.valid[:, places] & present[None, :, None]
+    used[:, :, 0] = False
+    told = used[:, :, 1] & (sd > 0.0)
+    if not told.any():
+        raise InputError("no peak-to-peak value of the response can be used", remedy="record longer dwells")
+    weight = np.where(told, 1.0 / np.where(told, sd, 1.0), 0.0)
+    return PeakToPeakTarget(jnp.asarray(measured.peak_to_peak[:, places]), jnp.asarray(weight), used)
+
+
+class Pins(NamedTuple):
+    """Free coordinates [1] held near a value.
+
+    Residuals ``weight`` (u - ``at``), both (n,); weight 0 leaves one free.
+    """
+
+    weight: Float[Array, " n"]
+    at: Float[Array, " n"]
+
+
+class Problem(eqx.Module):
+    """Model, free vector, values of everything else [SI], and what is compared up to which order."""
+
+    model: AbstractPlant
+    free: FreeVector
+    fixed: dict[str, Float[Array, ""]]
+    target: Target
+    orders: int = eqx.field(static=True)
+    iterations: int = eqx.field(static=True)
+
+    def parameters(self, u: Float[Array, " n"]) -> Values:
+        """All parameters of the model [SI] at unconstrained coordinates."""
+        return self.fixed | _to_constrained(self.free, u)
+
+    def slopes(self, u: Float[Array, " n"]) -> Float[Array, " n"]:
+        """d(parameter)/du of every free parameter [its SI unit]."""
+        return _slopes(self.free, u)
+
+    @property
+    def unpinned(self) -> Pins:
+        """No coordinate held."""
+        nothing = jnp.zeros(len(self.free.names))
+        return Pins(nothing, nothing)
+
+
+def used_parameters(model: AbstractPlant, table: ParameterTable) -> frozenset[str]:
+    """The parameters in ``table`` that a response of ``model`` can depend on."""
+    size = len(model.states)
+
+    def response(p: Values) -> tuple[Array, ...]:
+        zero = jnp.zeros(())
+        pair = model.coordinate_type(*(zero for _ in model.coordinates))
+        inputs = model.drive(tuple(InputSignal(zero, zero) for _ in model.inputs))
+        state = jnp.zeros(size)
+        residual = model.residual(p, Motion(pair, pair, pair), state, state, inputs)
+        seen = model.read(p, Motion(pair, pair, pair), state, state, inputs)
+        return residual, *seen, model.transfers(p, zero)
+
+    values = as_values(table.as_dict())
+    jaxpr = jax.make_jaxpr(response)(values).jaxpr
+    needed = {id(variable) for variable in jaxpr.outvars}
+    for equation in reversed(jaxpr.eqns):
+        if any(id(variable) in needed for variable in equation.outvars):
+            needed |= {id(variable) for variable in equation.invars}
+    # A dictionary is flattened in the order of its sorted keys.
+    return frozenset(n for n, v in zip(sorted(values), jaxpr.invars, strict=True) if id(v) in needed)
+
+
+# Compiled as a whole: the maps of forty parameters, one operation at a time, would take seconds.
+@eqx.filter_jit
+def _to_constrained(free: FreeVector, u: Array) -> dict[str, Array]:
+    return free.to_constrained(u)
+
+
+@eqx.filter_jit
+def _slopes(free: FreeVector, u: Array) -> Array:
+    return free.jacobian_diag(u)
+
+
+class Linearised(NamedTuple):
+    """A problem about the free coordinates ``u`` (n,): residuals (m,) there and their Jacobian (m, n)."""
+
+    u: Float[Array, " n"]
+    residual: Float[Array, " m"]
+    jacobian: Float[Array, "m n"]
+
+
+class Evaluation(NamedTuple):
+    """A problem evaluated at a point, and the model's periodic motions there."""
+
+    at: Linearised
+    solution: PeriodicSolution
+
+
+def evaluate(problem: Problem, u: Float[Array, " n"], pins: Pins, warm_start: PeriodicSolution) -> Evaluation:
+    """Residuals of data, priors and pins at free coordinates ``u``, solved from ``warm_start`` on its nodes.
+
+    The solver is the one that made ``warm_start``, compiled already.
+    """
+    u, pins = placed((u, pins))
+    p = problem.parameters(u)
+    return _evaluation(problem, pins, u, p, resolve(problem.model, p, warm_start, problem.iterations))
+
+
+def evaluate_beside(problem: Problem, u: Float[Array, " n"], pins: Pins, best: Evaluation) -> Evaluation:
+    """The same, started from a ``best`` point known so far; whose Jacobian it borrows if it is no better.
+
+    Such a point is rejected by any optimiser, and its own Jacobian would cost most of the evaluation. ``u`` are
+    free coordinates.
+    """
+    u, pins = placed((u, pins))
+    p = problem.parameters(u)
+    solution = resolve(problem.model, p, best.solution, problem.iterations)
+    residual = _residual_at(problem, pins, u, p, solution)
+    if jnp.sum(residual**2) < jnp.sum(best.at.residual**2):
+        return _evaluation(problem, pins, u, p, solution)
+    return Evaluation(Linearised(u, residual, best.at.jacobian), solution)
+
+
+def _evaluation(problem: Problem, pins: Pins, u: Array, p: Values, solution: PeriodicSolution) -> Evaluation:
+    residual, jacobian = _compared(problem, pins, u, p, solution)
+    return Evaluation(Linearised(u, residual, jacobian), solution)
+
+
+@eqx.filter_jit
+def _compared(*args: Any) -> tuple[Array, ...]:
+    return stored(_residual_and_jacobian, *args)
+
+
+def _residual_and_jacobian(
+    problem: Problem, pins: Pins, u: Array, p: Values, solution: PeriodicSolution
+) -> tuple[Array, Array]:
+    predicted = harmonics(problem.model, p, solution, problem.orders)
+    by_name = harmonic_sensitivities(problem.model, p, solution, problem.free.names, problem.orders)
+    columns = jax.vmap(lambda change: jax.jvp(problem.target, (predicted,), (change,))[1])(by_name)
+    priors = jax.jacfwd(problem.free.prior_residuals)(u)
+    jacobian = jnp.concatenate([columns.T * problem.slopes(u), priors, jnp.diag(pins.weight)])
+    return _residual_at(problem, pins, u, p, solution), jacobian
+
+
+@eqx.filter_jit
+def _residual_at(problem: Problem, pins: Pins, u: Array, p: Values, solution: PeriodicSolution) -> Array:
+    data = problem.target(harmonics(problem.model, p, solution, problem.orders))
+    return jnp.concatenate([data, problem.free.prior_residuals(u), pins.weight * (u - pins.at)])
+
+
+Quantity = Literal["harmonics", "peak_to_peak"]
+
+
+@dataclass(frozen=True)
+class ProblemSettings:
+    """What is compared with what.
+
+    Attributes:
+        orders: highest harmonic order that is compared.
+        fixed_tolerances: take the parameters with a tolerance as exact instead of estimating them along.
+        quantity: compare complex harmonics, or peak-to-peak values only, as the paper did.
+        periodic: how finely to solve the model.
+    """
+
+    orders: int = 9
+    fixed_tolerances: bool = False
+    quantity: Quantity = "harmonics"
+    periodic: PeriodicSettings = field(default_factory=PeriodicSettings)
+
+
+class Task(NamedTuple):
+    """A model, all its parameters, a response and how to compare them; the problem that follows."""
+
+    model: Model
+    table: ParameterTable
+    measured: HarmonicResponse
+    settings: ProblemSettings
+    excitation: Excitation
+    problem: Problem
+
+
+def plan_task(
+    measured: HarmonicResponse, model: Model, free: tuple[str, ...], settings: ProblemSettings
+) -> Task:
+    """The task of identifying ``free`` parameters of a model.
+
+    Raises :class:`InputError` for names that do not exist or that the model does not use, and for a response
+    that cannot be used.
+    """
+    table, plant = model.table, model.build()
+    used = used_parameters(plant, table)
+    _check_free(free, table, used)
+    tolerated = tuple(name for name in known_to_tolerance(table, free) if name in used)
+    free_vector = FreeVector(table, free, () if settings.fixed_tolerances else tolerated)
+    target: Target
+    if settings.quantity == "harmonics":
+        target = harmonic_target(measured, plant.channels, settings.orders)
+    else:
+        target = peak_to_peak_target(measured, plant.channels)
+    orders, iterations = target.used.shape[-1] - 1, settings.periodic.iterations
+    problem = Problem(plant, free_vector, as_values(table.as_dict()), target, orders, iterations)
+    excitation = measured_excitation(plant, measured, table)
+    return Task(model, table, measured, settings, excitation, problem)
+
+
+def _check_free(free: tuple[str, ...], table: ParameterTable, used: frozenset[str]) -> None:
+    remedy = "choose among: " + ", ".join(sorted(used))
+    for name in free:
+        if name not in table:
+            raise InputError(f"there is no parameter '{name}'", remedy=remedy)
+        if name not in used:
+            raise InputError(f"the model does not depend on '{name}'", remedy=remedy)

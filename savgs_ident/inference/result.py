@@ -1,0 +1,192 @@
+"""What sampling gives: draws with their convergence, marginals, what the model predicts, what is told in words."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.presentation import Result
+from savgs_ident.plants.model import Model
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Sampler = Literal["emcee", "nuts"]
+"""The samplers there are."""
+
+Role = Literal["identified", "tolerated", "nuisance"]
+"""Identified by the data alone, known to a tolerance before, or a scale of the likelihood."""
+
+
+@dataclass(frozen=True)
+class ProfileLine:
+    """How much -2 log density rises (k,) [1] with a parameter held at ``values`` (k,) [its unit], others refitted."""
+
+    values: NDArray[np.float64]
+    rise: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """One parameter's posterior; all values in [``unit``].
+
+    Attributes:
+        name: the parameter.
+        unit: its SI unit.
+        about: what it is.
+        role: how it came into the posterior.
+        median: of the draws.
+        sd: standard deviation of the draws.
+        q025: lower end of the central 95 % interval.
+        q975: its upper end.
+        prior: the central 95 % interval before the data.
+        contraction: share by which that interval has shrunk [1].
+        laplace_value: the value at the posterior's mode.
+        laplace_sd: the standard deviation that its curvature there promises.
+        ess_bulk: effective sample size of the middle of the distribution, rank-normalised [1].
+        ess_tail: the same of its 5 % and 95 % quantiles [1].
+        r_hat: rank-normalised split R-hat [1].
+        autocorrelation: integrated autocorrelation time [draws].
+        profile: profile of the density; None but for identified parameters.
+    """
+
+    name: str
+    unit: str
+    about: str
+    role: Role
+    median: float
+    sd: float
+    q025: float
+    q975: float
+    prior: tuple[float, float]
+    contraction: float
+    laplace_value: float
+    laplace_sd: float
+    ess_bulk: float
+    ess_tail: float
+    r_hat: float
+    autocorrelation: float
+    profile: ProfileLine | None = None
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """Whether the draws may be used.
+
+    Attributes:
+        converged: whether they may.
+        reasons: why not, a sentence each.
+        target_ess: effective sample size that was asked for [1].
+        ess_min: the least of bulk and tail over the identified parameters [1].
+        r_hat_max: the largest over all parameters [1].
+        acceptance: share of proposals that the exact model accepted [1].
+        divergences: diverging trajectories of the gradient-based sampler; 0 for emcee, which has none.
+        pareto_k: tail index of the ratios of exact to surrogate density at the proposals [1]; the proposals
+            cover the posterior if it is below 0.7.
+        evaluations: responses of the exact model, all dwells each.
+        unsolved: proposals at which the model found no periodic motion; they were rejected.
+    """
+
+    converged: bool
+    reasons: tuple[str, ...]
+    target_ess: float
+    ess_min: float
+    r_hat_max: float
+    acceptance: float
+    divergences: int
+    pareto_k: float
+    evaluations: int
+    unsolved: int
+
+
+@dataclass(frozen=True)
+class Predictive:
+    """What the posterior predicts for a repetition of the campaign.
+
+    S draws, D dwells, the C channels of the plant, orders 0..K-1, complex, in the channels' SI units.
+
+    Attributes:
+        model: harmonics of the model at the draws, (S, D, C, K).
+        replicated: the same with the noise and the discrepancy that a repetition would have, (S, D, C, K).
+        used: which entries the likelihood compares, (D, C, K).
+        inside: whether the measured magnitude and phase lie within 95 % of ``replicated``: whether the measured
+            phasor is no further from their mean than 95 % of them, in their own covariance, (D, C, K).
+    """
+
+    model: NDArray[np.complex128]
+    replicated: NDArray[np.complex128]
+    used: NDArray[np.bool_]
+    inside: NDArray[np.bool_]
+
+    @property
+    def count_inside(self) -> tuple[int, int]:
+        """How many of the compared phasors lie inside, and how many there are."""
+        return int(np.sum(self.inside & self.used)), int(np.sum(self.used))
+
+
+@dataclass(frozen=True)
+class Posterior(Result):
+    """A finished run; arrays are read-only.
+
+    Attributes:
+        model: the model with the posterior medians in place of the assumed values.
+        sampler: which sampler ran.
+        marginals: identified parameters first, then the nuisance scales, then the tolerated parameters.
+        draws: name to values in SI, (chains, draws), in the order of ``marginals``.
+        statistics: per draw, (chains, draws): "lp" log density, "accepted" whether the draw is a new one.
+        convergence: whether they may be used.
+        predictive: what they predict.
+        measured: the response that they follow from.
+        sentences: what the data tell, in words.
+        wall_s: time taken, from the response to the last draw [s].
+    """
+
+    presenter: ClassVar[str] = "POSTERIOR"
+
+    model: Model
+    sampler: Sampler
+    marginals: tuple[Marginal, ...]
+    draws: Mapping[str, NDArray[np.float64]]
+    statistics: Mapping[str, NDArray[np.float64]]
+    convergence: Convergence
+    predictive: Predictive
+    measured: HarmonicResponse
+    sentences: tuple[str, ...]
+    wall_s: float
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects in the model."""
+        return self.model.effects
+
+    @property
+    def by_name(self) -> Mapping[str, Marginal]:
+        """The marginals by parameter name."""
+        return {each.name: each for each in self.marginals}
+
+    def __getitem__(self, name: str) -> Marginal:
+        """The marginal of a parameter; raises ``KeyError`` for one that was not sampled."""
+        return self.by_name[name]
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the chains converged."""
+        return self.convergence.converged
+
+    def to_arviz(self) -> "xr.DataTree":
+        """The draws as ArviZ's inference data: the content of ``posterior.nc``."""
+        # Only here: ArviZ and what it brings along take seconds to load.
+        from savgs_ident.inference.draws import inference_data
+
+        return inference_data(self)
+
+    def of_role(self, role: Role) -> tuple[Marginal, ...]:
+        """The marginals of one role."""
+        return tuple(each for each in self.marginals if each.role == role)
+
+    def correlation(self, names: tuple[str, ...]) -> NDArray[np.float64]:
+        """Correlation [1] of the draws of the named parameters, (n, n)."""
+        return np.atleast_2d(np.corrcoef(np.stack([self.draws[name].ravel() for name in names])))

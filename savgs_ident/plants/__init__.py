@@ -1,0 +1,1 @@
+"""Differentiable models of test rigs."""

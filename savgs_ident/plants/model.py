@@ -1,0 +1,219 @@
+"""The model that the public calls take: a plant with its parameters, and the effects that act on it.
+
+    model = PlantModel(TwoMass(), TwoMass.parameters) + "guide_coulomb"
+    fit = fit_response(model, measured)
+    fit.model.table["k"].value
+
+:class:`Model` is what a fit, a posterior or a diagnosis asks of one; :class:`PlantModel` is that of any plant, and
+the quarter car has its own, with a rig file (:mod:`savgs_ident.plants.quarter_car.model`).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from typing import Any, Protocol, Self
+
+from savgs_ident.core.errors import DataWarning, InputError
+from savgs_ident.core.parameter import Parameter, ParameterTable, merge_parameters
+from savgs_ident.core.presentation import Origin
+from savgs_ident.effects.effect import Effect
+from savgs_ident.effects.generic import generic_effects
+from savgs_ident.plants.base import AbstractPlant, Channel
+from savgs_ident.recordings.recording import Campaign
+
+
+class Model(Protocol):
+    """A plant with its parameters and effects, and what an earlier fit did to it; frozen."""
+
+    @property
+    def name(self) -> str:
+        """Its name in files and reports."""
+
+    @property
+    def plant_name(self) -> str:
+        """The name of the plant that it is a model of."""
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects in it."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What the plant's sensors read."""
+
+    @property
+    def catalogue(self) -> Mapping[str, Effect]:
+        """The effects, by name, that it may have."""
+
+    @property
+    def table(self) -> ParameterTable:
+        """All parameters, those of the plant and those that its effects bring along."""
+
+    @property
+    def is_drawing(self) -> bool:
+        """Whether it comes from no fit."""
+
+    @property
+    def identified(self) -> tuple[tuple[str, ...], dict[str, float]]:
+        """The parameters that a fit left free, and the values of all that it moved [SI]."""
+
+    @property
+    def before(self) -> Self:
+        """The model with the values that were known before its fit, the centres of their priors."""
+
+    def build(self) -> AbstractPlant:
+        """The plant that solvers take, with its effects."""
+
+    def free(self, wanted: Sequence[str] = ()) -> tuple[str, ...]:
+        """The parameters to identify: those ``wanted``, or what the model identifies by itself."""
+
+    def with_parameters(self, table: ParameterTable) -> Self:
+        """The same model with another table."""
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """The same model with some values replaced [SI], by name."""
+
+    def with_provenance(self, provenance: Mapping[str, Any]) -> Self:
+        """The same model, which remembers the fit that its values come from."""
+
+    def origin(self, campaign: Campaign | None = None, warnings: Sequence[DataWarning] = ()) -> Origin:
+        """Where results on this model come from; ``warnings`` are those beyond the campaign's own."""
+
+
+@dataclass(frozen=True)
+class PlantModel:
+    """A plant with its parameters.
+
+    Attributes:
+        plant: the plant, with the effects that it has.
+        parameters: its parameters, SI, with bounds and tolerances.
+        catalogue: the effects, by name, that it may have; every law at every port that it suits, if left out.
+        provenance: what a fit did: the parameters left ``free``, and the values ``before`` of all that it moved.
+
+    ``model + "guide_coulomb"`` is the model with one more effect of the catalogue, ``model + effect`` with one of
+    your own. Raises :class:`InputError` for an effect that is not in the catalogue, or whose parameters do not go
+    with those of the plant.
+    """
+
+    plant: AbstractPlant
+    parameters: ParameterTable
+    catalogue: Mapping[str, Effect] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.catalogue:
+            object.__setattr__(self, "catalogue", generic_effects(self.plant.ports))
+        _ = self.table
+
+    def __add__(self, effect: str | Effect) -> "PlantModel":
+        """The model with one more effect; the same model if it is there already."""
+        if isinstance(effect, str):
+            if effect not in self.catalogue:
+                raise InputError(
+                    f"there is no effect '{effect}'",
+                    remedy="choose among: " + ", ".join(sorted(self.catalogue)),
+                )
+            effect = self.catalogue[effect]
+        if effect.name in self.effects:
+            return self
+        catalogue = {**self.catalogue, effect.name: effect}
+        return replace(self, plant=self.plant + effect, catalogue=catalogue)
+
+    def __str__(self) -> str:
+        return " + ".join((self.name, *self.effects))
+
+    @property
+    def name(self) -> str:
+        """The name of the plant."""
+        return self.plant_name
+
+    @property
+    def plant_name(self) -> str:
+        """The name of the plant's class."""
+        return type(self.plant).__name__
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects in it."""
+        return tuple(effect.name for effect in self.plant.effects)
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What the plant's sensors read."""
+        return self.plant.channels
+
+    @property
+    def table(self) -> ParameterTable:
+        """All parameters, those of the plant and those that its effects bring along."""
+        brought = (ParameterTable(effect.parameters) for effect in self.plant.effects)
+        return merge_parameters(self.parameters, *brought)
+
+    @property
+    def is_drawing(self) -> bool:
+        """Whether it comes from no fit."""
+        return not self.provenance
+
+    def build(self) -> AbstractPlant:
+        """The plant that solvers take, with its effects."""
+        return self.plant
+
+    def free(self, wanted: Sequence[str] = ()) -> tuple[str, ...]:
+        """The parameters to identify: those ``wanted``, or all of which nothing is known but two bounds.
+
+        Raises :class:`InputError` for a name that the model does not know, and if nothing is left to identify.
+        """
+        table = self.table
+        for name in wanted:
+            if name not in table:
+                raise InputError(
+                    f"there is no parameter '{name}'", remedy="choose among: " + ", ".join(table)
+                )
+        found = tuple(dict.fromkeys(wanted)) or tuple(each.name for each in table.entries if _open(each))
+        if not found:
+            raise InputError(
+                "no parameter is known to two bounds and without a tolerance",
+                remedy="name the parameters to identify",
+            )
+        return found
+
+    @property
+    def identified(self) -> tuple[tuple[str, ...], dict[str, float]]:
+        """The parameters that a fit left free, and the values of all that it moved [SI]."""
+        table = self.table
+        free = tuple(self.provenance.get("free", ())) or self.free()
+        moved = (*free, *self.provenance.get("before", {}))
+        return free, {name: table[name].value for name in moved}
+
+    @property
+    def before(self) -> "PlantModel":
+        """The model with the values that were known before its fit, the centres of their priors."""
+        return self.with_values(self.provenance.get("before", {}))
+
+    def with_parameters(self, table: ParameterTable) -> "PlantModel":
+        """The same model with another table."""
+        return replace(self, parameters=table)
+
+    def with_values(self, values: Mapping[str, float]) -> "PlantModel":
+        """The same model with some values replaced [SI], by name.
+
+        Raises :class:`InputError` for a name that the model does not know or a value outside its bounds.
+        """
+        return self.with_parameters(self.table.with_values(values))
+
+    def with_provenance(self, provenance: Mapping[str, Any]) -> "PlantModel":
+        """The same model, which remembers the fit that its values come from."""
+        return replace(self, provenance=provenance)
+
+    def origin(self, campaign: Campaign | None = None, warnings: Sequence[DataWarning] = ()) -> Origin:
+        """Where results on this model come from; ``warnings`` are those beyond the campaign's own."""
+        origin = Origin(rig=self.name, effects=self.effects, warnings=tuple(warnings))
+        if campaign is None:
+            return origin
+        told = (*campaign.warnings, *warnings)
+        return replace(origin, data=campaign.source, data_sha256=campaign.sha256, warnings=told)
+
+
+def _open(each: Parameter) -> bool:
+    """Whether nothing is known of a parameter but two bounds."""
+    bounded = isfinite(each.lower) and isfinite(each.upper)
+    return bounded and each.tolerance == 0.0 and each.lower < each.value < each.upper

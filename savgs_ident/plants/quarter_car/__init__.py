@@ -1,0 +1,1 @@
+"""The quarter-car rig: one implicit residual, differentiable in every parameter."""

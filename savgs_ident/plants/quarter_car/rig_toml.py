@@ -1,0 +1,417 @@
+"""From a parsed TOML document to the parts of a rig, with every fault named by its key.
+
+Nothing is guessed: a key that the form does not know, a unit other than the form's, a missing parameter are
+errors, each with its remedy. The file's name is added by the caller.
+
+The form of a rig file: its sections, the parameters of each, and the one unit each is given in.
+
+A rig file has one section for every part of the rig. Names are unique over the whole file, so that the model
+takes them flat; the section says where a reader finds them. Everything is SI: a number in millimetres is
+refused rather than converted, so that a file means the same to everybody who reads it.
+
+From the parts of a rig to the text of its TOML file: section by section, one line a parameter.
+"""
+
+from collections.abc import Mapping
+from math import inf, isnan
+from types import MappingProxyType
+from typing import NamedTuple
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import InlineTable, Table
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.parameter import Parameter, ParameterTable
+
+SCHEMA = 1
+"""The number of the form; a file with another one is refused."""
+
+KNOWN_UNITS = frozenset(
+    {
+        "1", "m", "1/m", "m/s", "s/m", "m/s^2", "rad", "rad/m", "rad/s", "s", "Hz",
+        "kg", "1/kg", "kg m^2", "N", "N/m", "N/m^2", "N/m^3", "m/N", "N s/m", "m/(N s)", "N s^2/m^2", "Pa",
+        "N m", "N m/rad", "N m s/rad", "rad/(N m)", "J", "W",
+        "A", "V", "ohm", "H", "Wb", "N m/A", "V/A", "V/(A s)",
+    }
+)  # fmt: skip
+"""Units that a rig file may name. SI only."""
+
+EXTRA_SECTION = "effects"
+"""The section for parameters beyond the form: those of further effects that were fitted."""
+
+EXTRA_TITLE = "Parameters of further effects"
+"""What a file says above that section."""
+
+DAMPER_SECTION = "damper"
+"""The section with the damper table."""
+
+DAMPER_TITLE = "Force over velocity of the strut, compression positive; scaled as one by c_sd"
+"""What a file says above that section."""
+
+DAMPER_UNITS: Mapping[str, str] = MappingProxyType({"velocity": "m/s", "force": "N"})
+"""The columns of the damper table and their units."""
+
+PROVENANCE_SECTION = "provenance"
+"""Where an identified rig says which data, versions and options it came from."""
+
+
+class Section(NamedTuple):
+    """One part of the rig: a ``title`` for the reader and the unit of every parameter by name."""
+
+    title: str
+    units: Mapping[str, str]
+
+
+def _all_in(unit: str, names: str) -> dict[str, str]:
+    return dict.fromkeys(names.split(), unit)
+
+
+SECTIONS: Mapping[str, Section] = MappingProxyType(
+    {
+        "hardpoints": Section(
+            "Points of the linkage in the nominal state: y from the rail to the wheel, z up from the plate",
+            _all_in("m", "A_y A_z B_y B_z C_y C_z D_y D_z E_y E_z G_y G_z W_y W_z"),
+        ),
+        "link": Section(
+            "Single link: the crank pin is F = G + l_SL (cos psi, sin psi) with psi = theta_0 + link angle",
+            {"l_SL": "m", "theta_0": "rad", "psi_nominal": "rad"},
+        ),
+        "masses": Section(
+            "Masses, moments of inertia about the x axis through the cg, and cgs in the nominal state",
+            _all_in("kg", "m_s m_u m_L m_U")
+            | _all_in("kg m^2", "J_L J_U J_K")
+            | _all_in("m", "cg_L_y cg_L_z cg_U_y cg_U_z cg_K_y cg_K_z")
+            | {"g": "m/s^2"},
+        ),
+        "strut": Section("Spring and damper of the strut", {"k_sd": "N/m", "l_free": "m", "c_sd": "N s/m"}),
+        "tyre": Section(
+            "Tyre: radial spring and damper, lateral friction at the contact point",
+            {"k_t": "N/m", "c_t": "N s/m", "r_free": "m", "tilt": "rad", "mu_t": "1", "ydot_Hth": "m/s"},
+        ),
+        "rail": Section(
+            "Railway that guides the sprung mass: two carriages and their friction",
+            {"mu_r": "1", "l_tb": "m", "z_tb": "m", "k_pre": "N/m", "c_pre": "N s/m"},
+        ),
+        "sensors": Section(
+            "Gains of the sensors: reading over truth", _all_in("1", "accel_gain deflection_gain")
+        ),
+        "road": Section("Cam under the road plate", {"cam_peak_to_peak": "m"}),
+        "motor": Section(
+            "Drive of the link for the active suspension: motor in d-q axes, gear, cascaded loops, limits",
+            {
+                "motor_pole_pairs": "1",
+                "motor_resistance": "ohm",
+                "motor_inductance_d": "H",
+                "motor_inductance_q": "H",
+                "motor_flux_linkage": "Wb",
+                "motor_torque_constant": "N m/A",
+                "motor_stall_torque": "N m",
+                "motor_peak_torque": "N m",
+                "motor_dc_bus": "V",
+                "motor_rotor_inertia": "kg m^2",
+                "motor_gear_input_inertia": "kg m^2",
+                "motor_gear_ratio": "1",
+                "motor_gear_efficiency": "1",
+                "motor_link_inertia": "kg m^2",
+                "motor_static_friction": "N m",
+                "motor_speed_limit": "rad/s",
+                "motor_peak_power": "W",
+                "motor_current_bandwidth": "Hz",
+                "motor_current_kp": "V/A",
+                "motor_current_ki": "V/(A s)",
+                "motor_velocity_bandwidth": "Hz",
+                "motor_velocity_kp": "N m s/rad",
+                "motor_velocity_ki": "N m/rad",
+                "motor_reference_bandwidth": "Hz",
+            },
+        ),
+        "servo": Section(
+            "Drive that holds the link in the recordings",
+            {
+                "servo_gear_ratio": "1",
+                "servo_torque_constant": "N m/A",
+                "servo_inertia": "kg m^2",
+                "servo_friction": "N m",
+                "servo_speed_limit": "rad/s",
+                "servo_current_limit": "A",
+            },
+        ),
+    }
+)
+"""Section to title and parameters, in the order in which a file is written."""
+
+UNIT_OF: Mapping[str, str] = MappingProxyType(
+    {name: unit for section in SECTIONS.values() for name, unit in section.units.items()}
+)
+"""The unit of every parameter of the form."""
+
+SECTION_OF: Mapping[str, str] = MappingProxyType(
+    {name: key for key, section in SECTIONS.items() for name in section.units}
+)
+"""The section of every parameter of the form."""
+
+
+def check_unit(unit: str, where: str, expected: str | None) -> str:
+    """``unit`` itself, if it is the ``expected`` one or, where the form expects none, a known one.
+
+    Raises :class:`InputError` that begins with ``where`` otherwise.
+    """
+    if expected is not None and unit != expected:
+        raise InputError(f"{where} is given in '{unit}'", remedy=f"convert it to '{expected}'")
+    if unit not in KNOWN_UNITS:
+        raise InputError(
+            f"{where} has the unknown unit '{unit}'", remedy="choose among: " + ", ".join(sorted(KNOWN_UNITS))
+        )
+    return unit
+
+
+Document = Mapping[str, object]
+
+_NUMBERS = ("value", "tolerance", "lower", "upper")
+_TEXTS = ("unit", "about", "source")
+_TOP_LEVEL = ("schema", "name", *SECTIONS, DAMPER_SECTION, EXTRA_SECTION, PROVENANCE_SECTION)
+
+
+def parse_name(document: Document) -> str:
+    """The rig's name, after a check that the document is of a form and schema that this version reads.
+
+    Raises :class:`InputError` for another schema, an unknown section or a missing name.
+    """
+    schema = document.get("schema")
+    if schema != SCHEMA or isinstance(schema, bool):
+        raise InputError(
+            f"schema is {'missing' if schema is None else repr(schema)}",
+            remedy=f"this version reads rig files with schema = {SCHEMA}",
+        )
+    _refuse_unknown(document, _TOP_LEVEL, "")
+    name = document.get("name")
+    if not isinstance(name, str) or not name:
+        raise InputError("name is missing or not a text", remedy='give the rig a name: name = "gt_rear"')
+    return name
+
+
+def parse_parameters(document: Document) -> ParameterTable:
+    """All parameters of the form, in its order, then those of further effects.
+
+    Raises :class:`InputError` for the first fault, by key.
+    """
+    entries = [entry for key in SECTIONS for entry in _parse_section(document, key)]
+    if EXTRA_SECTION in document:
+        section = _table_at(document, EXTRA_SECTION)
+        _refuse_misplaced(section, EXTRA_SECTION)
+        _refuse_unusual(section)
+        entries += [_parse_parameter(section, EXTRA_SECTION, name) for name in section]
+    table = ParameterTable(tuple(entries))
+    _check_mass_split(table)
+    return table
+
+
+def parse_damper(document: Document) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Velocities [m/s] and forces [N] of the damper table; whether they make a curve is for the rig to check.
+
+    Raises :class:`InputError` for a missing column, a wrong unit or what is not a number.
+    """
+    damper = _table_at(document, DAMPER_SECTION)
+    _refuse_unknown(damper, tuple(DAMPER_UNITS), f"{DAMPER_SECTION}.")
+    return _parse_column(damper, "velocity"), _parse_column(damper, "force")
+
+
+def parse_provenance(document: Document) -> Document:
+    """Where an identified rig comes from, as written; empty if the file does not say."""
+    return _table_at(document, PROVENANCE_SECTION) if PROVENANCE_SECTION in document else {}
+
+
+def _parse_section(document: Document, key: str) -> list[Parameter]:
+    section = _table_at(document, key)
+    units = SECTIONS[key].units
+    _refuse_misplaced(section, key)
+    _refuse_unknown(section, tuple(units), f"{key}.")
+    missing = [name for name in units if name not in section]
+    if missing:
+        raise InputError(
+            f"{key}.{missing[0]} is missing", remedy=f"give it under [{key}], in '{units[missing[0]]}'"
+        )
+    return [_parse_parameter(section, key, name) for name in units]
+
+
+def _parse_parameter(section: Document, key: str, name: str) -> Parameter:
+    where = f"{key}.{name}"
+    fields = _table_at(section, name, where)
+    _refuse_unknown(fields, _NUMBERS + _TEXTS, f"{where}.")
+    unit = _parse_unit(fields, where, UNIT_OF.get(name))
+    if "value" not in fields:
+        raise InputError(f"{where}.value is missing", remedy=f"give the number in '{unit}' as value = ...")
+    number = {field: _number(fields[field], f"{where}.{field}") for field in _NUMBERS if field in fields}
+    text = {field: _text(fields[field], f"{where}.{field}") for field in _TEXTS if field in fields}
+    try:
+        return Parameter(
+            name,
+            number["value"],
+            unit,
+            number.get("tolerance", 0.0),
+            number.get("lower", -inf),
+            number.get("upper", inf),
+            text.get("about", ""),
+            text.get("source", ""),
+        )
+    except InputError as error:
+        raise InputError(f"{where}: {error.what}", remedy=error.remedy) from None
+
+
+def _parse_column(damper: Document, key: str) -> tuple[float, ...]:
+    where = f"{DAMPER_SECTION}.{key}"
+    fields = _table_at(damper, key, where)
+    _refuse_unknown(fields, ("values", "unit", "about", "source"), f"{where}.")
+    _parse_unit(fields, where, DAMPER_UNITS[key])
+    values = fields.get("values")
+    if not isinstance(values, list):
+        raise InputError(f"{where}.values is missing or not a list", remedy="give a list of numbers")
+    return tuple(_number(value, f"{where}.values[{index}]") for index, value in enumerate(values))
+
+
+def _table_at(parent: Document, key: str, where: str = "") -> dict[str, object]:
+    where = where or f"section [{key}]"
+    if key not in parent:
+        raise InputError(f"{where} is missing", remedy="take the shipped rig file as an example")
+    table = parent[key]
+    if not isinstance(table, dict):
+        raise InputError(
+            f"{where} is {table!r}, not a table",
+            remedy="write it as in the shipped rig file, with its unit",
+        )
+    return table
+
+
+def _refuse_unknown(table: Document, known: tuple[str, ...], prefix: str) -> None:
+    for name in table:
+        if name not in known:
+            raise InputError(f"{prefix}{name} is not known", remedy="choose among: " + ", ".join(known))
+
+
+def _refuse_misplaced(section: Document, key: str) -> None:
+    for name in section:
+        if SECTION_OF.get(name, key) != key:
+            raise InputError(
+                f"{key}.{name} stands in the wrong section", remedy=f"move it to [{SECTION_OF[name]}]"
+            )
+
+
+def _refuse_unusual(section: Document) -> None:
+    for name in section:
+        if not name.isidentifier():
+            raise InputError(
+                f"{EXTRA_SECTION}: {name!r} cannot be the name of a parameter",
+                remedy="use letters, digits and underscores",
+            )
+
+
+def _parse_unit(fields: Document, where: str, expected: str | None) -> str:
+    if "unit" not in fields:
+        raise InputError(f"{where}.unit is missing", remedy=f"the unit here is '{expected or 'one of SI'}'")
+    return check_unit(_text(fields["unit"], f"{where}.unit"), where, expected)
+
+
+def _text(value: object, where: str) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{where} is {value!r}, not a text", remedy="put it in quotes")
+    return value
+
+
+def _number(value: object, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{where} is {value!r}, not a number", remedy="give a plain number in SI")
+    try:
+        number = float(value)
+    except OverflowError:
+        raise InputError(f"{where} is larger than any float", remedy="give a number that fits") from None
+    if isnan(number):
+        raise InputError(f"{where} is not a number (nan)", remedy="give a finite number")
+    return number
+
+
+def _check_mass_split(table: ParameterTable) -> None:
+    total, lower, upper = table.values_of(("m_u", "m_L", "m_U"))
+    if total <= lower + upper:
+        raise InputError(
+            f"masses.m_u = {total} kg leaves nothing for the upright beside m_L + m_U = {lower + upper} kg",
+            remedy="m_u is the whole unsprung mass: wishbones and upright",
+        )
+
+
+_HEAD = (
+    "SI units; tolerance is one standard deviation of what is known beforehand, 0 (left out) means exact",
+    "or, for a parameter that is to be identified, that only its bounds are known.",
+)
+_DEFAULTS = {"tolerance": 0.0, "lower": -inf, "upper": inf, "about": "", "source": ""}
+
+
+def compose_rig(
+    name: str,
+    parameters: ParameterTable,
+    damper_velocity: tuple[float, ...],
+    damper_force: tuple[float, ...],
+    provenance: Mapping[str, object],
+) -> str:
+    """The text of a rig file; what :func:`read_rig` makes the same rig of.
+
+    Raises :class:`InputError` for a missing parameter, a unit that rig files do not know, or a
+    ``provenance`` that TOML cannot say (it takes texts, numbers, booleans, dates, lists and tables of
+    these). The damper's table is ``damper_force`` [N] over ``damper_velocity`` [m/s].
+    """
+    missing = [entry for entry in SECTION_OF if entry not in parameters]
+    if missing:
+        raise InputError(f"the rig has no parameter '{missing[0]}'", remedy="write a whole rig")
+    document = tomlkit.document()
+    for line in _HEAD:
+        document.add(tomlkit.comment(line))
+    document.add("schema", tomlkit.item(SCHEMA))
+    document.add("name", tomlkit.item(name))
+    for key, section in SECTIONS.items():
+        document.add(key, _compose_section(section.title, [parameters[entry] for entry in section.units]))
+    document.add(DAMPER_SECTION, _compose_damper(damper_velocity, damper_force))
+    extra = [entry for entry in parameters.entries if entry.name not in SECTION_OF]
+    if extra:
+        document.add(EXTRA_SECTION, _compose_section(EXTRA_TITLE, extra))
+    if provenance:
+        document.add(PROVENANCE_SECTION, _compose_provenance(provenance))
+    return tomlkit.dumps(document)
+
+
+def _compose_section(title: str, entries: list[Parameter]) -> Table:
+    table = tomlkit.table()
+    table.add(tomlkit.comment(title))
+    for entry in entries:
+        unit = check_unit(entry.unit, f"parameter '{entry.name}'", UNIT_OF.get(entry.name))
+        optional = {key: getattr(entry, key) for key in _DEFAULTS if getattr(entry, key) != _DEFAULTS[key]}
+        table.add(entry.name, _inline({"value": entry.value, "unit": unit} | optional))
+    table.add(tomlkit.nl())
+    return table
+
+
+def _compose_damper(velocity: tuple[float, ...], force: tuple[float, ...]) -> Table:
+    table = tomlkit.table()
+    table.add(tomlkit.comment(DAMPER_TITLE))
+    table.add("velocity", _inline({"values": list(velocity), "unit": DAMPER_UNITS["velocity"]}))
+    table.add("force", _inline({"values": list(force), "unit": DAMPER_UNITS["force"]}))
+    table.add(tomlkit.nl())
+    return table
+
+
+def _compose_provenance(provenance: Mapping[str, object]) -> Table:
+    table = tomlkit.table()
+    for key, value in provenance.items():
+        try:
+            table.add(key, tomlkit.item(value))
+        except (TOMLKitError, TypeError, ValueError) as error:
+            raise InputError(
+                f"provenance.{key} cannot be written as TOML: {error}",
+                remedy="give texts, numbers, lists and tables of these",
+            ) from error
+    return table
+
+
+def _inline(fields: Mapping[str, object]) -> InlineTable:
+    table = tomlkit.inline_table()
+    table.update(fields)
+    return table

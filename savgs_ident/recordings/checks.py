@@ -1,0 +1,262 @@
+"""All checks of a campaign: clean every test, and leave out the tests that cannot be used.
+
+:func:`screen` checks the channels (:mod:`checks_signal`), then every test as a whole (the channels that a
+response needs, for long enough, the road moving at the frequency in the test's name), then the campaign
+(:mod:`checks_physics`). A test that cannot be used is left out with a warning that gives the reason; if no
+test remains, the first reason is raised as the error.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+
+from savgs_ident.core.errors import DataWarning, InputError
+from savgs_ident.recordings.checks_physics import check_physics, remove_gravity
+from savgs_ident.recordings.checks_signal import (
+    LONGEST_GAP,
+    DataLocation,
+    check_clipping,
+    check_missing,
+    check_possible,
+    check_stamps,
+    check_time,
+    find_longest_constant,
+)
+from savgs_ident.recordings.recording import Channel, Recording
+
+RESPONSES = ("sprung_accel", "susp_deflection")
+"""Channels of which a test with a moving road needs at least one."""
+_FEWEST_PERIODS, _FEW_PERIODS = 3.0, 6.0
+"""Periods below which the noise (what does not repeat) cannot be estimated, or is estimated poorly."""
+_FREQUENCY_OFF = 0.05
+_LEAST_RATE = 4.0
+"""Samples a period below which even the first harmonic is doubtful."""
+_STILL = 1e-3
+"""Peak-to-peak road [m] that a standstill may have."""
+_STUCK_SHARE = 0.20
+
+
+def screen(
+    recordings: Sequence[Recording], source: str
+) -> tuple[tuple[Recording, ...], tuple[DataWarning, ...]]:
+    """The usable recordings, cleaned, and all warnings.
+
+    Raises :class:`InputError` where none is usable.
+    """
+    kept: list[Recording] = []
+    warnings: list[DataWarning] = []
+    errors: list[InputError] = []
+    for recording in recordings:
+        try:
+            cleaned, found = screen_test(recording, source)
+        except InputError as error:
+            errors.append(error)
+            continue
+        kept.append(cleaned)
+        warnings.extend(found)
+    if not kept:
+        raise errors[0] if errors else InputError("holds no test", source=source, remedy="record again")
+    level, gravity = remove_gravity(kept, source)
+    return level, (
+        *(_left_out(error) for error in errors),
+        *warnings,
+        *gravity,
+        *check_clipping(level, source),
+        *check_physics(level, source),
+    )
+
+
+def screen_test(recording: Recording, source: str) -> tuple[Recording, tuple[DataWarning, ...]]:
+    """One test with cleaned channels; raises :class:`InputError` where it cannot be used."""
+    channels: dict[str, Channel] = {}
+    warnings: list[DataWarning] = []
+    longest_gap = inf if recording.kind == "other" else LONGEST_GAP
+    for name, channel in recording.channels.items():
+        place = DataLocation(source, recording.name, name)
+        check_stamps(channel, DataLocation(source, recording.name, "time"))
+        whole, found = check_missing(channel, place, longest_gap)
+        warnings.extend(found)
+        if whole is None:
+            continue
+        ordered, found = check_time(whole, place, longest_gap)
+        warnings.extend(found)
+        check_possible(ordered, place)
+        channels[name] = ordered
+    place = DataLocation(source, recording.name)
+    cleaned = replace(recording, channels=channels)
+    stuck = find_stuck_channels(cleaned, place)
+    cleaned = replace(cleaned, channels={k: v for k, v in channels.items() if k not in stuck})
+    check_complete(cleaned, place)
+    if not cleaned.channels:
+        raise place.error("has no channel with data", "record the test again")
+    return cleaned, (
+        *_once(warnings),
+        *stuck.values(),
+        *check_test(cleaned, place),
+        *_unknown(cleaned, place),
+    )
+
+
+def find_stuck_channels(recording: Recording, place: DataLocation) -> dict[str, DataWarning]:
+    """Channels that keep one value while the test goes on, with a warning each.
+
+    In a steady oscillation nothing is constant for a whole period; in a sweep the bound is a fifth of the record,
+    because it begins at rest. The link may be held, so its channels are not checked.
+    """
+    if recording.kind not in ("dwell", "sweep"):
+        return {}
+    found = {}
+    for name in ("road_height", *RESPONSES):
+        channel = recording.channels.get(name)
+        if channel is None:
+            continue
+        length, start = find_longest_constant(channel)
+        allowed = _STUCK_SHARE * recording.duration_s
+        if recording.kind == "dwell" and recording.frequency_hz:
+            allowed = min(allowed, 1.0 / recording.frequency_hz)
+        if length > allowed:
+            found[name] = DataLocation(place.source, place.test, name).warning(
+                "stuck_sensor",
+                f"keeps one value for {length:.3g} s while the test goes on, left out of this test",
+                "check the sensor",
+                time=start,
+            )
+    return found
+
+
+def check_complete(recording: Recording, place: DataLocation) -> None:
+    """Raises :class:`InputError` where a test with a moving road lacks the road or all responses."""
+    if recording.kind not in ("dwell", "sweep"):
+        return
+    here = ", ".join(recording.channels) or "none"
+    if "road_height" not in recording.channels:
+        raise DataLocation(place.source, place.test, "road_height").error(
+            f"the channel is missing or unusable (there is: {here})", "record it, or map it in channels.toml"
+        )
+    if not any(name in recording.channels for name in RESPONSES):
+        raise DataLocation(place.source, place.test, RESPONSES[0]).error(
+            f"neither {' nor '.join(RESPONSES)} is there and usable (there is: {here})",
+            "record one of them, or map it in channels.toml",
+        )
+
+
+def check_test(recording: Recording, place: DataLocation) -> tuple[DataWarning, ...]:
+    """Warnings about a dwell or a standstill; raises :class:`InputError` for a dwell that is too short."""
+    if recording.kind == "standstill":
+        return _check_still(recording, place)
+    if recording.kind != "dwell":
+        return ()
+    measured = measure_frequency(recording.channels["road_height"])
+    nominal = recording.frequency_hz
+    frequency = nominal or measured
+    periods = recording.duration_s * frequency
+    if periods < _FEWEST_PERIODS:
+        raise place.error(
+            f"the dwell holds {periods:.1f} periods in {recording.duration_s:.2f} s, too few for a response",
+            f"record at least {_FEWEST_PERIODS:.0f} periods, better 8 and more",
+        )
+    return (
+        *_few_periods(periods, place),
+        *_frequency_off(nominal, measured, place),
+        *_undersampled(recording, frequency, place),
+    )
+
+
+def measure_frequency(road: Channel) -> float:
+    """Frequency [Hz] of the road from its upward crossings of mid height (hysteresis a fifth of its travel).
+
+    0 where it does not cross twice.
+    """
+    values = road.values - 0.5 * (road.values.max() + road.values.min())
+    band = 0.1 * float(np.ptp(road.values))
+    state = np.where(values > band, 1, np.where(values < -band, -1, 0))
+    firm = np.flatnonzero(state)
+    up = firm[1:][np.diff(state[firm]) == 2]
+    if up.size < 2:
+        return 0.0
+    return float((up.size - 1) / (road.time[up[-1]] - road.time[up[0]]))
+
+
+def _few_periods(periods: float, place: DataLocation) -> tuple[DataWarning, ...]:
+    if periods >= _FEW_PERIODS:
+        return ()
+    return (
+        place.warning(
+            "few_periods",
+            f"the dwell holds only {periods:.1f} periods, its noise is poorly known",
+            "record at least 8 periods",
+        ),
+    )
+
+
+def _frequency_off(nominal: float | None, measured: float, place: DataLocation) -> tuple[DataWarning, ...]:
+    if nominal is None or abs(measured / nominal - 1.0) <= _FREQUENCY_OFF:
+        return ()
+    return (
+        DataLocation(place.source, place.test, "road_height").warning(
+            "frequency_mismatch",
+            f"the road moves at {measured:.4g} Hz, the test is said to be at {nominal:.4g} Hz",
+            "check the name of the test and the unit of the time",
+        ),
+    )
+
+
+def _undersampled(recording: Recording, frequency: float, place: DataLocation) -> tuple[DataWarning, ...]:
+    return tuple(
+        DataLocation(place.source, place.test, name).warning(
+            "undersampled",
+            f"has {channel.rate_hz / frequency:.1f} samples a period",
+            f"sample at least {_LEAST_RATE:.0f} times a period",
+        )
+        for name, channel in recording.channels.items()
+        if name in ("road_height", *RESPONSES) and channel.rate_hz < _LEAST_RATE * frequency
+    )
+
+
+def _check_still(recording: Recording, place: DataLocation) -> tuple[DataWarning, ...]:
+    road = recording.channels.get("road_height")
+    if road is None or np.ptp(road.values) <= _STILL:
+        return ()
+    return (
+        DataLocation(place.source, place.test, "road_height").warning(
+            "standstill_moves",
+            f"the road moves by {1e3 * float(np.ptp(road.values)):.3g} mm in a standstill",
+            "check the name of the test",
+        ),
+    )
+
+
+def _once(warnings: list[DataWarning]) -> tuple[DataWarning, ...]:
+    """Channels of one table share their clock: a warning about the clock is given once."""
+    seen: dict[tuple[str, str, float | None], DataWarning] = {}
+    for warning in warnings:
+        about_clock = warning.code in ("repeated_time", "time_jump")
+        key = (warning.code, warning.what if about_clock else warning.channel, warning.time)
+        seen.setdefault(key, warning)
+    return tuple(seen.values())
+
+
+def _left_out(error: InputError) -> DataWarning:
+    return DataWarning(
+        "test_left_out",
+        f"{error.what}; the test is left out",
+        error.source,
+        error.test,
+        error.channel,
+        error.time,
+        error.remedy,
+    )
+
+
+def _unknown(recording: Recording, place: DataLocation) -> tuple[DataWarning, ...]:
+    if recording.kind != "other":
+        return ()
+    return (
+        place.warning(
+            "test_kind_unknown",
+            "what kind of test this is cannot be told from its name",
+            "call it dwell_<f>Hz, sweep... or standstill, by events, a test column or the file's name",
+        ),
+    )

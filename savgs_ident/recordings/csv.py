@@ -1,0 +1,264 @@
+"""CSV campaigns: one table with a ``test`` column, or one test a file; plain or gzipped.
+
+    test,time [s],road_height [m],sprung_accel [m/s^2],susp_deflection [mm]
+    dwell_0.50Hz,0.00001,-0.005737,0.0156,-5.737
+
+The unit stands in the header (``name [unit]``, ``name (unit)``, ``name_unit``) or in a row of units below it.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import DataWarning, InputError
+from savgs_ident.recordings.binding import (
+    Binding,
+    Progress,
+    Reader,
+    Reading,
+    SignalCandidate,
+    bind,
+    mapped_channels,
+    unit_factor_or_si,
+)
+from savgs_ident.recordings.channels import (
+    TEST_COLUMNS,
+    ChannelMap,
+    ChannelRule,
+    canonical_name,
+    normalise,
+    split_header,
+)
+from savgs_ident.recordings.csv_table import GZIP_MAGIC, CsvHead, CsvTable, TextBlocks, read_head
+from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording, classify_test, unix_time
+
+_MOST_REPEATS = 20
+"""A test that comes back more often than this is not a repeated test but a table out of order."""
+
+
+def read_csv(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading:
+    """Read one CSV file; raises :class:`InputError` where it is no table of measurements."""
+    source = str(path)
+    text = TextBlocks(path, progress)
+    blocks = iter(text)
+    first = next(blocks, b"")
+    if not first:
+        raise _nothing_whole(text, source)
+    head = read_head(first, source)
+    warnings: list[DataWarning] = []
+    candidates = head.candidates()
+    time_position, time_factor = _time_column(head, channel_map, source, warnings)
+    rules = _rules(candidates, channel_map, source)
+    bindings, notes = bind(candidates, rules, mapped_channels(channel_map), source)
+    warnings.extend(notes)
+    if not bindings:
+        raise _no_channel(head, source)
+    positions = {int(binding.key) for binding in bindings} | {time_position}
+    table = CsvTable(head, tuple(sorted(positions)), _test_column(head, channel_map, source), source)
+    for block in _chain(head.body, blocks):
+        table.append(block)
+    if table.rows == 0:
+        raise InputError(
+            "has a header but no data", source=source, remedy="record again, or give another file"
+        )
+    runs = table.runs or [(_stem(path), 0)]
+    columns = {position: table.take(position) for position in positions}
+    # An overflow becomes infinite, which the checks report.
+    with np.errstate(over="ignore", invalid="ignore"):
+        time = columns[time_position] * time_factor
+        channels = {binding.channel: _channel_values(columns, binding) for binding in bindings}
+        recordings = _split_tests(runs, time, channels, {b.channel: b.label for b in bindings})
+    warnings.extend(_end_warnings(text, source, time))
+    warnings.extend(_repeat_warnings(recordings, runs, source))
+    return Reading(recordings, tuple(warnings))
+
+
+CSV = Reader(
+    name="CSV",
+    suffixes=(".csv", ".csv.gz", ".tsv", ".txt"),
+    magic=(GZIP_MAGIC,),
+    plain_text=True,
+    read=read_csv,
+)
+
+
+def _chain(body: bytes, blocks: Iterable[bytes]) -> Iterator[bytes]:
+    if body:
+        yield body
+    yield from blocks
+
+
+def _stem(path: Path) -> str:
+    return path.name.removesuffix(".gz").rpartition(".")[0] or path.name
+
+
+def _nothing_whole(text: TextBlocks, source: str) -> InputError:
+    if text.cut:
+        return InputError(f"{text.cut}, nothing in it is whole", source=source, remedy="copy the file again")
+    if text.tail:
+        return InputError("has a single line", source=source, remedy="give a table with a header and data")
+    return InputError("is empty", source=source, remedy="record again, or give another file")
+
+
+def _no_channel(head: CsvHead, source: str) -> InputError:
+    return InputError(
+        "no column is known: found " + ", ".join(f"'{name}'" for name in head.columns[:20]),
+        source=source,
+        remedy="name the columns as " + ", ".join(CANONICAL_UNITS) + ", or map them in channels.toml",
+    )
+
+
+def _position(head: CsvHead, wanted: str, channel: str, source: str) -> int:
+    """Where the column stands that the map calls ``wanted``."""
+    for position, text in enumerate(head.columns):
+        if wanted == text or normalise(wanted) == normalise(split_header(text).label):
+            return position
+    raise InputError(
+        f"channels.toml names column '{wanted}', the file does not have it",
+        source=source,
+        channel=channel,
+        remedy="the columns are " + ", ".join(head.columns[:20]),
+    )
+
+
+def _rules(
+    candidates: tuple[SignalCandidate, ...], channel_map: ChannelMap, source: str
+) -> list[tuple[ChannelRule, str]]:
+    found = []
+    for rule in channel_map.rules:
+        if rule.column is None:
+            continue
+        exact = [c.key for c in candidates if c.text == rule.column]
+        loose = [c.key for c in candidates if normalise(split_header(c.text).label) == normalise(rule.column)]
+        if not exact and not loose:
+            raise InputError(
+                f"channels.toml names column '{rule.column}', the file does not have it",
+                source=source,
+                channel=rule.channel,
+                remedy="the columns are " + ", ".join(c.text for c in candidates[:20]),
+            )
+        found.append((rule, (exact or loose)[0]))
+    return found
+
+
+def _time_column(
+    head: CsvHead, channel_map: ChannelMap, source: str, warnings: list[DataWarning]
+) -> tuple[int, float]:
+    if channel_map.time_column is not None:
+        position = _position(head, channel_map.time_column, "time", source)
+    else:
+        found = [
+            i for i, text in enumerate(head.columns) if canonical_name(split_header(text).label) == "time"
+        ]
+        if not found:
+            raise InputError(
+                "no column is the time: found " + ", ".join(f"'{name}'" for name in head.columns[:20]),
+                source=source,
+                channel="time",
+                remedy="call it 'time [s]', or name it under [time] in channels.toml",
+            )
+        exact = [i for i in found if normalise(split_header(head.columns[i]).label) == "time"]
+        position = (exact or found)[0]
+    unit = channel_map.time_unit or split_header(head.columns[position]).unit or head.units[position]
+    return position, unit_factor_or_si(unit, "time", head.columns[position], source, warnings)
+
+
+def _test_column(head: CsvHead, channel_map: ChannelMap, source: str) -> int | None:
+    if channel_map.test_column is not None:
+        return _position(head, channel_map.test_column, "test", source)
+    names = [normalise(text) for text in head.columns]
+    return next((names.index(name) for name in TEST_COLUMNS if name in names), None)
+
+
+def _channel_values(columns: dict[int, NDArray[np.float64]], binding: Binding) -> NDArray[np.float64]:
+    values = columns[int(binding.key)]
+    if binding.gain == 1.0 and binding.bias == 0.0:
+        return values
+    return values * binding.gain + binding.bias
+
+
+def _split_tests(
+    runs: list[tuple[str, int]],
+    time: NDArray[np.float64],
+    channels: dict[str, NDArray[np.float64]],
+    labels: dict[str, str],
+) -> tuple[Recording, ...]:
+    """One recording a run of equal test names; rows without a name belong to no test."""
+    stops = [start for _, start in runs[1:]] + [time.size]
+    seen: Counter[str] = Counter()
+    recordings = []
+    for (name, start), stop in zip(runs, stops, strict=True):
+        if not name:
+            continue
+        seen[name] += 1
+        clock = _from_zero(time[start:stop])
+        kind, frequency = classify_test(name)
+        recordings.append(
+            Recording(
+                name=name if seen[name] == 1 else f"{name}#{seen[name]}",
+                kind=kind,
+                frequency_hz=frequency,
+                channels={
+                    channel: Channel(
+                        channel, CANONICAL_UNITS[channel], clock, values[start:stop], labels[channel]
+                    )
+                    for channel, values in channels.items()
+                },
+                start=unix_time(float(time[start])),
+            )
+        )
+    return tuple(recordings)
+
+
+def _from_zero(time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Time from the start of the test; a clock that already restarts there is left as it is."""
+    if time.size < 2 or not np.isfinite(time[0]):
+        return time
+    steps = np.diff(time[np.isfinite(time)])
+    starts_here = steps.size > 0 and 0.0 <= time[0] <= np.median(steps)
+    return time if starts_here else time - time[0]
+
+
+def _end_warnings(text: TextBlocks, source: str, time: NDArray[np.float64]) -> Iterator[DataWarning]:
+    if text.cut:
+        yield DataWarning(
+            "truncated_file",
+            f"{text.cut}, the whole lines before that are used",
+            source=source,
+            time=float(time[-1]),
+            remedy="copy the file again",
+        )
+    elif text.tail.strip():
+        yield DataWarning(
+            "unfinished_line",
+            "the last line has no line end and may be cut, it is left out",
+            source=source,
+            time=float(time[-1]),
+            remedy="end the file with a newline",
+        )
+
+
+def _repeat_warnings(
+    recordings: tuple[Recording, ...], runs: list[tuple[str, int]], source: str
+) -> Iterator[DataWarning]:
+    for name, count in Counter(name for name, _ in runs if name).items():
+        if count > _MOST_REPEATS:
+            raise InputError(
+                f"the rows of this test are in {count} pieces",
+                source=source,
+                test=name,
+                remedy="sort the table so that the rows of a test stand together",
+            )
+        if count > 1:
+            yield DataWarning(
+                "repeated_test",
+                f"is there {count} times, kept as separate tests",
+                source=source,
+                test=name,
+                remedy="give repeated tests their own names",
+            )
+    if not recordings:
+        raise InputError("no row belongs to a test", source=source, remedy="fill the test column")

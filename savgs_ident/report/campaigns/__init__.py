@@ -1,0 +1,1 @@
+"""What a campaign contains, and parameters followed through many campaigns."""

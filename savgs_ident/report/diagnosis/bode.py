@@ -1,0 +1,125 @@
+"""Before, recalibrated, after: three models against the measured first harmonics.
+
+The curves of a Bode plot hide what matters where a gap is a few per cent of a resonance. So the lowest panel shows
+the gap itself, |predicted - measured| / |measured|, over the noise of the measurement: what calibration closes lies
+between the first and the second curve, what the named effect closes between the second and the third.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from savgs_ident.diagnosis.result import Diagnosis
+from savgs_ident.fit.residuals import measured_points
+from savgs_ident.report.diagnosis.text import model_label
+from savgs_ident.report.panels import LINES, draw_magnitude, draw_phase
+from savgs_ident.report.text import READINGS, ROAD, channel_label
+from savgs_ident.report.theme import PALE, frequency_axis, magnitude_axis, new_figure, styled
+from savgs_ident.simulate.frequency_response import ModelCurve, model_curve
+
+_MARKERS = ("o", "s", "^")
+
+
+@dataclass(frozen=True)
+class FirstHarmonicGap:
+    """Gap of the first harmonic of one channel [%], (D,), of each model and of the noise; NaN where not compared."""
+
+    before: NDArray[np.float64]
+    recalibrated: NDArray[np.float64]
+    after: NDArray[np.float64]
+    noise: NDArray[np.float64]
+
+
+def first_harmonic_gap(diagnosis: Diagnosis, c: int) -> FirstHarmonicGap:
+    """The gap of channel ``c`` of :data:`READINGS` dwell by dwell."""
+    measured, name = diagnosis.measured, tuple(READINGS)[c]
+    if name not in measured.channels:
+        nothing = np.full(len(measured.tests), np.nan)
+        return FirstHarmonicGap(nothing, nothing, nothing, nothing)
+    channel = measured.channel(name)
+    seen = np.where(measured.valid[:, channel, 1], measured.harmonics[:, channel, 1], np.nan)
+    noise = np.sqrt(np.trace(measured.covariance[:, channel, 1], axis1=-2, axis2=-1))
+
+    def of(predicted: NDArray[np.complex128]) -> NDArray[np.float64]:
+        return np.asarray(100.0 * np.abs(predicted[:, c, 1] - seen) / np.abs(seen))
+
+    answers = diagnosis.responses
+    return FirstHarmonicGap(
+        of(answers.before), of(answers.recalibrated), of(answers.after), 100.0 * noise / np.abs(seen)
+    )
+
+
+def compared_channels(diagnosis: Diagnosis) -> tuple[int, ...]:
+    """The channels of :data:`READINGS` whose first harmonic is compared anywhere."""
+    return tuple(
+        c for c in range(len(READINGS)) if np.any(np.isfinite(first_harmonic_gap(diagnosis, c).recalibrated))
+    )
+
+
+def diagnosis_bode_figure(diagnosis: Diagnosis, c: int) -> Figure:
+    """Magnitude, phase and gap of the first harmonic of channel ``c`` of :data:`READINGS`."""
+    shown = channel_label(tuple(READINGS)[c])
+    points, curves = measured_points(diagnosis.measured, tuple(READINGS), ROAD), _curves(diagnosis)
+    with styled():
+        figure = new_figure(4.5, 7.6)
+        figure.set_layout_engine("none")
+        places = {"left": 0.155, "right": 0.985, "bottom": 0.062, "top": 0.875, "hspace": 0.12}
+        panels = figure.subplots(3, 1, height_ratios=(1.2, 0.9, 1.1), gridspec_kw=places)
+        magnitude, phase, gap = panels
+        figure.suptitle(shown.title, y=0.985, fontsize=10.0, fontweight="bold")
+        draw_magnitude(magnitude, curves, points, c, shown)
+        draw_phase(phase, curves, points, c)
+        _draw_gap(gap, diagnosis.measured.frequency, first_harmonic_gap(diagnosis, c))
+        for axes in panels:
+            lowest, highest = diagnosis.measured.frequency[[0, -1]]
+            frequency_axis(axes, float(lowest), float(highest), labelled=axes is gap)
+            axes.yaxis.set_label_coords(-0.135, 0.5)
+        _explain(figure, magnitude)
+        return figure
+
+
+def _explain(figure: Figure, axes: Axes) -> None:
+    """The models in the order in which they were made, then the measurement and its noise."""
+    lines, _ = axes.get_legend_handles_labels()
+    after, recalibrated, before, points = lines
+    noise = Patch(color=PALE, label="noise of the measurement")
+    figure.legend(
+        handles=[before, recalibrated, after, points, noise],
+        loc="upper center",
+        bbox_to_anchor=(0.53, 0.968),
+        ncols=2,
+        columnspacing=1.4,
+    )
+
+
+def _curves(diagnosis: Diagnosis) -> list[ModelCurve]:
+    """The models, the last one first: it has the strongest line."""
+    measured, answers = diagnosis.measured, diagnosis.responses
+    road = measured.harmonics[:, measured.channel(ROAD), 1]
+    found = []
+    for label, harmonics in (
+        (model_label(diagnosis), answers.after),
+        ("recalibrated", answers.recalibrated),
+        ("before, as given", answers.before),
+    ):
+        solved = np.all(np.isfinite(harmonics[:, :, 1]), axis=1)
+        found.append(model_curve(label, measured.frequency, harmonics, road, solved))
+    return found
+
+
+def _draw_gap(axes: Axes, frequency: NDArray[np.float64], gap: FirstHarmonicGap) -> None:
+    """The gaps on a logarithmic scale down to half of the smallest noise; smaller ones lie on its edge."""
+    magnitude_axis(axes)
+    axes.set_ylabel("gap [% of the response]")
+    every = np.concatenate([gap.before, gap.recalibrated, gap.after])
+    top = float(np.max(every[np.isfinite(every)], initial=1.0))
+    noise = gap.noise[np.isfinite(gap.noise) & (gap.noise > 0.0)]
+    bottom = max(0.5 * float(np.min(noise, initial=top)), 1e-4 * top)
+    axes.fill_between(frequency, bottom, np.maximum(gap.noise, bottom), color=PALE, linewidth=0.0, zorder=0.5)
+    for values, line, marker in zip((gap.after, gap.recalibrated, gap.before), LINES, _MARKERS, strict=True):
+        axes.plot(frequency, np.maximum(values, bottom), marker=marker, markersize=3.2, **line)
+    axes.set_ylim(bottom, 1.6 * top)

@@ -1,0 +1,385 @@
+"""The report of a diagnosis: one page that an engineer reads from the top down, and its files.
+
+Whether the verdict may be used comes first, then the verdict in one sentence, the port on the rig, the response, the
+signal inferred at the port, the other hypotheses, the gap by model, the next tests, and the data behind all this.
+Every cell of a table is a text that was rounded here.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isfinite, nan
+from pathlib import Path
+
+import numpy as np
+
+from savgs_ident.core.files import write_bytes
+from savgs_ident.core.output import write_json
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.core.presentation import Origin
+from savgs_ident.diagnosis.result import Candidate, CyclePosition, Diagnosis, ForceLoop, PortShare, Shrink
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.report.diagnosis.bode import compared_channels, diagnosis_bode_figure, first_harmonic_gap
+from savgs_ident.report.diagnosis.drawing import rig_figure
+from savgs_ident.report.diagnosis.figures import (
+    force_figure,
+    gap_channels,
+    gap_map_figure,
+    gap_table,
+    shrink_figure,
+    spread_loops,
+)
+from savgs_ident.report.diagnosis.record import diagnosis_record
+from savgs_ident.report.diagnosis.text import (
+    KIND_WORDS,
+    about_candidate,
+    alarm,
+    baseline_sentence,
+    closed_words,
+    estimate_words,
+    gain_words,
+    gap_percentage,
+    law_label,
+    port_words,
+    probability_words,
+    references,
+    shown_candidates,
+    sigma_words,
+    smallest_words,
+)
+from savgs_ident.report.html import Picture, embed, render_page
+from savgs_ident.report.text import (
+    DASH,
+    READINGS,
+    channel_label,
+    decimal,
+    numeral,
+    percentage,
+    signed,
+    unit_text,
+)
+
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A share of a whole as a bar: its length in per cent, and in words."""
+
+    length: float
+    words: str
+
+
+@dataclass(frozen=True)
+class CandidateRow:
+    """A hypothesis; ``parameters`` are pairs of name and value with interval."""
+
+    name: str
+    about: str
+    named: bool
+    probability: str
+    bar: Bar
+    score: str
+    gain: str
+    closed: str
+    evaluated: str
+    parameters: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class PortRow:
+    """A port; ``named`` where the verdict names it."""
+
+    port: str
+    words: str
+    named: bool
+    share: str
+    bar: Bar
+    reach: str
+
+
+@dataclass(frozen=True)
+class ShrinkRow:
+    """The gap of a channel, of both, or of the sweep."""
+
+    name: str
+    before: str
+    recalibrated: str
+    after: str
+    floor: str
+    closed: str
+
+
+@dataclass(frozen=True)
+class CycleRow:
+    """Where in the cycle of the body's velocity the gap of a channel lies."""
+
+    name: str
+    reversal: str
+    between: str
+    mid_stroke: str
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """A parameter before, recalibrated, and with what is named; ``moved`` in tolerances."""
+
+    name: str
+    about: str
+    given: str
+    recalibrated: str
+    identified: str
+    moved: str
+    unit: str
+
+
+def candidate_row(each: Candidate, diagnosis: Diagnosis) -> CandidateRow:
+    """One line of the table of hypotheses."""
+    return CandidateRow(
+        name=str(each.hypothesis),
+        about=about_candidate(each),
+        named=bool(each.effects) and each.effects == diagnosis.verdict.effects,
+        probability=probability_words(each.probability),
+        bar=_bar(each.probability),
+        score=sigma_words(each.score_sigma),
+        gain=gain_words(each.heldout_gain),
+        closed=percentage(each.share_closed),
+        evaluated="full fit" if each.refitted else "score only",
+        parameters=tuple((estimate.name, estimate_words(estimate)) for estimate in each.parameters),
+    )
+
+
+def port_row(each: PortShare, diagnosis: Diagnosis) -> PortRow:
+    """One line of the table of ports."""
+    named = each.port in diagnosis.verdict.ports
+    return PortRow(
+        each.port,
+        port_words(each.port),
+        named,
+        percentage(each.share),
+        _bar(each.share),
+        percentage(each.free_input_share),
+    )
+
+
+def shrink_table(diagnosis: Diagnosis) -> tuple[ShrinkRow, ...]:
+    """Both channels together, each channel, and the sweep if one was recorded."""
+    rows = [_shrink_row("Both channels together", diagnosis.shrink)]
+    rows += [_shrink_row(channel_label(name).heading, each) for name, each in diagnosis.by_channel.items()]
+    if diagnosis.sweep is not None:
+        swept = diagnosis.sweep
+        rows.append(
+            ShrinkRow(
+                name="Recorded sweep, first harmonic",
+                before=gap_percentage(swept.before),
+                recalibrated=gap_percentage(swept.recalibrated),
+                after=gap_percentage(swept.after),
+                floor=gap_percentage(swept.floor),
+                closed=DASH,
+            )
+        )
+    return tuple(rows)
+
+
+def cycle_row(each: CyclePosition) -> CycleRow:
+    """One line of the table of where in the cycle."""
+    shares = (percentage(share, 0) for share in (each.reversal, each.between, each.mid_stroke))
+    return CycleRow(channel_label(each.channel).heading, *shares)
+
+
+def parameter_table(diagnosis: Diagnosis) -> tuple[ParameterRow, ...]:
+    """The parameters that calibration or the named effects moved, and those that the effects brought along."""
+    return tuple(_parameter_rows(diagnosis))
+
+
+def _shrink_row(name: str, each: Shrink) -> ShrinkRow:
+    return ShrinkRow(
+        name=name,
+        before=gap_percentage(each.before),
+        recalibrated=gap_percentage(each.recalibrated),
+        after=gap_percentage(each.after),
+        floor=gap_percentage(each.floor),
+        closed=closed_words(each),
+    )
+
+
+def _bar(share: float) -> Bar:
+    length = 100.0 * min(max(share, 0.0), 1.0) if isfinite(share) else 0.0
+    return Bar(round(length, 2), percentage(share))
+
+
+def _parameter_rows(diagnosis: Diagnosis) -> Iterator[ParameterRow]:
+    given = diagnosis.rig.parameters
+    known = {each.name: each for effect in CATALOGUE.values() for each in effect.parameters} | dict(given)
+    for name in dict.fromkeys((*diagnosis.parameters, *diagnosis.identified)):
+        recalibrated, identified = diagnosis.parameters.get(name), diagnosis.identified.get(name)
+        before = given[name].value if name in given else None
+        if before is None or any(
+            after is not None and abs(after - before) > _SAME * abs(before)
+            for after in (recalibrated, identified)
+        ):
+            about = known.get(name)
+            yield ParameterRow(
+                name=name,
+                about=about.about.split(",")[0] if about else "",
+                given=_number(before),
+                recalibrated=_number(recalibrated),
+                identified=_number(identified),
+                moved=_moved(about, before, identified),
+                unit=unit_text(about.unit) if about else DASH,
+            )
+
+
+def _moved(about: Parameter | None, given: float | None, identified: float | None) -> str:
+    if about is None or not about.tolerance > 0.0 or given is None or identified is None:
+        return DASH
+    return signed((identified - given) / about.tolerance, 1)
+
+
+def _number(value: float | None) -> str:
+    return DASH if value is None else numeral(value, nan)
+
+
+def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
+    """The page: one file, no network, nothing executed; the same diagnosis gives the same bytes."""
+    shown, rest = shown_candidates(diagnosis)
+    verdict = diagnosis.verdict
+    return render_page(
+        "diagnosis.html.j2",
+        {
+            "rig": diagnosis.rig.name,
+            "origin": origin,
+            "alarm": alarm(diagnosis),
+            "verdict": verdict,
+            # A number and its per cent stay on one line.
+            "sentence": verdict.sentence.replace(" %", "\u00a0%"),
+            "named": " + ".join(verdict.effects) or "its verdict",
+            "baseline": baseline_sentence(diagnosis),
+            "facts": _facts(diagnosis),
+            "warnings": diagnosis.warnings,
+            "rig_picture": _rig(diagnosis),
+            "ports": [port_row(each, diagnosis) for each in diagnosis.ports],
+            "bode": [_bode(diagnosis, c) for c in compared_channels(diagnosis)],
+            "loops": [_loop(diagnosis, each) for each in spread_loops(diagnosis.loops)],
+            "lawful": any(each.law.size for each in diagnosis.loops),
+            "shown": [candidate_row(each, diagnosis) for each in shown],
+            "rest": [candidate_row(each, diagnosis) for each in rest],
+            "references": references(verdict.effects),
+            "parameters": [
+                (each.name, each.about, each.given, each.recalibrated, each.identified, each.moved, each.unit)
+                for each in parameter_table(diagnosis)
+            ],
+            "shrink_picture": _shrink(diagnosis),
+            "shrink": shrink_table(diagnosis),
+            "maps": [_map(diagnosis, channel) for channel in gap_channels(diagnosis)],
+            "cycle": [
+                (each.name, each.reversal, each.between, each.mid_stroke)
+                for each in map(cycle_row, diagnosis.cycle)
+            ],
+            "next_tests": [
+                (each.test, " from ".join(each.separates), decimal(each.expected_sigma, 1))
+                for each in diagnosis.next_tests
+            ],
+            "confusable": [(*each.effects, signed(each.cosine, 3)) for each in diagnosis.confusable],
+            "not_judgeable": [
+                (each.effect, each.parameter, smallest_words(each)) for each in diagnosis.not_judgeable
+            ],
+        },
+    )
+
+
+def _facts(diagnosis: Diagnosis) -> tuple[dict[str, object], ...]:
+    """Four numbers for a first look."""
+    verdict, shrink = diagnosis.verdict, diagnosis.shrink
+    said = verdict.effects or (verdict.kind,)
+    named = next(
+        (each for each in diagnosis.candidates if (each.effects or (str(each.hypothesis),)) == said), None
+    )
+    low, high = (percentage(end) for end in shrink.interval)
+    known = np.isfinite(shrink.share_closed)
+    return (
+        {
+            "name": "Missing",
+            "value": KIND_WORDS[verdict.kind],
+            "then": f"probability {probability_words(named.probability)}" if named else DASH,
+            "bad": not diagnosis.converged,
+        },
+        {
+            "name": "Gap before",
+            "value": gap_percentage(shrink.before),
+            "then": f"recalibrated {gap_percentage(shrink.recalibrated)}",
+            "bad": False,
+        },
+        {
+            "name": "Gap after",
+            "value": gap_percentage(shrink.after),
+            "then": f"noise alone {gap_percentage(shrink.floor)}",
+            "bad": False,
+        },
+        {
+            "name": "Share closed",
+            "value": percentage(shrink.share_closed),
+            "then": f"95 %: {low} to {high}" if known else "nothing to close",
+            "bad": False,
+        },
+    )
+
+
+def _rig(diagnosis: Diagnosis) -> Picture:
+    shares = ", ".join(f"{port_words(each.port)} {percentage(each.share, 0)}" for each in diagnosis.ports)
+    named = " and ".join(map(port_words, diagnosis.verdict.ports)) or "none"
+    words = f"The rig with its ports. Named port: {named}. Shares of the gap: {shares or 'not known'}."
+    return embed(rig_figure(diagnosis), words)
+
+
+def _bode(diagnosis: Diagnosis, c: int) -> Picture:
+    gap = first_harmonic_gap(diagnosis, c)
+    largest = [
+        f"{name} {np.max(values[np.isfinite(values)], initial=0.0):.3g} %"
+        for name, values in (
+            ("before", gap.before),
+            ("recalibrated", gap.recalibrated),
+            ("after", gap.after),
+        )
+    ]
+    title = channel_label(tuple(READINGS)[c]).title
+    words = f"Magnitude, phase and gap of the {title} over road frequency; largest gap {', '.join(largest)}."
+    return embed(diagnosis_bode_figure(diagnosis, c), words)
+
+
+def _loop(diagnosis: Diagnosis, loop: ForceLoop) -> Picture:
+    largest = float(np.max(np.abs(loop.inferred), initial=0.0))
+    words = (
+        f"Signal inferred at the {port_words(loop.port)} over velocity and displacement at"
+        f" {loop.frequency_hz:.3g} Hz; it reaches {largest:.3g} {loop.unit}."
+    )
+    return embed(force_figure(loop, law_label(diagnosis, loop.port)), words)
+
+
+def _shrink(diagnosis: Diagnosis) -> Picture:
+    each = diagnosis.shrink
+    words = (
+        f"Gap on held-out tests: {gap_percentage(each.before)} before, {gap_percentage(each.recalibrated)}"
+        f" recalibrated, {gap_percentage(each.after)} after, {gap_percentage(each.floor)} noise alone."
+    )
+    return embed(shrink_figure(diagnosis), words)
+
+
+def _map(diagnosis: Diagnosis, channel: str) -> Picture:
+    frequency, orders, sigma, _ = gap_table(diagnosis.map, channel)
+    words = f"Gap of the {channel_label(channel).title} by dwell and harmonic order."
+    known = np.where(np.isfinite(sigma), np.abs(sigma), -1.0)
+    k, d = np.unravel_index(np.argmax(known), known.shape)
+    words += f" Largest: {known[k, d]:.0f} standard deviations in order {orders[k]} at {frequency[d]:.3g} Hz."
+    return embed(gap_map_figure(diagnosis, channel), words)
+
+
+def write_diagnosis(diagnosis: Diagnosis, origin: Origin, out: Path) -> tuple[Path, ...]:
+    """Write diagnosis.json and diagnosis.html to the folder ``out``, each whole or not at all; their paths.
+
+    Raises :class:`InputError` if a file cannot be written.
+    """
+    page = diagnosis_html(diagnosis, origin).encode()
+    return (
+        write_json(out / "diagnosis.json", diagnosis_record(diagnosis, origin)),
+        write_bytes(out / "diagnosis.html", page),
+    )

@@ -1,0 +1,319 @@
+"""A posterior in words: the texts that terminal and page share, and the report in the terminal.
+
+The terminal shows whether the sampler converged, the parameters, the convergence and the posterior prediction.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from math import floor, log10, sqrt
+from types import MappingProxyType
+
+import numpy as np
+from rich.console import Group, RenderableType
+
+from savgs_ident.inference.result import Marginal, Posterior
+from savgs_ident.report.fit.text import value_with_error
+from savgs_ident.report.text import DASH, count, decimal, numeral, percentage, plain, table
+
+NUISANCE_WORDS: Mapping[str, str] = MappingProxyType(
+    {
+        "noise_scale": (
+            "Factor on the noise that was estimated from what does not repeat from period to period;"
+            " 1 if that estimate is right."
+        ),
+        "discrepancy": (
+            "Relative rms by which the model is allowed to miss the first harmonic of each channel beyond noise"
+            " (order k by 1/k of it in the acceleration, by 1/k² in the deflection); 0 for a perfect model."
+            " It keeps intervals from becoming absurdly narrow"
+            " where the model is not perfect."
+        ),
+    }
+)
+"""What the scales of the likelihood mean."""
+
+SAMPLERS: Mapping[str, str] = MappingProxyType(
+    {"emcee": "emcee (an ensemble of walkers)", "nuts": "NUTS (Hamiltonian, gradient-based)"}
+)
+"""The samplers in words."""
+
+GOOD_R_HAT = 1.01
+"""R-hat up to which chains agree."""
+
+NORMAL_95 = 1.959964
+"""Half of the central 95 % interval of a normal distribution [sd]."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of the convergence table: a quantity, its value, what it should be, what it means."""
+
+    name: str
+    value: str
+    wanted: str
+    meaning: str
+
+
+def verdict_line(posterior: Posterior) -> str:
+    """Whether the numbers may be used, first of all."""
+    if posterior.convergence.converged:
+        return "Converged: these numbers may be used."
+    return "Not converged: these numbers must not be used."
+
+
+def reasons(posterior: Posterior) -> tuple[str, ...]:
+    """Why not, at least one sentence where it did not converge."""
+    given = posterior.convergence.reasons or ("The sampler gave no reason.",)
+    return () if posterior.convergence.converged else tuple(map(_as_sentence, given))
+
+
+def scope_sentence(posterior: Posterior) -> str:
+    """What was estimated from what."""
+    measured, used = posterior.measured, posterior.predictive.used
+    identified, tolerated = (len(posterior.of_role(role)) for role in ("identified", "tolerated"))
+    orders = np.flatnonzero(np.any(used, axis=(0, 1)))
+    span = f"orders {orders[0]} to {orders[-1]}" if orders.size > 1 else f"order {' '.join(map(str, orders))}"
+    along = (
+        f"; {tolerated} more that are known to a tolerance were sampled too and marginalised"
+        if tolerated
+        else "; everything else was held at its value"
+    )
+    were = "was" if identified == 1 else "were"
+    return (
+        f"{_counted(identified, 'parameter')} {were} identified from {_counted(len(measured.tests), 'dwell')}"
+        f" between {measured.frequency[0]:.2f} and {measured.frequency[-1]:.2f} Hz"
+        f" ({np.sum(used)} harmonics, {span}){along}."
+    )
+
+
+def chance_of_inside(total: int) -> tuple[int, int]:
+    """How many of ``total`` harmonics lie inside 95 % regions if the model is right, two standard deviations."""
+    middle, scatter = 0.95 * total, 2.0 * sqrt(0.95 * 0.05 * total)
+    return round(max(middle - scatter, 0.0)), round(min(middle + scatter, total))
+
+
+def predictive_sentence(posterior: Posterior) -> str:
+    """How many measured harmonics the posterior would have predicted, and what that says about the model."""
+    inside, total = posterior.predictive.count_inside
+    if not total:
+        return "No measured harmonic was compared with a prediction."
+    low, high = chance_of_inside(total)
+    verdict = ""
+    if inside < low:
+        verdict = " That is fewer than chance allows: the model misses something."
+    if inside > high:
+        verdict = " That is more than chance allows: the predicted spread is too wide."
+    return (
+        f"Of {total} measured harmonics {inside} ({percentage(inside / total)}) lie where 95 % of the repetitions"
+        f" lie that the posterior predicts; for a perfect model it would be {low} to {high}.{verdict}"
+    )
+
+
+def correlation_sentence(posterior: Posterior) -> str | None:
+    """The identified parameters that trade off most; None for fewer than two, or where none moves."""
+    names = tuple(
+        each.name for each in posterior.of_role("identified") if np.ptp(posterior.draws[each.name]) > 0.0
+    )
+    if len(names) < 2:
+        return None
+    matrix = posterior.correlation(names)
+    one, other = max(combinations(range(len(names)), 2), key=lambda pair: abs(matrix[pair]))
+    return f"Strongest correlation: {names[one]} with {names[other]}, {matrix[one, other]:+.2f}."
+
+
+def shift_in_sd(each: Marginal) -> float:
+    """How far the median has moved from the middle of the prior interval, in prior standard deviations [1]."""
+    low, high = each.prior
+    return (each.median - 0.5 * (low + high)) / ((high - low) / (2.0 * NORMAL_95))
+
+
+def checks(posterior: Posterior) -> tuple[Check, ...]:
+    """How the sampling went, line by line."""
+    c = posterior.convergence
+    chains, length = next(iter(posterior.draws.values())).shape
+    slowest = max(posterior.of_role("identified"), key=lambda each: each.autocorrelation)
+    return (
+        Check(
+            "Chains",
+            f"{chains} of {count(length)} draws",
+            DASH,
+            "Independent chains; all must have the same distribution.",
+        ),
+        Check(
+            "Largest R-hat",
+            decimal(c.r_hat_max, 3),
+            f"at most {GOOD_R_HAT}, a little more for what is known to a tolerance",
+            "Spread of all chains together over the spread within each, by ranks; 1 when they agree.",
+        ),
+        Check(
+            "Smallest effective sample size",
+            count(c.ess_min),
+            f"at least {count(c.target_ess)}",
+            "Number of independent draws of the same precision, for the median (bulk) and for the ends of"
+            " the 90 % interval (tail), whichever is less, over the identified parameters.",
+        ),
+        Check(
+            "Autocorrelation time",
+            f"{decimal(slowest.autocorrelation, 1)} draws ({slowest.name})",
+            "far below the length of a chain",
+            "Number of draws after which draws are independent; the largest of the identified parameters.",
+        ),
+        *_sampler_checks(posterior),
+        Check(
+            "Time taken",
+            f"{decimal(posterior.wall_s, 1)} s",
+            DASH,
+            "From the measured response to the last draw.",
+        ),
+    )
+
+
+def _sampler_checks(posterior: Posterior) -> tuple[Check, ...]:
+    """What the sampler reports of its proposals."""
+    c, gradient = posterior.convergence, posterior.sampler == "nuts"
+    return (
+        Check(
+            "Acceptance",
+            percentage(c.acceptance),
+            "not near 0",
+            "Share of proposed moves that the exact model accepted.",
+        ),
+        Check(
+            "Divergences",
+            count(c.divergences) if gradient else "not applicable",
+            "0",
+            "Diverging trajectories of the gradient-based sampler: regions of the posterior that it did not sample.",
+        ),
+        Check(
+            "Pareto k",
+            decimal(c.pareto_k, 2),
+            "below 0.7",
+            "Heaviness of the tail of exact over approximate density at the proposals; above 0.7 the proposals"
+            " do not cover the posterior.",
+        ),
+        Check(
+            "Exact evaluations",
+            count(c.evaluations),
+            DASH,
+            "How often the full model was solved, all dwells each time.",
+        ),
+        Check(
+            "Not solved",
+            count(c.unsolved),
+            "few",
+            "Proposals at which the model has no periodic motion that the solver found; they were rejected.",
+        ),
+    )
+
+
+def short(about: str) -> str:
+    """What a parameter is, in a few words."""
+    return about.split(",")[0]
+
+
+def interval_words(each: Marginal) -> str:
+    """A marginal in a few words, for those who cannot see a picture."""
+    return (
+        f"{each.name}: median {numeral(each.median, each.sd)}, standard deviation {numeral(each.sd, each.sd)}"
+    )
+
+
+def _as_sentence(text: str) -> str:
+    """``text`` with a capital at its head and a full stop at its end."""
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def posterior_text(posterior: Posterior) -> RenderableType:
+    """Tables and sentences of a posterior, most important first."""
+    why = reasons(posterior)
+    correlation = correlation_sentence(posterior)
+    parts = [
+        *([plain(verdict_line(posterior), "bold")] if why else []),
+        *(plain(f"- {reason}") for reason in why),
+        *([plain("")] if why else []),
+        _identified(posterior),
+        *([plain(correlation)] if correlation else []),
+        plain(_sampling(posterior)),
+        plain(""),
+        _nuisance(posterior),
+        *_tolerances(posterior),
+        plain("Identifiability", "bold"),
+        *(plain(f"- {sentence}") for sentence in posterior.sentences),
+        plain(f"- {scope_sentence(posterior)}"),
+        plain(f"- {predictive_sentence(posterior)}"),
+    ]
+    return Group(*parts)
+
+
+def _identified(posterior: Posterior) -> RenderableType:
+    rows = [
+        (
+            each.name,
+            value_with_error(each.median, each.sd),
+            _interval(each),
+            "" if each.unit == "1" else each.unit,
+            percentage(each.contraction),
+            count(min(each.ess_bulk, each.ess_tail)),
+        )
+        for each in posterior.of_role("identified")
+    ]
+    headers = ("parameter", "median ± 1 sd", "95 % interval", "unit", "shrunk", "ESS")
+    return table("Identified parameters", headers, rows, texts=(0, 3))
+
+
+def _sampling(posterior: Posterior) -> str:
+    c = posterior.convergence
+    state = "converged" if c.converged else "NOT converged"
+    return (
+        f"{posterior.sampler}: {state}, largest R-hat {decimal(c.r_hat_max, 3)},"
+        f" smallest ESS {count(c.ess_min)} (target {count(c.target_ess)}),"
+        f" acceptance {percentage(c.acceptance, 0)}, {c.divergences} divergences,"
+        f" Pareto k {decimal(c.pareto_k, 2)}, {c.evaluations} exact evaluations ({posterior.wall_s:.1f} s)"
+    )
+
+
+def _nuisance(posterior: Posterior) -> RenderableType:
+    rows = [
+        (each.name, value_with_error(each.median, each.sd), _interval(each))
+        for each in posterior.of_role("nuisance")
+    ]
+    return table("Scales of the likelihood", ("scale", "median ± 1 sd", "95 % interval"), rows)
+
+
+def _tolerances(posterior: Posterior) -> list[RenderableType]:
+    known = posterior.of_role("tolerated")
+    if not known:
+        return []
+    moved = [each for each in known if abs(shift_in_sd(each)) >= 0.5]
+    title = (
+        f"Known to a tolerance and sampled too: {len(known)},"
+        f" of which {len(moved)} changed by half a tolerance or more"
+    )
+    if not moved:
+        return [plain(title), plain("")]
+    rows = [
+        (
+            each.name,
+            _before(each),
+            value_with_error(each.median, each.sd),
+            each.unit,
+            f"{shift_in_sd(each):+.1f}",
+        )
+        for each in sorted(moved, key=lambda each: -abs(shift_in_sd(each)))
+    ]
+    headers = ("parameter", "before ± 1 sd", "after ± 1 sd", "unit", "change\n[sd]")
+    return [table(title, headers, rows, texts=(0, 3))]
+
+
+def _before(each: Marginal) -> str:
+    low, high = each.prior
+    return value_with_error(0.5 * (low + high), (high - low) / (2.0 * NORMAL_95))
+
+
+def _interval(each: Marginal) -> str:
+    places = min(max(1 - floor(log10(each.sd)), 0), 12) if each.sd > 0.0 else 6
+    return f"{each.q025:.{places}f} to {each.q975:.{places}f}"

@@ -1,0 +1,179 @@
+"""Numbers, units and channels as people read them, and text for terminals.
+
+A number has the digits that its error justifies, thousands in groups of three, and its unit:
+
+>>> numeral(5386.23, 9.7), with_error(0.030018, 0.00012), interval(0.02941, 0.03059, 0.0003)
+('5386.2', '0.03002 ± 0.00012', '0.02941 to 0.03059')
+>>> unit_text("kg m^2")
+'kg m²'
+
+Very large and very small numbers have a power of ten, a pair of them one in common. Names come from data that anybody
+may have written: in the terminal nothing in them is markup, colour or control.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import floor, isfinite, isinf, log10
+from types import MappingProxyType
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+MINUS = "\u2212"
+"""A minus as long as a plus."""
+
+DASH = "\u2013"
+"""Stands where there is no number, or no unit."""
+
+_NARROW_SPACE = "\u202f"
+_TIMES = "\u00d7"
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_PLAIN = (-4, 5)
+"""Powers of ten of numbers that are written out."""
+
+
+def numeral(value: float, error: float) -> str:
+    """``value`` to the second significant digit of ``error``; to four digits of its own where that is unknown.
+
+    Both are in the same unit.
+    """
+    return _scaled("{}", (value,), error)
+
+
+def with_error(value: float, error: float) -> str:
+    """A value and its error in the same unit, both to the second significant digit of the error."""
+    return _scaled("{} ± {}", (value, error), error)
+
+
+def interval(low: float, high: float, error: float) -> str:
+    """Two ends of an interval, to the second significant digit of ``error``. All are in the same unit."""
+    return _scaled("{} to {}", (low, high), error)
+
+
+def _scaled(form: str, values: tuple[float, ...], error: float) -> str:
+    """``values`` in ``form``, with a power of ten in common where they are very large or very small."""
+    known = [abs(value) for value in values if isfinite(value)]
+    largest = max(known, default=0.0)
+    # Powers of ten below the least normal number are zero.
+    power = floor(log10(largest)) if largest > 1e-300 else 0
+    last = floor(log10(error)) - 1 if isfinite(error) and error > 0.0 else power - 3
+    if _PLAIN[0] <= power <= _PLAIN[1]:
+        return form.format(*(_grouped(value, -last) for value in values))
+    text = form.format(*(_grouped(value / 10.0**power, power - last) for value in values))
+    whole = f"({text})" if len(values) > 1 else text
+    return f"{whole} {_TIMES} 10{str(power).translate(_SUPERSCRIPTS)}"
+
+
+def _grouped(value: float, places: int) -> str:
+    """With so many decimals, and thousands apart from ten thousand on."""
+    if not isfinite(value):
+        return (f"{MINUS}∞" if value < 0.0 else "∞") if isinf(value) else "unknown"
+    text = f"{value:,.{min(max(places, 0), 12)}f}"
+    return text.replace(",", _NARROW_SPACE if abs(value) >= 1e4 else "").replace("-", MINUS)
+
+
+def percentage(share: float, places: int = 1) -> str:
+    """A share as a percentage, 100 only if it is the whole; a dash where there is none."""
+    if not isfinite(share):
+        return DASH
+    if share < 1.0 and round(100.0 * share, places) == 100.0:
+        return f"> {100.0 - 10.0**-places:.{places}f} %"
+    return f"{100.0 * share:.{places}f} %".replace("-", MINUS)
+
+
+def decimal(number: float, places: int) -> str:
+    """A number of any unit with so many decimals; a dash where there is none."""
+    return _grouped(number, places) if isfinite(number) else DASH
+
+
+def count(number: float) -> str:
+    """A whole number [1] in groups of three; a dash where there is none."""
+    return _grouped(round(number), 0) if isfinite(number) else DASH
+
+
+def signed(value: float, places: int) -> str:
+    """A number of any unit with its sign, none if it rounds to zero; a dash where there is no number."""
+    if not isfinite(value):
+        return DASH
+    rounded = round(value, places)
+    return f"{rounded:+.{places}f}".replace("-", MINUS) if rounded else f"{0.0:.{places}f}"
+
+
+def unit_text(unit: str) -> str:
+    """A unit as it is printed, a dash for a number without one."""
+    return DASH if unit == "1" else unit.replace("^2", "²").replace("^3", "³")
+
+
+def plain(text: object, style: str = "") -> Text:
+    """``text`` as it is, with control characters spelled out and markup left unread.
+
+    What keeps thousands apart becomes a space that every terminal knows.
+    """
+    shown = "".join(
+        char if char.isprintable() or char == "\n" else char.encode("unicode_escape").decode()
+        for char in str(text).replace("\u202f", " ")
+    )
+    return Text(shown, style=style)
+
+
+def table(
+    title: str, headers: Sequence[str], rows: Iterable[Sequence[object]], texts: Sequence[int] = (0,)
+) -> RenderableType:
+    """A table; the columns whose numbers are in ``texts`` hold texts and stand to the left."""
+    grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    for index, header in enumerate(headers):
+        grid.add_column(plain(header), justify="left" if index in texts else "right", overflow="fold")
+    for row in rows:
+        grid.add_row(*(plain(cell) for cell in row))
+    return Group(plain(title, "bold"), grid, plain(""))
+
+
+def fixed(value: float | None, places: int) -> str:
+    """A number of any unit with ``places`` decimals, a dash where there is none."""
+    return "-" if value is None else f"{value:.{places}f}"
+
+
+def significant(value: float | None, digits: int = 4) -> str:
+    """A number of any unit with ``digits`` significant digits, a dash where there is none."""
+    return "-" if value is None else f"{value:.{digits}g}"
+
+
+@dataclass(frozen=True)
+class ChannelLabel:
+    """How a channel is shown: ``title``, ``unit``, ``scale`` from SI to that unit, and unit per metre of road."""
+
+    title: str
+    unit: str
+    scale: float
+    per_road: str
+
+    @property
+    def heading(self) -> str:
+        """The title with a capital."""
+        return f"{self.title[:1].upper()}{self.title[1:]}"
+
+
+READINGS: Mapping[str, ChannelLabel] = MappingProxyType(
+    {
+        "sprung_accel": ChannelLabel("sprung-mass acceleration", "m/s²", 1.0, "m/s² per m"),
+        "susp_deflection": ChannelLabel("suspension deflection", "mm", 1e3, "m per m"),
+    }
+)
+"""The channels whose response to the road is identified, by name, in the order of
+:data:`savgs_ident.plants.quarter_car.sensors.RESPONSE_CHANNELS` (which would load JAX)."""
+
+
+ROAD = "road_height"
+"""The input that it is the response to."""
+
+
+def channel_label(name: str) -> ChannelLabel:
+    """How the channel ``name`` is shown: as listed, any other by its name and in SI."""
+    # Only here: the command line prints errors without numpy, which recordings load.
+    from savgs_ident.recordings.recording import CANONICAL_UNITS
+
+    if name in READINGS:
+        return READINGS[name]
+    unit = unit_text(CANONICAL_UNITS.get(name, "1"))
+    return ChannelLabel(name, unit, 1.0, f"{unit} per m")

@@ -1,0 +1,1 @@
+"""Reports of blind trials, false alarms and calibration."""

@@ -1,0 +1,167 @@
+"""False alarms and the calibration of the posterior: JSON objects, sentences, tables and figures."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from rich.console import Group, RenderableType
+from scipy.stats import binom
+
+from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.report.text import decimal, percentage, plain, table
+from savgs_ident.report.theme import BLUE, INK, ORANGE, PALE, new_figure, printable, styled
+from savgs_ident.validation.calibration import INTERVAL, RANKED, Trial, uniformity
+from savgs_ident.validation.false_alarms import CONFIDENCE, NullDraw, rate_bound
+
+MOST = 0.02
+"""Rate of false alarms that is allowed."""
+
+
+def alarms_record(draws: Sequence[NullDraw], odds: float, command: Sequence[str]) -> dict[str, Any]:
+    """How many of the draws were false alarms, the rate that they leave possible, and all odds.
+
+    Odds are log odds.
+    """
+    solved = [each.odds for each in draws if each.odds is not None]
+    alarms = sum(each.alarm for each in draws)
+    return {
+        "schema": 1,
+        "few_enough": bool(solved) and alarms <= MOST * len(solved),
+        "drawn": len(solved),
+        "not_solved": len(draws) - len(solved),
+        "alarms": alarms,
+        "rate_at_most": rate_bound(alarms, len(solved)),
+        "confidence": CONFIDENCE,
+        "threshold": DEFAULTS.alarm_log_odds,
+        "odds": odds,
+        "drawn_odds": solved,
+        "named": [list(each.named) for each in draws if each.alarm],
+        "command": " ".join(command),
+    }
+
+
+def alarms_text(record: Mapping[str, Any]) -> str:
+    """The same in two sentences."""
+    lost = f" ({record['not_solved']} more could not be solved)" if record["not_solved"] else ""
+    sentence = (
+        f"Of {record['drawn']} campaigns like this one with nothing missing{lost}, the diagnosis reported something "
+        f"missing in {record['alarms']}: the rate of false alarms is at most {percentage(record['rate_at_most'])} "
+        f"({percentage(record['confidence'], 0)} confidence)."
+    )
+    if not record["drawn_odds"]:
+        return sentence
+    return (
+        f"{sentence} Their log odds that something is missing are {decimal(min(record['drawn_odds']), 1)} to "
+        f"{decimal(max(record['drawn_odds']), 1)}, those of this campaign {decimal(record['odds'], 1)}; the "
+        f"threshold of an alarm is {decimal(record['threshold'], 0)}."
+    )
+
+
+def alarms_figure(draws: Sequence[NullDraw], odds: float) -> Figure:
+    """Histogram of the log odds of the draws, with those of the campaign and the threshold."""
+    solved = np.array([each.odds for each in draws if each.odds is not None])
+    with styled():
+        figure = new_figure(6.4, 3.4)
+        axes = figure.subplots()
+        axes.hist(
+            solved, bins="sturges", color=BLUE, alpha=0.75, rwidth=0.9, label="campaigns with nothing missing"
+        )
+        axes.axvline(DEFAULTS.alarm_log_odds, color=INK, linestyle="--", label="threshold of an alarm")
+        # Odds of a campaign in which something is missing are in the thousands: they would leave the rest no room.
+        shown = min(odds, 2.0 * DEFAULTS.alarm_log_odds)
+        there = "this campaign" if odds <= shown else f"this campaign: {odds:.0f}, far to the right"
+        axes.axvline(shown, color=ORANGE, label=there)
+        axes.set_xlabel("log odds that something is missing [nat]")
+        axes.set_ylabel("campaigns")
+        axes.set_title(f"{solved.size} campaigns with nothing missing, diagnosed")
+        axes.legend(loc="upper center", fontsize=8)
+    return figure
+
+
+BINS = 8
+
+LEAST, CALIBRATION_MOST = 0.90, 0.99
+"""Coverage of 95 % intervals, all parameters together, that counts as right."""
+
+UNEVEN = 1e-3
+"""Probability of an uneven rank histogram, times the number of parameters, below which ranks are wrong."""
+
+
+def calibration_record(
+    trials: Sequence[Trial], names: Sequence[str], command: Sequence[str]
+) -> dict[str, object]:
+    """Coverage and rank statistics by parameter, how many trials failed, and whether all is as it should be.
+
+    A trial whose mode was not found counts as one whose intervals miss.
+    """
+    solved = [trial for trial in trials if trial.solved]
+    ranked = [trial for trial in solved if trial.found]
+    parameters: dict[str, dict[str, Any]] = {
+        name: {
+            "coverage": sum(trial.inside[name] for trial in ranked) / max(len(solved), 1),
+            "uniformity": uniformity([trial.rank[name] for trial in ranked], BINS),
+            "ranks": [trial.rank[name] for trial in ranked],
+        }
+        for name in names
+    }
+    held = sum(sum(trial.inside.values()) for trial in ranked)
+    coverage = held / max(len(solved) * len(names), 1)
+    even = all(each["uniformity"] > UNEVEN / len(names) for each in parameters.values())
+    return {
+        "schema": 1,
+        "calibrated": bool(names) and LEAST <= coverage <= CALIBRATION_MOST and even,
+        "coverage": coverage,
+        "interval": INTERVAL,
+        "ranks_even": even,
+        "trials": len(trials),
+        "not_solved": len(trials) - len(solved),
+        "mode_not_found": len(solved) - len(ranked),
+        "places": RANKED + 1,
+        "parameters": parameters,
+        "command": " ".join(command),
+    }
+
+
+def calibration_text(record: Mapping[str, Any]) -> RenderableType:
+    """Coverage of every parameter in a table, and the sum of it in words."""
+    rows = [
+        [name, f"{100.0 * each['coverage']:.0f}", f"{each['uniformity']:.2g}"]
+        for name, each in record["parameters"].items()
+    ]
+    counted = record["trials"] - record["not_solved"]
+    words = (
+        f"{100.0 * record['interval']:.0f} % intervals contained the truth in {100.0 * record['coverage']:.1f} % of "
+        f"{counted} campaigns times {len(rows)} parameters; {record['not_solved']} campaigns could not be "
+        f"simulated, of {record['mode_not_found']} the mode was not found (counted as missed)."
+    )
+    headers = ["parameter", "inside\n[%]", "ranks even\n(p value)"]
+    return Group(table("Calibration", headers, rows, texts=(0,)), plain(words))
+
+
+def calibration_figure(trials: Sequence[Trial], names: Sequence[str]) -> Figure:
+    """Rank histograms of all parameters; the band holds 95 % of the bars of an even one."""
+    ranked = [trial for trial in trials if trial.found]
+    columns = 6
+    rows = max(1, -(-len(names) // columns))
+    with styled():
+        figure = new_figure(11.0, 1.0 + 1.35 * rows)
+        figure.suptitle(
+            f"Ranks of true values among {RANKED} posterior draws, {len(ranked)} synthetic campaigns",
+            fontsize=11,
+        )
+        axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+        low, high = binom.ppf([0.025, 0.975], len(ranked), 1.0 / BINS)
+        for place, each in enumerate(axes.ravel()):
+            if place >= len(names):
+                each.set_visible(False)
+                continue
+            name = names[place]
+            each.axhspan(low, high, color=PALE, linewidth=0.0)
+            each.axhline(len(ranked) / BINS, color=INK, linewidth=0.8)
+            edges = np.linspace(0, RANKED + 1, BINS + 1)
+            each.hist([trial.rank[name] for trial in ranked], bins=edges, color=BLUE, alpha=0.75, rwidth=0.9)
+            each.set_title(printable(name), fontsize=8.5)
+        figure.supxlabel(f"rank of the true value [0 to {RANKED}]", fontsize=9)
+        figure.supylabel("campaigns", fontsize=9)
+    return figure

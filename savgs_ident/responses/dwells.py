@@ -1,0 +1,376 @@
+"""Dwells of a campaign to one harmonic response.
+
+    >>> response = estimate_response(campaign, orders=9)           # doctest: +SKIP
+    >>> accel = response.harmonics[:, response.channel("sprung_accel"), 1]   # doctest: +SKIP
+
+Every dwell is fitted on its actual stamps, channel by channel as far as the sampling carries; the noise is what does
+not repeat from period to period; then the time origin is moved to the instant, within half a period of mid-record,
+at which the road's fundamental is real and positive. The checks of a dwell and of its fit follow at the end; their
+findings are warnings of the response.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import DataWarning, InputError
+from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, Recording
+from savgs_ident.responses.dwell_fit import ChannelFit, DwellFit, fit_dwell
+from savgs_ident.responses.fundamental import (
+    ClockGroup,
+    coarse_frequency,
+    group_by_clock,
+    highest_valid_order,
+)
+from savgs_ident.responses.harmonic_response import HarmonicResponse, unbiased_peak_to_peak
+
+FEWEST_PERIODS = 3
+_FREQUENCY_MISS = 0.02
+_STEADY_SHARE = 0.01
+_STEADY_SIGMAS = 5.0
+_NOISE_FACTOR = 1.5
+_CLOCK_SIGMAS = 5.0
+ROAD = "road_height"
+
+
+def estimate_response(campaign: Campaign, orders: int = 15, driven: str = ROAD) -> HarmonicResponse:
+    """Complex harmonics, covariance and peak-to-peak of all dwells of ``campaign``, sorted by frequency.
+
+    ``driven`` is the input that moves in them, the road or that of another plant, called the road below.
+
+    ``orders`` is the highest order kept; a channel sampled at r Hz is valid up to 0.4 r / f. The covariance
+    holds the noise of the channel and the phase noise of the road, which sets the time origin (a part common
+    to all entries of a dwell; it is left out for the road's fundamental itself). The mean (order 0) has
+    no imaginary part, and variance 0 for it. A constant offset between the clocks of two channels cannot be
+    seen in periodic data: stamps are taken as true up to their rate, which is checked.
+
+    Dwells that cannot be used are left out with a warning: ``no_road_motion``, ``too_few_periods`` (3 are
+    needed to tell noise from signal), ``not_determined``. Further warnings: ``frequency_differs``,
+    ``not_steady``, ``clock_rate_differs``, ``noise_above_standstill``, ``folded_orders``.
+
+    Raises :class:`InputError` when ``orders`` is below 1 or no dwell can be used.
+    """
+    if orders < 1:
+        raise InputError(f"orders is {orders}", source="orders", remedy="ask for at least order 1")
+    fits, groups, warnings = _fit_all(campaign, orders, {}, driven)
+    if not fits:
+        raise _no_dwell(campaign, warnings)
+    stretch, clock_warnings = check_clocks(campaign.source, fits, driven)
+    if stretch:
+        fits, groups, warnings = _fit_all(campaign, orders, stretch, driven)
+    for test, fit in fits.items():
+        warnings += check_steady(campaign.source, test, groups[test], fit)
+    return _assemble(fits, orders, warnings + clock_warnings + _check_all(campaign, fits), driven)
+
+
+def _fit_all(
+    campaign: Campaign, orders: int, stretch: Mapping[str, float], driven: str
+) -> tuple[dict[str, DwellFit], dict[str, tuple[ClockGroup, ...]], tuple[DataWarning, ...]]:
+    """Fits and channels of the usable dwells by name, and warnings with the reasons of the others."""
+    fits: dict[str, DwellFit] = {}
+    kept: dict[str, tuple[ClockGroup, ...]] = {}
+    warnings: tuple[DataWarning, ...] = ()
+    for recording in campaign.of_kind("dwell"):
+        groups = group_by_clock(recording, _middle(recording, driven), stretch)
+        start, refusal = _start_frequency(campaign.source, recording, groups, driven)
+        if refusal is None:
+            try:
+                fit = fit_dwell(groups, driven, start, orders)
+            except np.linalg.LinAlgError:
+                what = "the time stamps do not determine the harmonics"
+                remedy = "look for repeated or clustered time stamps"
+                refusal = DataWarning(
+                    "not_determined", what, campaign.source, recording.name, "", None, remedy
+                )
+        if refusal is not None:
+            warnings += (refusal,)
+            continue
+        fits[recording.name], kept[recording.name] = fit, groups
+        warnings += check_frequency(campaign.source, recording, fit.frequency, driven)
+    return fits, kept, warnings
+
+
+def _check_all(campaign: Campaign, fits: Mapping[str, DwellFit]) -> tuple[DataWarning, ...]:
+    return check_noise(campaign, fits) + check_folding(campaign.source, fits)
+
+
+def _middle(recording: Recording, driven: str) -> float:
+    """Middle of the road's record [s], 0 where there is none."""
+    road = recording.channels.get(driven)
+    return 0.0 if road is None or road.time.size == 0 else 0.5 * float(road.time[0] + road.time[-1])
+
+
+def _start_frequency(
+    source: str, recording: Recording, groups: tuple[ClockGroup, ...], driven: str
+) -> tuple[float, DataWarning | None]:
+    """Initial frequency [Hz], or the warning that the dwell cannot be used."""
+
+    def refuse(code: str, what: str, remedy: str) -> tuple[float, DataWarning]:
+        return 0.0, DataWarning(code, what, source, recording.name, driven, None, remedy)
+
+    lead = next((group for group in groups if driven in group.names), None)
+    if lead is None:
+        return refuse(
+            "no_road_motion", "no road height recorded", "map the road channel, or leave this test out"
+        )
+    road = lead.values[lead.names.index(driven)]
+    if np.ptp(road) == 0.0:
+        return refuse("no_road_motion", "the road does not move", "name this test a standstill")
+    frequency = coarse_frequency(lead.time, road)
+    periods = min(group.span_s for group in groups) * frequency
+    if periods < FEWEST_PERIODS - 0.3:
+        return refuse(
+            "too_few_periods",
+            f"{periods:.1f} periods are recorded, {FEWEST_PERIODS} are needed to tell noise from signal",
+            f"record at least {FEWEST_PERIODS / frequency:.3g} s",
+        )
+    if highest_valid_order(lead, frequency, 1) < 1:
+        return refuse(
+            "too_few_samples",
+            f"the road is sampled at {lead.rate_hz:.3g} Hz, too slow for {frequency:.3g} Hz",
+            f"sample it at {3 * frequency:.3g} Hz or faster",
+        )
+    return frequency, None
+
+
+def _no_dwell(campaign: Campaign, warnings: tuple[DataWarning, ...]) -> InputError:
+    if not warnings:
+        return InputError(
+            "there is no harmonic dwell", source=campaign.source, remedy="name the tests dwell_<f>Hz"
+        )
+    first = warnings[0]
+    return InputError(
+        f"no dwell can be used; the first: {first.what}",
+        source=campaign.source,
+        test=first.test,
+        channel=first.channel,
+        remedy=first.remedy,
+    )
+
+
+def _assemble(
+    fits: Mapping[str, DwellFit], orders: int, warnings: tuple[DataWarning, ...], driven: str
+) -> HarmonicResponse:
+    """The record: dwells sorted by frequency, channels in canonical order, time origins moved."""
+    tests = tuple(sorted(fits, key=lambda test: fits[test].frequency))
+    present = {name for fit in fits.values() for name in fit.channels}
+    channels = tuple(name for name in CANONICAL_UNITS if name in present)
+    channels += tuple(sorted(present - set(channels)))
+    shape = (len(tests), len(channels), orders + 1)
+    harmonics = np.zeros(shape, dtype=np.complex128)
+    covariance = np.zeros((*shape, 2, 2))
+    valid = np.zeros(shape, dtype=np.bool_)
+    dof = np.zeros(shape)
+    noise_sd, peak, peak_sd = (np.zeros(shape[:2]) for _ in range(3))
+    for d, test in enumerate(tests):
+        road = fits[test].channels[driven]
+        for name, fit in fits[test].channels.items():
+            c, upto = channels.index(name), slice(0, fit.amplitude.size)
+            harmonics[d, c, upto], covariance[d, c, upto] = _at_road_origin(fit, road)
+            valid[d, c, upto] = True
+            dof[d, c, upto] = fit.dof
+            noise_sd[d, c] = fit.noise_sd
+        peak[d], peak_sd[d] = unbiased_peak_to_peak(harmonics[d], covariance[d], valid[d])
+    return HarmonicResponse(
+        tests=tests,
+        channels=channels,
+        frequency=np.array([fits[test].frequency for test in tests]),
+        frequency_sd=np.array([fits[test].frequency_sd for test in tests]),
+        harmonics=harmonics,
+        covariance=covariance,
+        valid=valid,
+        peak_to_peak=peak,
+        peak_to_peak_sd=peak_sd,
+        noise_sd=noise_sd,
+        periods=np.array([fits[test].periods for test in tests]),
+        warnings=warnings,
+        covariance_dof=dof,
+    )
+
+
+def _at_road_origin(fit: ChannelFit, road: ChannelFit) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+    """Harmonics and covariance of (Re, Im) with the origin where the road's fundamental is real and positive.
+
+    An error dphi of the road's phase turns X_k by -k dphi, which adds k^2 |X_k|^2 var(dphi) across it.
+    """
+    order = np.arange(fit.amplitude.size)
+    turn = np.exp(-1j * order * np.angle(road.amplitude[1]))
+    harmonics = fit.amplitude * turn
+    across = order**2 * _phase_variance(road)
+    if fit is road:
+        harmonics[1] = abs(road.amplitude[1])
+        across[1] = 0.0
+    spread = fit.variance + across * np.abs(harmonics) ** 2
+    skew = fit.pseudo_variance * turn**2 - across * harmonics**2
+    covariance = np.empty((order.size, 2, 2))
+    covariance[:, 0, 0] = 0.5 * (spread + skew.real)
+    covariance[:, 1, 1] = 0.5 * (spread - skew.real)
+    covariance[:, 0, 1] = covariance[:, 1, 0] = 0.5 * skew.imag
+    return harmonics, covariance
+
+
+def _phase_variance(road: ChannelFit) -> float:
+    """Variance of the phase of the road's fundamental [rad^2]."""
+    turn = np.exp(-1j * np.angle(road.amplitude[1]))
+    spread = 0.5 * (road.variance[1] - (road.pseudo_variance[1] * turn**2).real)
+    return float(spread / abs(road.amplitude[1]) ** 2)
+
+
+def check_frequency(
+    source: str, recording: Recording, measured: float, driven: str = ROAD
+) -> tuple[DataWarning, ...]:
+    """A warning where the road moves at another frequency [Hz] than the test's name or label gives."""
+    nominal = recording.frequency_hz
+    if nominal is None or abs(measured - nominal) <= _FREQUENCY_MISS * nominal:
+        return ()
+    what = f"the road moves at {measured:.4g} Hz, {nominal:.4g} Hz was asked for; the measured one is used"
+    remedy = "check the test's label or the cam drive"
+    return (DataWarning("frequency_differs", what, source, recording.name, driven, None, remedy),)
+
+
+def check_steady(
+    source: str, test: str, groups: tuple[ClockGroup, ...], fit: DwellFit
+) -> tuple[DataWarning, ...]:
+    """Warnings for channels whose fundamental changes between the first and the last third of the dwell.
+
+    A change counts when it exceeds both 1 % of the fundamental and five of its standard deviations.
+    """
+    found = []
+    for group in groups:
+        names = [name for name in group.names if name in fit.channels]
+        if not names:
+            continue
+        first, last, samples = _end_fundamentals(group, fit.frequency, max(fit.periods // 3, 1))
+        for i, name in enumerate(group.names):
+            channel = fit.channels[name]
+            size = abs(channel.amplitude[1])
+            change = abs(last[i] - first[i])
+            deviation = np.sqrt(8.0 * channel.density[1] / samples)
+            if change > max(_STEADY_SHARE * size, _STEADY_SIGMAS * deviation):
+                what = f"not steady: the fundamental changes by {100 * change / size:.2g} % within the dwell"
+                remedy = "let the rig settle longer before recording, or leave this dwell out"
+                found.append(DataWarning("not_steady", what, source, test, name, None, remedy))
+    return tuple(found)
+
+
+def check_noise(campaign: Campaign, fits: Mapping[str, DwellFit]) -> tuple[DataWarning, ...]:
+    """One warning for each channel that is much noisier in the dwells than at standstill.
+
+    More noise in motion than at rest is motion that does not repeat from period to period: rattle, a transient
+    not yet over, a supply that hums with the load, or orders above the sampling.
+    """
+    found = []
+    for name, at_rest in _standstill_noise(campaign).items():
+        ratio = {
+            test: fit.channels[name].noise_sd / at_rest for test, fit in fits.items() if name in fit.channels
+        }
+        loud = {test: value for test, value in ratio.items() if value > _NOISE_FACTOR}
+        if loud:
+            worst = max(loud, key=lambda test: loud[test])
+            what = (
+                f"what does not repeat is {loud[worst]:.1f} times the noise at standstill"
+                f" ({len(loud)} of {len(ratio)} dwells above {_NOISE_FACTOR:g} times)"
+            )
+            remedy = "look for rattle, unfinished transients or content above the sampling rate"
+            found.append(
+                DataWarning("noise_above_standstill", what, campaign.source, worst, name, None, remedy)
+            )
+    return tuple(found)
+
+
+def check_folding(source: str, fits: Mapping[str, DwellFit]) -> tuple[DataWarning, ...]:
+    """One warning for each channel with dwells in which orders above the sampling fold onto those kept."""
+    found = []
+    for name in dict.fromkeys(name for fit in fits.values() for name in fit.channels):
+        hit = [
+            test for test, fit in fits.items() if name in fit.channels and np.any(_folds(fit.channels[name]))
+        ]
+        if hit:
+            what = (
+                "content above the Nyquist frequency may fold onto the orders kept where the frequency"
+                f" divides the sampling rate ({len(hit)} of {len(fits)} dwells); the covariance allows for it"
+            )
+            remedy = (
+                "sample faster, filter before sampling, or choose frequencies that do not divide the rate"
+            )
+            found.append(DataWarning("folded_orders", what, source, hit[0], name, None, remedy))
+    return tuple(found)
+
+
+def _folds(channel: ChannelFit) -> NDArray[np.bool_]:
+    """Which orders 1..m have more of their variance from folding than from noise."""
+    exceeds: NDArray[np.bool_] = channel.folded[1:] > 0.5 * channel.variance[1:]
+    return exceeds
+
+
+def estimate_clock_rates(fits: Mapping[str, DwellFit]) -> dict[str, tuple[float, float]]:
+    """Relative rate by which each channel's clock runs slow, with its standard deviation, over all dwells.
+
+    Where the dwells scatter by more than their own deviations, the deviation is widened accordingly.
+    """
+    names = dict.fromkeys(name for fit in fits.values() for name in fit.channels)
+    rates = {}
+    for name in names:
+        having = [fit for fit in fits.values() if name in fit.channels]
+        rate = np.array([fit.channels[name].drift_hz / fit.frequency for fit in having])
+        weight = np.array([fit.frequency**2 / fit.channels[name].drift_variance for fit in having])
+        total = float(np.sum(weight))
+        if total == 0.0:
+            continue
+        mean = float(weight @ rate) / total
+        scatter = float(weight @ (rate - mean) ** 2) / max(len(having) - 1, 1)
+        rates[name] = (mean, float(np.sqrt(max(scatter, 1.0) / total)))
+    return rates
+
+
+def check_clocks(
+    source: str, fits: Mapping[str, DwellFit], road: str
+) -> tuple[dict[str, float], tuple[DataWarning, ...]]:
+    """Factors [1] by which to stretch the time of channels whose clock differs from the road's, with warnings."""
+    rates = estimate_clock_rates(fits)
+    stretch: dict[str, float] = {}
+    found = []
+    lead, lead_sd = rates[road]
+    for name, (rate, deviation) in rates.items():
+        apart = rate - lead
+        if name == road or abs(apart) <= _CLOCK_SIGMAS * np.hypot(deviation, lead_sd):
+            continue
+        stretch[name] = 1.0 + apart
+        what = (
+            f"the clock runs {1e6 * abs(apart):.3g} ppm (+- {1e6 * deviation:.2g})"
+            f" {'slower' if apart > 0 else 'faster'} than the road's; its time was scaled, about mid-dwell"
+        )
+        found.append(
+            DataWarning("clock_rate_differs", what, source, "", name, None, "synchronise the loggers' clocks")
+        )
+    return stretch, tuple(found)
+
+
+def _end_fundamentals(
+    group: ClockGroup, frequency: float, periods: int
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128], int]:
+    """Fundamental over the first and over the last whole ``periods``, and the samples in each."""
+    count = max(round(periods / frequency * group.rate_hz), 1)
+    ends = []
+    for part in (slice(None, count), slice(-count, None)):
+        turns = np.exp(-2j * np.pi * frequency * group.time[part])
+        values = group.values[:, part] - group.values[:, part].mean(axis=1, keepdims=True)
+        ends.append(2.0 * np.mean(values * turns, axis=1))
+    return ends[0], ends[1], count
+
+
+def _standstill_noise(campaign: Campaign) -> dict[str, float]:
+    """Standard deviation of each channel about its trend over the standstill records, where it is not 0."""
+    noise: dict[str, float] = {}
+    for recording in campaign.of_kind("standstill"):
+        for channel in recording.channels.values():
+            usable = np.isfinite(channel.values)
+            if np.count_nonzero(usable) < 16:
+                continue
+            time, values = channel.time[usable], channel.values[usable]
+            trend = np.polynomial.Polynomial.fit(time, values, 1)
+            spread = float(np.std(values - trend(time)))
+            if spread > 0.0:
+                noise[channel.name] = max(spread, noise.get(channel.name, 0.0))
+    return noise

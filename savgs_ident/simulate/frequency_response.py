@@ -1,0 +1,217 @@
+"""The response of a model over frequency: periodic motions at many frequencies, and a sweep of the cam.
+
+Under the road and the link of measured dwells a model answers at the frequencies of the dwells. For a smooth curve
+it is also solved between them: road and link then move as in the dwells to either side, their harmonics interpolated
+over frequency. As many frequencies are added as there are dwells, in the widest gaps, for arrays of the same shape
+need no second compilation.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.presentation import Result
+from savgs_ident.core.status import Status
+from savgs_ident.core.values import as_values
+from savgs_ident.plants.base import Excitation
+from savgs_ident.plants.quarter_car.actuation import RigSource, held_link
+from savgs_ident.plants.quarter_car.catalogue import EFFECTS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.road import sweep_road
+from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
+from savgs_ident.responses.harmonic_response import peak_to_peak
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.mesh import Layout, layout_for
+from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
+from savgs_ident.simulate.transient import simulate_transient
+
+
+@dataclass(frozen=True)
+class ModelCurve:
+    """A model's response at F frequencies, channels as in ``RESPONSE_CHANNELS``.
+
+    Attributes:
+        label: what the legend calls it.
+        frequency: [Hz], (F,), increasing.
+        transfer: complex first harmonic per metre of road [unit/m], (F, 2); NaN where not solved.
+        peak_to_peak: [unit], (F, 2); NaN where not solved.
+    """
+
+    label: str
+    frequency: NDArray[np.float64]
+    transfer: NDArray[np.complex128]
+    peak_to_peak: NDArray[np.float64]
+
+
+def model_curve(
+    label: str,
+    frequency: NDArray[np.float64],
+    harmonics: NDArray[np.complex128],
+    road: NDArray[np.complex128],
+    solved: NDArray[np.bool_],
+) -> ModelCurve:
+    """The curve of ``harmonics`` (F, 2, K) under a road whose first harmonics [m] are ``road`` (F,).
+
+    Frequencies that are not ``solved`` (F,) are left open.
+    """
+    every = np.ones(harmonics.shape, dtype=np.bool_)
+    transfer = np.where(solved[:, None], harmonics[:, :, 1] / road[:, None], np.nan)
+    reach = np.where(solved[:, None], peak_to_peak(harmonics, every), np.nan)
+    return ModelCurve(label, frequency, transfer, reach)
+
+
+@dataclass(frozen=True)
+class SimulatedResponse(Result):
+    """Harmonics of the readings of a model under an excitation of F frequencies.
+
+    Attributes:
+        excitation: what drove the rig.
+        harmonics: complex, (F, 2, orders + 1), channels as in ``RESPONSE_CHANNELS``, SI.
+        status: whether each was found, length F.
+    """
+
+    presenter: ClassVar[str] = "SIMULATED_RESPONSE"
+
+    excitation: Excitation
+    harmonics: NDArray[np.complex128]
+    status: tuple[Status, ...]
+
+    @property
+    def trusted(self) -> bool:
+        """Whether all were found."""
+        return bool(np.all(self.ok))
+
+    @property
+    def frequency(self) -> NDArray[np.float64]:
+        """[Hz], (F,)."""
+        return np.asarray(self.excitation.frequency)
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """Which were found, (F,)."""
+        return np.array([status.ok for status in self.status], dtype=np.bool_)
+
+    def curve(self, label: str) -> ModelCurve:
+        """As a curve for a figure."""
+        road = np.asarray(self.excitation.harmonics["road_height"])[:, 1]
+        return model_curve(label, self.frequency, self.harmonics, road, self.ok)
+
+
+_DRAWN = PeriodicSettings(adaptations=1)
+"""Settings for curves: a second adaptation of the nodes moves them by less than the width of a line."""
+
+
+def simulate_response(
+    rig: Rig,
+    effects: Sequence[str],
+    excitation: Excitation,
+    orders: int,
+    settings: PeriodicSettings | None = None,
+    layout: Layout | None = None,
+) -> SimulatedResponse:
+    """The periodic motions of a rig with the named effects; the rest as in :func:`simulate_periodic`."""
+    table = model_parameters(rig, effects)
+    p = as_values(table.as_dict())
+    model = build_model(rig, effects)
+    solution = simulate_periodic(model, p, excitation, settings, layout)
+    return SimulatedResponse(excitation, np.asarray(harmonics(model, p, solution, orders)), solution.status())
+
+
+def simulate_between(rig: Rig, effects: Sequence[str], known: SimulatedResponse) -> SimulatedResponse:
+    """``known`` and as many frequencies again, see :func:`interpolate_excitation`, as one."""
+    layout = layout_for(known.frequency, _DRAWN.nodes, _DRAWN.slow)
+    orders = known.harmonics.shape[2] - 1
+    added = interpolate_excitation(known.excitation)
+    return merge_responses(known, simulate_response(rig, effects, added, orders, _DRAWN, layout))
+
+
+def disable_effects(rig: Rig, effects: Sequence[str]) -> Rig:
+    """The rig with the named effects at their null: the same compiled model then shows it without them."""
+    nulls = {name: value for effect in effects for name, value in EFFECTS[effect].null.items()}
+    return replace(rig, parameters=model_parameters(rig, effects).with_values(nulls))
+
+
+def merge_responses(one: SimulatedResponse, other: SimulatedResponse) -> SimulatedResponse:
+    """Two solutions of one model as one, by growing frequency."""
+    order = np.argsort(np.concatenate([one.frequency, other.frequency]), kind="stable")
+    excitation = jax.tree.map(lambda a, b: jnp.concatenate([a, b])[order], one.excitation, other.excitation)
+    status = one.status + other.status
+    return SimulatedResponse(
+        excitation,
+        np.concatenate([one.harmonics, other.harmonics])[order],
+        tuple(status[i] for i in order),
+    )
+
+
+def interpolate_excitation(excitation: Excitation) -> Excitation:
+    """As many frequencies again, in the widest gaps on a logarithmic axis."""
+    known = np.asarray(excitation.frequency)
+    added = bisect_widest_gaps(known, known.size)
+
+    def interpolated(values: object) -> NDArray[np.complex128]:
+        columns = np.asarray(values).T
+        parts = [
+            np.interp(added, known, column.real) + 1j * np.interp(added, known, column.imag)
+            for column in columns
+        ]
+        return np.stack(parts, axis=1)
+
+    harmonics = {name: jnp.asarray(interpolated(values)) for name, values in excitation.harmonics.items()}
+    return Excitation(jnp.asarray(added), harmonics)
+
+
+def bisect_widest_gaps(known: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """``count`` frequencies, each in the middle of what is then the widest gap; growing.
+
+    ``known`` (D,) grows; a single one has no gap and is followed at one per cent.
+    """
+    points = list(np.log(known)) if known.size > 1 else [*np.log(known), *(np.log(known) + 0.01)]
+    added = []
+    for _ in range(count):
+        gap = int(np.argmax(np.diff(points)))
+        middle = 0.5 * (points[gap] + points[gap + 1])
+        points.insert(gap + 1, middle)
+        added.append(middle)
+    return np.asarray(np.exp(np.sort(added)))
+
+
+LOWEST_HZ, HIGHEST_HZ, DURATION_S, RATE_HZ = 0.0, 3.0, 60.0, 500.0
+"""The paper's sweep, and how densely it is written down."""
+
+
+@dataclass(frozen=True)
+class SimulatedSweep(Result):
+    """``time`` [s], ``road`` [m] and ``readings`` (2, n), SI, channels as in ``RESPONSE_CHANNELS``."""
+
+    presenter: ClassVar[str] = "SIMULATED_SWEEP"
+
+    time: NDArray[np.float64]
+    road: NDArray[np.float64]
+    readings: NDArray[np.float64]
+    status: Status
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the integration ended well."""
+        return self.status.ok
+
+    @property
+    def frequency(self) -> NDArray[np.float64]:
+        """Frequency of the cam at each instant [Hz], (n,)."""
+        return LOWEST_HZ + (HIGHEST_HZ - LOWEST_HZ) * self.time / DURATION_S
+
+
+def integrate_sweep(rig: Rig, effects: Sequence[str]) -> SimulatedSweep:
+    """The sweep of a rig with the named effects, the link held at its nominal angle."""
+    p = as_values(model_parameters(rig, effects).as_dict())
+    time = np.linspace(0.0, DURATION_S, round(DURATION_S * RATE_HZ) + 1)
+    cam, angle = rig.parameters.values_of(("cam_peak_to_peak", "psi_nominal"))
+    road = sweep_road(cam, LOWEST_HZ, HIGHEST_HZ, DURATION_S)
+    solution = simulate_transient(build_model(rig, effects), p, RigSource(road, held_link(angle)), time)
+    readings = np.stack([np.asarray(getattr(solution.readings, name)) for name in RESPONSE_CHANNELS])
+    return SimulatedSweep(time, np.asarray(solution.inputs.road.height), readings, solution.status())

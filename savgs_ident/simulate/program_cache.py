@@ -1,0 +1,287 @@
+"""Traced programs, kept from one run to the next beside the compiled ones.
+
+The compilation cache spares a later run the compiler; to ask for a compiled program, Python must still trace
+the model through a few thousand operations, which takes longer than solving it. Where a persistent cache is
+in use (:mod:`savgs_ident.simulate.program_cache`), what was traced is kept too.
+
+What a traced program depends on, as one short text.
+
+A traced program may serve again where nothing that shaped it has changed: the source of what is traced, the
+versions of what traced it, and of its arguments everything but the numbers in arrays. Whatever cannot be
+described with certainty, such as an effect that is defined outside this package, has no fingerprint.
+
+Programs, traced and compiled, kept from one run to the next in the user's cache folder.
+"""
+
+import dataclasses
+import enum
+import gc
+import hashlib
+import os
+import shutil
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from importlib.metadata import version
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+from jax import export
+from jaxtyping import Array
+
+_PACKAGE = "savgs_ident"
+_TRACERS = ("jax", "jaxlib", "equinox", "numpy", "scipy")
+_SETTINGS = (
+    "jax_enable_x64",
+    "jax_default_matmul_precision",
+    "jax_numpy_dtype_promotion",
+    "jax_numpy_rank_promotion",
+)
+
+
+class _UntoldError(Exception):
+    """Something of which no description is certain."""
+
+
+def fingerprint(function: Callable[..., Any], args: tuple[Any, ...]) -> str | None:
+    """A digest of ``function`` of this package and the structure of its arguments; None if it has none."""
+    try:
+        told = [_origin(function), *_description(args)]
+    except _UntoldError:
+        return None
+    told += [_SOURCE, jax.default_backend(), *map(version, _TRACERS)]
+    told += [f"{setting} {getattr(jax.config, setting)}" for setting in _SETTINGS]
+    return hashlib.sha256("\n".join(told).encode()).hexdigest()
+
+
+TRACED = (
+    "core",
+    "effects",
+    "plants",
+    "symbolic",
+    "simulate",
+    "inference",
+    "fit",
+    "diagnosis",
+    "validation",
+    "control",
+    "export",
+)
+"""Folders of the package with code that shapes programs; readers, reports and commands shape none."""
+
+
+def _sources(folder: Traversable) -> Iterator[Traversable]:
+    for each in folder.iterdir():
+        if each.is_dir():
+            yield from _sources(each)
+        elif each.name.endswith(".py"):
+            yield each
+
+
+def digest_of_sources(package: Traversable) -> str:
+    """Digest of the source files of a package from which programs are traced, as hexadecimal digits."""
+    digest = hashlib.sha256()
+    for name in TRACED:
+        for file in sorted(_sources(package / name), key=str):
+            digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+# Taken when this package is loaded: what is on disk later is not what runs.
+_SOURCE = digest_of_sources(files(_PACKAGE))
+
+
+def _origin(thing: Any) -> str:
+    """Where a class or function is defined; a function within another sees more than its arguments."""
+    name = f"{thing.__module__}.{thing.__qualname__}"
+    if thing.__module__.partition(".")[0] != _PACKAGE or "<locals>" in name or "<lambda>" in name:
+        raise _UntoldError(name)
+    return name
+
+
+def _description(value: Any) -> Iterator[str]:
+    match value:
+        case jax.Array():
+            yield f"array {value.dtype} {value.shape}"
+        case np.ndarray():
+            yield f"numbers {value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
+        case enum.Enum():
+            yield f"{_origin(type(value))}.{value.name}"
+        case None | bool() | int() | float() | str():
+            yield f"{type(value).__name__} {value!r}"
+        case dict():
+            yield f"dict {len(value)}"
+            for key in sorted(value):
+                yield from _description(key)
+                yield from _description(value[key])
+        case tuple() | list():
+            yield type(value).__name__ if type(value) in (tuple, list) else _origin(type(value))
+            yield str(len(value))
+            for each in value:
+                yield from _description(each)
+        case _ if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            yield _origin(type(value))
+            for field in dataclasses.fields(value):
+                yield field.name
+                yield from _description(getattr(value, field.name))
+        case _:
+            raise _UntoldError(type(value).__name__)
+
+
+_DIGEST = hashlib.sha256().digest_size
+
+
+def stored(function: Callable[..., tuple[Array, ...]], *args: Any) -> tuple[Array, ...]:
+    """``function(*args)`` from its stored program, if one was kept; else trace it, and keep it.
+
+    ``function`` is pure, defined at the top of a module of this package, and gives a flat tuple of arrays
+    of any shape and any units. A stored program can be compiled within a larger one, but neither
+    differentiated nor batched.
+    """
+    folder = jax.config.values["jax_compilation_cache_dir"]
+    key = fingerprint(function, args) if folder else None
+    if key is None:
+        return function(*args)
+    leaves, structure = jax.tree.flatten(args, is_leaf=lambda each: each is None)
+    places = [place for place, leaf in enumerate(leaves) if isinstance(leaf, jax.Array)]
+
+    def of_arrays(*arrays: Array) -> tuple[Array, ...]:
+        every = list(leaves)
+        for place, array in zip(places, arrays, strict=True):
+            every[place] = array
+        return function(*jax.tree.unflatten(structure, every))
+
+    file = Path(folder) / f"traced-{key}"
+    arrays = [leaves[place] for place in places]
+    program = _read(file)
+    if program is None:
+        shapes = [jax.ShapeDtypeStruct(array.shape, array.dtype) for array in arrays]
+        program = export.export(jax.jit(of_arrays))(*shapes)
+        _write(file, program)
+    return tuple(program.call(*arrays))
+
+
+def placed(tree: Any) -> Any:
+    """``tree`` with its arrays bound to the device.
+
+    What a stored program gives is bound to a device. A program that takes such arrays together with others is
+    compiled once for every combination in which they come; if all are bound there is only one.
+    """
+    arrays, rest = eqx.partition(tree, eqx.is_array)
+    return eqx.combine(jax.device_put(arrays, jax.devices()[0]), rest)
+
+
+def _read(file: Path) -> export.Exported | None:
+    """The program in a file; None if there is none or it is not whole."""
+    try:
+        content = file.read_bytes()
+    except OSError:
+        return None
+    digest, program = content[:_DIGEST], content[_DIGEST:]
+    if hashlib.sha256(program).digest() != digest:
+        return None
+    return export.deserialize(bytearray(program))
+
+
+def _write(file: Path, program: export.Exported) -> None:
+    """Keep a program, whole or not at all; a folder that cannot be written keeps nothing."""
+    content = bytes(program.serialize())
+    part = file.with_name(f"{file.name}-{os.getpid()}")
+    try:
+        part.write_bytes(hashlib.sha256(content).digest() + content)
+        part.replace(file)
+    except OSError:
+        return
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+MANY_REGIONS = 20_000
+"""Mapped regions of memory above which compiled programs are let go; Linux ends a process at 65 530."""
+
+LEAST_ROOM = 64 * 2**20
+"""Space on the disk [byte] below which no programs are kept: half of one would be found in every later run."""
+
+_QUICK = "--xla_cpu_use_fusion_emitters=false"
+_QUICK_IS_KNOWN_TO = "0.10."
+
+
+def spare_the_compiler() -> None:
+    """Compile in half the time and memory, for the same speed of what is compiled.
+
+    A flag that XLA does not know ends the process, hence only for versions on which it was tried.
+    """
+    flags = os.environ.get("XLA_FLAGS", "")
+    if version("jaxlib").startswith(_QUICK_IS_KNOWN_TO) and "fusion_emitters" not in flags:
+        os.environ["XLA_FLAGS"] = f"{flags} {_QUICK}".strip()
+
+
+def compute_on_one_core() -> None:
+    """Have programs of this process use one core: for processes of which there are as many as cores.
+
+    Threads beyond the cores only get in each other's way. To be called before anything is computed.
+    """
+    # The variable from which XLA takes the size of its pool of threads.
+    os.environ["NPROC"] = "1"
+
+
+def cache_folder() -> Path:
+    """Where programs are kept: ``SAVGS_IDENT_CACHE``, else the platform's cache folder.
+
+    Raises :class:`RuntimeError` where that is in a home folder and the user has none.
+    """
+    chosen = os.environ.get("SAVGS_IDENT_CACHE")
+    if chosen:
+        return Path(chosen)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "savgs_ident" / "xla"
+
+
+def use_persistent_cache() -> bool:
+    """Keep compiled programs from now on; False where there is no folder that can take them, and none is kept.
+
+    To be called before anything is computed: the compiler is set up here too.
+    """
+    spare_the_compiler()
+    try:
+        folder = cache_folder()
+        folder.mkdir(parents=True, exist_ok=True)
+        room = shutil.disk_usage(folder).free
+    except (OSError, RuntimeError):
+        return False
+    if not os.access(folder, os.W_OK) or room < LEAST_ROOM:
+        return False
+    # What cannot be kept, or read again, is compiled: slower, and no concern of the user's.
+    warnings.filterwarnings("ignore", message="Error (reading|writing) persistent compilation cache entry")
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    return True
+
+
+def make_room_for_programs() -> None:
+    """Let compiled programs go where they are many: each takes some twenty regions of the process's memory.
+
+    For processes that do one task after another. Beyond the bound of the system the next program, compiled or read
+    from the cache, would end the process.
+    """
+    if mapped_regions() > MANY_REGIONS:
+        jax.clear_caches()
+        gc.collect()
+
+
+def mapped_regions() -> int:
+    """Regions of memory [1] that this process has mapped; 0 where the system does not tell."""
+    maps = Path("/proc/self/maps")
+    return maps.read_bytes().count(b"\n") if maps.exists() else 0

@@ -1,0 +1,166 @@
+"""What ``import savgs_ident`` offers of simulation: responses to the cam, a sweep of it, tests of any plant."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.presentation import Progress, no_progress
+from savgs_ident.core.values import as_values
+from savgs_ident.plants.base import Excitation
+from savgs_ident.plants.model import Model
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.road import cam_excitation
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.responses.dwells import estimate_response
+from savgs_ident.responses.harmonic_response import HarmonicResponse, unbiased_peak_to_peak
+from savgs_ident.simulate.excitation import measured_excitation, recorded_names
+from savgs_ident.simulate.frequency_response import (
+    SimulatedResponse,
+    SimulatedSweep,
+    integrate_sweep,
+    simulate_response,
+)
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.program_cache import use_persistent_cache
+
+DWELLS = (
+    0.5, 0.8, 1.1, 1.4, 1.6, 1.75, 1.85, 1.95, 2.0, 2.05, 2.15, 2.25, 2.3, 2.35, 2.4, 2.45, 2.55, 2.65, 2.75,
+    2.85, 3.0, 3.25, 3.5, 4.0, 4.5, 5.0, 5.5, 6.0,
+)  # fmt: skip
+"""The frequencies of the shipped campaign's dwells [Hz]."""
+
+
+def simulate(
+    model: RigModel,
+    frequency: Sequence[float] = (),
+    campaign: Campaign | None = None,
+    orders: int = 15,
+    progress: Progress = no_progress,
+) -> SimulatedResponse:
+    """The periodic motions of a model on the cam.
+
+    Args:
+        model: the rig with its effects.
+        frequency: of the cam [Hz]; 28 from 0.5 to 6 if empty.
+        campaign: road and link as in its dwells instead.
+        orders: highest harmonic order.
+        progress: is told what is being done.
+
+    A motion that was not found has its status in the result. Raises :class:`InputError` for a frequency that is not
+    above zero.
+    """
+    use_persistent_cache()
+    excitation = _excitation(model, frequency, campaign, orders)
+    progress(f"solving {excitation.frequency.shape[0]} periodic motions")
+    return replace(
+        simulate_response(model.rig, model.effects, excitation, orders), origin=model.origin(campaign)
+    )
+
+
+def simulate_sweep(model: RigModel, progress: Progress = no_progress) -> SimulatedSweep:
+    """A sweep of the cam from 0 to 3 Hz in 60 s, from standstill."""
+    use_persistent_cache()
+    progress("integrating a sweep of 60 s")
+    return replace(integrate_sweep(model.rig, model.effects), origin=model.origin())
+
+
+def simulate_dwells(
+    model: Model,
+    frequency: Sequence[float],
+    amplitudes: Mapping[str, float],
+    noise: Mapping[str, float],
+    *,
+    samples: int = 4000,
+    orders: int = 9,
+    seed: int = 1,
+    progress: Progress = no_progress,
+) -> HarmonicResponse:
+    """Harmonic tests of a plant as they would be measured: what :func:`fit`, :func:`sample`, :func:`diagnose` take.
+
+    Args:
+        model: the plant with its effects.
+        frequency: of the tests [Hz].
+        amplitudes: of the plant's inputs [unit of each], by name; the others rest.
+        noise: standard deviation of one sample of each of the plant's channels [unit of each], by name.
+        samples: samples of each channel in a test.
+        orders: highest harmonic order.
+        seed: of all random numbers.
+        progress: is told what is being done.
+
+    Raises :class:`InputError` for names that the plant does not have, a channel without noise, a frequency that is
+    not above zero, and a test without periodic motion.
+    """
+    use_persistent_cache()
+    plant, table = model.build(), model.table
+    _check_names("input", amplitudes, [each.name for each in plant.inputs])
+    _check_names("channel", noise, [each.name for each in plant.channels])
+    for each in plant.channels:
+        if not noise.get(each.name, 0.0) > 0.0:
+            raise InputError(f"channel '{each.name}' has no noise", remedy="give its standard deviation")
+    hertz = np.unique(_checked(frequency))
+    rows = {
+        each.name: [table[each.rest].value if each.rest else 0.0, amplitudes.get(each.name, 0.0)]
+        for each in plant.inputs
+    }
+    driven = {name: jnp.tile(jnp.asarray(row, complex), (hertz.size, 1)) for name, row in rows.items()}
+    excitation, p = Excitation(jnp.asarray(hertz), driven), as_values(table.as_dict())
+    progress(f"solving {hertz.size} periodic motions")
+    solution = simulate_periodic(plant, p, excitation)
+    lost = [f"{f:g} Hz" for f, status in zip(hertz, solution.status(), strict=True) if not status.ok]
+    if lost:
+        raise InputError("there is no periodic motion at " + ", ".join(lost), remedy="change the amplitudes")
+    names, inputs = recorded_names(plant), len(plant.inputs)
+    found = np.zeros((hertz.size, len(names), orders + 1), complex)
+    for c, row in enumerate(rows.values()):
+        found[:, c, :2] = row
+    found[:, inputs:] = np.asarray(harmonics(plant, p, solution, orders))
+    sample_sd = np.array([noise.get(name, 0.0) for name in names])
+    # A sine that is fitted to n samples is known to the noise times the square root of 2 / n in each part.
+    sd = sample_sd * np.sqrt(2.0 / samples)
+    random = np.random.default_rng(seed)
+    found += sd[:, None] * (random.standard_normal((2, *found.shape)).T @ [1.0, 1j]).T
+    found[:, :, 0] = found[:, :, 0].real
+    covariance = np.broadcast_to((sd**2)[:, None, None, None] * np.eye(2), (*found.shape, 2, 2)).copy()
+    valid = np.ones(found.shape, np.bool_)
+    peaks = [unbiased_peak_to_peak(*each) for each in zip(found, covariance, valid, strict=True)]
+    return HarmonicResponse(
+        tests=tuple(f"dwell_{f:g}Hz" for f in hertz),
+        channels=names,
+        frequency=hertz,
+        frequency_sd=np.zeros(hertz.size),
+        harmonics=found,
+        covariance=covariance,
+        valid=valid,
+        peak_to_peak=np.stack([each[0] for each in peaks]),
+        peak_to_peak_sd=np.stack([each[1] for each in peaks]),
+        noise_sd=np.tile(sample_sd, (hertz.size, 1)),
+        periods=np.full(hertz.size, 10),
+    )
+
+
+def _check_names(what: str, given: Mapping[str, float], known: Sequence[str]) -> None:
+    for name in given:
+        if name not in known:
+            raise InputError(f"the plant has no {what} '{name}'", remedy="choose among: " + ", ".join(known))
+
+
+def _checked(frequency: Sequence[float]) -> Sequence[float]:
+    for value in frequency:
+        if not 0.0 < value < np.inf:
+            raise InputError(f"{value:g} Hz is no frequency", remedy="give frequencies above 0 Hz")
+    return frequency
+
+
+def _excitation(
+    model: RigModel, frequency: Sequence[float], campaign: Campaign | None, orders: int
+) -> Excitation:
+    parameters = model.rig.parameters
+    if campaign is not None:
+        return measured_excitation(QuarterCar, estimate_response(campaign, orders), parameters)
+    values = parameters.values_of(("cam_peak_to_peak", "psi_nominal"))
+    return cam_excitation(np.unique(_checked(frequency) or DWELLS), *values)

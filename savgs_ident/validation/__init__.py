@@ -1,0 +1,1 @@
+"""How far a diagnosis can be trusted: blind trials, false alarms, calibration."""

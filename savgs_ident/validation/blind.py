@@ -1,0 +1,171 @@
+"""Blind trials: how often the diagnosis is right about effects that it was not told of.
+
+    study = blind("out/blind", trials=60, seed=1)
+    print(study)                            # the rates with their intervals, and where it was wrong
+
+Trials run side by side, each is kept as soon as it is there (:mod:`savgs_ident.validation.trials`); one trial from
+the draw to its marks is :mod:`savgs_ident.validation.blind_trial`.
+"""
+
+import secrets
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, ClassVar
+
+from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.presentation import Origin, Progress, Result, no_progress
+from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig, rig_content
+from savgs_ident.simulate.program_cache import use_persistent_cache
+from savgs_ident.validation.blind_draw import Shares
+from savgs_ident.validation.blind_score import Score, rates_of, score_from
+from savgs_ident.validation.blind_trial import (
+    Diagnose,
+    Draw,
+    Plan,
+    check_trial_folder,
+    diagnose_folder,
+    draw_and_record,
+    run_trial,
+)
+from savgs_ident.validation.trials import begin_trials, keep_trial, known_trials, marks_in, side_by_side
+
+FILE = "trials.jsonl"
+"""The file in which marks are kept."""
+
+SHARES = (20.0, 50.0, 15.0, 15.0)
+"""How often nothing is missing, one effect, two, or one that is removed from the catalogue."""
+
+
+@dataclass(frozen=True)
+class BlindStudy(Result):
+    """The marks of blind trials, and what the trials have in common."""
+
+    presenter: ClassVar[str] = "BLIND_STUDY"
+
+    scores: tuple[Score, ...]
+    settings: Mapping[str, Any]
+
+    @property
+    def trusted(self) -> bool:
+        """Whether every rate keeps its bounds."""
+        return all(rate.met is not False for rate in rates_of(self.scores).values())
+
+
+@dataclass(frozen=True)
+class Job:
+    """How many trials to run, of what, and how; see :func:`blind`."""
+
+    trials: int
+    seed: int | None
+    jobs: int | None
+    rig: Path | None
+    shares: tuple[float, float, float, float]
+    every: int
+    sweep: bool
+    again: bool
+    command: tuple[str, ...] = ()
+    scheduler: str | None = None
+
+
+def blind(
+    folder: str | Path,
+    trials: int = 60,
+    *,
+    seed: int | None = None,
+    rig: str | Path | None = None,
+    shares: tuple[float, float, float, float] = SHARES,
+    every: int = 1,
+    sweep: bool = False,
+    again: bool = False,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress = no_progress,
+) -> BlindStudy:
+    """Try the diagnosis on campaigns whose effect is withheld, and count how often it is right.
+
+    A rig is drawn in secret: its parameters within their tolerances, with nothing missing, one effect, two, or one
+    that is removed from the catalogue. Its campaign is simulated in time, with noise; the answer is sealed; the
+    diagnosis gets the recordings; then the seal is opened. Takes minutes a trial.
+
+    Args:
+        folder: where recordings and marks are kept; a run that was stopped goes on from there.
+        trials: how many campaigns are drawn.
+        seed: of all that is drawn; a secret one, or that of the folder, if left out.
+        rig: drawing of the rig; the shipped one if left out.
+        shares: how often nothing is missing, one effect, two, or one that is removed from the catalogue.
+        every: record every so many dwells only: quicker, harder.
+        sweep: record a sweep of a minute, too.
+        again: diagnose the recordings in the folder anew; keep none of the marks.
+        jobs: trials at a time on this machine; one for each core if left out.
+        scheduler: address of a Dask cluster to work on instead, whose workers see the folder under the same path.
+        progress: is told what is being done.
+
+    Raises :class:`InputError` for a rig that cannot be read, and for a folder with trials of something else.
+    """
+    sheet = None if rig is None else Path(rig)
+    asked = Job(trials, seed, jobs, sheet, shares, every, sweep, again, (), scheduler)
+    return run_blind(asked, draw_and_record, diagnose_folder, Path(folder), progress)
+
+
+def run_blind(
+    job: Job, draw: Draw, diagnose: Diagnose, out: Path, progress: Progress = no_progress
+) -> BlindStudy:
+    """Run the trials that are not in the folder ``out`` yet; ``draw`` makes their rigs, ``diagnose`` is tried."""
+    Shares(*job.shares)
+    rig = job.rig or default_rig_path()
+    sheet = rig_content(rig)
+    parse_rig(sheet, rig)
+    prepare_folder(out)
+    use_persistent_cache()
+    kept = out / FILE
+    plan = plan_of(job, sheet, kept)
+    done = known_trials(kept, plan.marks(), score_from)
+    if job.again or not done:
+        done = []
+        begin_trials(kept, plan.marks())
+    # Not when it is their turn, which may be in hours.
+    for number in _missing(job, done):
+        check_trial_folder(plan, out, number)
+    # Workers of a cluster run in other folders.
+    place = out if job.scheduler is None else out.absolute()
+    scores = _run(job, partial(run_trial, plan, draw, diagnose, place), out, done, progress)
+    origin = Origin(command=job.command, model=str(rig))
+    return BlindStudy(tuple(scores), plan.marks(), origin=origin)
+
+
+def plan_of(job: Job, sheet: bytes, kept: Path) -> Plan:
+    """What the trials are, with the seed of an earlier run or a secret one if none was given.
+
+    ``sheet`` is what is in the rig file.
+    """
+    seed = job.seed
+    if seed is None:
+        told = marks_in(kept).get("seed")
+        seed = told if type(told) is int and told >= 0 else secrets.randbits(32)
+    return Plan(job.rig or default_rig_path(), sheet, seed, job.shares, job.every, job.sweep)
+
+
+def _missing(job: Job, done: Sequence[Score]) -> list[int]:
+    """The numbers of the trials that are not ``done``."""
+    there = {score.number for score in done}
+    return [number for number in range(1, job.trials + 1) if number not in there]
+
+
+def _run(
+    job: Job, work: Callable[[int], Score], out: Path, done: list[Score], progress: Progress
+) -> list[Score]:
+    """The marks of all trials: those ``done``, and the others, each kept in ``out`` as soon as it is there."""
+    scores = {score.number: score for score in done}
+    missing = _missing(job, done)
+    if done:
+        progress(f"{len(done)} trials are there from an earlier run")
+    if missing:
+        progress(f"trial {missing[0]} of {job.trials}")
+    for score in side_by_side(work, missing, job.jobs, job.scheduler):
+        scores[score.number] = score
+        keep_trial(out / FILE, asdict(score))
+        there = sum(number <= job.trials for number in scores)
+        progress(f"{there} of {job.trials} trials done; {score}")
+    return [scores[number] for number in sorted(scores) if number <= job.trials]

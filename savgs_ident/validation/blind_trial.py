@@ -1,0 +1,251 @@
+"""One blind trial from the draw to its marks, on disk.
+
+    trial_0007/
+      campaign/campaign.csv.gz     all that the diagnosis gets
+      campaign/seal.json           digests of answer and recordings, written before the diagnosis begins
+      answer.json                  the answer and its salt, opened when the diagnosis has spoken
+      diagnosis.json               what it said
+
+The seal is written last: a folder with a seal is whole, and its recordings serve again.
+"""
+
+import json
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from savgs_ident.core.errors import InputError, blamed_on
+from savgs_ident.core.files import is_begun, record_of
+from savgs_ident.core.output import prepare_folder, write_json
+from savgs_ident.diagnosis.quarter_car import diagnose_response
+from savgs_ident.diagnosis.result import DiagnosisSettings
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.rig import Rig, parse_rig
+from savgs_ident.recordings.read import read_campaign
+from savgs_ident.recordings.recording import Recording
+from savgs_ident.simulate.measured import first_sweep, measured_response
+from savgs_ident.simulate.public import DWELLS
+from savgs_ident.validation.blind_draw import Shares, draw_answer
+from savgs_ident.validation.blind_record import (
+    FILE,
+    Answer,
+    Envelope,
+    Seal,
+    envelope_of,
+    opened,
+    record_campaign,
+    sealed,
+    write_campaign,
+)
+from savgs_ident.validation.blind_score import Score, failed, score_of
+from savgs_ident.validation.trials import rig_marks
+from savgs_ident.validation.virtual_rig import Bench, Programme
+
+DRAWS = 5
+"""So often a rig that does not come to a steady motion is drawn again."""
+
+SWEEP = 60.0
+"""Length of the sweep [s], where there is one."""
+
+Parsed = TypeVar("Parsed")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the trials of a run have in common.
+
+    Attributes:
+        rig: file of the rig's sheet, by which it is called.
+        sheet: what was in it when the run began.
+        seed: of everything that is drawn.
+        shares: how often which kind of trial is drawn.
+        every: so many dwells of the programme are left out between two.
+        sweep: whether a sweep is recorded.
+    """
+
+    rig: Path
+    sheet: bytes
+    seed: int
+    shares: tuple[float, float, float, float]
+    every: int
+    sweep: bool
+
+    def marks(self) -> dict[str, Any]:
+        """What trials must have in common to be counted together, as JSON has it."""
+        return {
+            "rig": str(self.rig),
+            **rig_marks(self.sheet),
+            "seed": self.seed,
+            "shares": list(self.shares),
+            "every": self.every,
+            "sweep": self.sweep,
+        }
+
+    def bench(self) -> Bench:
+        """The rig and what it is put through."""
+        settings = DiagnosisSettings()
+        programme = Programme(
+            dwells=DWELLS[(len(DWELLS) - 1) % self.every :: self.every], sweep=SWEEP if self.sweep else 0.0
+        )
+        return Bench(parse_rig(self.sheet, self.rig), settings.baseline, settings.free, programme)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A rig that was drawn: the truth, a salt for its seal (hexadecimal), and its campaign."""
+
+    answer: Answer
+    salt: str
+    recordings: tuple[Recording, ...]
+
+
+@dataclass(frozen=True)
+class HandedOver:
+    """What goes with the recordings: the seal, and what the catalogue of this trial lacks."""
+
+    without: tuple[str, ...]
+    seal: Seal
+
+
+Draw = Callable[[Plan, Bench, int], Drawn]
+"""The rig of the trial with a number; always the same."""
+
+Diagnose = Callable[[Path, Rig, tuple[str, ...]], Mapping[str, Any]]
+"""From a campaign's folder, the rig's sheet and effects to leave out to the object of ``diagnosis.json``."""
+
+
+def check_trial_folder(plan: Plan, out: Path, number: int) -> None:
+    """Raise :class:`InputError` if a trial is to be recorded in a folder that holds what is not a trial's."""
+    folder = _folder(out, number)
+    if _is_recorded(folder, plan, number):
+        return
+    campaign = folder / "campaign"
+    strange = _strange(folder, ("answer.json", "diagnosis.json"))
+    if campaign in strange and campaign.is_dir():
+        strange.remove(campaign)
+        strange += _strange(campaign, ("seal.json", FILE))
+    if strange:
+        raise InputError(
+            f"holds {strange[0].relative_to(folder)}, which is not of a trial",
+            source=folder,
+            remedy="name another --out DIR, or move the folder away",
+        )
+
+
+def run_trial(plan: Plan, draw: Draw, diagnose: Diagnose, out: Path, number: int) -> Score:
+    """The marks of a trial: drawn and recorded unless its folder holds that already, diagnosed, opened."""
+    folder = prepare_folder(_folder(out, number))
+    bench = plan.bench()
+    if not _is_recorded(folder, plan, number):
+        drawn = draw(plan, bench, number)
+        check_trial_folder(plan, out, number)
+        _record(folder, plan, drawn, number)
+    campaign = folder / "campaign"
+    found = _diagnosed(diagnose, campaign, bench.rig, _handed_over(folder).without)
+    write_json(folder / "diagnosis.json", found)
+    seal = _handed_over(folder).seal
+    envelope = _read(folder / "answer.json", envelope_of)
+    with blamed_on(campaign / "seal.json"):
+        answer = opened(seal, envelope, read_campaign(campaign).sha256)
+    return score_of(answer, found)
+
+
+def diagnose_folder(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
+    """The diagnosis of a recorded campaign as its ``diagnosis.json`` has it."""
+    settings = DiagnosisSettings(without=without)
+    campaign = read_campaign(folder)
+    measured = measured_response(campaign, settings.orders)
+    diagnosis = diagnose_response(measured, rig, settings, sweep=first_sweep(campaign))
+    origin = RigModel(rig, settings.baseline).origin(campaign, measured.warnings)
+    record: Mapping[str, Any] = json.loads(replace(diagnosis, origin=origin).to_json())
+    return record
+
+
+def _diagnosed(diagnose: Diagnose, folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
+    try:
+        return diagnose(folder, rig, without)
+    except OSError:
+        # A disk that is full says nothing of the diagnosis.
+        raise
+    except Exception as error:
+        # A diagnosis that breaks is one that is not right; the other trials go on.
+        return failed(f"{type(error).__name__}: {error}")
+
+
+def draw_and_record(plan: Plan, bench: Bench, number: int) -> Drawn:
+    """A rig drawn in secret, and its campaign by the transient simulator.
+
+    Raises :class:`InputError` if none that can be judged, or none that comes to a steady motion, is found.
+    """
+    for attempt in range(DRAWS):
+        random = np.random.default_rng((plan.seed, number, attempt))
+        answer = draw_answer(bench, Shares(*plan.shares), number, random)
+        try:
+            recordings = record_campaign(bench, answer, random)
+        except InputError:
+            continue
+        return Drawn(answer, random.bytes(16).hex(), recordings)
+    raise InputError(
+        f"no rig that comes to a steady motion was drawn in {DRAWS} attempts",
+        source=f"trial {number}",
+        remedy="name another --seed",
+    )
+
+
+def _record(folder: Path, plan: Plan, drawn: Drawn, number: int) -> None:
+    """Write the campaign, the answer, and last the seal, in the place of what is there."""
+    shutil.rmtree(folder)
+    campaign = prepare_folder(folder / "campaign")
+    write_campaign(drawn.recordings, campaign)
+    envelope = Envelope(drawn.answer, drawn.salt)
+    settings = {"trial": number, "settings": plan.marks()}
+    write_json(folder / "answer.json", settings | asdict(envelope))
+    seal = sealed(envelope, read_campaign(campaign).sha256)
+    # What the catalogue of this trial lacks is part of the question.
+    write_json(campaign / "seal.json", {"without": drawn.answer.without, "seal": asdict(seal)})
+
+
+def _is_recorded(folder: Path, plan: Plan, number: int) -> bool:
+    """Whether the folder holds the sealed recordings of this trial."""
+    campaign = folder / "campaign"
+    whole = all(path.is_file() for path in (campaign / "seal.json", campaign / FILE, folder / "answer.json"))
+    if not whole:
+        return False
+    told = _read(folder / "answer.json", lambda record: (record.get("trial"), record.get("settings")))
+    return told == (number, plan.marks())
+
+
+def _folder(out: Path, number: int) -> Path:
+    return out / f"trial_{number:04d}"
+
+
+def _strange(folder: Path, names: Sequence[str]) -> list[Path]:
+    """What is in a folder besides files with these names, whole or begun; nothing where there is no folder."""
+    found = sorted(folder.iterdir()) if folder.is_dir() else []
+    return [
+        each for each in found if not (each.is_file() and (each.name in names or is_begun(each.name, names)))
+    ]
+
+
+def _handed_over(folder: Path) -> HandedOver:
+    return _read(folder / "campaign" / "seal.json", partial(record_of, HandedOver))
+
+
+def _read(path: Path, parse: Callable[[dict[str, Any]], Parsed]) -> Parsed:
+    """What ``parse`` makes of the JSON object in a file of the trial."""
+    try:
+        record = json.loads(path.read_text("utf-8"))
+        if not isinstance(record, dict):
+            raise ValueError("it is no table")
+        return parse(record)
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"is not what a trial leaves behind: {error}",
+            source=path,
+            remedy="remove the trial's folder to record it again",
+        ) from error

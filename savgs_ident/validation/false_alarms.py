@@ -1,0 +1,268 @@
+"""How often a diagnosis would cry wolf: campaigns like a recorded one in which nothing is missing.
+
+The recalibrated baseline is the truth of every one of them: parameters drawn from what the recorded campaign leaves
+open about them, the noise of the record, which a diagnosis knows no better than that of a record, nothing else. Each
+is diagnosed as any other. The share of those in which
+something is said to be missing is the false-alarm rate of this campaign, and their odds are what its own odds are to
+be compared with.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import ClassVar
+from uuid import uuid4
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
+from threadpoolctl import threadpool_limits
+
+from savgs_ident.core.files import record_of
+from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.presentation import Progress, Result, no_progress
+from savgs_ident.diagnosis.model_selection import DiagnosisProblem, recalibrate, select_model
+from savgs_ident.diagnosis.public import baseline_of
+from savgs_ident.diagnosis.quarter_car import quarter_car_problem
+from savgs_ident.diagnosis.result import DiagnosisSettings
+from savgs_ident.diagnosis.verdict import alarm_odds
+from savgs_ident.inference.find_map import find_map, refine, search_of
+from savgs_ident.inference.prior import bounds_of, values_at
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.measured import measured_response
+from savgs_ident.simulate.program_cache import use_persistent_cache
+from savgs_ident.validation.trials import Kept, marks_of, once_a_process, run_trials
+
+CONFIDENCE = 0.95
+"""Of the bound that is given of a rate."""
+
+FILE = "draws.jsonl"
+"""The file in which draws are kept."""
+
+
+@dataclass(frozen=True)
+class NullDraw:
+    """A campaign in which nothing is missing, and what was made of it.
+
+    Attributes:
+        number: its number.
+        odds: log odds that something is missing, against nothing; missing where the campaign could not be solved.
+        alarm: whether something was said to be missing.
+        named: what was said to be.
+    """
+
+    number: int
+    odds: float | None
+    alarm: bool
+    named: Sequence[str]
+
+
+@dataclass(frozen=True)
+class AlarmBench:
+    """A recorded campaign, recalibrated: what campaigns with nothing missing are drawn from.
+
+    Attributes:
+        problem: the campaign, its baseline recalibrated.
+        odds: its own log odds that something is missing.
+        dof: degrees of freedom of the noise level behind each row, (m,); infinite where it is known.
+        level: which level that is, (m,).
+        seed: of all random numbers.
+    """
+
+    problem: DiagnosisProblem
+    odds: float
+    dof: NDArray[np.float64]
+    level: NDArray[np.intp]
+    seed: int
+
+    def draw(self, number: int) -> NullDraw:
+        """The draw with this number; the same every time."""
+        with threadpool_limits(1, "blas"):
+            problem = self._null_problem(np.random.default_rng((self.seed, number)))
+            if problem is None:
+                return NullDraw(number, None, False, ())
+            evidence = select_model(problem, no_progress)
+        alarm = evidence.kind != "none"
+        named = evidence.chosen.hypothesis.effects or (evidence.kind,) * alarm
+        return NullDraw(number, alarm_odds(evidence.weighed), alarm, named)
+
+    def _null_problem(self, random: np.random.Generator) -> DiagnosisProblem | None:
+        base, plant = self.problem.base, self.problem.plant
+        spread = np.linalg.cholesky(base.covariance()) @ random.standard_normal(base.x.size)
+        truth = values_at(base.coordinates, np.clip(base.x + spread, *bounds_of(base.coordinates)))
+        asked = [each.name for each in base.coordinates]
+        found = plant.predict((), truth, asked, base.prediction.warm_start)
+        if not found.solved:
+            return None
+        # On nodes of its own: what finitely many of them cost is then not the same in truth and model.
+        there = plant.predict((), truth, asked, plant.refined((), truth, found.warm_start))
+        noise = base.noise_scales.noise * np.sqrt(self.problem.data.variance)
+        rows = there.rows + noise * random.standard_normal(there.rows.size)
+        return self._recalibrated(rows, self._estimated_variance(random)) if there.solved else None
+
+    def _estimated_variance(self, random: np.random.Generator) -> NDArray[np.float64]:
+        """The variances (m,) as a record of the same length would show them."""
+        _, first, level = np.unique(self.level, return_index=True, return_inverse=True)
+        dof = self.dof[first]
+        known = np.isinf(dof)
+        shown = np.where(known, 1.0, random.chisquare(np.where(known, 1.0, dof)) / np.where(known, 1.0, dof))
+        return np.asarray(self.problem.data.variance * shown[level])
+
+    def _recalibrated(
+        self, rows: NDArray[np.float64], variance: NDArray[np.float64]
+    ) -> DiagnosisProblem | None:
+        known = self.problem
+        likelihood = eqx.tree_at(lambda each: each.measured, known.plant.likelihood, jnp.asarray(rows))
+        plant, data = (
+            replace(known.plant, likelihood=likelihood),
+            replace(known.data, measured=rows, variance=variance),
+        )
+        search = search_of(plant, data)
+        base = find_map(search, (), known.base.values, known.base.prediction.warm_start)
+        if not base.solved:
+            return None
+        return replace(
+            known,
+            plant=plant,
+            data=data,
+            search=search,
+            given=base.prediction.rows,
+            base=refine(search, base, ()),
+        )
+
+
+def alarm_bench(
+    measured: HarmonicResponse,
+    rig: Rig,
+    settings: DiagnosisSettings,
+    values: Mapping[str, float],
+    seed: int,
+    progress: Progress,
+) -> AlarmBench:
+    """Recalibrate the baseline on a measured response, and select a model for it.
+
+    Raises :class:`InputError` as :func:`savgs_ident.diagnosis.quarter_car.diagnose_response` does. ``values``
+    are parameters in SI.
+    """
+    with threadpool_limits(1, "blas"):
+        plant, data = quarter_car_problem(measured, rig, settings)
+        problem = recalibrate(plant, data, values, progress, settings.constants)
+        odds = alarm_odds(select_model(problem, progress).weighed)
+    level = data.test * len(RESPONSE_CHANNELS) + plant.channel
+    return AlarmBench(problem, odds, _degrees_of_freedom(measured, problem), level, seed)
+
+
+def _degrees_of_freedom(measured: HarmonicResponse, problem: DiagnosisProblem) -> NDArray[np.float64]:
+    """Of the noise level behind each row, (m,)."""
+    if measured.covariance_dof is None:
+        return np.full(problem.data.measured.size, np.inf)
+    channels = [name for name in RESPONSE_CHANNELS if name in measured.channels]
+    first = {RESPONSE_CHANNELS.index(name): measured.channel(name) for name in channels}
+    places = np.array([first[channel] for channel in problem.plant.channel])
+    return np.asarray(measured.covariance_dof[problem.data.test, places, 1])
+
+
+@dataclass(frozen=True)
+class AlarmStudy(Result):
+    """Campaigns with nothing missing, diagnosed, and the log ``odds`` of the campaign that they are like."""
+
+    presenter: ClassVar[str] = "ALARM_STUDY"
+
+    draws: tuple[NullDraw, ...]
+    odds: float
+
+    @property
+    def trusted(self) -> bool:
+        """Whether there are as few alarms as there may be."""
+        return not self.doubts
+
+
+def false_alarms(
+    model: RigModel,
+    campaign: Campaign,
+    draws: int = 100,
+    *,
+    orders: int = 9,
+    max_frequency: float | None = None,
+    seed: int = 1,
+    folder: str | Path | None = None,
+    resume: bool = False,
+    channels: str | Path | None = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress = no_progress,
+) -> AlarmStudy:
+    """Count false alarms: how often does a diagnosis find something in campaigns like this one with nothing missing?
+
+    The baseline is recalibrated on the campaign; campaigns are drawn from it (its frequencies, its noise, parameters
+    within what it leaves open) and diagnosed. The odds that the campaign itself gives are put beside theirs.
+
+    Args:
+        model: the baseline.
+        campaign: what the drawn ones are like.
+        draws: how many are drawn.
+        orders: highest harmonic order to compare.
+        max_frequency: leave out faster dwells [Hz].
+        seed: of all random numbers.
+        folder: where each draw is kept as soon as it is there; nowhere if left out.
+        resume: keep the draws that an earlier run left there.
+        channels: the map that the campaign was read with, by which an earlier run is recognised.
+        jobs: draws at a time on this machine; one for each core if left out.
+        scheduler: address of a Dask cluster to work on instead.
+        progress: is told what is being done.
+
+    Raises :class:`InputError` as :func:`diagnose` does, and for draws of something else in the folder.
+    """
+    use_persistent_cache()
+    rig, settings, values = baseline_of(model, orders)
+    kept = None
+    if folder is not None:
+        marks = marks_of(model, campaign.source, channels)
+        marks |= {"max_frequency": max_frequency, "orders": orders, "seed": seed}
+        kept = Kept(prepare_folder(Path(folder)) / FILE, marks, resume)
+    done = [] if kept is None else kept.earlier(read_draw)
+    measured = measured_response(campaign, orders, max_frequency, progress)
+    asked = _Asked(measured, rig, settings, values, seed)
+    bench = asked.bench(progress)
+    found = run_trials(
+        partial(_draw, asked), draws, kept, done, jobs=jobs, scheduler=scheduler, progress=progress
+    )
+    return AlarmStudy(tuple(found), bench.odds, origin=model.origin(campaign, measured.warnings))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What draws follow from; ``key`` is the same in all processes."""
+
+    measured: HarmonicResponse
+    rig: Rig
+    settings: DiagnosisSettings
+    values: Mapping[str, float]
+    seed: int
+    key: str = field(default_factory=lambda: uuid4().hex)
+
+    def bench(self, progress: Progress = no_progress) -> AlarmBench:
+        """What they are drawn from."""
+        given = (self.measured, self.rig, self.settings, self.values, self.seed)
+        return once_a_process(self.key, lambda: alarm_bench(*given, progress))
+
+
+def _draw(asked: _Asked, number: int) -> NullDraw:
+    return asked.bench().draw(number)
+
+
+def read_draw(fields: Mapping[str, object]) -> NullDraw:
+    """The draw of a line of the file; raises ``ValueError`` for what is none."""
+    return record_of(NullDraw, fields)
+
+
+def rate_bound(alarms: int, drawn: int) -> float:
+    """Highest rate [1] that so many alarms leave possible (Clopper and Pearson, 1934); 1 where none was drawn."""
+    return 1.0 if alarms >= drawn else float(beta.ppf(CONFIDENCE, alarms + 1, drawn - alarms))

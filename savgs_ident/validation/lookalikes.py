@@ -1,0 +1,399 @@
+"""Effects that do the same to a campaign: nobody can tell from it which of them the rig has.
+
+To first order about the rig without any it is seen which ones may: effects without states by their derivatives, those
+with states by what they do along its motion, for several of their shapes.
+
+Whether an effect can be seen at all: what calibration and tolerances can do, it must not be.
+
+A spring that is 3 % stiffer than its sheet says, at a tolerance of 1.5 %, is no missing effect, and a tyre with
+10 % more friction is identified anyway. What an effect changes is therefore held against the best that the
+model without it can do:
+
+    sigma^2 = min_x  |(change - moved(x)) / noise|^2 + |x|^2
+
+with x the parameters that are identified or known to a tolerance, in units of what is known of them beforehand.
+The search takes damped Gauss-Newton steps within bounds.
+
+How large a drawn effect is made: by what it changes, not by its parameter's number.
+
+Newtons of friction and seconds of lag have no common size; what they do to the response has. The amplitude is
+searched for at which the clean response changes by what was drawn; how that is measured, see
+:func:`savgs_ident.validation.virtual_rig.change_of`.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.core.transforms import known_to_tolerance
+from savgs_ident.core.values import Values
+from savgs_ident.diagnosis.dwell_problem import term_of
+from savgs_ident.diagnosis.effect_sensitivities import columns_with_states
+from savgs_ident.effects.effect import Effect
+from savgs_ident.inference.likelihood import Likelihood
+from savgs_ident.inference.observations import Term
+from savgs_ident.inference.prior import Scales
+from savgs_ident.inference.problem import used_parameters
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.sensitivity import harmonic_sensitivities
+from savgs_ident.validation.virtual_rig import ORDERS, Bench
+
+Real = NDArray[np.float64]
+
+STEPS = 12
+"""Steps of the search at most."""
+
+SHARES = (1.0, 0.3, 0.1, 0.03)
+"""Shares of a step that are tried."""
+
+SETTLED = 0.95
+"""The search ends where a whole step leaves more than this of the square."""
+
+ENOUGH = 2.0
+"""It ends as well below so many standard deviations: nobody could see that."""
+
+
+class Hiding(NamedTuple):
+    """What can hide an effect, to first order about a rig.
+
+    Attributes:
+        noise: standard deviations of the rows, (m,).
+        names: parameters that are identified or known to a tolerance, n.
+        columns: change of the rows in noise per unit of what is known of each, (m, n).
+    """
+
+    noise: Real
+    names: tuple[str, ...]
+    columns: Real
+
+
+def rows_of(response: NDArray[np.complex128]) -> Real:
+    """Real and imaginary parts of the orders from 1 on, (m,), of a response (..., K) [unit of the reading]."""
+    kept = response[..., 1:]
+    return np.stack([kept.real, kept.imag], axis=-1).ravel()
+
+
+def noise_rows(bench: Bench) -> Real:
+    """Standard deviation of every row, (m,): white noise of the sensors over the length of each dwell."""
+    each = bench.sensors
+    samples = [bench.programme.periods_at(f) / f * each.rate for f in bench.programme.dwells]
+    spread = np.sqrt(2.0 / np.array(samples))[:, None] * np.array([each.accel, each.deflection])
+    return np.repeat(spread.ravel(), 2 * ORDERS)
+
+
+def moved(each: Parameter, value: float, x: float) -> float:
+    """A parameter moved from ``value`` [its unit] by ``x`` of what is known of it beforehand, within its bounds.
+
+    ``x`` is in standard deviations.
+    """
+    there = value + each.tolerance * x if each.tolerance > 0.0 else value * np.exp(x)
+    return float(np.clip(there, each.lower, each.upper))
+
+
+def hiding_at(
+    bench: Bench, effects: Sequence[str], given: Mapping[str, float], solution: PeriodicSolution
+) -> Hiding:
+    """What can hide an effect of the rig with these effects and parameters [SI], whose motions are ``solution``."""
+    model, p = bench.model(effects), bench.values(given)
+    used = used_parameters(model, bench.table)
+    known = [name for name in known_to_tolerance(bench.table, bench.free) if name in used]
+    names = (*bench.free, *known)
+    slopes = np.asarray(harmonic_sensitivities(model, p, solution, names, ORDERS))
+    noise = noise_rows(bench)
+    units = [float(p[name]) if name in bench.unknown else bench.table[name].tolerance for name in names]
+    columns = [rows_of(slope) / noise * unit for slope, unit in zip(slopes, units, strict=True)]
+    return Hiding(noise, names, np.stack(columns, axis=1))
+
+
+def _step(
+    columns: Real,
+    miss: Real,
+    x: Real,
+    known: int,
+    bounds: tuple[Real, Real] | None = None,
+) -> Real:
+    """The step of the search from ``x``; its first ``known`` entries have priors, it does not leave the bounds."""
+    stacked = np.concatenate([columns, np.eye(known, x.size)])
+    wanted = np.concatenate([miss, -x[:known]])
+    lower, upper = (-np.inf, np.inf) if bounds is None else (bounds[0] - x, bounds[1] - x)
+    step: Real = lsq_linear(stacked, wanted, (lower, upper), method="bvls").x
+    return step
+
+
+class Closest(NamedTuple):
+    """How far a change stands out of the nearest that can be done, and the sizes (k,) of free columns there.
+
+    ``sigma`` is in standard deviations, sizes are in units of the columns.
+    """
+
+    sigma: float
+    sizes: Real
+
+
+def closest(hiding: Hiding, change: Real, flat: Real) -> Closest:
+    """The nearest to ``change`` (m,) to first order, with columns ``flat`` (m, k) that may have any size.
+
+    ``change`` is in the units of the rows, ``flat`` in those of their noise.
+    """
+    columns, known = np.concatenate([hiding.columns, flat], axis=1), hiding.columns.shape[1]
+    miss = change / hiding.noise
+    x = _step(columns, miss, np.zeros(columns.shape[1]), known)
+    sigma = float(np.sqrt(np.sum((miss - columns @ x) ** 2) + np.sum(x[:known] ** 2)))
+    return Closest(sigma, x[known:])
+
+
+def sigma_of(
+    miss_at: Callable[[Real], Real | None],
+    columns_at: Callable[[Real, Real], Real],
+    start: Real,
+    known: int,
+    bounds: tuple[Real, Real],
+) -> float:
+    """How far a response stands out: the least sigma found from ``start`` (n,), with (m,) misses in noise.
+
+    ``columns_at(x, miss)`` are minus the slopes of ``miss_at(x)``, (m, n); the first ``known`` entries of x have
+    priors, and x stays between ``bounds``. Steps that make it worse, or lead where there is no motion, are shortened.
+    """
+
+    def square(x: Real, miss: Real | None) -> float:
+        return np.inf if miss is None else float(miss @ miss + np.sum(x[:known] ** 2))
+
+    x, miss = start, miss_at(start)
+    best = square(x, miss)
+    for _ in range(STEPS):
+        if miss is None or best < ENOUGH**2:
+            break
+        step, before = _step(columns_at(x, miss), miss, x, known, bounds), best
+        for share in SHARES:
+            there = x + share * step
+            found = miss_at(there)
+            if square(there, found) < best:
+                x, miss, best = there, found, square(there, found)
+                break
+        if best == before or (share == 1.0 and best > SETTLED * before):
+            break
+    return float(np.sqrt(best))
+
+
+SIMILAR = 0.6
+"""Share of its distance from the baseline that an effect keeps, to first order, from one that may do the same."""
+
+
+class Way(NamedTuple):
+    """What an effect does at given shapes [SI]: change of the rows in noise per unit of its amplitudes, (m, a)."""
+
+    shapes: Mapping[str, float]
+    columns: Real
+
+
+Ways = Mapping[str, tuple[Way, ...]]
+"""By effect, for every shape that is tried."""
+
+
+def ways_of(bench: Bench, given: Mapping[str, float], solution: PeriodicSolution) -> Ways:
+    """What every effect that the baseline lacks would do to a rig whose motions are ``solution``.
+
+    ``given`` are its parameters in SI.
+    """
+    terms = [term_of(each) for name, each in CATALOGUE.items() if name not in bench.baseline]
+    model, noise = bench.model(()), noise_rows(bench)
+    ways: dict[str, list[Way]] = {term.name: [] for term in terms}
+    for one in range(max(len(term.tried) for term in terms)):
+        some = [term for term in terms if len(term.tried) > one]
+        shapes = {name: value for term in some for name, value in term.tried[one].items()}
+        p = bench.values({**given, **shapes})
+        rows = {**_sloped(model, p, solution, some), **_marched(bench, model, p, solution, some)}
+        for term in some:
+            ways[term.name].append(Way(term.tried[one], rows[term.name] / noise[:, None]))
+    return {name: tuple(each) for name, each in ways.items()}
+
+
+def similar(hiding: Hiding, change: Real, ways: Ways, name: str) -> dict[str, dict[str, float]]:
+    """Effects other than ``name`` that ``change`` the rows (m,) nearly as it does, to first order.
+
+    With the parameters [SI] at which they do.
+    """
+    blank = np.zeros((change.size, 0))
+    limit = SIMILAR * closest(hiding, change, blank).sigma
+    found = {}
+    for other in ways:
+        if other == name:
+            continue
+        nearest = [(way, closest(hiding, change, way.columns)) for way in ways[other]]
+        way, best = min(nearest, key=lambda each: each[1].sigma)
+        if best.sigma < limit:
+            null = CATALOGUE[other].null
+            found[other] = {
+                **way.shapes,
+                **{each: null[each] + float(size) for each, size in zip(null, best.sizes, strict=True)},
+            }
+    return found
+
+
+def _sloped(
+    model: QuarterCar, p: Values, solution: PeriodicSolution, terms: Sequence[Term]
+) -> dict[str, Real]:
+    """Derivatives of the rows in the amplitudes of every effect without states."""
+    plain = [term for term in terms if not CATALOGUE[term.name].states]
+    names = tuple(each.name for term in plain for each in term.amplitudes)
+    slopes = np.asarray(harmonic_sensitivities(model, p, solution, names, ORDERS)) if names else ()
+    table = {name: rows_of(each) for name, each in zip(names, slopes, strict=True)}
+    return {term.name: np.stack([table[each.name] for each in term.amplitudes], axis=1) for term in plain}
+
+
+def _marched(
+    bench: Bench, model: QuarterCar, p: Values, solution: PeriodicSolution, terms: Sequence[Term]
+) -> dict[str, Real]:
+    """Change of the rows by every effect with states per unit of its amplitude, found at its typical size, (m, 1)."""
+    special = [term for term in terms if CATALOGUE[term.name].states]
+    effects = [CATALOGUE[term.name] for term in special]
+    typical = [{each.name: each.centre + 0.5 * each.scale for each in term.amplitudes} for term in special]
+    rows = columns_with_states(model, _all_rows(bench), ORDERS, p, solution, effects, typical)
+    return {
+        term.name: each[:, None] / (0.5 * term.amplitudes[0].scale)
+        for term, each in zip(special, rows, strict=True)
+    }
+
+
+def _all_rows(bench: Bench) -> Likelihood:
+    """Real and imaginary parts of all orders from 1 on as rows, as :func:`rows_of` has them."""
+    shape = len(bench.programme.dwells), 2, ORDERS + 1
+    wanted = np.broadcast_to(np.arange(ORDERS + 1)[:, None] > 0, (*shape, 2))
+    nothing: Array = jnp.zeros(int(wanted.sum()))
+    return Likelihood(
+        axes=jnp.broadcast_to(jnp.eye(2), (*shape, 2, 2)),
+        place=np.flatnonzero(wanted),
+        measured=nothing,
+        variance=nothing,
+        discrepancy_scale=nothing,
+        scales=Scales(),
+    )
+
+
+SHAPE_SPREAD = 0.35
+"""Width of the logarithm of what shapes an effect: nearly always within a factor of two of its typical value."""
+
+SHAPE_LIMIT = 2.0
+"""It is never further off."""
+
+CLOSE = 0.02
+"""The change is met to this share of it."""
+
+TRIES = 14
+"""Amplitudes that are tried."""
+
+FURTHER = 8.0
+"""Most by which an amplitude grows from one try to the next."""
+
+UNSEEN = 1e-9
+"""A change that is none."""
+
+Change = Callable[[float], float | None]
+"""Change of the response at an amplitude in typical sizes; None where there is no motion."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """An effect whose size is still open.
+
+    ``shapes`` are the parameters that shape it and ``direction`` those of its size, at one typical size; SI.
+    ``null`` are the values at which it vanishes and ``most`` the typical sizes that its bounds allow.
+    """
+
+    shapes: Mapping[str, float]
+    direction: Mapping[str, float]
+    null: Mapping[str, float]
+    most: float
+
+    def at(self, size: float) -> dict[str, float]:
+        """All parameters [SI] at so many typical sizes."""
+        return {name: self.null[name] + size * step for name, step in self.direction.items()} | dict(
+            self.shapes
+        )
+
+
+def draw_form(effect: Effect, random: np.random.Generator) -> Form:
+    """Shapes and the direction of the amplitudes of an effect.
+
+    An effect with one amplitude grows to either side that its bounds allow, one with several in any direction.
+    """
+    amplitudes = [each for each in effect.parameters if each.name in effect.null]
+    shapes = {each.name: _shape(each, random) for each in effect.parameters if each.name not in effect.null}
+    typical = np.array([abs(each.value - effect.null[each.name]) for each in amplitudes])
+    toward = random.standard_normal(len(amplitudes))
+    toward *= typical / np.linalg.norm(toward)
+    signed = [
+        float(step if _room(each, effect.null[each.name], step) > 0.0 else -step)
+        for each, step in zip(amplitudes, toward, strict=True)
+    ]
+    most = min(
+        _room(each, effect.null[each.name], step) for each, step in zip(amplitudes, signed, strict=True)
+    )
+    direction = {each.name: step for each, step in zip(amplitudes, signed, strict=True)}
+    return Form(shapes, direction, effect.null, most)
+
+
+def _shape(each: Parameter, random: np.random.Generator) -> float:
+    factor = np.exp(SHAPE_SPREAD * random.standard_normal())
+    return float(
+        np.clip(each.value * np.clip(factor, 1.0 / SHAPE_LIMIT, SHAPE_LIMIT), each.lower, each.upper)
+    )
+
+
+def _room(each: Parameter, null: float, step: float) -> float:
+    """Steps that fit between the null and the bound."""
+    bound = each.upper if step > 0.0 else each.lower
+    return abs((bound - null) / step)
+
+
+def find_size(change: Change, target: float, most: float) -> float | None:
+    """The size [1] at which the response changes by ``target`` [1]; None if it does nowhere up to ``most``.
+
+    Steps along the logarithms of size and change, held between what was too small and what was too large.
+    """
+    size, below, above = min(1.0, most), 0.0, most
+    known: list[tuple[float, float]] = []
+    for _ in range(TRIES):
+        found = change(size)
+        if found is not None and abs(found / target - 1.0) < CLOSE:
+            return size
+        if found is not None and found < target:
+            if size >= most:
+                return None
+            below = size
+        else:
+            above = min(above, size)
+        if found is not None and found > UNSEEN:
+            known.append((float(np.log(size)), float(np.log(found))))
+        size = _next(known, target, size, below, above, found is None)
+    return None
+
+
+def _next(
+    known: list[tuple[float, float]], target: float, size: float, below: float, above: float, lost: bool
+) -> float:
+    """The next size to try."""
+    if lost:
+        return float(np.sqrt(below * size)) if below > 0.0 else size / FURTHER
+    if not known:
+        return min(size * FURTHER, above)
+    slope = 1.0
+    if len(known) > 1:
+        (x0, y0), (x1, y1) = known[-2:]
+        slope = float(np.clip((y1 - y0) / (x1 - x0), 0.3, 5.0)) if x1 != x0 else 1.0
+    x, y = known[-1]
+    wanted = float(np.exp(x + np.clip((np.log(target) - y) / slope, -np.log(FURTHER), np.log(FURTHER))))
+    if below < wanted < above:
+        return wanted
+    if wanted >= above and above > size:
+        return above
+    return float(np.sqrt(max(below, 1e-3 * above) * above))

@@ -1,0 +1,139 @@
+"""Rigs whose effects are those of the catalogue by another law: they are named, and said to be of another law.
+
+And one whose effect is at the port of one of the catalogue but nothing like it: that is unknown, and at that port.
+
+The recordings are periodic motions of the rig with the other law, and noise of the laboratory's campaign.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jaxtyping import Array, Complex, Float
+
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.diagnosis.quarter_car import diagnose_response
+from savgs_ident.effects.base import (
+    AbstractFrictionLimitLaw,
+    AbstractInputLaw,
+    AbstractSensorLaw,
+    Family,
+    FrictionLimit,
+    Fundamental,
+    InputSignal,
+    Port,
+    PortSignals,
+    Role,
+)
+from savgs_ident.effects.effect import Effect, effect_at
+from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.ports import ACCEL, RAIL, ROAD
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.excitation import measured_excitation
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import simulate_periodic
+
+from .conftest import Measure
+
+
+class ExponentialStribeck(AbstractFrictionLimitLaw):
+    """The rise falls off exponentially, not as a bell."""
+
+    name: ClassVar[str] = "exponential_stribeck"
+    roles: ClassVar[tuple[Role, ...]] = (Role("coefficient"),)
+
+    def typical(self, port: Port) -> Mapping[str, Parameter | float]:
+        return {}
+
+    def limit(self, v: Values, signals: PortSignals) -> FrictionLimit:
+        share = 0.25 * v["coefficient"] * jnp.exp(-jnp.abs(signals.velocity) / 0.08) * signals.load
+        return FrictionLimit(share, share)
+
+
+class SecondOrderLag(AbstractSensorLaw):
+    """The accelerometer lags by a filter of second order, not of first."""
+
+    name: ClassVar[str] = "second_order_lag"
+    family: ClassVar[Family] = Family.DYNAMICS
+    roles: ClassVar[tuple[Role, ...]] = ()
+
+    def typical(self, port: Port) -> Mapping[str, Parameter | float]:
+        return {}
+
+    def transfer(self, v: Values, frequency: Float[Array, " f"]) -> Complex[Array, " f"]:
+        s = 2j * jnp.pi * frequency * 0.008
+        return 1.0 / (1.0 + 1.4 * s + s**2)
+
+
+class WavyCam(AbstractInputLaw):
+    """A wave of fourth order on the cam, where the catalogue has a second and a third."""
+
+    name: ClassVar[str] = "wavy_cam"
+    family: ClassVar[Family] = Family.SHAPE
+    roles: ClassVar[tuple[Role, ...]] = ()
+
+    def typical(self, port: Port) -> Mapping[str, Parameter | float]:
+        return {}
+
+    def shift(self, v: Values, signal: InputSignal, fundamental: Fundamental) -> InputSignal:
+        turned = 4.0 * fundamental.angle
+        return InputSignal(1e-4 * jnp.cos(turned), -4e-4 * jnp.sin(turned) * fundamental.speed)
+
+
+STRIBECK = effect_at("exponential_stribeck", RAIL, ExponentialStribeck(), {"coefficient": "mu_r"})
+LAG = effect_at("second_order_lag", ACCEL, SecondOrderLag(), {})
+WAVY = effect_at("wavy_cam", ROAD, WavyCam(), {})
+
+
+def _recorded(response: HarmonicResponse, rig: Rig, effect: Effect) -> HarmonicResponse:
+    """A response of the rig with one more effect: the periodic motion, and noise as in ``response``."""
+    baseline = MODELS["simtr"]
+    model = build_model(rig, baseline) + effect
+    p = as_values(model_parameters(rig, baseline).as_dict())
+    solution = simulate_periodic(model, p, measured_excitation(response, float(p["psi_nominal"])))
+    assert all(status.ok for status in solution.status())
+    clean = np.asarray(harmonics(model, p, solution, response.orders))
+    shown = response.harmonics.copy()
+    random = np.random.default_rng(7)
+    for place, name in enumerate(RESPONSE_CHANNELS):
+        c = response.channel(name)
+        root = np.linalg.cholesky(response.covariance[:, c, 1:])
+        noise = np.einsum("dkij,dkj->dki", root, random.standard_normal(root.shape[:-1]))
+        shown[:, c, 1:] = clean[:, place, 1:] + noise[..., 0] + 1j * noise[..., 1]
+    return replace(response, harmonics=shown)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("effect", "name", "port"),
+    [
+        (STRIBECK, "rail_stribeck", "rail"),
+        (LAG, "accel_lag", "sensor.sprung_accel"),
+    ],
+)
+def test_an_effect_by_another_law_is_named(
+    measure: Measure, rig: Rig, effect: Effect, name: str, port: str
+) -> None:
+    diagnosis = diagnose_response(_recorded(measure("nominal"), rig, effect), rig)
+    assert diagnosis.verdict.kind == "effect"
+    assert diagnosis.verdict.effects == (name,)
+    assert diagnosis.verdict.ports == (port,)
+    assert diagnosis.verdict.another_law
+    assert "another law than the catalogue's" in diagnosis.verdict.sentence
+    assert diagnosis.candidates[0].effects == (name,)
+    assert diagnosis.shrink.share_closed > 0.9
+
+
+@pytest.mark.slow
+def test_a_wave_that_no_cam_of_the_catalogue_has_is_unknown_at_the_road(measure: Measure, rig: Rig) -> None:
+    diagnosis = diagnose_response(_recorded(measure("nominal"), rig, WAVY), rig)
+    assert diagnosis.verdict.kind == "unknown"
+    assert diagnosis.verdict.ports == ("road",)
+    assert not diagnosis.verdict.another_law
+    assert diagnosis.shrink.share_closed > 0.9

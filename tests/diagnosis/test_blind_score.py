@@ -1,0 +1,215 @@
+"""Marks of diagnoses made by hand, and what many of them say together."""
+
+import json
+from dataclasses import asdict, replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binomtest
+
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.validation.blind_score import (
+    NOTHING,
+    OTHERS,
+    TWO,
+    UNKNOWN,
+    Rate,
+    Score,
+    confusion_of,
+    failed,
+    rates_of,
+    score_from,
+    score_of,
+)
+
+from .blind_answers import answer, diagnosis
+
+LAG = answer("effect", "accel_lag", accel_lag_time=0.01)
+PAIR = answer("two", "accel_lag", "rail_viscous", accel_lag_time=0.01, rail_viscous_damping=50.0)
+GONE = answer("unknown", "accel_lag")
+NONE = answer("none")
+
+
+def test_the_drawn_effect_named_and_located() -> None:
+    score = score_of(LAG, diagnosis("effect", "accel_lag"))
+    assert score.named_right is True
+    assert score.located_right is True
+    assert (score.false_alarm, score.unknown_recognised, score.both_named) == (None, None, None)
+    assert score.share_closed == 0.99
+
+
+def test_an_effect_at_the_same_port_is_located_but_not_named() -> None:
+    score = score_of(LAG, diagnosis("effect", "accel_gain"))
+    assert score.named_right is False
+    assert score.located_right is True
+    assert score.named_exactly is False
+
+
+@pytest.mark.parametrize(
+    ("imitators", "like", "right"),
+    [
+        (("gear_compliance",), ("mount_compliance", "cam_scale"), True),
+        (("gear_compliance",), ("cam_scale",), False),
+        ((), ("mount_compliance",), False),
+        (("accel_gain",), ("mount_compliance",), False),
+    ],
+)
+def test_what_does_the_same_counts_where_the_verdict_says_so(
+    imitators: tuple[str, ...], like: tuple[str, ...], right: bool
+) -> None:
+    truth = replace(answer("effect", "mount_compliance"), imitators=imitators)
+    score = score_of(truth, diagnosis("effect", "gear_compliance", like=like))
+    assert (score.named_right, score.located_right, score.named_exactly) == (right, right, False)
+
+
+@pytest.mark.parametrize("verdict", [diagnosis("none"), diagnosis("unknown", ports=["rail"])])
+def test_an_effect_that_is_not_named(verdict: dict[str, object]) -> None:
+    score = score_of(LAG, verdict)
+    assert score.named_right is False
+    assert score.located_right is False
+
+
+def test_one_effect_too_many_is_not_right() -> None:
+    score = score_of(LAG, diagnosis("several", "accel_lag", "rail_viscous"))
+    assert score.named_right is False
+    assert score.located_right is False
+
+
+def test_two_effects_in_any_order() -> None:
+    right = score_of(PAIR, diagnosis("several", "rail_viscous", "accel_lag"))
+    assert right.both_named is True
+    assert right.located_right is True
+    assert right.named_right is None
+    half = score_of(PAIR, diagnosis("effect", "accel_lag"))
+    assert half.both_named is False
+    assert half.located_right is False
+
+
+def test_nothing_missing() -> None:
+    assert score_of(NONE, diagnosis("none")).false_alarm is False
+    assert score_of(NONE, diagnosis("none")).located_right is None
+    assert score_of(NONE, diagnosis("effect", "cam_scale")).false_alarm is True
+    assert score_of(NONE, diagnosis("unknown", ports=["rail"])).false_alarm is True
+
+
+def test_an_effect_that_the_catalogue_lacks() -> None:
+    there = score_of(GONE, diagnosis("unknown", ports=["sensor.sprung_accel"]))
+    assert (there.unknown_recognised, there.located_right) == (True, True)
+    elsewhere = score_of(GONE, diagnosis("unknown", ports=["rail"]))
+    assert (elsewhere.unknown_recognised, elsewhere.located_right) == (True, False)
+    told = score_of(GONE, diagnosis("unknown", ports=["rail"], beside=["sensor.sprung_accel"]))
+    assert (told.located_right, told.located_exactly) == (True, False)
+    untold = score_of(GONE, diagnosis("unknown", ports=["rail"], beside=["strut"]))
+    assert (untold.located_right, untold.located_exactly) == (False, False)
+    assert (there.located_exactly, elsewhere.located_exactly) == (True, False)
+    named = score_of(GONE, diagnosis("effect", "accel_gain"))
+    assert (named.unknown_recognised, named.located_right) == (False, True)
+
+
+@pytest.mark.parametrize("truth", [LAG, PAIR, GONE, NONE])
+def test_a_diagnosis_that_failed_is_never_right(truth) -> None:
+    score = score_of(truth, failed("cannot be read"))
+    marks = (score.named_right, score.located_right, score.unknown_recognised, score.both_named)
+    assert not any(marks)
+
+
+def test_intervals_count_where_all_effects_are_named() -> None:
+    both = {"accel_lag_time": (0.009, 0.0095), "rail_viscous_damping": (40.0, 60.0)}
+    score = score_of(PAIR, diagnosis("several", "rail_viscous", "accel_lag", intervals=both))
+    assert {name: each.holds for name, each in score.intervals.items()} == {
+        "accel_lag_time": False,
+        "rail_viscous_damping": True,
+    }
+    one = diagnosis("effect", "accel_lag", intervals={"accel_lag_time": (0.0, 1.0)})
+    assert score_of(PAIR, one).intervals == {}
+
+
+def test_marks_survive_being_written() -> None:
+    found = diagnosis("effect", "accel_lag", intervals={"accel_lag_time": (0.009, 0.011)})
+    score = score_of(LAG, found)
+    assert score_from(json.loads(json.dumps(asdict(score)))) == score
+
+
+def _scores() -> list[Score]:
+    """Nine trials: three of one effect, two of two, two of none, two of unknown."""
+    pairs = [
+        (LAG, diagnosis("effect", "accel_lag", intervals={"accel_lag_time": (0.009, 0.011)})),
+        (LAG, diagnosis("effect", "accel_gain", like=("accel_lag",))),
+        (answer("effect", "cam_scale"), diagnosis("several", "cam_scale", "accel_gain")),
+        (PAIR, diagnosis("several", "accel_lag", "rail_viscous", closed=0.5)),
+        (PAIR, diagnosis("several", "accel_lag", "cam_scale")),
+        (NONE, diagnosis("none")),
+        (NONE, diagnosis("effect", "cam_scale")),
+        (GONE, diagnosis("unknown", ports=["sensor.sprung_accel"])),
+        (GONE, diagnosis("effect", "accel_gain")),
+    ]
+    return [score_of(truth, said) for truth, said in pairs]
+
+
+def test_rates_count_only_the_trials_that_they_are_about() -> None:
+    rates = {name: (rate.count, rate.total) for name, rate in rates_of(_scores()).items()}
+    assert rates == {
+        "named_right": (1, 3),
+        "located_right": (5, 7),
+        "false_alarms": (1, 2),
+        "unknown_recognised": (1, 2),
+        "both_named": (1, 2),
+        "intervals_hold": (1, 1),
+        "share_closed_90": (1, 2),
+        "named_exactly": (1, 3),
+        "located_exactly": (5, 7),
+    }
+
+
+def test_bounds_are_met_or_not_or_not_asked() -> None:
+    assert Rate(9, 10, least=0.9).met is True
+    assert Rate(8, 10, least=0.9).met is False
+    assert Rate(1, 10, most=0.02).met is False
+    assert Rate(0, 10, most=0.02).met is True
+    assert Rate(0, 0, least=0.9).met is None
+    assert Rate(5, 10).met is None
+    assert Rate(20, 20, least=0.9, most=0.99).met is True
+    assert Rate(1000, 1000, least=0.9, most=0.99).met is False
+    assert Rate(17, 20, least=0.9, most=0.99).met is False
+
+
+@given(total=st.integers(1, 200), data=st.data())
+def test_intervals_of_rates_are_those_of_wilson(total: int, data: st.DataObject) -> None:
+    count = data.draw(st.integers(0, total))
+    expected = binomtest(count, total).proportion_ci(method="wilson")
+    rate = Rate(count, total)
+    assert rate.low == pytest.approx(expected.low, abs=1e-6)
+    assert rate.high == pytest.approx(expected.high, abs=1e-6)
+
+
+def test_who_is_taken_for_whom() -> None:
+    confusion = confusion_of(_scores(), tuple(CATALOGUE))
+    assert confusion.truths == (NOTHING, "cam_scale", "accel_lag", TWO, UNKNOWN)
+    assert confusion.verdicts == (
+        NOTHING,
+        "cam_scale",
+        "accel_gain",
+        "accel_lag",
+        TWO,
+        OTHERS,
+        UNKNOWN,
+    )
+    assert confusion.counts.sum() == 9
+    table = {
+        (truth, verdict): int(confusion.counts[i, j])
+        for i, truth in enumerate(confusion.truths)
+        for j, verdict in enumerate(confusion.verdicts)
+        if confusion.counts[i, j]
+    }
+    assert table == {
+        (NOTHING, NOTHING): 1,
+        (NOTHING, "cam_scale"): 1,
+        ("cam_scale", OTHERS): 1,
+        ("accel_lag", "accel_lag"): 1,
+        ("accel_lag", "accel_gain"): 1,
+        (TWO, TWO): 1,
+        (TWO, OTHERS): 1,
+        (UNKNOWN, UNKNOWN): 1,
+        (UNKNOWN, "accel_gain"): 1,
+    }

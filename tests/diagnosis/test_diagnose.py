@@ -1,0 +1,103 @@
+"""Whole diagnoses of the laboratory's labelled campaigns: named, located, closed, within intervals."""
+
+import numpy as np
+import pytest
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.diagnosis.quarter_car import diagnose_response
+from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
+from savgs_ident.plants.quarter_car.rig import Rig
+
+from ..fit.bench import only
+from .conftest import Measure
+
+TRUTH = {
+    "stribeck_rail": ("rail_stribeck", "rail", {"stribeck_rise": 0.25, "stribeck_velocity": 0.1}),
+    "mount_compliance": (
+        "mount_compliance",
+        "strut",
+        {"mount_compliance": 1.0 / 6.0e5, "mount_damping": 400.0},
+    ),
+    "accel_lag": ("accel_lag", "sensor.sprung_accel", {"accel_lag_time": 0.015}),
+}
+
+FEW = (0.5, 1.1, 1.85, 2.15, 2.35, 2.55, 3.0, 4.0, 6.0)
+
+
+def _check(diagnosis: Diagnosis, name: str) -> None:
+    effect, port, truth = TRUTH[name]
+    assert diagnosis.converged
+    assert diagnosis.verdict.kind == "effect"
+    assert diagnosis.verdict.effects == (effect,)
+    assert diagnosis.verdict.ports == (port,)
+    assert diagnosis.verdict.confusable_with == ()
+    assert diagnosis.shrink.share_closed > 0.99
+    assert diagnosis.shrink.after < 1.3 * diagnosis.shrink.floor < diagnosis.shrink.recalibrated
+    best = diagnosis.candidates[0]
+    assert best.effects == (effect,)
+    assert best.probability > 0.99
+    assert best.heldout_gain > 0.5
+    for each in best.parameters:
+        assert each.lo <= truth[each.name] <= each.hi, each
+    assert sum(each.probability for each in diagnosis.candidates) == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+def test_a_stribeck_rail_is_found_in_a_few_dwells(measure: Measure, rig: Rig) -> None:
+    response = measure("stribeck_rail")
+    few = only(response, np.isin(np.round(response.frequency, 2), FEW))
+    told: list[str] = []
+    diagnosis = diagnose_response(few, rig, progress=told.append)
+    _check(diagnosis, "stribeck_rail")
+    assert diagnosis.ports[0].port == "rail"
+    assert len(told) > 5
+    law = diagnosis.loops[1]
+    assert law.port == "rail"
+    assert law.law.size == law.inferred.size == law.velocity.size
+
+
+def test_an_effect_that_does_not_exist_is_refused(measure: Measure, rig: Rig) -> None:
+    with pytest.raises(InputError, match="there is no effect 'rail_stribek'"):
+        diagnose_response(measure("nominal"), rig, DiagnosisSettings(without=("rail_stribek",)))
+
+
+@pytest.mark.slow
+def test_an_effect_of_the_baseline_cannot_be_left_out(measure: Measure, rig: Rig) -> None:
+    with pytest.raises(InputError, match="'rail_coulomb' is part of the baseline"):
+        diagnose_response(measure("nominal"), rig, DiagnosisSettings(without=("rail_coulomb",)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TRUTH)
+def test_labelled_campaigns(measure: Measure, rig: Rig, name: str) -> None:
+    _check(diagnose_response(measure(name), rig), name)
+
+
+@pytest.mark.slow
+def test_nothing_is_missing_in_the_nominal_campaign(measure: Measure, rig: Rig) -> None:
+    diagnosis = diagnose_response(measure("nominal"), rig)
+    assert diagnosis.verdict.kind == "none"
+    assert diagnosis.verdict.effects == ()
+
+
+@pytest.mark.slow
+def test_both_frictions_are_found_from_the_frictionless_baseline(measure: Measure, rig: Rig) -> None:
+    settings = DiagnosisSettings(model="simqc", baseline=(), free=("c_sd",))
+    diagnosis = diagnose_response(measure("nominal"), rig, settings)
+    assert diagnosis.verdict.kind == "several"
+    assert set(diagnosis.verdict.effects) == {"rail_coulomb", "tyre_friction"}
+    assert diagnosis.shrink.share_closed > 0.99
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "without", "port"), [("stribeck_rail", "rail_stribeck", "rail")])
+def test_what_the_catalogue_lacks_is_called_unknown(
+    measure: Measure, rig: Rig, name: str, without: str, port: str
+) -> None:
+    diagnosis = diagnose_response(measure(name), rig, DiagnosisSettings(without=(without,)))
+    assert diagnosis.verdict.kind == "unknown"
+    assert diagnosis.verdict.ports == (port,)
+    assert diagnosis.shrink.share_closed > 0.9
+    assert diagnosis.learned is not None
+    assert diagnosis.learned.effect == f"learned_{port}"
+    assert diagnosis.shrink.after < 2.0 * diagnosis.shrink.floor

@@ -1,0 +1,52 @@
+"""How often something is found where nothing is missing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from savgs_ident.diagnosis.result import DiagnosisSettings
+from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.simulate.periodic import PeriodicSettings
+from savgs_ident.validation.false_alarms import CONFIDENCE, alarm_bench, rate_bound
+
+from ..fit.bench import only
+from .conftest import DWELLS, Measure
+
+
+@pytest.mark.parametrize(("alarms", "drawn"), [(0, 60), (1, 100), (7, 30)])
+def test_with_the_rate_at_its_bound_so_few_alarms_are_as_improbable_as_is_said(
+    alarms: int, drawn: int
+) -> None:
+    bound = rate_bound(alarms, drawn)
+    assert binom.cdf(alarms, drawn, bound) == pytest.approx(1.0 - CONFIDENCE)
+
+
+def test_alarms_in_all_draws_or_no_draw_at_all_bound_nothing() -> None:
+    assert rate_bound(5, 5) == rate_bound(0, 0) == 1.0
+
+
+def _silent(line: str) -> None:
+    del line
+
+
+@pytest.mark.slow
+def test_campaigns_with_nothing_missing_give_no_alarm_and_one_with_a_gap_does(
+    measure: Measure, rig: Rig
+) -> None:
+    """On six dwells; the same number draws the same campaign."""
+    settings = DiagnosisSettings(periodic=PeriodicSettings(nodes=128, adaptations=1))
+    few = {
+        name: only(measure(name), np.isin(np.round(measure(name).frequency, 2), DWELLS))
+        for name in ("nominal", "stribeck_rail")
+    }
+    bench = alarm_bench(few["nominal"], rig, settings, {}, 3, _silent)
+    draws = [bench.draw(number) for number in range(20)]
+    assert not any(each.alarm for each in draws)
+    assert all(each.odds is not None and each.odds < DEFAULTS.alarm_log_odds for each in draws)
+    assert bench.draw(4) == draws[4] != replace(bench, seed=4).draw(4)
+    assert (
+        alarm_bench(few["stribeck_rail"], rig, settings, {}, 3, _silent).odds > 10.0 * DEFAULTS.alarm_log_odds
+    )

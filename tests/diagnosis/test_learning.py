@@ -1,0 +1,76 @@
+"""A force learned where the catalogue has no name: on recordings of a rail whose friction falls with velocity."""
+
+import numpy as np
+import pytest
+
+from savgs_ident.core.values import as_values
+from savgs_ident.diagnosis.dwell_problem import ITERATIONS, DwellProblem, rows_of
+from savgs_ident.diagnosis.held_out import hold_out
+from savgs_ident.diagnosis.learning import LearnedLaw, learn
+from savgs_ident.diagnosis.location_hypotheses import force_port
+from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.inference.observations import Data
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, LEARNED, MODELS, build_model
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.ports import RAIL
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.simulate.periodic import PeriodicSettings, resolve
+
+from ..fit.bench import only
+from .conftest import DWELLS, Measure, rig_problem
+
+BASELINE = MODELS["simtr"]
+
+
+@pytest.fixture(scope="module")
+def case(measure: Measure, rig: Rig) -> tuple[DwellProblem, Data, LaplaceFit]:
+    """SimTR, recalibrated on six dwells of a rail that it does not have."""
+    response = measure("stribeck_rail")
+    few = only(response, np.isin(np.round(response.frequency, 2), DWELLS))
+    settings = PeriodicSettings(nodes=128, adaptations=1)
+    catalogue = {name: CATALOGUE[name] for name in BASELINE}
+    plant, data = rig_problem(few, rig, catalogue, settings)
+    return plant, data, find_map(search_of(plant, data), (), {}, plant.start({}))
+
+
+@pytest.fixture(scope="module")
+def law(case: tuple[DwellProblem, Data, LaplaceFit]) -> LearnedLaw:
+    """The force at the rail."""
+    return learn(*case, RAIL)
+
+
+@pytest.mark.slow
+def test_it_explains_tests_that_it_was_not_learned_from(
+    case: tuple[DwellProblem, Data, LaplaceFit], law: LearnedLaw
+) -> None:
+    plant, data, base = case
+    assert law.mode.status.ok
+    without = hold_out(search_of(plant, data), base, ())
+    missed = [np.sum((data.measured - each.rows) ** 2 / data.variance) for each in (without, law.held)]
+    assert missed[1] < 0.1 * missed[0]
+    assert law.held.mean > without.mean
+
+
+@pytest.mark.slow
+def test_as_an_effect_of_the_model_it_does_what_the_fit_says(law: LearnedLaw, rig: Rig) -> None:
+    """The numbers alone, put into a model as an export does, give the response of the fit on the same nodes."""
+    model = build_model(rig, (*BASELINE, law.name))
+    p = as_values(law.problem.table.as_dict() | law.values)
+    solution = resolve(model, p, law.mode.prediction.warm_start, ITERATIONS)
+    assert all(status.ok for status in solution.status())
+    rows = np.asarray(rows_of(model, law.problem.likelihood, p, solution, law.problem.orders))
+    fitted = law.mode.prediction.rows
+    assert np.linalg.norm(rows - fitted) < 1e-6 * np.linalg.norm(fitted)
+
+
+@pytest.mark.slow
+def test_it_knows_the_range_of_the_motion(law: LearnedLaw) -> None:
+    assert set(law.spans) == {f"learned_rail_{name}" for name in ("middle", "stroke", "speed", "carried")}
+    assert 0.005 < law.spans["learned_rail_stroke"] < 0.05
+    assert 0.05 < law.spans["learned_rail_speed"] < 1.0
+
+
+def test_only_forces_are_learned() -> None:
+    assert force_port(QuarterCar, "rail") is RAIL
+    assert not any(force_port(QuarterCar, location) for location in ("frame", "road", "link", "inertia"))
+    assert all(force_port(QuarterCar, each.port.location) == each.port for each in LEARNED.values())

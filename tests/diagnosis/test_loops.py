@@ -1,0 +1,82 @@
+"""The force that is drawn for a named effect is the force of the plant, its damper and its bristle included."""
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from savgs_ident.diagnosis.dwell_problem import DwellProblem
+from savgs_ident.diagnosis.effect_sensitivities import impose, marched_effect
+from savgs_ident.diagnosis.loops import effect_force
+from savgs_ident.inference.observations import Data
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.simulate.collocation import Trajectory
+from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.sensitivity import loads_at_nodes
+
+Case = tuple[DwellProblem, Data]
+
+
+@pytest.mark.slow
+def test_the_force_of_a_mount_is_that_of_the_strut_with_its_nonlinear_damper(
+    plant_and_data: Case, start: PeriodicSolution
+) -> None:
+    plant, _ = plant_and_data
+    p = plant.values({"mount_compliance": 2e-7, "mount_damping": 500.0})
+    without, mounted = plant.complete(()), plant.complete(("mount_compliance",))
+    deflection = marched_effect(without, p, start, CATALOGUE["mount_compliance"])
+    x, y = start.trajectory
+    state, rate = jnp.asarray(deflection.T)[:, None]
+    moving = replace(start, trajectory=Trajectory(jnp.concatenate([x, state]), jnp.concatenate([y, rate])))
+    expected = np.asarray(loads_at_nodes(mounted, p, moving).strut - loads_at_nodes(without, p, start).strut)
+    force = effect_force(without, p, start, CATALOGUE["mount_compliance"])
+    assert force is not None
+    np.testing.assert_allclose(force, expected, atol=1e-6 * np.abs(expected).max())
+    linear = -(float(p["k_sd"]) * deflection[:, 0] + float(p["c_sd"]) * deflection[:, 1])
+    assert np.abs(linear - expected).max() > 0.1 * np.abs(expected).max(), "the damper would pass for linear"
+
+
+def test_the_force_of_the_rails_friction_is_that_of_its_bristle(
+    plant_and_data: Case, start: PeriodicSolution
+) -> None:
+    plant, _ = plant_and_data
+    model, p = plant.complete(()), plant.values({})
+    loads = loads_at_nodes(model, p, start)
+    expected = np.asarray(loads.rail)
+    force = effect_force(model, p, start, CATALOGUE["rail_coulomb"])
+    assert force is not None
+    size = np.sqrt(np.mean(expected**2))
+    assert np.sqrt(np.mean((force - expected) ** 2)) < 0.02 * size
+    sliding = loads.ports["rail"]
+    tanh = -float(p["mu_r"]) * np.asarray(sliding.load * jnp.tanh(sliding.velocity / 1e-3))
+    assert np.sqrt(np.mean((tanh - expected) ** 2)) > 0.1 * size, "a tanh would pass for the bristle"
+
+
+def test_the_force_of_a_mount_does_to_the_response_what_the_mount_does(
+    plant_and_data: Case, start: PeriodicSolution
+) -> None:
+    plant, data = plant_and_data
+    model, p = plant.complete(()), plant.values({"mount_compliance": 1e-9, "mount_damping": 500.0})
+    deflection = marched_effect(model, p, start, CATALOGUE["mount_compliance"])
+    force = effect_force(model, p, start, CATALOGUE["mount_compliance"])
+    assert force is not None
+    signals = [("mount", deflection), ("strut", force)]
+    given, same = impose(model, plant.likelihood, plant.orders, p, start, signals) / data.discrepancy_scale
+    assert np.linalg.norm(same - given) < 0.01 * np.linalg.norm(given)
+
+
+def test_a_stiffer_tyre_pushes_in_proportion_to_its_compression(
+    plant_and_data: Case, start: PeriodicSolution
+) -> None:
+    plant, _ = plant_and_data
+    effect = CATALOGUE["tyre_stiffness"]
+    (name,) = effect.null
+    p = plant.values({name: effect.null[name] + 0.1})
+    force = effect_force(plant.complete(()), p, start, effect)
+    assert force is not None
+    ports = loads_at_nodes(plant.complete(()), p, start).ports
+    compression = np.asarray(ports["tyre_radial"].displacement)
+    stiffness = (force @ compression) / (compression @ compression)
+    np.testing.assert_allclose(force, stiffness * compression, atol=1e-6 * np.abs(force).max())
+    assert stiffness > 0.0

@@ -1,0 +1,138 @@
+"""What a diagnosis says where the verdict needs a reason."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from savgs_ident.core.status import Status
+from savgs_ident.diagnosis.model_selection import DiagnosisEvidence, weights_of
+from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Shrink
+from savgs_ident.diagnosis.score_test import PriorConflict
+from savgs_ident.diagnosis.search import Findings, LostHypothesis
+from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.diagnosis.verdict import BrokenTolerance, Reason, UnknownEvidence, WeighedHypothesis
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+
+GAP = Shrink(0.3, 0.04, 0.002, 0.0015, 0.99, (0.98, 1.0))
+RAIL: Any = SimpleNamespace(name="rail", share=0.9, evidence=50.0)
+PROBLEM: Any = SimpleNamespace(
+    constants=DEFAULTS,
+    locations=lambda hypothesis: tuple(CATALOGUE[name].port.location for name in hypothesis.effects),
+)
+
+
+def _mode(evidence: float, *terms: str) -> Any:
+    return SimpleNamespace(terms=terms, evidence=evidence, status=Status.CONVERGED)
+
+
+def _evidence(kind: Any, reason: Reason, weights: dict[str, float], **more: Any) -> DiagnosisEvidence:
+    """Evidence by the weights of "none", "unknown" and single effects."""
+    effects = {name: weight for name, weight in weights.items() if name not in ("none", "unknown")}
+    weighed = [
+        WeighedHypothesis(Hypothesis((name,)), weight, _mode(weight, name))
+        for name, weight in effects.items()
+    ]
+    weighed += [
+        WeighedHypothesis(NONE, weights["none"], _mode(weights["none"])),
+        WeighedHypothesis(UNKNOWN, weights["unknown"], None),
+    ]
+    ranked = tuple(sorted(weighed, key=lambda each: -each.weight))
+    modes = tuple(each.mode for each in weighed if each.mode is not None and each.hypothesis.effects)
+    return DiagnosisEvidence(
+        findings=Findings(_mode(weights["none"]), (), modes, more.get("lost", ())),
+        localisations=(RAIL,),
+        location_weights=weights_of((RAIL,)),
+        weighed=ranked,
+        unknown=UnknownEvidence(weights["unknown"], reason),
+        broken=BrokenTolerance(
+            weights["unknown"], PriorConflict(20.0, "k_t", -4.2), Hypothesis(tuple(effects)), "tyre_radial"
+        ),
+        kind=kind,
+        chosen=next(each for each in ranked if str(each.hypothesis) == kind),
+        left=0.08,
+        another_law=more.get("another_law", False),
+        refit_failed=more.get("refit_failed", False),
+    )
+
+
+def test_something_unknown_is_told_with_how_near_the_catalogue_comes() -> None:
+    evidence = _evidence("unknown", "law", {"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0})
+    verdict = write_verdict(PROBLEM, evidence, (), GAP)
+    assert "law learned at the port 'rail' accounts for 90 %" in verdict.sentence
+    assert verdict.sentence.endswith(
+        "The nearest effect of the catalogue, rail_viscous, leaves 8 % of the misfit beyond the noise."
+    )
+    assert verdict.ports == ("rail",)
+
+
+@pytest.mark.parametrize(
+    ("weights", "start"),
+    [
+        ({"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0}, "With rail_viscous the model would need"),
+        ({"none": 0.0, "unknown": 900.0}, "The model would need"),
+    ],
+)
+def test_a_tolerance_that_does_not_hold_is_named(weights: dict[str, float], start: str) -> None:
+    verdict = write_verdict(PROBLEM, _evidence("unknown", "tolerance", weights), (), GAP)
+    assert verdict.sentence.endswith(
+        f"{start} k_t 4.2 tolerances below its data sheet, which acts at the port 'tyre_radial'."
+    )
+    assert verdict.ports == ("tyre_radial",)
+
+
+@pytest.mark.parametrize("another_law", [False, True])
+def test_an_effect_by_another_law_is_said_to_be_one(another_law: bool) -> None:
+    weights = {"none": 0.0, "unknown": 100.0, "rail_stribeck": 900.0}
+    evidence = _evidence("rail_stribeck", "law", weights, another_law=another_law)
+    verdict = write_verdict(PROBLEM, replace(evidence, kind="effect"), (), GAP)
+    told = "Its law differs from that of the catalogue, which leaves 8 % of the misfit beyond the noise"
+    assert (told in verdict.sentence) is another_law
+    assert ("at the same port, 'rail'" in verdict.sentence) is another_law
+    assert verdict.another_law is another_law
+    assert verdict.effects == ("rail_stribeck",)
+
+
+@pytest.mark.parametrize(
+    ("odds", "told"),
+    [
+        (-3.0, ""),
+        (3.0, "The evidence that something is missing is 3.0 nat"),
+        (DEFAULTS.alarm_log_odds + 90.0, "too little to matter"),
+    ],
+)
+def test_nothing_missing_is_told_with_what_speaks_against_it(odds: float, told: str) -> None:
+    evidence = _evidence("none", "law", {"none": 0.0, "unknown": -20.0, "rail_viscous": odds})
+    sentence = write_verdict(PROBLEM, evidence, (), GAP).sentence
+    assert sentence.startswith("These data show nothing missing in the model")
+    assert told in sentence
+    assert sentence.count(".") >= 2 + bool(told)
+
+
+def test_what_could_not_be_judged_or_settled_is_a_warning() -> None:
+    evidence = _evidence(
+        "unknown",
+        "law",
+        {"none": 0.0, "unknown": 900.0},
+        lost=(LostHypothesis(Hypothesis(("gear_backlash",)), Status.MAX_ITERATIONS),),
+        refit_failed=True,
+    )
+    problem: Any = SimpleNamespace(base=_mode(0.0), constants=DEFAULTS)
+    told = " ".join(write_warnings(problem, evidence, _mode(0.0), GAP))
+    assert "The fit of gear_backlash found no periodic motion of the plant" in told
+    assert "not evaluated: stopped at the iteration limit" in told
+    assert "on twice as many mesh nodes failed" in told
+
+
+@pytest.mark.parametrize(("recalibrated", "warned"), [(0.0016, False), (0.003, False), (0.02, True)])
+def test_a_baseline_that_misses_by_what_no_law_explains_is_warned_of(
+    recalibrated: float, warned: bool
+) -> None:
+    evidence = _evidence("none", "law", {"none": 0.0, "unknown": -20.0})
+    gap = replace(GAP, recalibrated=recalibrated)
+    problem: Any = SimpleNamespace(base=_mode(0.0), constants=DEFAULTS)
+    told = write_warnings(problem, evidence, _mode(0.0), gap)
+    assert bool(told) is warned
+    assert all("follow no law at any port" in each for each in told)

@@ -1,0 +1,145 @@
+"""A sweep predicted from steady motions: against an oscillator that is swept, and against the rig in time."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from savgs_ident.diagnosis import sweep as module
+from savgs_ident.diagnosis.sweep import along, first_harmonic, frequencies_of, sweep_shrink
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.recordings.read import read_campaign
+from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording
+from savgs_ident.responses.dwells import estimate_response
+from savgs_ident.responses.harmonic_response import SweepResponse
+from savgs_ident.responses.sweeps import estimate_sweep_response
+from savgs_ident.validation.virtual_rig import sweep_readings
+
+from .conftest import rig_problem
+
+CHANNELS = ("sprung_accel", "susp_deflection")
+RATE, OWN, DAMPING = 0.05, 2.0 * np.pi * 2.3, 0.25
+STEADY = np.linspace(0.5, 3.0, 51)
+DWELLS = np.array([0.5, 0.9, 1.4, 1.8, 2.0, 2.2, 2.4, 2.7, 3.5, 4.5, 6.0])
+
+
+def _oscillator(frequency: np.ndarray) -> np.ndarray:
+    omega = 2.0 * np.pi * frequency
+    return OWN**2 / (OWN**2 - omega**2 + 2j * DAMPING * OWN * omega)
+
+
+def _swept(frequency: np.ndarray) -> np.ndarray:
+    """An oscillator that is swept from rest, against the phase of what drives it, at some frequencies [Hz]."""
+
+    def rates(t: float, x: np.ndarray) -> np.ndarray:
+        # In the frame of the phase: x = Re(X exp(i phase)), X complex.
+        omega = 2.0 * np.pi * RATE * t
+        slope = 2.0 * np.pi * RATE
+        amplitude, velocity = x
+        force = OWN**2 * (1.0 - amplitude) - 2.0 * DAMPING * OWN * (velocity + 1j * omega * amplitude)
+        return np.array([velocity, force - 2j * omega * velocity - (1j * slope - omega**2) * amplitude])
+
+    times = frequency / RATE
+    found = solve_ivp(
+        rates, (0.0, 60.0), np.array([1.0 + 0j, 0j]), t_eval=times, rtol=1e-9, atol=1e-11, max_step=0.05
+    )
+    return np.asarray(found.y[0])
+
+
+def test_peaks_come_late_in_a_sweep() -> None:
+    frequency = np.linspace(0.6, 2.9, 60)
+    swept = _swept(frequency)
+    told = along(STEADY, _oscillator(STEADY)[:, None], frequency, np.full(60, RATE))[:, 0]
+    steady = _oscillator(frequency)
+    assert np.abs(swept - steady).max() > 0.02
+    assert np.abs(swept - told).max() < 0.1 * np.abs(swept - steady).max()
+
+
+def _sweep(
+    low: float = 0.06, high: float = 2.95, channels: tuple[str, ...] = ("sprung_accel",)
+) -> SweepResponse:
+    frequency = np.linspace(low, high, 50)
+    count = len(channels)
+    return SweepResponse(
+        test="sweep",
+        channels=channels,
+        time=frequency / RATE,
+        frequency=frequency,
+        frequency_sd=np.zeros(50),
+        sweep_rate=np.full(50, RATE),
+        window_s=np.ones(50),
+        road_amplitude=np.full(50, 0.01375),
+        response=np.repeat(_oscillator(frequency)[:, None], count, axis=1),
+        response_sd=np.full((50, count), 0.01),
+        valid=np.ones((50, count), bool),
+    )
+
+
+def test_motions_are_found_at_the_dwells_in_range_and_between() -> None:
+    found = frequencies_of(DWELLS, _sweep())
+    assert found is not None
+    assert found.size == DWELLS.size
+    assert (np.diff(found) > 0.0).all()
+    assert set(DWELLS[DWELLS < 2.95]) <= set(found.tolist())
+    assert found[-1] == pytest.approx(2.95)
+    assert frequencies_of(DWELLS[4:], _sweep()) is None
+
+
+def test_where_all_dwells_lie_in_the_sweep_it_is_compared_as_far_as_they_reach() -> None:
+    found = frequencies_of(DWELLS[:7], _sweep())
+    assert found is not None
+    assert found.tolist() == DWELLS[:7].tolist()
+
+
+def test_the_gap_is_relative_to_the_response_and_leaves_out_what_no_dwell_reaches(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    plant = cast(Any, SimpleNamespace(excitation=SimpleNamespace(frequency=DWELLS), channels=CHANNELS))
+    sweep = _sweep()
+
+    def told(plant: Any, sweep: SweepResponse, frequencies: Any, terms: Any, values: Any) -> Any:
+        low = sweep.frequency < 0.5
+        return (
+            None
+            if terms
+            else np.where(low[:, None], 99.0, values["gain"] * np.repeat(sweep.response, 2, axis=1))
+        )
+
+    monkeypatch.setattr(module, "first_harmonic", told)
+    found = sweep_shrink(plant, sweep, [((), {"gain": 1.2}), ((), {"gain": 0.9}), (("lag",), {})])
+    assert found is not None
+    assert (found.before, found.recalibrated) == (pytest.approx(0.2), pytest.approx(0.1))
+    assert np.isnan(found.after)
+    seen = sweep.response[sweep.frequency >= 0.5]
+    assert found.floor == pytest.approx(0.01 * np.sqrt(2.0 * seen.size / np.sum(np.abs(seen) ** 2)))
+    assert np.isnan(sweep_shrink(plant, sweep, [((), {"gain": 1.0})] * 2).after)  # type: ignore[union-attr]
+    assert sweep_shrink(plant, _sweep(channels=("motor_current",)), [((), {"gain": 1.0})] * 2) is None
+
+
+@pytest.mark.slow
+def test_the_rig_swept_in_time_answers_as_predicted(rig: Rig, nominal_campaign) -> None:
+    """Within a hundredth of the response, where a dwell as slow would be off by more near the peak."""
+    campaign = read_campaign(nominal_campaign)
+    measured = estimate_response(campaign, 9)
+    plant, _ = rig_problem(measured, rig, dict(CATALOGUE))
+    model = build_model(rig, MODELS["simtr"])
+    times, readings = sweep_readings(model, plant.values({}), 60.0, 3.0, 500.0)
+    road = 0.01375 * np.sin(np.pi * RATE * times**2)
+    channels = {
+        name: Channel(name, CANONICAL_UNITS[name], times, values)
+        for name, values in zip(
+            ("road_height", "sprung_accel", "susp_deflection"), (road, *readings), strict=True
+        )
+    }
+    sweep = estimate_sweep_response(Recording("sweep", "sweep", None, channels))
+    frequencies = frequencies_of(np.asarray(plant.excitation.frequency), sweep)
+    assert frequencies is not None
+    told = first_harmonic(plant, sweep, frequencies, (), {})
+    assert told is not None
+    rows = (sweep.frequency > frequencies[0]) & (sweep.frequency < frequencies[-1])
+    for place, name in enumerate(("sprung_accel", "susp_deflection")):
+        seen = sweep.response[rows, sweep.channel(name)]
+        assert np.linalg.norm(seen - told[rows, place]) < 0.01 * np.linalg.norm(seen)

@@ -1,0 +1,323 @@
+"""The search for what is missing, on a plant that can be checked by hand."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import quad
+
+from savgs_ident.core.status import Status
+from savgs_ident.diagnosis.held_out import hold_out
+from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation, anywhere, localise
+from savgs_ident.diagnosis.result import Hypothesis
+from savgs_ident.diagnosis.score_test import cosine, score_terms
+from savgs_ident.diagnosis.search import Findings, excess, forward_selection, left_over, pairs_with
+from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
+from savgs_ident.inference.noise_scales import noise_scales
+from savgs_ident.inference.observations import Prediction, Term
+from savgs_ident.inference.prior import Linear
+
+from .toy import TERMS, ToyPlant, draw
+
+PLANT = ToyPlant()
+NOISE = 0.02
+
+
+def _silent(line: str) -> None:
+    del line
+
+
+def _found(values: dict[str, float], seed: int) -> tuple[Search, Findings]:
+    search = search_of(PLANT, draw(PLANT, values, NOISE, seed))
+    base = find_map(search, (), {}, None)
+    return search, forward_selection(search, base, TERMS, _silent)
+
+
+def _names(findings: Findings) -> tuple[str, ...]:
+    best = findings.best
+    return best.terms if best.evidence > findings.base.evidence + 5.0 else ()
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize(
+    ("values", "names"),
+    [
+        ({"a": 1.1}, ()),
+        ({"a": 0.8, "c": 0.3}, ("bend",)),
+        ({"a": 1.1, "s": 0.1, "w": 7.0}, ("ripple",)),
+        ({"a": 1.0, "t": -0.8}, ("twist",)),
+    ],
+)
+def test_what_is_missing_is_named(values: dict[str, float], names: tuple[str, ...], seed: int) -> None:
+    _, findings = _found(values, seed)
+    assert _names(findings) == names
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_two_that_are_missing_are_both_named(seed: int) -> None:
+    search, findings = _found({"a": 0.9, "c": 0.3, "s": 0.15, "w": 8.0}, seed)
+    assert set(_names(findings)) == {"bend", "ripple"}
+    assert left_over(search, findings.base, findings.best) < 0.02
+    assert excess(search, findings.best) < 0.5
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_small_one_beside_a_large_one_is_named_too(seed: int) -> None:
+    """Though the large one alone explains all but a thousandth of the excess."""
+    search, findings = _found({"a": 0.9, "c": 1.5, "s": 0.03, "w": 6.5}, seed)
+    large = next(mode for mode in findings.modes if mode.terms == ("bend",))
+    assert left_over(search, findings.base, large) < 0.002
+    assert set(_names(findings)) == {"bend", "ripple"}
+
+
+def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
+    inside = []
+    for seed in range(60):
+        search = search_of(PLANT, draw(PLANT, {"a": 1.1, "c": 0.2}, NOISE, seed))
+        mode = find_map(search, TERMS[:1], {}, None)
+        sd = np.sqrt(np.diag(mode.covariance()))
+        truth = np.array([each.at({"a": 1.1, "c": 0.2}[each.name]) for each in mode.coordinates])
+        inside.append(np.abs(mode.x - truth) < 1.96 * sd)
+    share = np.mean(inside)
+    assert 0.88 < share <= 1.0
+
+
+def test_evidence_is_the_integral_over_the_prior() -> None:
+    """Against quadrature, noise scale and discrepancy held where the mode has them."""
+    search = search_of(PLANT, draw(PLANT, {"a": 1.1}, NOISE, 3))
+    mode = find_map(search, (), {}, None)
+    spread = mode.noise_scales.spread
+    height = mode.noise_scales.value - 0.5 * float(mode.x @ mode.x)
+
+    def relative(x: float) -> float:
+        residual = search.data.measured - PLANT.rows({"a": 1.0 + 0.2 * x})
+        here = mode.noise_scales.value - 0.5 * np.sum(residual**2 / spread)
+        there = -0.5 * np.sum(search.residual(mode.prediction) ** 2 / spread)
+        return float(np.exp(here - there - 0.5 * x**2 - height))
+
+    middle, width = float(mode.x[0]), float(np.sqrt(mode.covariance()[0, 0]))
+    area, _ = quad(relative, middle - 8.0 * width, middle + 8.0 * width, epsabs=1e-12)
+    assert mode.evidence == pytest.approx(height + np.log(area / np.sqrt(2.0 * np.pi)), abs=1e-3)
+
+
+def test_the_score_is_the_drop_of_chi2_that_a_fit_brings() -> None:
+    search = search_of(PLANT, draw(PLANT, {"a": 1.1, "c": 0.01}, NOISE, 5))
+    base = find_map(search, (), {}, None)
+    bend = next(score for score in score_terms(search, base, list(TERMS)) if score.term.name == "bend")
+    weight = 1.0 / np.sqrt(base.noise_scales.spread)
+    slope, bent = 0.2 * PLANT.x * weight, 0.4 * PLANT.x**2 * weight
+    residual = search.residual(base.prediction) * weight
+    both = np.stack([slope, bent], axis=1)
+    prior = np.diag([1.0, 0.0])
+    step = np.linalg.solve(both.T @ both + prior, both.T @ residual - prior @ np.array([base.x[0], 0.0]))
+
+    def chi2(step: np.ndarray) -> float:
+        return float(np.sum((residual - both @ step) ** 2) + (base.x[0] + step[0]) ** 2)
+
+    assert bend.sigma == pytest.approx(np.sqrt(chi2(np.zeros(2)) - chi2(step)), rel=1e-3)
+
+
+def test_what_a_tolerance_explains_is_no_effect() -> None:
+    search = search_of(PLANT, draw(PLANT, {"a": 1.35}, NOISE, 6))
+    base = find_map(search, (), {}, None)
+    assert base.values["a"] == pytest.approx(1.35, abs=0.01)
+    assert max(score.sigma for score in score_terms(search, base, list(TERMS))) < 4.0
+
+
+def test_two_effects_that_do_the_same_look_alike() -> None:
+    search = search_of(PLANT, draw(PLANT, {"t": 0.2}, NOISE, 7))
+    base = find_map(search, (), {}, None)
+    scores = {score.term.name: score for score in score_terms(search, base, list(TERMS))}
+    bend, ripple, twist = (scores[name] for name in ("bend", "ripple", "twist"))
+    assert cosine(twist, twist) == pytest.approx(1.0)
+    assert abs(cosine(bend, twist)) < 1e-6
+    assert abs(cosine(ripple, twist)) > 0.5
+
+
+def test_left_out_tests_are_predicted_without_being_seen() -> None:
+    data = draw(PLANT, {"a": 1.1, "c": 0.3}, NOISE, 8)
+    search = search_of(PLANT, data)
+    mode: LaplaceFit = find_map(search, TERMS[:1], {}, None)
+    seen = hold_out(search, mode, TERMS[:1])
+    fold = data.test % DEFAULTS.held_out_folds == 0
+    measured = np.where(fold, data.measured + 5.0, data.measured)
+    spoilt = search_of(PLANT, type(data)(measured, data.variance, data.discrepancy_scale, data.test))
+    again = hold_out(spoilt, mode, TERMS[:1])
+    np.testing.assert_allclose(again.rows[fold], seen.rows[fold], atol=1e-6)
+    assert np.abs(again.rows[~fold] - seen.rows[~fold]).max() > 0.1
+    without = hold_out(search, find_map(search, (), {}, None), ())
+    assert seen.mean > without.mean + 1.0
+
+
+def test_a_gap_is_attributed_to_the_place_that_can_make_it() -> None:
+    search = search_of(PLANT, draw(PLANT, {"c": 0.3}, NOISE, 9))
+    base = find_map(search, (), {}, None)
+    x = PLANT.x
+    spring = InputLocation("spring", (Law(np.stack([x**2, x**4], axis=1)),), np.stack([x**2, x**3], axis=1))
+    sensor = InputLocation(
+        "sensor", (Law(np.stack([np.sin(6 * x), np.sin(9 * x)], axis=1)),), np.stack([x**3], axis=1)
+    )
+    first, second = localise(search, base, [sensor, spring])
+    assert (first.name, second.name) == ("spring", "sensor")
+    assert first.share > 0.98
+    assert first.free_input_share > 0.98
+    assert second.share < 0.05
+    np.testing.assert_allclose(first.held_out, x + 0.3 * x**2, atol=0.02)
+    assert first.evidence > base.evidence + 100.0 > second.evidence
+
+
+def test_excess_is_what_the_noise_does_not_explain() -> None:
+    data = draw(PLANT, {"a": 1.0}, NOISE, 10, miss=0.05)
+    search = search_of(PLANT, data)
+    base = find_map(search, (), {}, None)
+    assert excess(search, base) == pytest.approx((0.05 / NOISE) ** 2, rel=0.3)
+    assert noise_scales(data, search.residual(base.prediction)).discrepancy == pytest.approx(0.05, rel=0.25)
+
+
+def test_a_law_anywhere_is_as_probable_as_its_places_are_on_average() -> None:
+    places = [
+        Localisation(name, 0.0, 0.0, evidence, np.zeros(0), np.zeros((0, 0)))
+        for name, evidence in (("strut", -700.0), ("rail", -701.0), ("link", -900.0))
+    ]
+    assert anywhere(places) == pytest.approx(-700.0 + np.log((1.0 + np.exp(-1.0)) / 3.0))
+
+
+def test_a_law_that_explains_nothing_is_less_probable_than_no_law() -> None:
+    """By Occam's factor, which the widest prior over as many rows bounds."""
+    search = search_of(PLANT, draw(PLANT, {"a": 1.1}, NOISE, 3))
+    base = find_map(search, (), {}, None)
+    place = InputLocation("spring", (Law(PLANT.x[:, None] ** 2),), PLANT.x[:, None] ** 2)
+    (found,) = localise(search, base, [place])
+    assert (
+        base.evidence - np.log(max(DEFAULTS.law_widths) * PLANT.tests * PLANT.points)
+        < found.evidence
+        < base.evidence
+    )
+
+
+def test_what_leaves_more_than_a_baseline_that_left_nothing_explains_nothing() -> None:
+    search = search_of(PLANT, draw(PLANT, {"a": 1.1}, NOISE, 2))
+    base = find_map(search, (), {}, None)
+    off = replace(base, prediction=base.prediction._replace(rows=base.prediction.rows + 3.0 * NOISE))
+    perfect = replace(base, prediction=base.prediction._replace(rows=search.data.measured))
+    assert left_over(search, perfect, base) == 0.0
+    assert left_over(search, perfect, off) == np.inf
+
+
+class _Breaking(ToyPlant):
+    """What twists breaks the model; what ripples has a column that is no number."""
+
+    def predict(
+        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
+    ) -> Prediction:
+        found = super().predict(terms, values, names, warm_start)
+        return found._replace(status=Status.STALLED) if "twist" in terms else found
+
+    def columns(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
+    ) -> list[np.ndarray]:
+        found = super().columns(terms, values, warm_start, candidates)
+        return [
+            np.full_like(each, np.nan) if term.name == "ripple" else each
+            for each, term in zip(found, candidates, strict=True)
+        ]
+
+
+def test_a_fit_without_motion_is_lost_and_a_column_that_is_no_number_not_scored() -> None:
+    plant = _Breaking()
+    search = search_of(plant, draw(plant, {"a": 1.0, "t": -0.8}, NOISE, 1))
+    findings = forward_selection(search, find_map(search, (), {}, None), TERMS, _silent)
+    assert (Hypothesis(("twist",)), Status.STALLED) in findings.lost
+    assert all("twist" not in mode.terms and np.isfinite(mode.evidence) for mode in findings.modes)
+    ripple = next(each for each in findings.scores if each.term.name == "ripple")
+    assert (ripple.sigma, ripple.evidence, ripple.smallest) == (0.0, -np.inf, np.inf)
+    assert ripple.status is Status.NOT_FINITE
+
+
+class _Shapes(ToyPlant):
+    """A line and six shapes.
+
+    Two that are missing, two that look like both together, one like the line, one nearly like the first.
+    """
+
+    def rows(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+        x, v = self.x, dict.fromkeys("bdefgh", 0.0) | {"a": 1.0} | dict(values)
+        round_, wavy = x**2, np.sin(6.0 * x)
+        both = round_ + 0.3 * wavy
+        line = (v["a"] + v["g"]) * x
+        shapes = v["b"] * round_ + v["d"] * wavy + v["h"] * (round_ + 0.1 * wavy + 0.03 * np.cos(5.0 * x))
+        return (
+            line + shapes + v["e"] * (both + 0.3 * np.sin(13.0 * x)) + v["f"] * (both + 0.3 * np.cos(9.0 * x))
+        )
+
+
+SHAPES = tuple(
+    Term(name, "spring", (Linear(symbol, "N", 0.0, 0.4),))
+    for name, symbol in (("round", "b"), ("wavy", "d"), ("stand-in", "e"), ("other", "f"), ("line", "g"))
+)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_stand_in_for_two_does_not_keep_its_place_beside_one_of_them(seed: int) -> None:
+    """Alone it is nearest, so that the two are never tried together but by exchanging it."""
+    plant = _Shapes()
+    search = search_of(plant, draw(plant, {"a": 1.0, "b": 0.3, "d": 0.15}, NOISE, seed))
+    findings = forward_selection(search, find_map(search, (), {}, None), SHAPES, _silent)
+    assert {score.term.name for score in findings.scores[:2]} == {"stand-in", "other"}
+    assert set(findings.best.terms) == {"round", "wavy"}
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_strains_a_tolerance_is_tried_with_an_effect_that_spares_it(seed: int) -> None:
+    plant = _Shapes()
+    search = search_of(plant, draw(plant, {"a": 1.8, "b": 0.3}, NOISE, seed))
+    findings = forward_selection(search, find_map(search, (), {}, None), (SHAPES[0], SHAPES[4]), _silent)
+    assert set(findings.best.terms) == {"round", "line"}
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_double_of_one_of_two_is_not_named_in_its_place(seed: int) -> None:
+    """It is nearest as long as the other is not there, and beside it leaves no more than half the noise."""
+    plant = _Shapes()
+    search = search_of(plant, draw(plant, {"a": 1.0, "b": 0.5, "d": 0.15}, NOISE, seed))
+    double = Term("double", "spring", (Linear("h", "N", 0.0, 0.4),))
+    findings = forward_selection(
+        search,
+        find_map(search, (), {}, None),
+        (SHAPES[0], SHAPES[1], double),
+        _silent,
+        constants=replace(DEFAULTS, parents=1),
+    )
+    assert findings.scores[0].term.name == "double"
+    assert set(findings.best.terms) == {"round", "wavy"}
+
+
+def test_a_partner_at_the_place_of_what_is_left_is_found_beside_the_right_member() -> None:
+    plant = _Shapes()
+    search = search_of(plant, draw(plant, {"a": 1.0, "b": 0.3, "d": 0.15}, NOISE, 1))
+    base = find_map(search, (), {}, None)
+    by_name = {term.name: term for term in SHAPES}
+    alone = find_map(search, (by_name["round"],), {}, None)
+    wrong = find_map(search, (by_name["round"], by_name["other"]), {}, None)
+    assert left_over(search, base, wrong) > 0.0
+    found = pairs_with(search, Findings(base, (), (wrong, alone)), wrong, [by_name["wavy"]], SHAPES, _silent)
+    assert found.best.terms == ("round", "wavy")
+    assert left_over(search, base, found.best) < 0.01
+    assert {mode.terms for mode in found.modes} >= {wrong.terms, alone.terms}
+
+
+def test_a_place_that_may_follow_another_law_is_not_much_less_probable_for_it() -> None:
+    """It costs the logarithm of its share, not what all functions of the other would as parts of one law."""
+    search = search_of(PLANT, draw(PLANT, {"c": 0.3}, NOISE, 9))
+    base, x = find_map(search, (), {}, None), PLANT.x
+    law, other = Law(x[:, None] ** 2), Law(np.stack([np.sin(k * x) for k in range(4, 12)], axis=1), 3.0)
+    alone, either = (
+        localise(search, base, [InputLocation("spring", laws, law.columns)])[0]
+        for laws in ((law,), (law, other))
+    )
+    assert either.evidence == pytest.approx(alone.evidence - np.log(4.0), abs=1e-3)
+    np.testing.assert_allclose(either.held_out, alone.held_out, atol=1e-9)

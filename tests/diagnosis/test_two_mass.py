@@ -1,0 +1,120 @@
+"""A diagnosis of the linear two-mass plant: nothing but generic laws at the ports that it declares."""
+
+from collections.abc import Iterator, Mapping
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from savgs_ident.core.parameter import ParameterTable
+from savgs_ident.core.values import as_values
+from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
+from savgs_ident.diagnosis.localisation import localise
+from savgs_ident.diagnosis.location_hypotheses import input_locations
+from savgs_ident.diagnosis.search import forward_selection
+from savgs_ident.diagnosis.verdict import most_probable
+from savgs_ident.effects.generic import generic_effects
+from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
+from savgs_ident.plants.base import Excitation
+from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
+
+from ..relaxed import as_users_have_it
+
+FREQUENCY = np.array([0.7, 1.0, 1.4, 1.9, 2.6, 4.0, 8.0, 12.0])
+STROKE, ORDERS, NOISE = 0.01, 5, 1e-3
+TRUTH = {"m_s": 321.0, "k": 6.3e4, "c": 2.2e3, "k_t": 2.79e5}
+"""The plant that is recorded, not the one of the sheet."""
+
+CATALOGUE = generic_effects(TwoMass.ports)
+SETTINGS = PeriodicSettings(nodes=192, adaptations=1)
+CHANNELS = ("road_height", *(each.name for each in TwoMass.channels))
+
+LOCATIONS = {
+    "suspension",
+    "guide",
+    "tyre",
+    "road",
+    "inertia",
+    "sensor.sprung_accel",
+    "sensor.susp_deflection",
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _relaxed() -> Iterator[None]:
+    with as_users_have_it():
+        yield
+
+
+def _recorded(effect: str, numbers: Mapping[str, float]) -> HarmonicResponse:
+    """Dwells of the plant with an effect, and noise of a thousandth of the first harmonic."""
+    rng, there = np.random.default_rng(3), CATALOGUE[effect]
+    model = TwoMass() + there
+    own = ParameterTable(there.parameters).with_values(numbers)
+    road = np.zeros((FREQUENCY.size, 2), complex)
+    road[:, 1] = STROKE
+    excitation = Excitation(jnp.asarray(FREQUENCY), {"road_height": jnp.asarray(road)})
+    p = as_values((PARAMETERS.with_values(TRUTH) + own).as_dict())
+    solution = simulate_periodic(model, p, excitation, PeriodicSettings(nodes=384))
+    assert all(status.ok for status in solution.status())
+    seen = np.zeros((FREQUENCY.size, len(CHANNELS), ORDERS + 1), complex)
+    seen[:, 0, :2] = road
+    seen[:, 1:] = np.asarray(harmonics(model, p, solution, ORDERS))
+    sd = NOISE * np.abs(seen[:, :, 1])
+    noise = rng.standard_normal(seen.shape) + 1j * rng.standard_normal(seen.shape)
+    seen[:, 1:] += (sd[:, :, None] * noise)[:, 1:]
+    covariance = sd[:, :, None, None, None] ** 2 * np.ones(ORDERS + 1)[:, None, None] * np.eye(2)
+    flat = np.zeros(sd.shape)
+    return HarmonicResponse(
+        tests=tuple(f"dwell_{f}Hz" for f in FREQUENCY),
+        channels=CHANNELS,
+        frequency=FREQUENCY,
+        frequency_sd=np.zeros(FREQUENCY.size),
+        harmonics=seen,
+        covariance=covariance,
+        valid=np.ones(seen.shape, bool),
+        peak_to_peak=flat,
+        peak_to_peak_sd=flat,
+        noise_sd=sd,
+        periods=np.full(FREQUENCY.size, 20),
+    )
+
+
+def _recalibrated(measured: HarmonicResponse) -> tuple[DwellProblem, Search, LaplaceFit]:
+    problem, data = dwell_problem(
+        measured, TwoMass(), PARAMETERS, CATALOGUE, free=("k", "c"), orders=ORDERS, settings=SETTINGS
+    )
+    search = search_of(problem, data)
+    return problem, search, find_map(search, (), {}, problem.start({}))
+
+
+@pytest.mark.parametrize(
+    ("effect", "numbers", "location", "alike"),
+    [
+        ("guide_coulomb", {"guide_coulomb_coefficient": 0.02}, "guide", {"guide_coulomb", "guide_preload"}),
+        pytest.param(
+            "mount_compliance",
+            {"mount_compliance_compliance": 1e-6},
+            "suspension",
+            {"mount_compliance"},
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_a_generic_effect_is_found_and_located(
+    effect: str, numbers: dict[str, float], location: str, alike: set[str]
+) -> None:
+    """Where the load is constant, friction in proportion to it is the one that needs no load."""
+    problem, search, base = _recalibrated(_recorded(effect, numbers))
+    assert base.status.ok
+    p = problem.values(base.values)
+    places = input_locations(problem, (), p, base.prediction.warm_start)
+    assert {each.name for each in places} == LOCATIONS
+    found = localise(search, base, places)
+    assert max(found, key=lambda each: each.evidence).name == location
+    findings = forward_selection(search, base, problem.candidates, lambda line: None, problem.known)
+    assert set(most_probable(findings).terms) <= alike
+    assert len(most_probable(findings).terms) == 1

@@ -1,0 +1,286 @@
+"""What may be said, by the weight of hypotheses."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from savgs_ident.core.status import Status
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
+from savgs_ident.diagnosis.score_test import PriorConflict
+from savgs_ident.diagnosis.search import Findings, LostHypothesis
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.diagnosis.verdict import (
+    Change,
+    UnknownEvidence,
+    WeighedHypothesis,
+    alarm_odds,
+    broken_tolerance,
+    decide,
+    indistinguishable,
+    most_probable,
+    probabilities,
+    reweighed,
+    unknown_evidence,
+    weigh,
+    without_immaterial_members,
+)
+from savgs_ident.inference.find_map import LaplaceFit
+
+FITTED = cast(LaplaceFit, SimpleNamespace(noise_scales=SimpleNamespace(value=-np.inf)))
+
+
+def _hypothesis(name: str) -> Hypothesis:
+    special = {"none": NONE, "unknown": UNKNOWN}
+    return special.get(name) or Hypothesis(tuple(name.split(" + ")))
+
+
+def _weighed(weights: Mapping[str, float], scored: tuple[str, ...] = ()) -> list[WeighedHypothesis]:
+    found = []
+    for name, weight in weights.items():
+        mode: Any = None if name in (*scored, "unknown") else FITTED
+        found.append(WeighedHypothesis(_hypothesis(name), weight, mode))
+    return sorted(found, key=lambda each: -each.weight)
+
+
+@pytest.mark.parametrize(
+    ("weights", "change", "left", "kind", "name"),
+    [
+        (
+            {"none": 0.0, "unknown": -20.0, "rail_viscous": DEFAULTS.alarm_log_odds - 1.0},
+            0.05,
+            0.5,
+            "none",
+            "none",
+        ),
+        (
+            {"none": 0.0, "unknown": -20.0, "rail_viscous": DEFAULTS.alarm_log_odds + 1.0},
+            0.05,
+            0.0,
+            "effect",
+            "rail_viscous",
+        ),
+        (
+            {"none": 0.0, "unknown": -20.0, "rail_viscous": 500.0},
+            DEFAULTS.material_share / 2.0,
+            0.0,
+            "none",
+            "none",
+        ),
+        (
+            {"none": 0.0, "unknown": 400.0, "rail_viscous": 500.0},
+            0.05,
+            DEFAULTS.unexplained_share * 2.0,
+            "unknown",
+            "unknown",
+        ),
+        ({"none": 0.0, "unknown": 600.0, "rail_viscous": 500.0}, 0.05, 0.0, "unknown", "unknown"),
+        ({"none": 0.0, "unknown": 600.0}, 0.0, 1.0, "unknown", "unknown"),
+        ({"none": 0.0, "unknown": DEFAULTS.alarm_log_odds - 1.0}, 0.0, 1.0, "none", "none"),
+        (
+            {"none": 0.0, "unknown": 400.0, "rail_viscous": 500.0},
+            DEFAULTS.material_share / 2.0,
+            DEFAULTS.unexplained_share * 2.0,
+            "none",
+            "none",
+        ),
+        (
+            {"none": 0.0, "unknown": 5.0, "spring_rate": 90.0, "spring_rate + accel_lag": 800.0},
+            0.05,
+            0.0,
+            "several",
+            "spring_rate + accel_lag",
+        ),
+    ],
+)
+def test_kinds(weights: dict[str, float], change: float, left: float, kind: str, name: str) -> None:
+    found, chosen = decide(_weighed(weights), Change(change, change), left)
+    assert (found, chosen.hypothesis) == (kind, _hypothesis(name))
+
+
+def test_only_what_was_fitted_can_be_named() -> None:
+    weights = {"none": 0.0, "unknown": -1.0, "rail_viscous": 900.0, "spring_rate": 50.0}
+    _, chosen = decide(_weighed(weights, scored=("rail_viscous",)), Change(0.05, 0.05), 0.0)
+    assert chosen.hypothesis == Hypothesis(("spring_rate",))
+
+
+@pytest.mark.parametrize(
+    ("constants", "kind"),
+    [
+        (DEFAULTS, "effect"),
+        (replace(DEFAULTS, alarm_log_odds=12.0), "none"),
+        (replace(DEFAULTS, material_share=0.06, material_share_of_test=0.06), "none"),
+        (replace(DEFAULTS, unexplained_share=0.01), "unknown"),
+    ],
+)
+def test_a_verdict_follows_the_constants_that_it_is_given(constants: DecisionConstants, kind: str) -> None:
+    weighed = _weighed({"none": 0.0, "unknown": -20.0, "rail_viscous": 10.0})
+    assert decide(weighed, Change(0.05, 0.05), 0.02, constants)[0] == kind
+
+
+def test_probabilities_are_those_of_the_weights() -> None:
+    weighed = _weighed({"none": 0.0, "unknown": -800.0, "spring_rate": np.log(3.0)})
+    shares = probabilities(weighed)
+    assert shares.sum() == pytest.approx(1.0)
+    assert dict(zip((str(each.hypothesis) for each in weighed), shares, strict=True)) == pytest.approx(
+        {"spring_rate": 0.75, "none": 0.25, "unknown": 0.0}
+    )
+
+
+def test_rivals_are_single_effects_that_the_data_hardly_tell_apart() -> None:
+    weights = {
+        "none": 0.0,
+        "unknown": 99.0,
+        "mount_compliance": 100.0,
+        "gear_compliance": 100.0 - DEFAULTS.indistinguishable_log_odds + 1.0,
+        "spring_rate": 100.0 - DEFAULTS.indistinguishable_log_odds - 1.0,
+        "spring_rate + accel_lag": 99.0,
+    }
+    weighed = _weighed(weights)
+    chosen = next(each for each in weighed if each.hypothesis.effects == ("mount_compliance",))
+    assert indistinguishable(weighed, chosen) == ("gear_compliance",)
+
+
+def test_rivals_of_a_pair_stand_in_for_one_of_its_members() -> None:
+    weights = {
+        "none": 0.0,
+        "unknown": 99.0,
+        "mount_compliance + accel_gain": 100.0,
+        "mount_compliance + accel_tilt": 99.0,
+        "gear_compliance + accel_gain": 100.0 - DEFAULTS.indistinguishable_log_odds - 1.0,
+        "gear_compliance + accel_tilt": 99.5,
+        "accel_tilt": 98.0,
+    }
+    weighed = _weighed(weights)
+    assert indistinguishable(weighed, weighed[0]) == ("accel_tilt",)
+
+
+def test_what_only_the_prior_speaks_against_is_a_rival() -> None:
+    """A sensor that leans by 30 degrees reads as one of less gain does; nobody mounts one like that."""
+    effects = {"accel_gain": (100.0, -50.0), "accel_tilt": (60.0, -50.5), "accel_lag": (40.0, -120.0)}
+    weighed = [
+        WeighedHypothesis(
+            Hypothesis((name,)),
+            weight,
+            cast(LaplaceFit, SimpleNamespace(noise_scales=SimpleNamespace(value=fit))),
+        )
+        for name, (weight, fit) in effects.items()
+    ]
+    assert indistinguishable(weighed, weighed[0]) == ("accel_tilt",)
+
+
+def _mode(evidence: float, *terms: str) -> LaplaceFit:
+    return cast(LaplaceFit, SimpleNamespace(terms=terms, evidence=evidence))
+
+
+@pytest.mark.parametrize(
+    ("trace", "best"),
+    [
+        (Change(2.0 * DEFAULTS.material_share, 0.0), ("strut_friction", "rail_stribeck")),
+        (Change(0.0, 2.0 * DEFAULTS.material_share_of_test), ("strut_friction", "rail_stribeck")),
+        (Change(0.5 * DEFAULTS.material_share, 0.5 * DEFAULTS.material_share_of_test), ("strut_friction",)),
+    ],
+)
+def test_an_effect_that_does_too_little_to_matter_is_no_part_of_a_pair(
+    trace: Change, best: tuple[str, ...]
+) -> None:
+    alone = _mode(500.0, "strut_friction")
+    pair = _mode(800.0, "strut_friction", "rail_stribeck")
+    changes = {"strut_friction": Change(0.1, 0.2), "rail_stribeck": trace}
+    findings = without_immaterial_members(
+        Findings(_mode(0.0), (), (pair, alone)), lambda _, gone: changes[gone[0]]
+    )
+    assert findings.best.terms == best
+    assert alone in findings.modes
+
+
+def _score(name: str, evidence: float) -> Any:
+    return SimpleNamespace(term=SimpleNamespace(name=name), evidence=evidence)
+
+
+SCORES = tuple(_score(name, 400.0) for name in ("rail_stribeck", "rail_viscous", "strut_friction"))
+
+
+def test_a_pair_must_be_better_by_what_it_is_less_probable_beforehand() -> None:
+    """Three pairs share a tenth and three singles four: the same odds of four for each."""
+    alone, pair = _mode(500.0, "rail_stribeck"), _mode(501.0, "rail_stribeck", "rail_viscous")
+    assert most_probable(Findings(_mode(0.0), SCORES, (pair, alone))) is alone
+    better = _mode(502.0, "rail_stribeck", "rail_viscous")
+    assert most_probable(Findings(_mode(0.0), SCORES, (better, alone))) is better
+
+
+@pytest.mark.parametrize(
+    ("alone", "beside", "broken", "reason"),
+    [
+        (600.0, -np.inf, 500.0, "law"),
+        (400.0, 600.0, 500.0, "law beside effects"),
+        (400.0, 500.0, 595.0, "tolerance"),
+    ],
+)
+def test_what_speaks_for_something_unknown_is_known(
+    alone: float, beside: float, broken: float, reason: str
+) -> None:
+    findings = Findings(_mode(0.0), SCORES, (_mode(500.0, "rail_stribeck"),))
+    found = unknown_evidence(findings, alone, beside, broken)
+    assert found.reason == reason
+    assert 590.0 < found.weight < 600.0
+
+
+@pytest.mark.parametrize(("pair", "beside"), [(510.0, ()), (560.0, ("rail_stribeck", "strut_friction"))])
+def test_a_broken_tolerance_is_held_against_a_pair(pair: float, beside: tuple[str, ...]) -> None:
+    """The baseline gains 540 from it and the pair nothing: one is simpler than two, unless two explain more."""
+    modes = (_mode(pair, "rail_stribeck", "strut_friction"), _mode(300.0, "rail_stribeck"))
+    gains = {(): 540.0, modes[0].terms: 0.0, modes[1].terms: 1000.0}
+    found = broken_tolerance(
+        Findings(_mode(0.0), SCORES, modes),
+        lambda mode: PriorConflict(gains[mode.terms], "k_sd", 8.7),
+        {"k_sd": "strut"}.get,
+    )
+    assert found.beside == Hypothesis(beside)
+    assert found.port == "strut"
+    assert found.weight == pytest.approx(
+        np.log(0.01) + (540.0 + np.log(0.4) if not beside else 560.0 + np.log(0.1 / 3.0))
+    )
+
+
+def test_an_effect_whose_fit_was_lost_is_not_judged_by_its_score() -> None:
+    findings = Findings(
+        _mode(0.0),
+        SCORES,
+        (_mode(300.0, "rail_stribeck"),),
+        (LostHypothesis(Hypothesis(("rail_viscous",)), Status.STALLED),),
+    )
+    weighed = weigh(findings, UnknownEvidence(-5.0, "law"))
+    assert [str(each.hypothesis) for each in weighed] == [
+        "strut_friction",
+        "rail_stribeck",
+        "none",
+        "unknown",
+    ]
+    # What was only scored cannot be named, and does not speak for something missing either.
+    assert alarm_odds(weighed) == pytest.approx(300.0 - np.log(3.0))
+
+
+def test_a_law_is_a_trace_only_if_it_does_next_to_nothing_in_every_test() -> None:
+    assert Change(0.00035, 0.019).is_trace()
+    assert not Change(0.00045, 0.0).is_trace()
+    assert not Change(0.0, 0.021).is_trace()
+
+
+def test_a_hypothesis_that_is_weighed_anew_takes_its_place_and_leaves_the_others() -> None:
+    first = _weighed({"none": 0.0, "unknown": 600.0, "rail_viscous": 500.0, "spring_rate": 300.0})
+    mine: Any = SimpleNamespace(noise_scales=SimpleNamespace(value=-np.inf))
+    marked = [
+        replace(each, mode=mine) if each.hypothesis.effects == ("rail_viscous",) else each for each in first
+    ]
+    again = reweighed(marked, mine, 590.0, 400.0)
+    assert [(str(each.hypothesis), each.weight) for each in again] == [
+        ("rail_viscous", 590.0),
+        ("unknown", 400.0),
+        ("spring_rate", 300.0),
+        ("none", 0.0),
+    ]
+    assert decide(again, Change(0.05, 0.05), DEFAULTS.unexplained_share / 2.0)[0] == "effect"

@@ -1,0 +1,58 @@
+"""The normal approximation that makes a posterior round, on posteriors whose covariance is known."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from savgs_ident.inference.posterior_mode import LONGEST, nuisance_scale, parameter_scale
+from savgs_ident.inference.prior import Prior, Scales
+
+from .toy import FIXED_SCALES, FREE, straight_toy
+from .toy_reference import reference_of
+from .toy_surrogate import mode_of, normal_covariance
+
+
+def test_its_axes_make_up_the_covariance() -> None:
+    toy = straight_toy(scales=FIXED_SCALES, strength=300.0)
+    axes = parameter_scale(toy.likelihood, Prior(FREE), jnp.zeros(5), toy.slope)
+    np.testing.assert_allclose(axes @ axes.T, normal_covariance(toy), rtol=1e-4, atol=1e-10)
+    # The best told comes first: the shear counts on it.
+    assert np.all(np.diff(np.linalg.norm(axes, axis=0)) >= 0.0)
+
+
+def test_a_direction_without_data_keeps_its_prior_as_far_as_axes_reach() -> None:
+    toy = straight_toy(scales=FIXED_SCALES)
+    slope = toy.slope.copy()
+    slope[:, 1:] = 0.0
+    axes = parameter_scale(toy.likelihood, Prior(FREE), jnp.zeros(5), slope)
+    covariance = axes @ axes.T
+    # The logistic density has curvature 1/2 at its middle, and so a longer axis than there is; the normal one 1.
+    assert covariance[1, 1] == pytest.approx(LONGEST**2)
+    assert covariance[2, 2] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("miss", [0.0, 0.05])
+def test_scales_of_the_noise_and_of_the_discrepancy(miss: float) -> None:
+    """Their moments are those of brute force, for parameters that hardly matter to them."""
+    toy = straight_toy(miss=miss)
+    mode = mode_of(toy)
+    rows = toy.rows(mode[None, :-2])[0][0]
+    means, deviations = nuisance_scale(toy.likelihood, Prior(FREE), jnp.asarray(mode), rows)
+    reference = reference_of(toy, mode)
+    if miss:
+        assert means[1] == pytest.approx(reference.weight @ reference.points[:, 4], rel=0.1)
+        assert deviations[1] == pytest.approx(reference.sd(4), rel=0.25)
+    else:
+        # Both halves together: no mean, the root of the second moment.
+        assert means[1] == 0.0
+        assert deviations[1] == pytest.approx(
+            np.sqrt(reference.weight @ reference.points[:, 4] ** 2), rel=0.25
+        )
+    assert deviations[0] == pytest.approx(reference.sd(3), rel=0.15)
+
+
+def test_scales_without_data_keep_their_prior() -> None:
+    toy = straight_toy(scales=Scales(noise_trust=1e-9, discrepancy=1e-12))
+    means, deviations = nuisance_scale(toy.likelihood, Prior(FREE), jnp.zeros(5), toy.base)
+    np.testing.assert_allclose(means, 0.0, atol=1e-6)
+    np.testing.assert_allclose(deviations, 1.0, rtol=0.02)

@@ -1,0 +1,72 @@
+"""Walks leave the density that they walk on as it is, in both directions of time."""
+
+import jax
+import numpy as np
+import pytest
+from scipy import stats
+
+from savgs_ident.inference.samplers.emcee import pcn_steps
+
+from .hill import SkewHill, a_normal_hill
+
+WALKERS = 20_000
+
+
+@pytest.fixture(scope="module")
+def skew() -> SkewHill:
+    return SkewHill(2.0)
+
+
+@pytest.fixture(scope="module")
+def pairs(skew: SkewHill) -> tuple[np.ndarray, np.ndarray]:
+    """Where short walks begin, as independent draws, and where they end, (WALKERS, 2) both."""
+    start = skew.draws(np.random.default_rng(3), WALKERS)
+    return start, pcn_steps(skew, 5, start)[0]
+
+
+def test_long_walks_reach_mean_and_covariance_of_a_normal_density() -> None:
+    hill = a_normal_hill(3)
+    end, _, _ = pcn_steps(hill, 4, np.zeros((WALKERS, 3)), rounds=4)
+    covariance = np.linalg.inv(np.asarray(hill.precision))
+    sd = np.sqrt(np.diag(covariance))
+    assert np.abs((end.mean(axis=0) - np.asarray(hill.centre)) / sd).max() < 4.0 / np.sqrt(WALKERS)
+    # The variance of an element of a normal sample covariance is (c_ij^2 + c_ii c_jj) / N.
+    error = np.sqrt((covariance**2 + np.outer(sd**2, sd**2)) / WALKERS)
+    assert (np.abs(np.cov(end.T) - covariance) / error).max() < 4.0
+    # A density that is not the unit normal, or the last comparison says nothing.
+    assert np.abs(covariance - np.eye(3)).max() > 0.3
+
+
+def test_a_density_that_is_not_normal_stays(skew: SkewHill, pairs: tuple[np.ndarray, np.ndarray]) -> None:
+    start, end = pairs
+    gumbel = stats.loggamma(skew.index)
+    assert stats.kstest(end[:, 0], gumbel.cdf).pvalue > 1e-3
+    assert stats.kstest((end[:, 1] - end[:, 0]) / 0.6, "norm").pvalue > 1e-3
+    assert np.mean(np.any(start != end, axis=1)) > 0.99
+
+
+def test_walks_are_reversible(pairs: tuple[np.ndarray, np.ndarray]) -> None:
+    """E f(x) g(y) = E g(x) f(y) for draws x of the density and ends y of their walks."""
+    start, end = pairs
+
+    def shapes(t: np.ndarray) -> list[np.ndarray]:
+        return [t[:, 0], t[:, 1], np.exp(t[:, 0]), t[:, 0] * t[:, 1], (t[:, 1] > 0.0).astype(float)]
+
+    for i, (f_start, f_end) in enumerate(zip(shapes(start), shapes(end), strict=True)):
+        for g_start, g_end in list(zip(shapes(start), shapes(end), strict=True))[:i]:
+            difference = f_start * g_end - g_start * f_end
+            assert abs(difference.mean()) < 4.0 * difference.std() / np.sqrt(WALKERS)
+
+
+def test_the_densities_are_those_at_both_ends(skew: SkewHill) -> None:
+    start = skew.draws(np.random.default_rng(6), 10)
+    end, before, after = pcn_steps(skew, 7, start)
+    np.testing.assert_allclose(before, jax.vmap(skew)(start), rtol=1e-12)
+    np.testing.assert_allclose(after, jax.vmap(skew)(end), rtol=1e-12)
+
+
+def test_a_seed_gives_the_same_walk_and_another_one_another(skew: SkewHill) -> None:
+    start = skew.draws(np.random.default_rng(9), 10)
+    one, again, other = (pcn_steps(skew, seed, start)[0] for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one, again)
+    assert np.all(one != other)

@@ -1,0 +1,155 @@
+"""The public interface: complete, documented, loaded when it is used, and what the README does with it."""
+
+import inspect
+import json
+import re
+import subprocess
+import sys
+import time
+from dataclasses import is_dataclass
+from pathlib import Path
+
+import pytest
+
+import savgs_ident as si
+from savgs_ident.cli.app import app
+from savgs_ident.core import presentation
+from savgs_ident.fit.public import fit as fit_call
+from savgs_ident.report import presenters
+
+from .in_one_test import over
+from .relaxed import as_users_have_it
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+HEAVY = ("jax", "numpy", "scipy", "pandas", "matplotlib", "control", "casadi", "rich", "typer")
+
+CALLS = {
+    "demo": "demo",
+    "inspect": "inspect",
+    "fit": "fit",
+    "bode": "compare",
+    "simulate": "simulate",
+    "posterior": "sample",
+    "calibrate": "calibrate",
+    "diagnose": "diagnose",
+    "false-alarms": "false_alarms",
+    "blind": "blind",
+    "linearise": "linearise",
+    "design": "design",
+    "closed-loop": "close_loop",
+    "export": "export",
+    "campaign": "run_campaigns",
+}
+"""Each command and its public call."""
+
+
+@over("name", si.__all__)
+def test_every_public_name_is_there_and_documented(name: str) -> None:
+    assert inspect.getdoc(getattr(si, name))
+
+
+def test_what_is_listed_is_what_there_is() -> None:
+    assert len(set(si.__all__)) == len(si.__all__)
+    assert set(dir(si)) == {*si.__all__, "__version__"}
+    with pytest.raises(AttributeError, match="has no attribute 'magic'"):
+        si.magic  # noqa: B018
+
+
+def test_a_room_of_the_same_name_does_not_hide_a_call() -> None:
+    assert si.fit is fit_call
+    __import__("savgs_ident.simulate.periodic")
+    __import__("savgs_ident.export.registry")
+    assert callable(si.simulate)
+    assert callable(si.export)
+
+
+def test_every_command_is_a_public_call() -> None:
+    commands = {each.name or each.callback.__name__.replace("_", "-") for each in app.registered_commands}  # type: ignore[union-attr]
+    assert commands == set(CALLS)
+    assert set(CALLS.values()) <= set(si.__all__)
+
+
+@over("command", CALLS)
+def test_a_command_is_thin_and_makes_that_call(command: str) -> None:
+    text = (REPOSITORY / "savgs_ident/cli" / f"{command.replace('-', '_')}.py").read_text()
+    called = set(re.findall(r"\bsi\.([a-z_]+)\(", text))
+    assert CALLS[command] in called or (command == "demo" and "fit" in called)
+    assert called <= set(si.__all__)
+
+
+@over("name", [name for name in si.__all__ if inspect.isclass(getattr(si, name))])
+def test_every_result_has_a_presenter(name: str) -> None:
+    kind = getattr(si, name)
+    if issubclass(kind, presentation.Result) and kind is not presentation.Result:
+        assert is_dataclass(kind)
+        shown = getattr(presenters, kind.presenter)
+        for method in ("record", "text", "page", "doubts", "figures", "write"):
+            assert callable(getattr(shown, method))
+
+
+def test_importing_the_package_loads_nothing_and_takes_no_time() -> None:
+    code = (
+        "import sys, time\n"
+        "began = time.perf_counter()\n"
+        "import savgs_ident\n"
+        "took = time.perf_counter() - began\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules], took)\n"
+    )
+    times = []
+    for _ in range(3):
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        loaded, _, took = done.stdout.strip().rpartition(" ")
+        assert loaded == "[]"
+        times.append(float(took))
+    assert min(times) < 0.1
+
+
+def test_effects_are_added_by_name() -> None:
+    model = si.QuarterCar(si.load_rig()) + "rail_coulomb" + "tyre_friction"
+    assert model == si.load_model()
+    assert (model + "rail_coulomb").effects == model.effects
+    assert model.name == "simtr"
+    assert model.free() == ("mu_r", "mu_t", "ydot_Hth", "c_sd")
+    assert si.QuarterCar(si.load_rig()).free() == ("c_sd",)
+    with pytest.raises(si.InputError, match=r"there is no effect 'magic'\. Remedy: choose among"):
+        model + "magic"
+
+
+def test_a_result_shows_itself_and_writes_what_the_command_writes(tmp_path: Path) -> None:
+    began = time.perf_counter()
+    summary = si.inspect(si.load_campaign(si.default_campaign_path()), orders=3)
+    assert str(summary).startswith(f"{si.default_campaign_path()}: ")
+    assert summary._repr_html_().startswith("<pre")
+    text = summary.to_json(tmp_path / "inspect.json")
+    assert (tmp_path / "inspect.json").read_text() == text
+    assert json.loads(text)["tests"] == len(summary.campaign.recordings)
+    assert summary.doubts == ()
+    assert summary.figure_names == ("inspect",)
+    with pytest.raises(si.InputError, match="there is no report on a CampaignSummary"):
+        summary.to_html(tmp_path / "inspect.html")
+    with pytest.raises(si.InputError, match=r"there is no figure 'bode'\. Remedy: choose among: inspect"):
+        summary.figure("bode")
+    with pytest.raises(si.InputError, match="a CampaignSummary has no frequency response"):
+        si.plot_bode(summary)
+    assert time.perf_counter() - began < 60.0
+
+
+@pytest.mark.slow
+def test_the_ten_lines_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    section = (REPOSITORY / "README.md").read_text().split("## From Python")[1]
+    code = section.split("```python\n")[1].split("```")[0]
+    assert set(re.findall(r"^(?:import|from) .*$", code, re.M)) == {"import savgs_ident as si"}
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    with as_users_have_it():
+        exec(compile(code, "README.md", "exec"), names)
+    fit, gap, loop = names["fit"], names["gap"], names["loop"]
+    assert isinstance(fit, si.Fit)
+    assert isinstance(gap, si.Diagnosis)
+    assert isinstance(loop, si.LoopStudy)
+    assert fit.trusted
+    assert gap.verdict.kind == "none"
+    assert loop.stable
+    assert (tmp_path / "gap.html").stat().st_size > 100_000
+    assert json.loads(fit.to_json())["parameters"]["mu_r"]["value"] == fit["mu_r"].value
+    assert list((tmp_path / "out").iterdir())
