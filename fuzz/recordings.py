@@ -1,4 +1,4 @@
-"""Files of measurements: campaigns as CSV and MCAP, their channel map, a road, the positioner's recording."""
+"""Files of measurements: campaigns as CSV and MCAP, their channel map, a road, an axis' motion."""
 
 import gzip
 import json
@@ -13,8 +13,8 @@ from scipy.io import savemat
 from fuzz.cdr import IMU, JOINTS, imu_message, joint_message, number_message, text_message
 from fuzz.loader import Original
 from fuzz.mcap_files import Message, Topic, mcap_bytes
-from savgs_ident.diagnosis.positioner.recording import read_positioner
 from savgs_ident.plants.quarter_car.road import read_road
+from savgs_ident.recordings.axis_recording import read_axis
 from savgs_ident.recordings.channels import read_channel_map
 from savgs_ident.recordings.read import read_campaign
 
@@ -125,8 +125,8 @@ def road() -> Original:
     return Original((f"time [s],height [m]\n{rows}".encode(),))
 
 
-def positioner() -> Original:
-    """A recording of the positioner, packed and not."""
+def axis() -> Original:
+    """A recording of a servo axis, packed and not."""
     t = 1e-3 * np.arange(60)[:, None]
     arrays = {"t": t, "qm": 0.1 * np.sin(t), "qg": 0.1 * np.sin(t) + 1e-5, "vir": np.cos(t), "gtau": 35.0}
     contents = []
@@ -154,9 +154,9 @@ def read_road_file(path: Path) -> object:
     return found.profile
 
 
-def read_positioner_file(path: Path) -> object:
+def read_axis_file(path: Path) -> object:
     """The positioner's recording."""
-    return read_positioner(path)
+    return read_axis(path)
 
 
 def _schema() -> bytes:

@@ -18,7 +18,7 @@ _CDR_MCAP = (
     "recordings.mcap_records.McapRecords._unpack_chunk",
 )  # fmt: skip
 _MATLAB = tuple(
-    f"diagnosis.positioner.recording.{name}" for name in ("_unpacked", "_arrays", "_element", "_header")
+    f"recordings.axis_recording.{name}" for name in ("_unpacked", "_arrays", "_element", "_header")
 )
 _RESULT = ("campaigns.store.kept_result", "campaigns.store.Kept.record")
 _TRIALS = ("validation.trials.marks_in", "validation.trials.known_trials")
@@ -37,8 +37,8 @@ _LOADERS = (
            recordings.channel_map, recordings.read_map, ("recordings.channels.read_channel_map",)),
     Loader("road", "road as a table", "road.csv", Form.table, recordings.road, recordings.read_road_file,
            ("plants.quarter_car.road.read_road",)),
-    Loader("positioner", "recording of the positioner", "run.mat", Form.matlab, recordings.positioner,
-           recordings.read_positioner_file, _MATLAB),
+    Loader("axis", "recording of a servo axis", "run.mat", Form.matlab, recordings.axis,
+           recordings.read_axis_file, _MATLAB),
     Loader("rig", "drawing of a rig", "rig.toml", Form.toml, models.drawing, models.read_drawing,
            ("plants.quarter_car.rig._load",)),
     Loader("model", "identified model.toml, with its provenance", "model.toml", Form.toml, models.identified,

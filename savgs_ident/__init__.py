@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from savgs_ident.recordings.read import read_campaign as load_campaign
     from savgs_ident.recordings.recording import Campaign
     from savgs_ident.report.public import plot_bode
+    from savgs_ident.responses.driven_motion import DrivenMotion, load_motion
     from savgs_ident.responses.harmonic_response import HarmonicResponse
     from savgs_ident.responses.summary import CampaignSummary, inspect
     from savgs_ident.simulate.frequency_response import SimulatedResponse, SimulatedSweep
@@ -65,6 +66,7 @@ _PLACES = {
     "load_rig": "plants.quarter_car.model",
     "load_model": "plants.quarter_car.model",
     "load_campaign": "recordings.read:read_campaign",
+    "load_motion": "responses.driven_motion",
     "default_campaign_path": "plants.quarter_car.rig",
     "QuarterCar": "plants.quarter_car.model:RigModel",
     # Plants of your own.
@@ -119,6 +121,7 @@ _PLACES = {
     "Design": "control.design",
     "Diagnosis": "diagnosis.result",
     "DigitalController": "control.design",
+    "DrivenMotion": "responses.driven_motion",
     "Exported": "export.public",
     "Fit": "fit.result",
     "HarmonicResponse": "responses.harmonic_response",
@@ -148,6 +151,7 @@ __all__ = [
     "Design",
     "Diagnosis",
     "DigitalController",
+    "DrivenMotion",
     "Effect",
     "Exported",
     "Fit",
@@ -187,6 +191,7 @@ __all__ = [
     "linearise",
     "load_campaign",
     "load_model",
+    "load_motion",
     "load_rig",
     "plot_bode",
     "run_campaigns",

@@ -26,6 +26,13 @@ class ModelName(StrEnum):
     simtr = "simtr"
 
 
+class PlantName(StrEnum):
+    """The plants that can be named."""
+
+    quarter_car = "quarter_car"
+    axis = "axis"
+
+
 class SamplerName(StrEnum):
     """The samplers there are."""
 
@@ -175,6 +182,7 @@ def _is_format(word: str) -> bool:
 
 SEVERAL: dict[str, Callable[[str], bool]] = {
     "--free": _is_name,
+    "--with": _is_name,
     "--without": _is_name,
     "--frequency": _is_number,
     "--to": _is_format,

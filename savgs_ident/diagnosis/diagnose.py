@@ -11,7 +11,7 @@ The stages in order, each a whole record:
 """
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,11 +24,10 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.diagnosis.candidates import candidates_of, confusable_of, estimates_among, not_judgeable_of
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
-from savgs_ident.diagnosis.gap import Rows, cycle_positions, gap_map, shrinks
+from savgs_ident.diagnosis.gap import Rows, shrinks
 from savgs_ident.diagnosis.held_out import HeldOut, held_out_by_law, hold_out
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.location_hypotheses import force_port
-from savgs_ident.diagnosis.loops import force_loops
 from savgs_ident.diagnosis.model_selection import (
     DiagnosisEvidence,
     DiagnosisProblem,
@@ -37,19 +36,18 @@ from savgs_ident.diagnosis.model_selection import (
     select_model,
 )
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
-from savgs_ident.diagnosis.next_test import next_tests
+from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import (
     NONE,
     UNKNOWN,
     Diagnosis,
     DiagnosisSettings,
     ForceLoop,
+    FurtherShrink,
     Hypothesis,
     Learned,
     NextTest,
     PortShare,
-    Responses,
-    SweepShrink,
 )
 from savgs_ident.diagnosis.search import hypothesis_of
 from savgs_ident.diagnosis.sweep import ModelPoint, sweep_shrink
@@ -61,6 +59,9 @@ from savgs_ident.inference.observations import Data
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
+
+FurtherRecording = Callable[[AbstractProblem, Sequence[ModelPoint]], FurtherShrink | None]
+"""Predicts a recording that takes no part, by two or three models: as given, recalibrated, with what is named."""
 
 
 def baseline_problem(
@@ -76,18 +77,7 @@ def baseline_problem(
     ``models`` are sets of effects that such plants are known to have together. Raises :class:`InputError` for effects
     that do not exist, for effects of the baseline that are to be left out, and for a response that cannot be used.
     """
-    absent = sorted({*settings.without, *settings.baseline} - set(catalogue))
-    if absent:
-        raise InputError(
-            f"there is no effect '{absent[0]}'", remedy="choose among: " + ", ".join(sorted(catalogue))
-        )
-    needed = sorted({*settings.without} & {*settings.baseline})
-    if needed:
-        raise InputError(
-            f"the effect '{needed[0]}' is part of the baseline",
-            remedy="leave out effects that the baseline lacks",
-        )
-    offered = {name: each for name, each in catalogue.items() if name not in settings.without}
+    offered = offered_effects(catalogue, settings)
     return dwell_problem(
         measured,
         plant,
@@ -99,6 +89,25 @@ def baseline_problem(
         settings.periodic,
         models,
     )
+
+
+def offered_effects(catalogue: Mapping[str, Effect], settings: DiagnosisSettings) -> dict[str, Effect]:
+    """The catalogue less the effects that are left out.
+
+    Raises :class:`InputError` for effects that do not exist, and for effects of the baseline that are to be left out.
+    """
+    absent = sorted({*settings.without, *settings.baseline} - set(catalogue))
+    if absent:
+        raise InputError(
+            f"there is no effect '{absent[0]}'", remedy="choose among: " + ", ".join(sorted(catalogue))
+        )
+    needed = sorted({*settings.without} & {*settings.baseline})
+    if needed:
+        raise InputError(
+            f"the effect '{needed[0]}' is part of the baseline",
+            remedy="leave out effects that the baseline lacks",
+        )
+    return {name: each for name, each in catalogue.items() if name not in settings.without}
 
 
 def diagnose_dwells(
@@ -119,20 +128,48 @@ def diagnose_dwells(
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a plant whose baseline has no periodic motion.
     """
+
+    def predict_sweep(problem: AbstractProblem, points: Sequence[ModelPoint]) -> FurtherShrink | None:
+        assert sweep is not None
+        assert isinstance(problem, DwellProblem)
+        progress("predicting the sweep")
+        return sweep_shrink(problem, sweep, points)
+
+    further = None if sweep is None else predict_sweep
+    return diagnose_problem(plant, data, given, settings, values, progress, further, measured)
+
+
+def diagnose_problem(
+    plant: AbstractProblem,
+    data: Data,
+    given: Model,
+    settings: DiagnosisSettings,
+    values: Mapping[str, float],
+    progress: Progress = no_progress,
+    further: FurtherRecording | None = None,
+    measured: HarmonicResponse | None = None,
+) -> Diagnosis:
+    """Diagnose the gap between a baseline and its data, of whatever kind these are.
+
+    ``further`` predicts a recording that takes no part; ``measured``, the dwells that the data come from, is handed
+    on to the result like ``given``.
+
+    Look at ``converged`` of the result. Raises :class:`InputError` for a baseline that has no solution.
+    """
     # Threads of the linear algebra only get in each other's way: its matrices are small, and there are many.
     with threadpool_limits(1, "blas"):
-        return _diagnose(plant, data, measured, given, settings, values, progress, sweep)
+        return _diagnose(plant, data, measured, given, settings, values, progress, further)
 
 
 def _diagnose(
-    plant: DwellProblem,
+    plant: AbstractProblem,
     data: Data,
-    measured: HarmonicResponse,
+    measured: HarmonicResponse | None,
     given: Model,
     settings: DiagnosisSettings,
     values: Mapping[str, float],
     progress: Progress,
-    sweep: SweepResponse | None,
+    further: FurtherRecording | None,
 ) -> Diagnosis:
     began = time.perf_counter()
     problem = recalibrate(plant, data, values, progress, settings.constants)
@@ -144,9 +181,9 @@ def _diagnose(
     )
     law = _learned(refitted, evidence, held, progress) if evidence.kind == "unknown" else None
     chosen = [] if evidence.chosen.mode is None else [evidence.chosen.mode]
-    last, swept = side_by_side(
+    last, apart = side_by_side(
         lambda: _held_out(refitted, chosen, progress),
-        lambda: _predict_sweep(refitted, evidence, law, values, sweep, progress),
+        lambda: _predict_further(refitted, evidence, law, values, further),
     )
     linear = held_out_by_law(refitted.search, evidence.localisation.held_out)
     held = {**held, **last, UNKNOWN: linear if law is None else law.held}
@@ -173,19 +210,19 @@ def _diagnose(
         ports=tuple(
             PortShare(each.name, each.share, each.free_input_share) for each in evidence.localisations
         ),
-        map=gap_map(plant, data, base.prediction.rows),
-        cycle=cycle_positions(plant, data, base.prediction.rows),
+        map=plant.gap_map(data, base.prediction.rows),
+        cycle=plant.cycle_positions(data, base.prediction.rows),
         candidates=candidates_of(
             evidence.findings, evidence.weighed, held, refitted.search, problem.constants
         ),
         shrink=together,
         by_channel=by_channel,
-        sweep=swept,
+        further=apart,
         next_tests=tests,
         not_judgeable=not_judgeable_of(evidence.findings, problem.constants),
         confusable=confusable_of(evidence.findings, problem.constants),
         loops=_loops(refitted, model, evidence, verdict.ports, progress),
-        responses=_responses(plant, problem.given, base.prediction.rows, model.rows),
+        responses=plant.responses(data, problem.given, base.prediction.rows, model.rows),
         measured=measured,
         converged=all(each.status.ok for each in _decisive_fits(problem, selected, evidence, law)),
         warnings=write_warnings(refitted, evidence, model.fit, together),
@@ -269,33 +306,27 @@ def _offered(law: LearnedLaw) -> Learned:
     return Learned(law.name, law.port.location, estimates_among(law.mode, coefficients), law.values)
 
 
-def _predict_sweep(
+def _predict_further(
     problem: DiagnosisProblem,
     evidence: DiagnosisEvidence,
     law: LearnedLaw | None,
     values: Mapping[str, float],
-    sweep: SweepResponse | None,
-    progress: Progress,
-) -> SweepShrink | None:
-    """The gap of a recorded sweep: of the baseline as given, recalibrated, and with what is named.
+    further: FurtherRecording | None,
+) -> FurtherShrink | None:
+    """The gap of a further recording: of the baseline as given, recalibrated, and with what is named.
 
     Nothing comes after where a law is known to first order alone: no model can be solved with that.
     """
-    if sweep is None:
+    if further is None:
         return None
-    progress("predicting the sweep")
     base = problem.base
     points: list[ModelPoint] = [((), values), ((), base.values)]
     if law is not None:
-        return sweep_shrink(law.problem, sweep, [*points, ((law.name,), law.values)])
+        return further(law.problem, [*points, ((law.name,), law.values)])
     if evidence.kind == "unknown":
-        return sweep_shrink(problem.plant, sweep, points)
+        return further(problem.plant, points)
     fit = evidence.chosen.mode or base
-    return sweep_shrink(problem.plant, sweep, [*points, (fit.terms, fit.values)])
-
-
-def _responses(plant: DwellProblem, *rows: NDArray[np.float64]) -> Responses:
-    return Responses(*(plant.likelihood.harmonics(each[None], plant.shape)[0] for each in rows))
+    return further(problem.plant, [*points, (fit.terms, fit.values)])
 
 
 def _loops(
@@ -312,8 +343,8 @@ def _loops(
     progress("inferring the signal at the port")
     named = model.hypothesis.effects
     here = next((problem.plant.catalogue[name] for name in named if problem.location(name) == ports[0]), None)
-    p = problem.plant.values(problem.base.values | model.fit.values)
-    return force_loops(problem.plant, p, problem.base.prediction.warm_start, found, here)
+    values = problem.base.values | model.fit.values
+    return problem.plant.loops(values, problem.base.prediction.warm_start, found, here)
 
 
 def _next_tests(
@@ -330,4 +361,4 @@ def _next_tests(
         return ()
     rival = max(rivals, key=lambda each: each.evidence)
     progress(f"looking for a test that separates {chosen.terms[0]} from {rival.terms[0]}")
-    return next_tests(problem.search, problem.plant, chosen, rival)
+    return problem.plant.next_tests(problem.search, chosen, rival)

@@ -1,14 +1,8 @@
 """The problem of a diagnosis on dwells: a plant, what may be missing in it, what drives it and what was measured.
 
+A problem is made of a response, and so are the data:
+
     problem, data = dwell_problem(measured, TwoMass(), PARAMETERS, generic_effects(TwoMass.ports), free=("k", "c"))
-
-One model has every effect without states at its null: such an effect costs next to nothing there, so that one
-compiled program serves the baseline and all of them; only an effect with states of its own asks for another.
-Parameters that are not given are those of the plant, effects at their null.
-
-Parameters of the plant have the coordinates and priors that they have in a fit
-(:mod:`savgs_ident.inference.prior`). The amplitude of an effect begins at its null, two typical sizes wide; what
-shapes an effect is log-normal about its typical value, to a factor of two.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -24,17 +18,23 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.parameter import Parameter, ParameterTable, merge_parameters
+from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import joint_status
-from savgs_ident.core.transforms import known_to_tolerance
-from savgs_ident.core.values import Values, as_values
-from savgs_ident.diagnosis.effect_sensitivities import columns_with_states, rehearse
-from savgs_ident.effects.base import AbstractFrictionLimitLaw
+from savgs_ident.core.values import Values
+from savgs_ident.diagnosis.effect_sensitivities import columns_with_states, node_loads, rehearse
+from savgs_ident.diagnosis.gap import cycle_positions, gap_map
+from savgs_ident.diagnosis.localisation import InputLocation, Localisation
+from savgs_ident.diagnosis.location_hypotheses import input_locations
+from savgs_ident.diagnosis.loops import force_loops
+from savgs_ident.diagnosis.next_test import next_tests
+from savgs_ident.diagnosis.problem import AbstractProblem
+from savgs_ident.diagnosis.result import CyclePosition, ForceLoop, MapCell, NextTest, Responses
+from savgs_ident.effects.base import PortSignals
 from savgs_ident.effects.effect import Effect
+from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of
 from savgs_ident.inference.observations import Data, Prediction, Term
-from savgs_ident.inference.prior import Coordinates, Linear, Logarithmic, sheet_coordinate
-from savgs_ident.inference.problem import harmonic_target, used_parameters
+from savgs_ident.inference.problem import harmonic_target
 from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.collocation import Trajectory
@@ -79,29 +79,6 @@ def _directional_rows(
     return (jax.lax.map(lambda direction: likelihood.rows(along(direction)), directions),)
 
 
-TYPICAL = 2.0
-"""Width of an amplitude's prior in typical sizes."""
-
-SHAPE = 0.7
-"""Width of the logarithm of what shapes an effect."""
-
-
-def term_of(effect: Effect) -> Term:
-    """An effect as a candidate; what it shares with the plant's sheet (a tolerance) is not its own."""
-    own = [each for each in effect.parameters if each.tolerance == 0.0]
-    amplitudes = tuple(_amplitude(each, effect.null[each.name]) for each in own if each.name in effect.null)
-    shapes = tuple(_shape(each) for each in own if each.name not in effect.null)
-    return Term(effect.name, effect.port.location, amplitudes, shapes, effect.tried)
-
-
-def _amplitude(each: Parameter, null: float) -> Linear:
-    return Linear(each.name, each.unit, null, TYPICAL * abs(each.value - null), each.lower, each.upper)
-
-
-def _shape(each: Parameter) -> Logarithmic:
-    return Logarithmic(each.name, each.unit, each.value, SHAPE, each.lower, each.upper)
-
-
 WIDTH = 52
 """Directions that are solved for at a time: a program for each number would have to be compiled."""
 
@@ -110,45 +87,28 @@ ITERATIONS = 25
 
 
 @dataclass(frozen=True)
-class DwellProblem:
-    """A plant, the effects that it may have, and what drives it.
+class DwellProblem(AbstractProblem):
+    """A plant in dwells.
 
     Attributes:
-        plant: the plant without any of the effects.
-        parameters: its parameters as known before the data.
-        catalogue: all effects by name.
-        baseline: names of those that the baseline has.
-        free: names of the parameters that the baseline identifies.
         excitation: the plant's inputs in the dwells.
         likelihood: what is compared, as rows.
         shape: tests, channels and orders of the harmonics that the likelihood takes.
         settings: how finely to solve.
-        models: sets of effects that such plants are known to have together.
         corrections: by terms, what is added to the rows [unit of each], (m,), for the motions that are
             found on finitely many nodes.
     """
 
-    plant: AbstractPlant
-    parameters: ParameterTable
-    catalogue: Mapping[str, Effect]
-    baseline: tuple[str, ...]
-    free: tuple[str, ...]
-    excitation: Excitation
-    likelihood: Likelihood
-    shape: tuple[int, int, int]
-    settings: PeriodicSettings
-    models: tuple[tuple[str, ...], ...] = ()
-    corrections: Mapping[tuple[str, ...], NDArray[np.float64]] = field(default_factory=dict)
+    excitation: Excitation = field(kw_only=True)
+    likelihood: Likelihood = field(kw_only=True)
+    shape: tuple[int, int, int] = field(kw_only=True)
+    settings: PeriodicSettings = field(kw_only=True)
+    corrections: Mapping[tuple[str, ...], NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
 
     @cached_property
     def layout(self) -> Layout:
         """How nodes share arrays."""
         return layout_for(np.asarray(self.excitation.frequency), self.settings.nodes, self.settings.slow)
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Names of the plant's channels."""
-        return tuple(each.name for each in self.plant.channels)
 
     @property
     def orders(self) -> int:
@@ -161,89 +121,6 @@ class DwellProblem:
         tests, channels, orders = self.shape
         every = np.broadcast_to(np.arange(channels)[None, :, None, None], (tests, channels, orders, 2))
         return np.asarray(every.ravel()[self.likelihood.place])
-
-    @cached_property
-    def table(self) -> ParameterTable:
-        """All parameters, effects that the baseline does not have at their null."""
-        brought = (ParameterTable(effect.parameters) for effect in self.catalogue.values())
-        table = merge_parameters(self.parameters, *brought)
-        absent = [each for name, each in self.catalogue.items() if name not in self.baseline]
-        return table.with_values({name: null for each in absent for name, null in each.null.items()})
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Names of all parameters, sorted."""
-        return tuple(sorted(self.table))
-
-    @cached_property
-    def nuisances(self) -> Coordinates:
-        """The free parameters of the baseline, then those known to a tolerance that matter.
-
-        What is identified and known to a tolerance all the same, as the damping is, is held against it.
-        """
-        used = used_parameters(self.model(()), self.table)
-        known = [name for name in known_to_tolerance(self.table, self.free) if name in used]
-        return tuple(sheet_coordinate(self.table[name]) for name in (*self.free, *known))
-
-    @cached_property
-    def candidates(self) -> tuple[Term, ...]:
-        """All effects that the baseline does not have."""
-        terms = [term_of(effect) for name, effect in self.catalogue.items() if name not in self.baseline]
-        return tuple(term for term in terms if term.amplitudes)
-
-    @property
-    def known(self) -> tuple[tuple[str, ...], ...]:
-        """What the known sets of effects have beyond the baseline, if more than one effect."""
-        mine, can = set(self.baseline), {term.name for term in self.candidates}
-        beyond = (
-            tuple(name for name in each if name not in mine) for each in self.models if mine < set(each)
-        )
-        return tuple(each for each in beyond if len(each) > 1 and can >= set(each))
-
-    def model(self, terms: Sequence[str]) -> AbstractPlant:
-        """The baseline with ``terms``.
-
-        With all effects without states too, at their null, unless a term with states asks for a program of its own
-        anyway: then the smaller model is the sooner compiled. The anchor of a contact is a state of all models or of
-        none.
-        """
-        special = [name for name in terms if self.catalogue[name].states and name not in self.baseline]
-        wanted = {
-            name
-            for name, effect in self.catalogue.items()
-            if name in self.baseline or (not effect.states and (not special or name in terms))
-        }
-        for limits in self._friction_limits.values():
-            if not wanted.intersection(limits):
-                wanted.add(limits[0])
-        model = self.plant
-        for name, effect in self.catalogue.items():
-            if name in wanted:
-                model = model + effect
-        for name in special:
-            model = model + self.catalogue[name]
-        return model
-
-    @cached_property
-    def _friction_limits(self) -> Mapping[str, list[str]]:
-        """Names of the effects that load the bristle of a contact, by the name of its port."""
-        found: dict[str, list[str]] = {}
-        for name, effect in self.catalogue.items():
-            if isinstance(effect.law, AbstractFrictionLimitLaw):
-                found.setdefault(effect.port.name, []).append(name)
-        return found
-
-    def complete(self, terms: Sequence[str]) -> AbstractPlant:
-        """The baseline with ``terms`` and all effects without states, those at their null."""
-        model = self.model(())
-        for name in terms:
-            if self.catalogue[name].states and name not in self.baseline:
-                model = model + self.catalogue[name]
-        return model
-
-    def values(self, given: Mapping[str, float]) -> Values:
-        """All parameters, SI, with the given ones."""
-        return as_values(self.table.as_dict() | dict(given))
 
     def start(self, values: Mapping[str, float]) -> PeriodicSolution:
         """Periodic motions of the baseline from a cold start at ``values`` [SI].
@@ -313,6 +190,10 @@ class DwellProblem:
         )
         return replace(self, corrections={**self.corrections, terms: 4.0 / 3.0 * (more - less)})
 
+    def uncorrected(self) -> "DwellProblem":
+        """The problem with rows as they are on finitely many nodes."""
+        return replace(self, corrections={})
+
     def columns(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
@@ -361,6 +242,45 @@ class DwellProblem:
             )
             parts.append(np.asarray(slopes)[: len(some)])
         return np.concatenate(parts).T
+
+    def locations(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
+    ) -> list[InputLocation]:
+        """What an unknown signal at each location could do to the harmonics, about a motion with ``terms``."""
+        return input_locations(self, terms, self.values(values), warm_start)
+
+    def port_signals(
+        self, values: Mapping[str, float], warm_start: PeriodicSolution
+    ) -> Mapping[str, PortSignals]:
+        """What laws see at the force ports at the nodes of the baseline's motions."""
+        return node_loads(self.model(()), self.values(values), warm_start)[0]
+
+    def gap_map(self, data: Data, rows: NDArray[np.float64]) -> tuple[MapCell, ...]:
+        """The gap of every harmonic that is compared."""
+        return gap_map(self, data, rows)
+
+    def cycle_positions(self, data: Data, rows: NDArray[np.float64]) -> tuple[CyclePosition, ...]:
+        """The gap of the waveforms at reversal, in mid-stroke and between."""
+        return cycle_positions(self, data, rows)
+
+    def loops(
+        self,
+        values: Mapping[str, float],
+        warm_start: PeriodicSolution,
+        found: Localisation,
+        effect: Effect | None,
+    ) -> tuple[ForceLoop, ...]:
+        """Loops at a location for a slow, a middle and a fast test."""
+        return force_loops(self, self.values(values), warm_start, found, effect)
+
+    def next_tests(self, search: Search, one: LaplaceFit, other: LaplaceFit) -> tuple[NextTest, ...]:
+        """Dwells under other conditions that separate two hypotheses best."""
+        return next_tests(search, self, one, other)
+
+    def responses(self, data: Data, *rows: NDArray[np.float64]) -> Responses:
+        """The harmonics of three models."""
+        del data
+        return Responses(*(self.likelihood.harmonics(each[None], self.shape)[0] for each in rows))
 
     def _fitting(self, model: AbstractPlant, warm_start: PeriodicSolution) -> Trajectory:
         """The motions of ``warm_start`` with as many states as ``model`` has, further ones at rest."""

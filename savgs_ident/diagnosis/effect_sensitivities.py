@@ -23,6 +23,7 @@ from savgs_ident.effects.composition import contact_bristle, nothing_imposed
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.plants.base import AbstractPlant, AtPorts
+from savgs_ident.simulate.along_motion import FORWARD, NEWTON_STEPS
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.program_cache import placed, stored
 from savgs_ident.simulate.sensitivity import answers, ports_at_nodes
@@ -32,12 +33,6 @@ SAMPLES = 384
 
 PERIODS = 16
 """Periods after which they repeat: what rang at the start has died away even in a slow, slightly damped frame."""
-
-FORWARD = 0.52
-"""Weight of the far end of a step for states that do not slip: hardly any damping, and none that rings on."""
-
-NEWTON_STEPS = 4
-"""Steps to the state of the next instant."""
 
 BATCH = 32
 """Signals that are imposed at a time."""

@@ -4,13 +4,16 @@ Where in the response the gap lies: by channel, frequency and order, and by posi
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.result import CyclePosition, MapCell, Shrink
 from savgs_ident.inference.observations import Data
+
+if TYPE_CHECKING:
+    from savgs_ident.diagnosis.dwell_problem import DwellProblem
 
 RESAMPLES = 500
 """Campaigns drawn by resampling the tests."""
@@ -97,7 +100,7 @@ DIFFERENTIATIONS = {"m/s^2": -1, "rad/s^2": -1, "m/s": 0, "rad/s": 0, "m": 1, "r
 """How many times a channel of a unit is differentiated to be a velocity."""
 
 
-def gap_map(problem: DwellProblem, data: Data, rows: NDArray[np.float64]) -> tuple[MapCell, ...]:
+def gap_map(problem: "DwellProblem", data: Data, rows: NDArray[np.float64]) -> tuple[MapCell, ...]:
     """The gap of every harmonic that is compared.
 
     ``rows`` (m,) are those that a model predicts [unit of the reading].
@@ -120,7 +123,7 @@ def gap_map(problem: DwellProblem, data: Data, rows: NDArray[np.float64]) -> tup
 
 
 def cycle_positions(
-    problem: DwellProblem, data: Data, rows: NDArray[np.float64]
+    problem: "DwellProblem", data: Data, rows: NDArray[np.float64]
 ) -> tuple[CyclePosition, ...]:
     """The gap of the waveforms at reversal, in mid-stroke and between, by channel; every test counts alike.
 

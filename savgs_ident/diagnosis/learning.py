@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import ParameterTable, merge_parameters
-from savgs_ident.diagnosis.dwell_problem import DwellProblem
-from savgs_ident.diagnosis.effect_sensitivities import node_loads
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out
 from savgs_ident.diagnosis.localisation import widths_of
+from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.effects.base import Port
 from savgs_ident.effects.learned import SMALLEST, coefficients_at, learned_effect
 from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
@@ -44,7 +43,7 @@ class LearnedLaw:
 
     name: str
     port: Port
-    problem: DwellProblem
+    problem: AbstractProblem
     mode: LaplaceFit
     held: HeldOut
     spans: dict[str, float]
@@ -55,7 +54,7 @@ class LearnedLaw:
         return self.mode.values | self.spans
 
 
-def learn(problem: DwellProblem, data: Data, base: LaplaceFit, port: Port) -> LearnedLaw:
+def learn(problem: AbstractProblem, data: Data, base: LaplaceFit, port: Port) -> LearnedLaw:
     """The law at a force ``port``; ``base`` is the recalibrated baseline.
 
     Look at the status of its mode.
@@ -68,8 +67,7 @@ def learn(problem: DwellProblem, data: Data, base: LaplaceFit, port: Port) -> Le
         problem,
         parameters=merge_parameters(problem.parameters, table),
         catalogue={**there, effect.name: effect},
-        corrections={},
-    )
+    ).uncorrected()
     search = search_of(mine, data)
     names = coefficients_at(port)
     slopes = mine.predict((effect.name,), base.values, names, base.prediction.warm_start).slopes
@@ -82,9 +80,9 @@ def learn(problem: DwellProblem, data: Data, base: LaplaceFit, port: Port) -> Le
     return LearnedLaw(effect.name, port, mine, mode, hold_out(search, mode, (term,)), spans)
 
 
-def _spans(problem: DwellProblem, base: LaplaceFit, port: Port) -> dict[str, float]:
+def _spans(problem: AbstractProblem, base: LaplaceFit, port: Port) -> dict[str, float]:
     """The middle of the displacement, its stroke, the largest velocity and load at a port [units of the port]."""
-    ports, _ = node_loads(problem.model(()), problem.values(base.values), base.prediction.warm_start)
+    ports = problem.port_signals(base.values, base.prediction.warm_start)
     displacement, velocity, load = (np.asarray(each) for each in ports[port.name][:3])
     middle = float(displacement.mean())
     spans = {

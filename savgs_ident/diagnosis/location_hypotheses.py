@@ -18,14 +18,13 @@ so can that of the location beside it; so every set also has its simple laws, of
 """
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.values import Values
-from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.effect_sensitivities import impose, node_loads
 from savgs_ident.diagnosis.localisation import InputLocation, Law
 from savgs_ident.diagnosis.thresholds import DEFAULTS
@@ -35,6 +34,9 @@ from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.program_cache import placed
+
+if TYPE_CHECKING:
+    from savgs_ident.diagnosis.dwell_problem import DwellProblem
 
 Signal = NDArray[np.float64]
 
@@ -76,6 +78,9 @@ INSTANTS = 256
 """Instants of a period at which a law of a sensor's reading is evaluated."""
 
 _FRICTION, _DAMPING, _STIFFNESS = (OF_THE_MOTION.index(words) for words in ("tanh(v/0.01)", "v", "x"))
+PLAIN_FORCES = (_FRICTION, _DAMPING, _STIFFNESS)
+"""Indices of the plain ones among the :func:`motion_functions`: a friction, a damper, a spring."""
+
 _LOADED_FRICTION = len(OF_THE_MOTION) + OF_THE_LOAD.index("n tanh(v/0.01)")
 
 GAIN_AND_RATE = (0, 1)
@@ -110,8 +115,8 @@ def laws_of_functions(columns: NDArray[np.float64], plain: tuple[int, ...] = ())
 def force_functions(port: Port, seen: PortSignals, solution: PeriodicSolution) -> Functions:
     """Forces as functions of what a ``port`` sees at the nodes of ``solution``, and those of contacts that give."""
     displacement, velocity, load = (np.asarray(part) for part in seen[:3])
-    found = _motion_functions(displacement, velocity, load)
-    plain = [_FRICTION, _DAMPING, _STIFFNESS, *([_LOADED_FRICTION] if np.any(load) else [])]
+    found = motion_functions(displacement, velocity, load)
+    plain = [*PLAIN_FORCES, *([_LOADED_FRICTION] if np.any(load) else [])]
     held = [_stop(displacement, share * port.displacement, solution) for share in STRETCHES]
     return Functions([*found, *held], (*plain, *range(len(found), len(found) + len(held))))
 
@@ -122,7 +127,7 @@ def series_functions(beyond: Signal, nodes: MeshPoints, solution: PeriodicSoluti
     ``beyond`` is the load less that at rest [the port's unit of force], (P,).
     """
     rate = rate_of(beyond, nodes, solution)
-    return Functions(_motion_functions(beyond, rate, np.zeros_like(beyond)), (_STIFFNESS, _DAMPING))
+    return Functions(motion_functions(beyond, rate, np.zeros_like(beyond)), (_STIFFNESS, _DAMPING))
 
 
 def resonance_functions(beyond: Signal, nodes: MeshPoints) -> Functions:
@@ -165,11 +170,11 @@ def sensor_functions(reading: NDArray[np.complex128], omega: Signal) -> list[NDA
     orders = reading.shape[1]
     turn = np.exp(2j * np.pi * np.outer(np.arange(orders), np.arange(INSTANTS)) / INSTANTS)
     along, rate = (np.real(each[:, 1:] @ turn[1:]) for each in (reading, 1j * omega * reading))
-    found = _motion_functions(along.ravel(), rate.ravel(), np.zeros(along.size))
+    found = motion_functions(along.ravel(), rate.ravel(), np.zeros(along.size))
     return [np.fft.rfft(each.reshape(along.shape))[:, :orders] * 2.0 / INSTANTS for each in found]
 
 
-def _motion_functions(displacement: Signal, velocity: Signal, load: Signal) -> list[Signal]:
+def motion_functions(displacement: Signal, velocity: Signal, load: Signal) -> list[Signal]:
     """Functions of what a port sees, each of about unit size."""
     x = displacement - displacement.mean()
     x = x / max(float(np.abs(x).max()), np.finfo(float).tiny)
@@ -181,16 +186,22 @@ def _motion_functions(displacement: Signal, velocity: Signal, load: Signal) -> l
 
 
 def _stop(displacement: Signal, width: float, solution: PeriodicSolution) -> Signal:
-    """What a contact of unit grip carries that gives by ``width`` [m] before it slides (Prandtl's element)."""
+    """What a contact of unit grip carries that gives by ``width`` [m] before it slides, over a period."""
     carried = np.zeros_like(displacement)
     for first, count in zip(solution.mesh.layout.starts, solution.mesh.layout.counts, strict=True):
         along = displacement[first : first + count]
-        moves = (along - np.roll(along, 1)) / width
-        now = 0.0
         # The first period forgets where it began.
-        for place, move in enumerate((*moves, *moves)):
-            now = min(max(now + move, -1.0), 1.0)
-            carried[first + place % count] = now
+        carried[first : first + count] = prandtl_element(np.concatenate([along, along]), width)[count:]
+    return carried
+
+
+def prandtl_element(displacement: Signal, width: float) -> Signal:
+    """What a spring and a slider of unit grip carry along a motion (n,), sliding when stretched by ``width`` [m]."""
+    carried = np.zeros_like(displacement)
+    moves, now = np.diff(displacement, prepend=displacement[:1]) / width, 0.0
+    for place, move in enumerate(moves):
+        now = min(max(now + move, -1.0), 1.0)
+        carried[place] = now
     return carried
 
 
@@ -238,7 +249,7 @@ def force_port(plant: AbstractPlant | type[AbstractPlant], location: str) -> Por
 class _Seen(NamedTuple):
     """What the hypotheses are made of: the motion of a model, and what its ports see along it."""
 
-    problem: DwellProblem
+    problem: "DwellProblem"
     model: AbstractPlant
     p: Values
     solution: PeriodicSolution
@@ -266,7 +277,7 @@ class _Seen(NamedTuple):
 
 
 def input_locations(
-    problem: DwellProblem, terms: tuple[str, ...], p: Values, solution: PeriodicSolution
+    problem: "DwellProblem", terms: tuple[str, ...], p: Values, solution: PeriodicSolution
 ) -> list[InputLocation]:
     """All locations about a motion with ``terms`` at the parameters ``p`` [SI]."""
     model = problem.complete(terms)

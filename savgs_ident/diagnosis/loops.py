@@ -5,6 +5,8 @@ named effect is that of the model itself: the force at the port with the effect,
 along the motion of the baseline. Nothing of the rig's laws is written here.
 """
 
+from typing import TYPE_CHECKING
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -12,7 +14,6 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.effect_sensitivities import (
     marched_contact,
     marched_effect,
@@ -34,6 +35,9 @@ from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.sensitivity import ports_at_nodes
 
+if TYPE_CHECKING:
+    from savgs_ident.diagnosis.dwell_problem import DwellProblem
+
 QUANTILES = (0.1, 0.5, 0.9)
 """The tests that have a loop, by their rank in frequency: a slow, a middle and a fast one."""
 
@@ -42,7 +46,7 @@ SAMPLES = 256
 
 
 def force_loops(
-    problem: DwellProblem,
+    problem: "DwellProblem",
     p: Values,
     solution: PeriodicSolution,
     found: Localisation,

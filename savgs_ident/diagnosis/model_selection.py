@@ -27,9 +27,8 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parallel import side_by_side
 from savgs_ident.core.presentation import Progress
-from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
-from savgs_ident.diagnosis.location_hypotheses import input_locations
+from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import Hypothesis, Kind
 from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.search import (
@@ -71,7 +70,7 @@ class DiagnosisProblem:
         constants: what the verdict is decided by.
     """
 
-    plant: DwellProblem
+    plant: AbstractProblem
     data: Data
     search: Search
     given: NDArray[np.float64]
@@ -162,7 +161,7 @@ class DiagnosisEvidence:
 
 
 def recalibrate(
-    plant: DwellProblem,
+    plant: AbstractProblem,
     data: Data,
     values: Mapping[str, float],
     progress: Progress,
@@ -344,8 +343,7 @@ def weights_here_and_elsewhere(weights: Sequence[LocationWeight], location: str)
 
 def _localised(problem: DiagnosisProblem, mode: LaplaceFit) -> list[Localisation]:
     """What a law at each location would explain beyond a hypothesis."""
-    p = problem.plant.values(mode.values)
-    locations = input_locations(problem.plant, mode.terms, p, mode.prediction.warm_start)
+    locations = problem.plant.locations(mode.terms, mode.values, mode.prediction.warm_start)
     return localise(problem.search, mode, locations, problem.constants)
 
 

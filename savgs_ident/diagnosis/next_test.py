@@ -7,7 +7,7 @@ moving its parameters as far as this campaign allows, in units of the noise, is 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.parallel import in_parallel
-from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.result import NextTest
 from savgs_ident.effects.base import AbstractInputLaw
 from savgs_ident.inference.find_map import LaplaceFit, Search
@@ -25,6 +24,9 @@ from savgs_ident.plants.base import Excitation, OperatingCondition
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.periodic import PeriodicSolution
 
+if TYPE_CHECKING:
+    from savgs_ident.diagnosis.dwell_problem import DwellProblem
+
 DWELLS = 4
 """Dwells of a proposed test."""
 
@@ -33,7 +35,7 @@ PROPOSED = 2
 
 
 def next_tests(
-    search: Search, problem: DwellProblem, one: LaplaceFit, other: LaplaceFit
+    search: Search, problem: "DwellProblem", one: LaplaceFit, other: LaplaceFit
 ) -> tuple[NextTest, ...]:
     """The tests that separate two hypotheses best, most significant first."""
     pair = " + ".join(one.terms) or "none", " + ".join(other.terms) or "none"
@@ -59,7 +61,7 @@ class _Draft(NamedTuple):
     warm_start: Any
 
 
-def _drafts(search: Search, problem: DwellProblem, one: LaplaceFit, other: LaplaceFit) -> list[_Draft]:
+def _drafts(search: Search, problem: "DwellProblem", one: LaplaceFit, other: LaplaceFit) -> list[_Draft]:
     """A draft for every condition under which both hypotheses can be solved."""
 
     def draft(condition: OperatingCondition) -> _Draft | None:
@@ -75,7 +77,7 @@ def _drafts(search: Search, problem: DwellProblem, one: LaplaceFit, other: Lapla
 
 
 def predicted(
-    problem: DwellProblem,
+    problem: "DwellProblem",
     mode: LaplaceFit,
     condition: OperatingCondition,
     names: Sequence[str] = (),
@@ -91,7 +93,7 @@ def predicted(
     return replace(problem, excitation=there, corrections={}).predict(mode.terms, values, names, moved)
 
 
-def _driven(problem: DwellProblem, condition: OperatingCondition) -> Excitation:
+def _driven(problem: "DwellProblem", condition: OperatingCondition) -> Excitation:
     """The inputs of the campaign under a condition."""
     harmonics = dict(problem.excitation.harmonics)
     first = problem.plant.inputs[0].name
@@ -112,14 +114,14 @@ def _begin(mode: LaplaceFit, condition: OperatingCondition) -> PeriodicSolution:
     return eqx.tree_at(lambda each: each.trajectory, near, rest)
 
 
-def _of_an_input_at_rest(terms: Sequence[str], problem: DwellProblem) -> dict[str, float]:
+def _of_an_input_at_rest(terms: Sequence[str], problem: "DwellProblem") -> dict[str, float]:
     """Null values of what the terms do to the inputs: a cam at rest has no shape; a plate still gives way."""
     effects = [problem.catalogue[name] for name in terms]
     moving = [each for each in effects if isinstance(each.law, AbstractInputLaw)]
     return {name: null for each in moving for name, null in each.null.items()}
 
 
-def _expected(search: Search, problem: DwellProblem, other: LaplaceFit, draft: _Draft) -> float:
+def _expected(search: Search, problem: "DwellProblem", other: LaplaceFit, draft: _Draft) -> float:
     """Significance of a draft once the rival has moved its parameters as far as the campaign allows."""
     names = [each.name for each in other.coordinates]
     rival = predicted(problem, other, draft.condition, names, draft.warm_start)
@@ -131,7 +133,7 @@ def _expected(search: Search, problem: DwellProblem, other: LaplaceFit, draft: _
 
 
 def _changed(
-    values: Mapping[str, float], problem: DwellProblem, changes: Mapping[str, float]
+    values: Mapping[str, float], problem: "DwellProblem", changes: Mapping[str, float]
 ) -> dict[str, float]:
     known = problem.parameters.as_dict() | dict(values)
     return dict(values) | {name: known[name] + change for name, change in changes.items()}

@@ -3,21 +3,32 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Progress, no_progress
-from savgs_ident.diagnosis.diagnose import baseline_problem, diagnose_dwells
+from savgs_ident.diagnosis.diagnose import (
+    baseline_problem,
+    diagnose_dwells,
+    diagnose_problem,
+    offered_effects,
+)
+from savgs_ident.diagnosis.motion_problem import MotionProblem, further_motion, motion_problem
+from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.quarter_car import diagnose_response
-from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
+from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings, FurtherShrink
+from savgs_ident.diagnosis.sweep import ModelPoint
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.simulate.measured import Measurements, campaign_of, first_sweep, measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
 def diagnose(
     model: Model,
-    measured: Measurements,
+    measured: Measurements | DrivenMotion,
     *,
+    held_out: DrivenMotion | None = None,
     without: Sequence[str] = (),
     orders: int = 9,
     max_frequency: float | None = None,
@@ -31,7 +42,9 @@ def diagnose(
 
     Args:
         model: the baseline, of the rig or of another plant.
-        measured: the recordings, or the response of their dwells.
+        measured: the recordings, or the response of their dwells; or a measured motion, along which a plant with one
+            coordinate is held against the force of its drive.
+        held_out: another motion, that nothing is fitted to: it is predicted, and compared.
         without: effects to leave out of the catalogue.
         orders: highest harmonic order to compare.
         max_frequency: leave out faster dwells [Hz].
@@ -41,6 +54,12 @@ def diagnose(
     do not exist, and for a model without periodic motion.
     """
     use_persistent_cache()
+    if isinstance(measured, DrivenMotion):
+        return _diagnose_motion(model, measured, held_out, without, progress)
+    if held_out is not None:
+        raise InputError(
+            "a held-out motion goes with a measured motion alone", remedy="diagnose each campaign by itself"
+        )
     response = measured_response(measured, orders, max_frequency, progress, model.build())
     campaign = campaign_of(measured)
     if isinstance(model, RigModel):
@@ -53,6 +72,35 @@ def diagnose(
         plant, data = baseline_problem(response, bare, given.table, model.catalogue, settings)
         found = diagnose_dwells(plant, data, response, given, settings, values, progress)
     return replace(found, origin=model.origin(campaign, response.warnings))
+
+
+def _diagnose_motion(
+    model: Model,
+    motion: DrivenMotion,
+    held_out: DrivenMotion | None,
+    without: Sequence[str],
+    progress: Progress,
+) -> Diagnosis:
+    """Diagnose a plant from the force of its drive along a measured motion."""
+    bare, given = replace(model.build(), effects=()), model.before
+    if len(bare.coordinates) != 1 or len(bare.inputs) != 1:
+        raise InputError(
+            f"{model.name} is no plant with one coordinate and one input, its drive",
+            source=motion.source,
+            remedy="give a recording of dwells, or a plant that is driven along the measured motion",
+        )
+    settings, values = _asked(model, 0, without)
+    offered = offered_effects(model.catalogue, settings)
+    problem, data = motion_problem(motion, bare, given.table, offered, model.effects, settings.free)
+
+    def predict(there: AbstractProblem, points: Sequence[ModelPoint]) -> FurtherShrink:
+        assert isinstance(there, MotionProblem)
+        assert held_out is not None
+        return further_motion(there, held_out, points)
+
+    further = None if held_out is None else predict
+    found = diagnose_problem(problem, data, given, settings, values, progress, further)
+    return replace(found, origin=replace(model.origin(), data=motion.source))
 
 
 def baseline_of(

@@ -206,9 +206,13 @@ class Shrink:
 
 
 @dataclass(frozen=True)
-class SweepShrink:
-    """The same [1] of the first harmonic along the recorded sweep; NaN where nothing was computed."""
+class FurtherShrink:
+    """The same [1] of a recording that took no part: a sweep, another motion; NaN where nothing was computed.
 
+    ``name`` says in a few words what was recorded.
+    """
+
+    name: str
     before: float
     recalibrated: float
     after: float
@@ -281,6 +285,29 @@ class Responses:
 
 
 @dataclass(frozen=True)
+class DriveForces:
+    """The force of a drive along a measured motion, m rows each.
+
+    Attributes:
+        source: file that the motion came from.
+        time: of each row since the first sample [s].
+        velocity: of the motion [m/s].
+        measured: force of the drive [N].
+        before: the same that the baseline needs as given [N].
+        recalibrated: the same of the recalibrated baseline [N].
+        after: the same with what is named [N].
+    """
+
+    source: str
+    time: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    before: NDArray[np.float64]
+    recalibrated: NDArray[np.float64]
+    after: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
 class Diagnosis(Result):
     """A whole diagnosis.
 
@@ -297,13 +324,13 @@ class Diagnosis(Result):
         candidates: all hypotheses, most probable first.
         shrink: the gap over held-out tests, both channels together.
         by_channel: the same by channel.
-        sweep: the gap of the sweep, if one was recorded.
+        further: the gap of a recording that took no part, if there is one: a sweep, another motion.
         next_tests: tests that would tell apart what this campaign cannot.
         not_judgeable: effects that this campaign cannot show.
         confusable: pairs of effects that look alike in this campaign.
         loops: inferred signals at the named port.
-        responses: the three models' responses.
-        measured: what they are held against.
+        responses: what the three models predict: responses of dwells, or the force of the drive.
+        measured: the dwells that they are held against; None where it is the force of the drive.
         converged: whether every search that the verdict stands on converged: the recalibrated baseline, the fitted
             hypothesis with the greatest weight, what is named and its refit, the learned correction.
         warnings: what a reader must know, a sentence each.
@@ -325,13 +352,13 @@ class Diagnosis(Result):
     candidates: tuple[Candidate, ...]
     shrink: Shrink
     by_channel: Mapping[str, Shrink]
-    sweep: SweepShrink | None
+    further: FurtherShrink | None
     next_tests: tuple[NextTest, ...]
     not_judgeable: tuple[NotJudgeable, ...]
     confusable: tuple[Confusable, ...]
     loops: tuple[ForceLoop, ...]
-    responses: Responses
-    measured: HarmonicResponse
+    responses: Responses | DriveForces
+    measured: HarmonicResponse | None
     converged: bool
     warnings: tuple[str, ...]
     wall_s: float

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
-from savgs_ident.diagnosis.result import SweepShrink
+from savgs_ident.diagnosis.result import FurtherShrink
 from savgs_ident.plants.base import Excitation
 from savgs_ident.responses.harmonic_response import SweepResponse
 from savgs_ident.simulate.harmonics import harmonics
@@ -25,6 +25,9 @@ from savgs_ident.simulate.periodic import simulate_periodic
 
 DWELLS = 6
 """Dwells of the campaign that must lie in the sweep's range: then the motions between them can be found, too."""
+
+NAME = "recorded sweep, first harmonic"
+"""What the gap of a sweep is called in reports."""
 
 Signal = NDArray[np.float64]
 
@@ -34,7 +37,7 @@ ModelPoint = tuple[tuple[str, ...], Mapping[str, float]]
 
 def sweep_shrink(
     problem: DwellProblem, sweep: SweepResponse, hypotheses: Sequence[ModelPoint]
-) -> SweepShrink | None:
+) -> FurtherShrink | None:
     """The gap of a sweep before, recalibrated and after, for three ``hypotheses``; two if nothing is to come after.
 
     None where too few dwells of the campaign lie in the sweep's range. NaN for a hypothesis without motion.
@@ -55,7 +58,7 @@ def sweep_shrink(
         _gap(sweep, shown, problem.channels, first_harmonic(problem, sweep, frequencies, *each))
         for each in hypotheses
     ]
-    return SweepShrink(gaps[0], gaps[1], gaps[2] if len(gaps) > 2 else np.nan, _floor(sweep, shown))
+    return FurtherShrink(NAME, gaps[0], gaps[1], gaps[2] if len(gaps) > 2 else np.nan, _floor(sweep, shown))
 
 
 def frequencies_of(dwells: Signal, sweep: SweepResponse) -> Signal | None:

@@ -20,6 +20,7 @@ from savgs_ident.effects.laws.coulomb import Coulomb
 from savgs_ident.effects.laws.delay import Delay
 from savgs_ident.effects.laws.gain import Gain
 from savgs_ident.effects.laws.input_harmonics import InputHarmonics
+from savgs_ident.effects.laws.input_offset import InputOffset
 from savgs_ident.effects.laws.input_scale import InputScale
 from savgs_ident.effects.laws.lag import Lag
 from savgs_ident.effects.laws.linear_stiffness import LinearStiffness
@@ -56,6 +57,7 @@ LAWS: tuple[AbstractLaw, ...] = (
     Resonance(),
     Offset(),
     Scale(),
+    InputOffset(),
     InputScale(),
     InputHarmonics(),
     Gain(),

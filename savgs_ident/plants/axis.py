@@ -4,7 +4,8 @@
 
 with the position x, the mass M that the motor feels, the viscous friction F_v, the drive force u beyond that of a
 position loop of stiffness K, and f what effects add at the ports: dry friction on the guide, a spring or a stop on
-the screw.
+the screw. K is zero where u is the whole force, as in a recording of the drive: then the motion is not periodic under
+a periodic force, but the force that the measured motion needs can be compared with the one recorded.
 
 Source: Janot, Gautier and Brunot 2019, Data set and reference models of EMPS, nonlinearbenchmark.org.
 """
@@ -52,6 +53,16 @@ GUIDE = Port(
     loaded=True,
     contact=("k_pre", "c_pre"),
 )
+LUBRICANT = Port(
+    "lubricant",
+    PortKind.FORCE,
+    "guide",
+    about="position; viscous friction on the carriage along it; load that friction itself",
+    displacement=1e-3,
+    velocity=0.1,
+    force=20.0,
+    damped=True,
+)
 SCREW = Port(
     "screw",
     PortKind.FORCE,
@@ -69,7 +80,7 @@ PARAMETERS = ParameterTable(
     (
         Parameter("mass", 100.0, "kg", lower=1.0, upper=1e4, about="mass that the motor feels"),
         Parameter("viscous_friction", 100.0, "N s/m", lower=0.0, upper=1e5, about="viscous friction"),
-        Parameter("holding", 1e4, "N/m", lower=0.0, about="stiffness of the position loop"),
+        Parameter("holding", 0.0, "N/m", lower=0.0, about="stiffness of the position loop"),
         Parameter("k_pre", 1e6, "N/m", lower=1.0, about="stiffness of the guide before it slides"),
         Parameter("c_pre", 3e3, "N s/m", lower=0.0, about="damping of the guide before it slides"),
         Parameter("g", 9.80665, "m/s^2", about="acceleration of free fall"),
@@ -87,7 +98,7 @@ class Axis(AbstractPlant):
     coordinate_type: ClassVar[type[Position]] = Position
     inputs: ClassVar[tuple[Input, ...]] = (Input("drive_force", "N", "drive force", moves=(1e-4,)),)
     channels: ClassVar[tuple[Channel, ...]] = (Channel("position", "m", "position", decay=2),)
-    ports: ClassVar[tuple[Port, ...]] = (GUIDE, SCREW, DRIVE, NUMBERS, ENCODER)
+    ports: ClassVar[tuple[Port, ...]] = (GUIDE, LUBRICANT, SCREW, DRIVE, NUMBERS, ENCODER)
     parameters: ClassVar[ParameterTable] = PARAMETERS
 
     def evaluate(
@@ -98,7 +109,10 @@ class Axis(AbstractPlant):
         none = jnp.zeros_like(x)
         drive = acting.input(DRIVE, u.signals[0], u.fundamental).value - p["holding"] * x
         sliding = PortSignals(x, xd, p["mass"] * p["g"] * jnp.ones_like(x), none)
-        guide = acting.force(GUIDE, sliding) - p["viscous_friction"] * xd
+        viscous = -p["viscous_friction"] * xd
+        lubricant = viscous + acting.force(LUBRICANT, PortSignals(x, xd, viscous, none))
+        acting.report(LUBRICANT, lubricant)
+        guide = acting.force(GUIDE, sliding) + lubricant
         screw = acting.force(SCREW, PortSignals(x, xd, none, none))
         return jnp.stack([drive + guide + screw - p["mass"] * xdd]), Loads(drive, guide, screw)
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.diagnosis.dwell_problem import term_of
+from savgs_ident.diagnosis.problem import term_of
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.validation.blind_record import Answer, Drawn

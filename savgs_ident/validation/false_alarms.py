@@ -14,8 +14,6 @@ from pathlib import Path
 from typing import ClassVar
 from uuid import uuid4
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
@@ -119,18 +117,13 @@ class AlarmBench:
         self, rows: NDArray[np.float64], variance: NDArray[np.float64]
     ) -> DiagnosisProblem | None:
         known = self.problem
-        likelihood = eqx.tree_at(lambda each: each.measured, known.plant.likelihood, jnp.asarray(rows))
-        plant, data = (
-            replace(known.plant, likelihood=likelihood),
-            replace(known.data, measured=rows, variance=variance),
-        )
-        search = search_of(plant, data)
+        data = replace(known.data, measured=rows, variance=variance)
+        search = search_of(known.plant, data)
         base = find_map(search, (), known.base.values, known.base.prediction.warm_start)
         if not base.solved:
             return None
         return replace(
             known,
-            plant=plant,
             data=data,
             search=search,
             given=base.prediction.rows,

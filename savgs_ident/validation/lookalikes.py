@@ -34,8 +34,8 @@ from scipy.optimize import lsq_linear
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.transforms import known_to_tolerance
 from savgs_ident.core.values import Values
-from savgs_ident.diagnosis.dwell_problem import term_of
 from savgs_ident.diagnosis.effect_sensitivities import columns_with_states
+from savgs_ident.diagnosis.problem import term_of
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.inference.observations import Term

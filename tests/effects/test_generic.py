@@ -77,9 +77,7 @@ def test_names_are_those_of_ports_numbers_and_laws() -> None:
     assert {"spindle_viscous", "slide_coulomb", "nut_backlash", "mass_m_offset", "mass_J_scale"} <= set(
         EFFECTS
     )
-    assert {"drive_harmonics", "encoder_lag", "spindle_rebound_fade", "belt_saturating_friction"} <= set(
-        EFFECTS
-    )
+    assert {"drive_harmonics", "encoder_lag", "spindle_one_sided", "belt_saturating_friction"} <= set(EFFECTS)
     parameters = [each.name for effect in EFFECTS.values() for each in effect.parameters]
     assert len(set(parameters)) == len(parameters)
 

@@ -86,7 +86,8 @@ def _two_mass(*effects: str) -> Bench:
 
 def _axis(*effects: str) -> Bench:
     plant, own = _with_effects(Axis(), *effects)
-    return Bench(plant, Axis.parameters + own, (200.0,), (0.7, 2.5))
+    parameters = Axis.parameters.with_values({"holding": 1e4})
+    return Bench(plant, parameters + own, (200.0,), (0.7, 2.5))
 
 
 BENCHES = {

@@ -19,6 +19,7 @@ from savgs_ident.diagnosis.result import (
     Diagnosis,
     Estimate,
     ForceLoop,
+    FurtherShrink,
     Hypothesis,
     Kind,
     MapCell,
@@ -27,7 +28,6 @@ from savgs_ident.diagnosis.result import (
     PortShare,
     Responses,
     Shrink,
-    SweepShrink,
     Verdict,
 )
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
@@ -112,9 +112,9 @@ def synthetic_diagnosis(measured: HarmonicResponse, kind: Kind = "effect") -> Di
         candidates=_candidates(named),
         shrink=NO_SHRINK if kind == "none" else SHRINK,
         by_channel={name: NO_SHRINK if kind == "none" else each for name, each in BY_CHANNEL.items()},
-        sweep=SweepShrink(0.0142, 0.0133, 0.0133, 0.0021)
+        further=FurtherShrink("recorded sweep, first harmonic", 0.0142, 0.0133, 0.0133, 0.0021)
         if kind == "none"
-        else SweepShrink(0.1881, 0.0942, 0.0132, 0.0021),
+        else FurtherShrink("recorded sweep, first harmonic", 0.1881, 0.0942, 0.0132, 0.0021),
         next_tests=(
             NextTest("dwell at 0.35 Hz, plate at half its stroke", ("rail_stribeck", "rail_preload"), 14.2),
             NextTest("standstill, then a step of 2 mm", ("rail_stribeck", "joint_friction"), 6.1),

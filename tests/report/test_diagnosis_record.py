@@ -119,7 +119,7 @@ def test_the_record_holds_the_numbers_of_the_diagnosis(diagnosis: Diagnosis) -> 
 
 
 def test_what_was_not_computed_is_null_in_the_record(by_kind: dict[str, Diagnosis]) -> None:
-    record = record_of(replace(by_kind["none"], sweep=None))
+    record = record_of(replace(by_kind["none"], further=None))
     assert record["sweep"] is None
     assert record["shrink"]["share_closed"] is None
     assert record["shrink"]["interval"] == [None, None]

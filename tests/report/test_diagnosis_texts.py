@@ -165,7 +165,7 @@ def test_a_diagnosis_that_did_not_converge_says_so_first_and_hostile_names_stay_
 
 def test_a_diagnosis_with_nothing_beside_its_verdict_has_a_page(diagnosis: Diagnosis) -> None:
     bare = replace(
-        diagnosis, ports=(), map=(), cycle=(), loops=(), by_channel={}, sweep=None, next_tests=(),
+        diagnosis, ports=(), map=(), cycle=(), loops=(), by_channel={}, further=None, next_tests=(),
         not_judgeable=(), confusable=(), warnings=(), candidates=diagnosis.candidates[:1],
         parameters=diagnosis.rig.parameters.as_dict(), identified=diagnosis.rig.parameters.as_dict(),
     )  # fmt: skip

@@ -21,7 +21,7 @@ from savgs_ident.effects.base import AbstractForceLaw, Family, Port, PortSignals
 class OneSidedDamping(AbstractForceLaw):
     """Less damping in extension than in compression."""
 
-    name: ClassVar[str] = "rebound_fade"
+    name: ClassVar[str] = "one_sided"
     family: ClassVar[Family] = Family.DAMPING
     roles: ClassVar[tuple[Role, ...]] = (Role("lost", 0.0),)
 

@@ -13,12 +13,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from savgs_ident.diagnosis.result import Diagnosis
+from savgs_ident.diagnosis.result import Diagnosis, Responses
 from savgs_ident.fit.residuals import measured_points
 from savgs_ident.report.diagnosis.text import model_label
 from savgs_ident.report.panels import LINES, draw_magnitude, draw_phase
 from savgs_ident.report.text import READINGS, ROAD, channel_label
 from savgs_ident.report.theme import PALE, frequency_axis, magnitude_axis, new_figure, styled
+from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.frequency_response import ModelCurve, model_curve
 
 _MARKERS = ("o", "s", "^")
@@ -34,9 +35,16 @@ class FirstHarmonicGap:
     noise: NDArray[np.float64]
 
 
+def compared_dwells(diagnosis: Diagnosis) -> tuple[HarmonicResponse, Responses]:
+    """The dwells of a diagnosis, measured and predicted; it must be one of dwells."""
+    assert diagnosis.measured is not None
+    assert isinstance(diagnosis.responses, Responses)
+    return diagnosis.measured, diagnosis.responses
+
+
 def first_harmonic_gap(diagnosis: Diagnosis, c: int) -> FirstHarmonicGap:
     """The gap of channel ``c`` of :data:`READINGS` dwell by dwell."""
-    measured, name = diagnosis.measured, tuple(READINGS)[c]
+    (measured, answers), name = compared_dwells(diagnosis), tuple(READINGS)[c]
     if name not in measured.channels:
         nothing = np.full(len(measured.tests), np.nan)
         return FirstHarmonicGap(nothing, nothing, nothing, nothing)
@@ -47,7 +55,6 @@ def first_harmonic_gap(diagnosis: Diagnosis, c: int) -> FirstHarmonicGap:
     def of(predicted: NDArray[np.complex128]) -> NDArray[np.float64]:
         return np.asarray(100.0 * np.abs(predicted[:, c, 1] - seen) / np.abs(seen))
 
-    answers = diagnosis.responses
     return FirstHarmonicGap(
         of(answers.before), of(answers.recalibrated), of(answers.after), 100.0 * noise / np.abs(seen)
     )
@@ -63,7 +70,8 @@ def compared_channels(diagnosis: Diagnosis) -> tuple[int, ...]:
 def diagnosis_bode_figure(diagnosis: Diagnosis, c: int) -> Figure:
     """Magnitude, phase and gap of the first harmonic of channel ``c`` of :data:`READINGS`."""
     shown = channel_label(tuple(READINGS)[c])
-    points, curves = measured_points(diagnosis.measured, tuple(READINGS), ROAD), _curves(diagnosis)
+    points, curves = measured_points(compared_dwells(diagnosis)[0], tuple(READINGS), ROAD), _curves(diagnosis)
+    frequency = compared_dwells(diagnosis)[0].frequency
     with styled():
         figure = new_figure(4.5, 7.6)
         figure.set_layout_engine("none")
@@ -73,10 +81,9 @@ def diagnosis_bode_figure(diagnosis: Diagnosis, c: int) -> Figure:
         figure.suptitle(shown.title, y=0.985, fontsize=10.0, fontweight="bold")
         draw_magnitude(magnitude, curves, points, c, shown)
         draw_phase(phase, curves, points, c)
-        _draw_gap(gap, diagnosis.measured.frequency, first_harmonic_gap(diagnosis, c))
+        _draw_gap(gap, frequency, first_harmonic_gap(diagnosis, c))
         for axes in panels:
-            lowest, highest = diagnosis.measured.frequency[[0, -1]]
-            frequency_axis(axes, float(lowest), float(highest), labelled=axes is gap)
+            frequency_axis(axes, float(frequency[0]), float(frequency[-1]), labelled=axes is gap)
             axes.yaxis.set_label_coords(-0.135, 0.5)
         _explain(figure, magnitude)
         return figure
@@ -98,7 +105,7 @@ def _explain(figure: Figure, axes: Axes) -> None:
 
 def _curves(diagnosis: Diagnosis) -> list[ModelCurve]:
     """The models, the last one first: it has the strongest line."""
-    measured, answers = diagnosis.measured, diagnosis.responses
+    measured, answers = compared_dwells(diagnosis)
     road = measured.harmonics[:, measured.channel(ROAD), 1]
     found = []
     for label, harmonics in (

@@ -159,7 +159,7 @@ _ROW = 0.42
 
 
 def shrink_rows(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
-    """The gaps [%] by row and model; rows are both channels together, each channel, and the sweep."""
+    """The gaps [%] by row and model; rows are all channels together, each one, and a further recording."""
     both = {"both channels": diagnosis.shrink} if len(diagnosis.by_channel) > 1 else {}
     named = {_title(name): each for name, each in diagnosis.by_channel.items()}
     rows = {
@@ -171,12 +171,12 @@ def shrink_rows(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
         }
         for title, each in ((both | named) or {"both channels": diagnosis.shrink}).items()
     }
-    if diagnosis.sweep is not None:
-        rows["sweep"] = {
-            "before": 100.0 * diagnosis.sweep.before,
-            "recalibrated": 100.0 * diagnosis.sweep.recalibrated,
-            "after": 100.0 * diagnosis.sweep.after,
-            "noise alone": 100.0 * diagnosis.sweep.floor,
+    if diagnosis.further is not None:
+        rows["other recording" if diagnosis.measured is None else "sweep"] = {
+            "before": 100.0 * diagnosis.further.before,
+            "recalibrated": 100.0 * diagnosis.further.recalibrated,
+            "after": 100.0 * diagnosis.further.after,
+            "noise alone": 100.0 * diagnosis.further.floor,
         }
     return rows
 

@@ -99,7 +99,7 @@ class PortRow:
 
 @dataclass(frozen=True)
 class ShrinkRow:
-    """The gap of a channel, of both, or of the sweep."""
+    """The gap of a channel, of both, or of a recording that took no part."""
 
     name: str
     before: str
@@ -162,18 +162,18 @@ def port_row(each: PortShare, diagnosis: Diagnosis) -> PortRow:
 
 
 def shrink_table(diagnosis: Diagnosis) -> tuple[ShrinkRow, ...]:
-    """Both channels together, each channel, and the sweep if one was recorded."""
+    """Both channels together, each channel, and the recording that took no part, if there is one."""
     rows = [_shrink_row("Both channels together", diagnosis.shrink)]
     rows += [_shrink_row(channel_label(name).heading, each) for name, each in diagnosis.by_channel.items()]
-    if diagnosis.sweep is not None:
-        swept = diagnosis.sweep
+    if diagnosis.further is not None:
+        other = diagnosis.further
         rows.append(
             ShrinkRow(
-                name="Recorded sweep, first harmonic",
-                before=gap_percentage(swept.before),
-                recalibrated=gap_percentage(swept.recalibrated),
-                after=gap_percentage(swept.after),
-                floor=gap_percentage(swept.floor),
+                name=f"{other.name[:1].upper()}{other.name[1:]}",
+                before=gap_percentage(other.before),
+                recalibrated=gap_percentage(other.recalibrated),
+                after=gap_percentage(other.after),
+                floor=gap_percentage(other.floor),
                 closed=DASH,
             )
         )

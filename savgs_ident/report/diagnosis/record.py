@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from savgs_ident.core.output import warning_record
 from savgs_ident.core.presentation import Origin
-from savgs_ident.diagnosis.result import Candidate, Diagnosis, Estimate, Learned, Shrink
+from savgs_ident.diagnosis.result import Candidate, Diagnosis, Estimate, FurtherShrink, Learned, Shrink
 
 
 def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
@@ -47,13 +47,8 @@ def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
             for each in diagnosis.not_judgeable
         ],
         "confusable": [{"effects": each.effects, "cosine": each.cosine} for each in diagnosis.confusable],
-        "sweep": diagnosis.sweep
-        and {
-            "before": diagnosis.sweep.before,
-            "recalibrated": diagnosis.sweep.recalibrated,
-            "after": diagnosis.sweep.after,
-            "floor": diagnosis.sweep.floor,
-        },
+        "sweep": _further(diagnosis.further) if diagnosis.further and diagnosis.measured else None,
+        "further": diagnosis.further and {"recording": diagnosis.further.name} | _further(diagnosis.further),
         "identified": dict(diagnosis.identified),
         "learned": diagnosis.learned and _learned(diagnosis.learned),
         "converged": diagnosis.converged,
@@ -128,6 +123,15 @@ def _learned(each: Learned) -> dict[str, object]:
         "port": each.port,
         "parameters": _parameters(each.parameters),
         "identified": dict(each.identified),
+    }
+
+
+def _further(each: FurtherShrink) -> dict[str, object]:
+    return {
+        "before": each.before,
+        "recalibrated": each.recalibrated,
+        "after": each.after,
+        "floor": each.floor,
     }
 
 

@@ -9,7 +9,15 @@ from types import MappingProxyType
 
 from rich.console import Group, RenderableType
 
-from savgs_ident.diagnosis.result import NONE, Candidate, Diagnosis, Estimate, NotJudgeable, Shrink
+from savgs_ident.diagnosis.result import (
+    NONE,
+    Candidate,
+    Diagnosis,
+    DriveForces,
+    Estimate,
+    NotJudgeable,
+    Shrink,
+)
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.report.text import (
     DASH,
@@ -115,9 +123,16 @@ def law_label(diagnosis: Diagnosis, port: str) -> str:
 
 def baseline_sentence(diagnosis: Diagnosis) -> str:
     """What was compared with what."""
-    measured = diagnosis.measured
-    number = len(measured.tests)
+    measured, forces = diagnosis.measured, diagnosis.responses
     effects = " and ".join(diagnosis.effects) or "no effect of the catalogue"
+    if isinstance(forces, DriveForces):
+        seconds = forces.time[-1] - forces.time[0]
+        return (
+            f"Baseline {diagnosis.model} with {effects}, compared with the force of the drive along {seconds:.1f} s "
+            f"of motion; computed in {diagnosis.wall_s:.0f} s."
+        )
+    assert measured is not None
+    number = len(measured.tests)
     span = f" between {measured.frequency[0]:.2f} and {measured.frequency[-1]:.2f} Hz" if number else ""
     return (
         f"Baseline {diagnosis.model} with {effects}, compared with {number}"
@@ -214,10 +229,10 @@ def _gap(diagnosis: Diagnosis) -> RenderableType:
 
     rows = [cells("together", diagnosis.shrink)]
     rows += [cells(_channel(name), each) for name, each in diagnosis.by_channel.items()]
-    if diagnosis.sweep is not None:
-        swept = diagnosis.sweep
-        gaps = (swept.before, swept.recalibrated, swept.after, swept.floor)
-        rows.append(("sweep, first harmonic", *map(gap_percentage, gaps), DASH))
+    if diagnosis.further is not None:
+        other = diagnosis.further
+        gaps = (other.before, other.recalibrated, other.after, other.floor)
+        rows.append((other.name, *map(gap_percentage, gaps), DASH))
     headers = ("gap on held-out tests", "before", "recali-\nbrated", "after", "floor", "share closed (95 %)")
     return table("Gap by model", headers, rows)
 

@@ -1,4 +1,4 @@
-"""The reader of positioner recordings takes files from strangers: it reads what is right and refuses the rest."""
+"""The reader of recordings of an axis takes files from strangers: it reads what is right and refuses the rest."""
 
 import struct
 import zlib
@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.diagnosis.positioner import recording as mat_file
-from savgs_ident.diagnosis.positioner.recording import read_positioner
+from savgs_ident.recordings import axis_recording as mat_file
+from savgs_ident.recordings.axis_recording import read_axis
 
 from ..in_one_test import over
 
@@ -33,7 +33,7 @@ def _written(folder: Path, packed: bool = True, **changes: Any) -> Path:
 
 
 def test_a_recording_comes_back_with_its_force_in_newtons(tmp_path: Path) -> None:
-    recording = read_positioner(_written(tmp_path))
+    recording = read_axis(_written(tmp_path))
     contents = _contents()
     np.testing.assert_array_equal(recording.position, contents["qm"].ravel())
     np.testing.assert_array_equal(recording.reference, contents["qg"].ravel())
@@ -43,13 +43,13 @@ def test_a_recording_comes_back_with_its_force_in_newtons(tmp_path: Path) -> Non
 
 def test_rows_serve_as_well_as_columns(tmp_path: Path) -> None:
     turned = {name: each.T for name, each in _contents().items() if name != "gtau"}
-    assert read_positioner(_written(tmp_path, **turned)).time.shape == (COUNT,)
+    assert read_axis(_written(tmp_path, **turned)).time.shape == (COUNT,)
 
 
 @pytest.mark.parametrize("name", ["t", "qm", "qg", "vir", "gtau"])
 def test_what_is_missing_is_named(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match=f"channel '{name}': is missing"):
-        read_positioner(_written(tmp_path, **{name: None}))
+        read_axis(_written(tmp_path, **{name: None}))
 
 
 def _with(value: float, place: int = 250) -> np.ndarray:
@@ -83,7 +83,7 @@ def _with(value: float, place: int = 250) -> np.ndarray:
 )
 def test_what_is_wrong_is_said(tmp_path: Path, changes: dict[str, Any], says: str) -> None:
     with pytest.raises(InputError, match=says):
-        read_positioner(_written(tmp_path, **changes))
+        read_axis(_written(tmp_path, **changes))
 
 
 def test_what_is_no_file_of_matlab_is_refused(tmp_path: Path) -> None:
@@ -96,10 +96,10 @@ def test_what_is_no_file_of_matlab_is_refused(tmp_path: Path) -> None:
     ):
         path.write_bytes(raw)
         with pytest.raises(InputError, match="not a MATLAB file of version 5 to 7"):
-            read_positioner(path)
+            read_axis(path)
     for place in (tmp_path, tmp_path / "absent.mat", Path("/dev/zero")):
         with pytest.raises(InputError, match="is no file"):
-            read_positioner(place)
+            read_axis(place)
 
 
 def test_a_file_cut_short_is_refused_wherever_it_is_cut(tmp_path: Path) -> None:
@@ -108,7 +108,7 @@ def test_a_file_cut_short_is_refused_wherever_it_is_cut(tmp_path: Path) -> None:
     for end in range(len(raw) - 9, 128, -len(raw) // 40):
         path.write_bytes(raw[:end])
         with pytest.raises(InputError):
-            read_positioner(path)
+            read_axis(path)
 
 
 def test_what_unpacks_without_end_is_refused_before_it_does(
@@ -120,7 +120,7 @@ def test_what_unpacks_without_end_is_refused_before_it_does(
     assert len(bomb) < 2**15
     path.write_bytes(path.read_bytes() + struct.pack("<II", 15, len(bomb)) + bomb)
     with pytest.raises(InputError, match="unpacks to more than"):
-        read_positioner(path)
+        read_axis(path)
 
 
 def test_a_signal_that_is_there_twice_is_refused(tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ def test_a_signal_that_is_there_twice_is_refused(tmp_path: Path) -> None:
     other.mkdir()
     path.write_bytes(path.read_bytes() + _written(other).read_bytes()[128:])
     with pytest.raises(InputError, match="is there more than once"):
-        read_positioner(path)
+        read_axis(path)
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -146,7 +146,7 @@ def test_whatever_is_changed_in_a_file_it_is_read_or_refused(
     path = tmp_path / "changed.mat"
     path.write_bytes(raw)
     try:
-        recording = read_positioner(path)
+        recording = read_axis(path)
     except InputError:
         return
     assert np.isfinite(recording.force).all()

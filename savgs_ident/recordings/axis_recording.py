@@ -1,4 +1,4 @@
-"""A recording of the positioner: a carriage on a ball screw, driven by a motor under closed loop.
+"""A recording of a servo axis under closed loop: where it was, where it was to be, and the force of its drive.
 
 The file has, in MATLAB's format, column vectors ``t`` [s], ``qm`` (measured position [m]), ``qg`` (reference [m])
 and ``vir`` (controller output [V]), and the scalar ``gtau`` (force of the drive per volt [N/V]). Pulses that were
@@ -207,7 +207,7 @@ JITTER = 0.01
 
 
 @dataclass(frozen=True)
-class PositionerRecording:
+class AxisRecording:
     """One test of n evenly spaced samples.
 
     Attributes:
@@ -230,7 +230,7 @@ class PositionerRecording:
         return float(self.time[-1] - self.time[0]) / (self.time.size - 1)
 
 
-def read_positioner(path: Path) -> PositionerRecording:
+def read_axis(path: Path) -> AxisRecording:
     """A recording from a MATLAB file.
 
     Raises :class:`InputError` for a file that cannot be read, a signal that is missing, of another length or not
@@ -244,7 +244,7 @@ def read_positioner(path: Path) -> PositionerRecording:
     _check_times(path, signals["t"])
     for name, signal in signals.items():
         _check_signal(path, name, signal, signals["t"])
-    return PositionerRecording(
+    return AxisRecording(
         str(path), signals["t"], signals["qm"], signals["qg"], float(gain.ravel()[0]) * signals["vir"]
     )
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.signal import lfilter
 
-from savgs_ident.diagnosis.positioner.recording import PositionerRecording
+from savgs_ident.recordings.axis_recording import AxisRecording
 
 PERIOD_S = 5.0
 RATE_HZ = 1000.0
@@ -14,7 +14,7 @@ BASE = {"mass": 80.0, "viscous": 150.0}
 
 def recorded_axis(
     laws: Mapping[str, float], seed: int, cycles: int = 4, noise: float = 0.3, colour: float = 0.9
-) -> PositionerRecording:
+) -> AxisRecording:
     """A recording of an axis with mass, viscous friction and the given ``laws`` (SI).
 
     The force has noise of standard deviation ``noise`` [N] with correlation ``colour`` from sample to sample, the
@@ -32,4 +32,4 @@ def recorded_axis(
     force += p["viscous_difference"] * np.abs(v)
     draw = np.random.default_rng(seed).normal(size=time.size)
     force += noise * np.sqrt(1.0 - colour**2) * lfilter([1.0], [1.0, -colour], draw)
-    return PositionerRecording("synthetic", time, np.round(q, 7), q, force)
+    return AxisRecording("synthetic", time, np.round(q, 7), q, force)

@@ -1,0 +1,339 @@
+"""The problem of a diagnosis along a measured motion: the force that a plant needs from its drive.
+
+    problem, data = motion_problem(motion, Axis(), Axis.parameters, generic_effects(Axis.ports), free=("mass",))
+
+Rows are the force that is needed (:mod:`savgs_ident.simulate.along_motion`), low-passed and thinned like the measured
+one; rows of a second of time are left out together. The motion is taken as it was measured, so that errors of its
+sensor are not among the candidates.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.parameter import ParameterTable
+from savgs_ident.core.status import Status
+from savgs_ident.core.values import Values
+from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation
+from savgs_ident.diagnosis.location_hypotheses import (
+    PLAIN_FORCES,
+    STRETCHES,
+    Functions,
+    force_port,
+    laws_of_functions,
+    motion_functions,
+    ports_by_location,
+    prandtl_element,
+)
+from savgs_ident.diagnosis.problem import AbstractProblem
+from savgs_ident.diagnosis.result import CyclePosition, DriveForces, ForceLoop, FurtherShrink, NextTest
+from savgs_ident.effects.base import Port, PortKind, PortSignals
+from savgs_ident.effects.effect import Effect
+from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.observations import Data, Prediction, Term
+from savgs_ident.plants.base import AbstractPlant, AtPorts
+from savgs_ident.responses.driven_motion import DrivenMotion
+from savgs_ident.simulate.along_motion import Samples, force_gain, force_slopes, needed_force, ports_along
+from savgs_ident.simulate.program_cache import placed
+
+WIDTH = 8
+"""Slopes are computed so many at a time: a program for each number of them would have to be compiled."""
+
+PRECISION = 1e-6
+"""Largest Newton step that may remain in a state, in its typical size [1]."""
+
+REVERSAL, MID_STROKE = 0.3, 0.8
+"""Shares of the largest velocity below which the plant turns round and above which it is in mid-stroke."""
+
+FREE_ORDERS = 5
+"""Highest order, in a block of time, of a signal that is free in every block."""
+
+
+class _Seen(NamedTuple):
+    """What laws may be made of: signals at the force ports, and the force that the model needs from the drive [N]."""
+
+    signals: Mapping[str, PortSignals]
+    drive: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MotionProblem(AbstractProblem):
+    """A plant with one coordinate, driven along a measured motion.
+
+    Attributes:
+        motion: what was measured.
+    """
+
+    motion: DrivenMotion = field(kw_only=True)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The force of the drive."""
+        return (self.plant.inputs[0].name,)
+
+    @property
+    def channel(self) -> NDArray[np.intp]:
+        """The channel of each row: there is one."""
+        return np.zeros(self.motion.row_times.size, np.intp)
+
+    @property
+    def samples(self) -> Samples:
+        """The motion as the equations take it."""
+        motion = self.motion
+        speed = 2.0 * np.pi / motion.period
+        angle = speed * motion.step * np.arange(motion.position.size)
+        signals = (
+            motion.position,
+            motion.velocity,
+            motion.acceleration,
+            motion.drive,
+            np.gradient(motion.drive, motion.step),
+            angle,
+            np.full_like(angle, speed),
+        )
+        return Samples(*(jnp.asarray(each) for each in signals))
+
+    def start(self, values: Mapping[str, float]) -> None:
+        """Nothing: the motion is known."""
+        del values
+
+    def _force(self, terms: tuple[str, ...], values: Mapping[str, float]) -> NDArray[np.float64]:
+        """The force that is needed from the drive [N] at every sample, (n,)."""
+        p = placed(self.values(values))
+        return np.asarray(needed_force(self.model(terms), p, self.samples, self.motion.step).force)
+
+    def predict(
+        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
+    ) -> Prediction:
+        """Force rows [N] with ``terms`` at ``values`` [SI], with slopes in ``names``."""
+        model, p = self.model(terms), placed(self.values(values))
+        needed = needed_force(model, p, self.samples, self.motion.step)
+        status = Status.CONVERGED if float(needed.step_left) < PRECISION else Status.STALLED
+        rows = self.motion.rows(np.asarray(needed.force))
+        return Prediction(rows, self._slopes(model, p, names), status, warm_start)
+
+    def columns(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
+    ) -> list[NDArray[np.float64]]:
+        """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""
+        base = self.predict(terms, values, (), warm_start).rows
+        return [
+            np.stack([self._columns(terms, dict(values) | shapes, base, term) for shapes in term.tried])
+            for term in candidates
+        ]
+
+    def _columns(
+        self, terms: tuple[str, ...], values: Mapping[str, float], base: NDArray[np.float64], term: Term
+    ) -> NDArray[np.float64]:
+        """The same at given shapes: slopes at the null, or the secant to half a width of one that has states."""
+        if not self.catalogue[term.name].states:
+            model, p = self.complete(terms), placed(self.values(values))
+            return self._slopes(model, p, [each.name for each in term.amplitudes])
+        found = []
+        for each in term.amplitudes:
+            there = dict(values) | {each.name: each.centre + 0.5 * each.scale}
+            moved = self.predict((*terms, term.name), there, (), None).rows - base
+            found.append(moved / (0.5 * each.scale))
+        return np.stack(found, axis=1)
+
+    def _slopes(self, model: AbstractPlant, p: Values, names: Sequence[str]) -> NDArray[np.float64]:
+        """Slopes of the rows in the named parameters [N per SI unit], (m, n)."""
+        parts = [np.zeros((0, self.motion.position.size))]
+        for first in range(0, len(names), WIDTH):
+            some = names[first : first + WIDTH]
+            directions = {name: np.zeros(WIDTH) for name in p}
+            for place, name in enumerate(some):
+                directions[name][place] = 1.0
+            slopes = force_slopes(model, p, self.samples, self.motion.step, placed(directions))
+            parts.append(np.asarray(slopes)[: len(some)])
+        return self.motion.rows(np.concatenate(parts)).T
+
+    def port_signals(self, values: Mapping[str, float], warm_start: Any) -> Mapping[str, PortSignals]:
+        """What laws see at the force ports at the samples."""
+        del warm_start
+        return self._at_ports((), values).signals
+
+    def _at_ports(self, terms: tuple[str, ...], values: Mapping[str, float]) -> AtPorts:
+        return ports_along(self.complete(terms), placed(self.values(values)), self.samples, self.motion.step)
+
+    def locations(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any
+    ) -> list[InputLocation]:
+        """What an unknown signal at each location could do to the force that is needed."""
+        del warm_start
+        seen = _Seen(self._at_ports(terms, values).signals, self._force(terms, values))
+        found = []
+        for name, ports in ports_by_location(self.plant).items():
+            kinds = {port.kind for port in ports}
+            if kinds == {PortKind.NUMBER}:
+                found.append(self._numbers(name, ports, terms, values))
+            elif kinds & {PortKind.FORCE, PortKind.INPUT}:
+                found.append(self._signals(name, ports, terms, values, seen))
+        return found
+
+    def _signals(
+        self,
+        name: str,
+        ports: Sequence[Port],
+        terms: tuple[str, ...],
+        values: Mapping[str, float],
+        seen: _Seen,
+    ) -> InputLocation:
+        """A location where a force acts, or the drive."""
+        acting = [port for port in ports if port.kind in (PortKind.FORCE, PortKind.INPUT)]
+        laws: list[Law] = []
+        for port in acting:
+            functions = self._functions(port, seen)
+            columns = self._imposed(port, terms, values, np.stack(functions.values))
+            laws += laws_of_functions(columns, functions.plain)
+        return InputLocation(name, tuple(laws), self._imposed(acting[0], terms, values, self._free()))
+
+    def _functions(self, port: Port, seen: _Seen) -> Functions:
+        """Functions of what a force port sees; at the drive, of the force that the model needs from it.
+
+        The recorded force is what is to be explained: a law of that would explain everything.
+        """
+        if port.kind is PortKind.INPUT:
+            drive = seen.drive / np.abs(seen.drive).max()
+            return Functions([np.ones_like(drive), drive, drive * np.abs(drive)], (0, 1))
+        displacement, velocity, load = (np.asarray(each) for each in seen.signals[port.name][:3])
+        found = motion_functions(displacement, velocity, load)
+        held = [prandtl_element(displacement, share * port.displacement) for share in STRETCHES]
+        plain = (*PLAIN_FORCES, *range(len(found), len(found) + len(held)))
+        return Functions([*found, *held], plain)
+
+    def _imposed(
+        self,
+        port: Port,
+        terms: tuple[str, ...],
+        values: Mapping[str, float],
+        signals: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Change of the rows by signals (k, n) at a port [its unit], (m, k)."""
+        model, p = self.complete(terms), placed(self.values(values))
+        gain = np.asarray(force_gain(model, p, self.samples, self.motion.step, port.name))
+        return self.motion.rows(gain * signals).T
+
+    def _numbers(
+        self, name: str, ports: Sequence[Port], terms: tuple[str, ...], values: Mapping[str, float]
+    ) -> InputLocation:
+        """A location of numbers alone: slopes in them."""
+        numbers = [number for port in ports for number in port.numbers]
+        model, p = self.complete(terms), placed(self.values(values))
+        columns = self._slopes(model, p, [each.name for each in numbers])
+        columns = columns * np.array([each.change for each in numbers])
+        return InputLocation(name, laws_of_functions(columns), columns)
+
+    def _free(self) -> NDArray[np.float64]:
+        """Waves over a block of time and a constant [1], (f, n): what a signal free in every block is made of."""
+        turned = 2.0 * np.pi * self.motion.step * np.arange(self.motion.position.size)
+        waves = [wave(order * turned) for order in range(1, FREE_ORDERS + 1) for wave in (np.cos, np.sin)]
+        return np.stack([np.ones_like(turned), *waves])
+
+    def gap_map(self, data: Data, rows: NDArray[np.float64]) -> tuple[()]:
+        """None: the force of a drive has no harmonics of its own."""
+        del data, rows
+        return ()
+
+    def cycle_positions(self, data: Data, rows: NDArray[np.float64]) -> tuple[CyclePosition, ...]:
+        """The gap at reversal, in mid-stroke and between, as shares of its square."""
+        speed = np.abs(self.motion.rows(self.motion.velocity))
+        speed, square = speed / speed.max(), (data.measured - rows) ** 2
+        at_reversal, at_middle = (
+            float(square[some].sum() / square.sum()) for some in (speed < REVERSAL, speed > MID_STROKE)
+        )
+        return (CyclePosition(self.channels[0], at_reversal, at_middle, 1.0 - at_reversal - at_middle),)
+
+    def loops(
+        self, values: Mapping[str, float], warm_start: Any, found: Localisation, effect: Effect | None
+    ) -> tuple[ForceLoop, ...]:
+        """The force inferred at a location over one cycle, beside that of a named ``effect``."""
+        port = force_port(self.plant, found.name)
+        if port is None:
+            return ()
+        base = self.predict((), values, (), warm_start)
+        gain = self._imposed(port, (), values, np.ones((1, self.motion.position.size)))[:, 0]
+        signals = self._at_ports((), values).signals[port.name]
+        start, end = self._cycle()
+        law = np.zeros(0)
+        if effect is not None and effect.port.kind is PortKind.FORCE:
+            terms = () if effect.name in self.baseline else (effect.name,)
+            forces = [
+                np.asarray(self._at_ports(terms, each).forces[effect.port.name])
+                for each in (values, dict(values) | dict(effect.null))
+            ]
+            law = self.motion.rows(forces[0] - forces[1])[start:end]
+        return (
+            ForceLoop(
+                port=found.name,
+                frequency_hz=1.0 / self.motion.period,
+                displacement=self.motion.rows(np.asarray(signals.displacement))[start:end],
+                velocity=self.motion.rows(np.asarray(signals.velocity))[start:end],
+                inferred=((self.motion.rows(self.motion.drive) - base.rows) / gain)[start:end],
+                law=law,
+                unit=port.force_unit,
+            ),
+        )
+
+    def _cycle(self) -> tuple[int, int]:
+        """First row of the recording's first cycle and that after its last."""
+        return 0, int(np.searchsorted(self.motion.row_times, self.motion.row_times[0] + self.motion.period))
+
+    def next_tests(self, search: Search, one: LaplaceFit, other: LaplaceFit) -> tuple[NextTest, ...]:
+        """None: which motions the axis could be given is not known."""
+        del search, one, other
+        return ()
+
+    def responses(self, data: Data, *rows: NDArray[np.float64]) -> DriveForces:
+        """The force along the motion, measured and needed by three models."""
+        velocity = self.motion.rows(self.motion.velocity)
+        return DriveForces(self.motion.source, self.motion.row_times, velocity, data.measured, *rows)
+
+
+def motion_problem(
+    motion: DrivenMotion,
+    plant: AbstractPlant,
+    parameters: ParameterTable,
+    catalogue: Mapping[str, Effect],
+    baseline: tuple[str, ...] = (),
+    free: tuple[str, ...] = (),
+) -> tuple[MotionProblem, Data]:
+    """The problem of a measured motion, and the force of its drive as data.
+
+    A relative discrepancy of one moves every row by the root mean square of the force: a model misses by as much
+    whenever it does.
+    """
+    offered = {name: each for name, each in catalogue.items() if each.port.kind is not PortKind.SENSOR}
+    problem = MotionProblem(plant, parameters, offered, baseline, free, motion=motion)
+    force = motion.rows(motion.drive)
+    size = float(np.sqrt(np.mean(force**2)))
+    noise, reach = (np.full(force.size, each) for each in (motion.noise**2, size))
+    return problem, Data(force, noise, reach, motion.blocks)
+
+
+def further_motion(
+    problem: MotionProblem,
+    motion: DrivenMotion,
+    points: Sequence[tuple[tuple[str, ...], Mapping[str, float]]],
+) -> FurtherShrink:
+    """The gap of another motion by models that nothing of it was fitted to: as given, recalibrated, with more.
+
+    ``points`` are terms and values [SI] of each; nothing comes after where there are two.
+    """
+    there = replace(problem, motion=motion)
+    measured = motion.rows(motion.drive)
+    gaps = [
+        float(
+            np.linalg.norm(measured - there.predict(terms, values, (), None).rows) / np.linalg.norm(measured)
+        )
+        for terms, values in points
+    ]
+    floor = float(problem.motion.noise * np.sqrt(measured.size) / np.linalg.norm(measured))
+    return FurtherShrink(
+        Path(motion.source).name, gaps[0], gaps[1], gaps[2] if len(gaps) > 2 else np.nan, floor
+    )

@@ -1,1 +1,0 @@
-"""Diagnosis of a servo axis from its published recordings."""

@@ -1,0 +1,243 @@
+"""What a diagnosis asks of a plant: its baseline, what may be missing in it, and how it is held against recordings.
+
+Two kinds of recordings have a problem of their own: dwells (:mod:`savgs_ident.diagnosis.dwell_problem`) and a
+measured motion with the force of its drive (:mod:`savgs_ident.diagnosis.motion_problem`). Search, model selection,
+hold-out and verdict know :class:`AbstractProblem` alone.
+
+One model has every effect without states at its null: such an effect costs next to nothing there, so that one
+compiled program serves the baseline and all of them; only an effect with states of its own asks for another.
+Parameters that are not given are those of the plant, effects at their null.
+
+Parameters of the plant have the coordinates and priors that they have in a fit
+(:mod:`savgs_ident.inference.prior`). The amplitude of an effect begins at its null, two typical sizes wide; what
+shapes an effect is log-normal about its typical value, to a factor of two.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.parameter import Parameter, ParameterTable, merge_parameters
+from savgs_ident.core.transforms import known_to_tolerance
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.diagnosis.localisation import InputLocation, Localisation
+from savgs_ident.diagnosis.result import (
+    CyclePosition,
+    DriveForces,
+    ForceLoop,
+    MapCell,
+    NextTest,
+    Responses,
+)
+from savgs_ident.effects.base import AbstractFrictionLimitLaw, PortSignals
+from savgs_ident.effects.effect import Effect
+from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.observations import Data, Prediction, Term
+from savgs_ident.inference.prior import Coordinates, Linear, Logarithmic, sheet_coordinate
+from savgs_ident.inference.problem import used_parameters
+from savgs_ident.plants.base import AbstractPlant
+
+TYPICAL = 2.0
+"""Width of an amplitude's prior in typical sizes."""
+
+SHAPE = 0.7
+"""Width of the logarithm of what shapes an effect."""
+
+
+def term_of(effect: Effect) -> Term:
+    """An effect as a candidate; what it shares with the plant's sheet (a tolerance) is not its own."""
+    own = [each for each in effect.parameters if each.tolerance == 0.0]
+    amplitudes = tuple(_amplitude(each, effect.null[each.name]) for each in own if each.name in effect.null)
+    shapes = tuple(_shape(each) for each in own if each.name not in effect.null)
+    return Term(effect.name, effect.port.location, amplitudes, shapes, effect.tried)
+
+
+def _amplitude(each: Parameter, null: float) -> Linear:
+    return Linear(each.name, each.unit, null, TYPICAL * abs(each.value - null), each.lower, each.upper)
+
+
+def _shape(each: Parameter) -> Logarithmic:
+    return Logarithmic(each.name, each.unit, each.value, SHAPE, each.lower, each.upper)
+
+
+@dataclass(frozen=True)
+class AbstractProblem(ABC):
+    """A plant, the effects that it may have, and what it is held against; :class:`Plant` of a search.
+
+    Attributes:
+        plant: the plant without any of the effects.
+        parameters: its parameters as known before the data.
+        catalogue: all effects by name.
+        baseline: names of those that the baseline has.
+        free: names of the parameters that the baseline identifies.
+        models: sets of effects that such plants are known to have together.
+    """
+
+    plant: AbstractPlant
+    parameters: ParameterTable
+    catalogue: Mapping[str, Effect]
+    baseline: tuple[str, ...] = ()
+    free: tuple[str, ...] = ()
+    models: tuple[tuple[str, ...], ...] = field(default=(), kw_only=True)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the plant's channels."""
+        return tuple(each.name for each in self.plant.channels)
+
+    @cached_property
+    def table(self) -> ParameterTable:
+        """All parameters, effects that the baseline does not have at their null."""
+        brought = (ParameterTable(effect.parameters) for effect in self.catalogue.values())
+        table = merge_parameters(self.parameters, *brought)
+        absent = [each for name, each in self.catalogue.items() if name not in self.baseline]
+        return table.with_values({name: null for each in absent for name, null in each.null.items()})
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of all parameters, sorted."""
+        return tuple(sorted(self.table))
+
+    @cached_property
+    def nuisances(self) -> Coordinates:
+        """The free parameters of the baseline, then those known to a tolerance that matter.
+
+        What is identified and known to a tolerance all the same, as the damping is, is held against it.
+        """
+        used = used_parameters(self.model(()), self.table)
+        known = [name for name in known_to_tolerance(self.table, self.free) if name in used]
+        return tuple(sheet_coordinate(self.table[name]) for name in (*self.free, *known))
+
+    @cached_property
+    def candidates(self) -> tuple[Term, ...]:
+        """All effects that the baseline does not have."""
+        terms = [term_of(effect) for name, effect in self.catalogue.items() if name not in self.baseline]
+        return tuple(term for term in terms if term.amplitudes)
+
+    @property
+    def known(self) -> tuple[tuple[str, ...], ...]:
+        """What the known sets of effects have beyond the baseline, if more than one effect."""
+        mine, can = set(self.baseline), {term.name for term in self.candidates}
+        beyond = (
+            tuple(name for name in each if name not in mine) for each in self.models if mine < set(each)
+        )
+        return tuple(each for each in beyond if len(each) > 1 and can >= set(each))
+
+    def model(self, terms: Sequence[str]) -> AbstractPlant:
+        """The baseline with ``terms``.
+
+        With all effects without states too, at their null, unless a term with states asks for a program of its own
+        anyway: then the smaller model is the sooner compiled. The anchor of a contact is a state of all models or of
+        none.
+        """
+        special = [name for name in terms if self.catalogue[name].states and name not in self.baseline]
+        wanted = {
+            name
+            for name, effect in self.catalogue.items()
+            if name in self.baseline or (not effect.states and (not special or name in terms))
+        }
+        for limits in self._friction_limits.values():
+            if not wanted.intersection(limits):
+                wanted.add(limits[0])
+        model = self.plant
+        for name, effect in self.catalogue.items():
+            if name in wanted:
+                model = model + effect
+        for name in special:
+            model = model + self.catalogue[name]
+        return model
+
+    @cached_property
+    def _friction_limits(self) -> Mapping[str, list[str]]:
+        """Names of the effects that load the bristle of a contact, by the name of its port."""
+        found: dict[str, list[str]] = {}
+        for name, effect in self.catalogue.items():
+            if isinstance(effect.law, AbstractFrictionLimitLaw):
+                found.setdefault(effect.port.name, []).append(name)
+        return found
+
+    def complete(self, terms: Sequence[str]) -> AbstractPlant:
+        """The baseline with ``terms`` and all effects without states, those at their null."""
+        model = self.model(())
+        for name in terms:
+            if self.catalogue[name].states and name not in self.baseline:
+                model = model + self.catalogue[name]
+        return model
+
+    def values(self, given: Mapping[str, float]) -> Values:
+        """All parameters, SI, with the given ones."""
+        return as_values(self.table.as_dict() | dict(given))
+
+    @property
+    @abstractmethod
+    def channel(self) -> NDArray[np.intp]:
+        """The channel of each row, an index of :attr:`channels`, (m,)."""
+
+    @abstractmethod
+    def start(self, values: Mapping[str, float]) -> Any:
+        """What the baseline at ``values`` [SI] is solved from; raises :class:`InputError` if it has no solution."""
+
+    @abstractmethod
+    def predict(
+        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
+    ) -> Prediction:
+        """Rows with ``terms`` at ``values`` [SI], with slopes in ``names``, from ``warm_start``."""
+
+    @abstractmethod
+    def columns(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
+    ) -> list[NDArray[np.float64]]:
+        """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""
+
+    def rehearse(self) -> None:
+        """Have compiled what scores of candidates will ask for, where that takes time."""
+        return None
+
+    def refined(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any) -> Any:
+        """What to start from nearby, made as precise as it can be. Values are in SI."""
+        return warm_start
+
+    def corrected(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any) -> Self:
+        """The problem free of discretisation errors about ``values`` [SI]; as it is where it has none."""
+        return self
+
+    def uncorrected(self) -> Self:
+        """The problem without the corrections of :meth:`corrected`, which hold for its own catalogue alone."""
+        return self
+
+    @abstractmethod
+    def locations(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any
+    ) -> list[InputLocation]:
+        """What an unknown signal at each location could do to the rows, about a solution with ``terms``."""
+
+    @abstractmethod
+    def port_signals(self, values: Mapping[str, float], warm_start: Any) -> Mapping[str, PortSignals]:
+        """What laws see at the force ports along the baseline's motion [the ports' units], (P,) each."""
+
+    @abstractmethod
+    def gap_map(self, data: Data, rows: NDArray[np.float64]) -> tuple[MapCell, ...]:
+        """Where in the data a prediction (m,) [units of the rows] misses."""
+
+    @abstractmethod
+    def cycle_positions(self, data: Data, rows: NDArray[np.float64]) -> tuple[CyclePosition, ...]:
+        """Where in the cycle of the motion a prediction (m,) [units of the rows] misses."""
+
+    @abstractmethod
+    def loops(
+        self, values: Mapping[str, float], warm_start: Any, found: Localisation, effect: Effect | None
+    ) -> tuple[ForceLoop, ...]:
+        """The signal inferred at a location against the motion there, beside the law of a named ``effect``."""
+
+    @abstractmethod
+    def next_tests(self, search: Search, one: LaplaceFit, other: LaplaceFit) -> tuple[NextTest, ...]:
+        """Tests that would separate two hypotheses, the most significant first."""
+
+    @abstractmethod
+    def responses(self, data: Data, *rows: NDArray[np.float64]) -> Responses | DriveForces:
+        """Rows before, recalibrated and after, (m,) each [units of the rows], as a report shows them."""
