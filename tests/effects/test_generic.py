@@ -33,7 +33,7 @@ SPINDLE = Port(
 BELT = Port("belt", PortKind.FORCE, "belt", sense=-1.0, loaded=True)
 NUT = Port("nut", PortKind.SERIES, "spindle", displacement=1e-5, velocity=1e-3, force=100.0)
 MASS = Port("mass", PortKind.NUMBER, "mass", numbers=(Number("m", "kg", 2.0), Number("J", "kg m^2", 0.1)))
-DRIVE = Port("drive", PortKind.INPUT, "drive", force_unit="N m")
+DRIVE = Port("drive", PortKind.INPUT, "drive", displacement_unit="N", force_unit="N m")
 ENCODER = Port("encoder", PortKind.SENSOR, "sensor.position")
 EFFECTS = generic_effects((SLIDE, SPINDLE, BELT, NUT, MASS, DRIVE, ENCODER))
 PLANT = {"m": 30.0, "J": 0.5, "k_stick": 1e7, "c_stick": 1e3}
