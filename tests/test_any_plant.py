@@ -1,6 +1,9 @@
-"""A plant that is no quarter car through the public interface: fitted, sampled, shown."""
+"""Plants that are no quarter car through the public interface: fitted, sampled, diagnosed, shown."""
 
 import json
+import re
+import runpy
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +14,8 @@ from .relaxed import as_users_have_it
 TRUTH = {"k": 5.5e4, "c": 2.5e3}
 DWELLS = (0.8, 1.2, 1.6, 2.0, 2.5, 3.5, 5.0, 8.0, 11.0)
 NOISE = {"sprung_accel": 0.05, "susp_deflection": 1e-4}
+
+PENDULUM = Path(__file__).resolve().parents[1] / "examples" / "pendulum.py"
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -102,3 +107,73 @@ def test_the_posterior_agrees_with_the_fit(fit: si.Fit) -> None:
         assert posterior[name].sd == pytest.approx(fit[name].stderr, rel=0.3)
     assert "stiffness" in str(posterior) or "k" in str(posterior)
     assert json.loads(posterior.to_json())["parameters"]["k"]["unit"] == "N/m"
+
+
+@pytest.mark.slow
+def test_friction_of_the_guide_is_diagnosed_and_reported_without_a_word_of_the_quarter_car(
+    model: si.PlantModel, tmp_path: Path
+) -> None:
+    rubbing = (model + "guide_coulomb").with_values(TRUTH)
+    measured = si.simulate_dwells(rubbing, (0.5, *DWELLS), {"road_height": 0.0137}, NOISE, seed=5)
+    found = si.diagnose(model, measured)
+    assert found.trusted
+    verdict = found.verdict
+    assert (verdict.kind, verdict.ports) == ("effect", ("guide",))
+    # The load of the guide is its weight: there a friction in proportion to it is a constant one.
+    assert {*verdict.effects, *verdict.confusable_with} == {"guide_coulomb", "guide_preload"}
+    force = {"guide_coulomb": ("coefficient", 0.03), "guide_preload": ("force", 0.03 * 320.0 * 9.80665)}
+    role, true = force[verdict.effects[0]]
+    assert abs(found.identified[f"{verdict.effects[0]}_{role}"] / true - 1.0) < 0.03
+    assert "at the port guide is missing" in str(found)
+    record = json.loads(found.to_json())
+    assert record["verdict"]["ports"] == ["guide"]
+    assert record["baseline"]["model"] == "TwoMass"
+    page = found.to_html(tmp_path / "gap.html").read_text()
+    assert "Diagnosis of TwoMass" in page
+    assert "per metre of road" in page
+    _names_no_quarter_car(page + str(found))
+    assert {"gap sprung_accel", "bode susp_deflection", "shrink", "force 0"} <= {*found.figure_names}
+    assert "ports" not in found.figure_names
+    assert si.plot_bode(found).axes[0].get_ylabel() == "magnitude [m/s² per m of road]"
+
+
+@pytest.mark.slow
+def test_the_example_of_a_plant_of_ones_own_is_sampled_and_diagnosed(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    runpy.run_path(str(PENDULUM), run_name="__main__")
+    printed = capsys.readouterr().out
+    assert printed.startswith("pivot_friction at the port pivot is missing in the model")
+    assert "emcee: converged" in printed
+    for name in ("c", "pivot_friction_force"):
+        median, sd = re.search(rf"^{name} +([\d.]+) ± ([\d.]+) ", printed, re.M).groups()
+        assert abs(float(median) - 0.02) < 3.0 * float(sd)
+
+
+@pytest.mark.slow
+def test_nothing_is_missing_in_the_model_of_a_pendulum_without_friction(tmp_path: Path) -> None:
+    pendulum = runpy.run_path(str(PENDULUM))["Pendulum"]
+    model = si.PlantModel(pendulum(), pendulum.parameters)
+    tests = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.5)
+    measured = si.simulate_dwells(
+        model.with_values({"c": 0.03}), tests, {"pivot_accel": 0.3}, {"angle": 1e-3}
+    )
+    found = si.diagnose(model, measured)
+    assert (found.trusted, found.verdict.kind) == (True, "none")
+    assert abs(found.parameters["c"] / 0.03 - 1.0) < 0.05
+    page = found.to_html(tmp_path / "gap.html").read_text()
+    assert "First harmonic per m/s² of pivot" in page
+    _names_no_quarter_car(page)
+    assert "road" not in page
+
+
+def _names_no_quarter_car(text: str) -> None:
+    for word in ("uarter", "rail", "wishbone", "cam ", "SAVGS", "simtr", "simqc", "SimQC"):
+        assert word not in text, word
+
+
+def test_the_example_is_short_and_uses_the_public_interface_alone() -> None:
+    lines = PENDULUM.read_text().splitlines()
+    assert len(lines) <= 60
+    ours = [line for line in lines if "import" in line and "savgs_ident" in line]
+    assert ours == ["import savgs_ident as si"]

@@ -60,7 +60,9 @@ def force_loops(
     if port is None:
         return ()
     ports, _ = node_loads(problem.complete(()), p, solution)
-    signals = ports[motion_port(problem.plant, port)]
+    moving = motion_port(problem.plant, port)
+    signals = ports[moving]
+    motion_unit = next(each.displacement_unit for each in problem.plant.ports if each.name == moving)
     force = None if effect is None else effect_force(problem.complete(()), p, solution, effect)
     order = np.argsort(np.asarray(solution.excitation.frequency))
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
@@ -83,6 +85,7 @@ def force_loops(
                 inferred=free_signal(found.free_input[test], grid),
                 law=np.zeros(0) if force is None else _without_mean(sample(force)),
                 unit=_unit(problem.plant, port),
+                motion_unit=motion_unit,
             )
         )
     return tuple(loops)

@@ -256,11 +256,12 @@ class ForceLoop:
     Attributes:
         port: name of the port.
         frequency_hz: of the test.
-        displacement: [m], (n,).
-        velocity: [m/s], (n,).
+        displacement: [``motion_unit``], (n,).
+        velocity: [``motion_unit``/s], (n,).
         inferred: inferred signal [``unit``], (n,).
         law: the named effect's law along the same motion [``unit``], (n,); empty if none is named.
         unit: N for a force, m or rad for what gives way, the channel's unit for a sensor.
+        motion_unit: of the displacement.
     """
 
     port: str
@@ -270,6 +271,7 @@ class ForceLoop:
     inferred: NDArray[np.float64]
     law: NDArray[np.float64]
     unit: str
+    motion_unit: str = "m"
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import inf
+from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Self
 
 import equinox as eqx
@@ -192,7 +193,8 @@ class AbstractPlant(eqx.Module):
     """Base of all plants; each one is final.
 
     A plant declares its coordinates, inputs, channels and ports, and implements :meth:`evaluate` and :meth:`read`.
-    ``conditions`` are those among which the next test is chosen.
+    ``conditions`` are those among which the next test is chosen; ``location_words`` say what reports call the
+    locations of ports, where not by their names.
     ``coordinate_type`` makes n scalars a tuple with names. :meth:`prepare`, :meth:`drive` and :meth:`cold_start` have
     defaults that serve a plant without costly kinematics; one that has them may replace these three. What exports
     offer beside the readings are its :attr:`outputs`.
@@ -207,6 +209,7 @@ class AbstractPlant(eqx.Module):
     ports: eqx.AbstractClassVar[tuple[Port, ...]]
     outputs: ClassVar[tuple[Output, ...]] = ()
     conditions: ClassVar[tuple[OperatingCondition, ...]] = SAME_OR_SCALED
+    location_words: ClassVar[Mapping[str, str]] = MappingProxyType({})
     effects: tuple[Effect, ...] = eqx.field(default=(), kw_only=True)
 
     @abstractmethod

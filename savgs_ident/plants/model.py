@@ -38,6 +38,10 @@ class Model(Protocol):
         """Names of the effects in it."""
 
     @property
+    def plant(self) -> AbstractPlant | type[AbstractPlant]:
+        """What the plant declares: coordinates, inputs, channels, ports."""
+
+    @property
     def channels(self) -> tuple[Channel, ...]:
         """What the plant's sensors read."""
 

@@ -61,7 +61,7 @@ def response_text(title: str, record: Mapping[str, Any]) -> RenderableType:
     columns = [[fixed(value, 3) for value in record["frequency_hz"]]]
     for name, shown in READINGS.items():
         channel = record["channels"][name]
-        headers += [f"{_SHORT[name]}\n[{shown.per_road}]", "phase\n[deg]", f"p-p\n[{shown.unit}]"]
+        headers += [f"{_SHORT[name]}\n[{shown.per_input}]", "phase\n[deg]", f"p-p\n[{shown.unit}]"]
         columns.append([fixed(value, 3) for value in channel["per_metre_of_road"]])
         columns.append([fixed(value, 1) for value in channel["phase_deg"]])
         columns.append([fixed(shown.scale * value, 3) for value in channel["peak_to_peak"]])

@@ -41,9 +41,9 @@ _SIGMAS = 2.0
 def draw_magnitude(
     axes: Axes, curves: Sequence[ModelCurve], measured: MeasuredPoints | None, c: int, shown: ChannelLabel
 ) -> None:
-    """Magnitude of the first harmonic per metre of road, labelled for a legend."""
+    """Magnitude of the first harmonic per unit of the input, labelled for a legend."""
     magnitude_axis(axes)
-    axes.set_ylabel(f"magnitude [{shown.per_road} of road]")
+    axes.set_ylabel(f"magnitude [{shown.per_input} of {shown.input}]")
     for curve, line in zip(curves, LINES, strict=False):
         axes.plot(curve.frequency, np.abs(curve.transfer[:, c]), label=printable(curve.label), **line)
     if measured is not None:
@@ -52,9 +52,11 @@ def draw_magnitude(
         axes.errorbar(measured.frequency, np.abs(measured.transfer[:, c]), error, label=label, **_POINTS)
 
 
-def draw_phase(axes: Axes, curves: Sequence[ModelCurve], measured: MeasuredPoints | None, c: int) -> None:
-    """Phase of the first harmonic against the road."""
-    axes.set_ylabel("phase to the road [deg]")
+def draw_phase(
+    axes: Axes, curves: Sequence[ModelCurve], measured: MeasuredPoints | None, c: int, shown: ChannelLabel
+) -> None:
+    """Phase of the first harmonic against the input."""
+    axes.set_ylabel(f"phase to the {shown.input} [deg]")
     axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1.0, 1.5, 3.0, 4.5, 9.0, 10.0]))
     for curve, line in zip(curves, LINES, strict=False):
         axes.plot(curve.frequency, phase_deg(curve.transfer[:, c]), **line)

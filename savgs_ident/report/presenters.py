@@ -187,7 +187,7 @@ def comparison_figure(comparison: "Comparison", progress: Progress = no_progress
         solving = pool.submit(comparison.between)
         from savgs_ident.fit.residuals import measured_points, whitened
         from savgs_ident.report.fit.bode import bode_figure
-        from savgs_ident.report.text import READINGS, ROAD
+        from savgs_ident.report.text import READINGS
     model, frictionless = solving.result()
     label = "identified model" if comparison.rig_model.rig.provenance else "model as drawn"
     curves = [model.curve(label)]
@@ -195,8 +195,15 @@ def comparison_figure(comparison: "Comparison", progress: Progress = no_progress
         curves.append(frictionless.curve("the same without friction (SimQC)"))
     progress("drawing")
     residuals = whitened(comparison.measured, tuple(READINGS), comparison.model.harmonics, comparison.used)
+    driven = comparison.rig_model.plant.inputs[0].name
     title = f"Model and measurement: {Path(comparison.origin.data).name}"
-    return bode_figure(title, measured_points(comparison.measured, tuple(READINGS), ROAD), curves, residuals)
+    return bode_figure(
+        title,
+        measured_points(comparison.measured, tuple(READINGS), driven),
+        curves,
+        residuals,
+        tuple(READINGS.values()),
+    )
 
 
 class _CampaignSummary(_Presenter["CampaignSummary"]):
@@ -243,10 +250,15 @@ class _SimulatedResponse(_Presenter["SimulatedResponse"]):
 
     def figures(self, result: "SimulatedResponse") -> Figures:
         from savgs_ident.report.fit.bode import response_figure
+        from savgs_ident.report.text import READINGS
 
         effects = result.origin.effects
         label = "with " + ", ".join(effects) if effects else "SimQC (without friction)"
-        return {"simulate": lambda: response_figure("Simulated response", [result.curve(label)])}
+        return {
+            "simulate": lambda: response_figure(
+                "Simulated response", [result.curve(label)], tuple(READINGS.values())
+            )
+        }
 
     def more(self, result: "SimulatedResponse", folder: Path) -> Iterator[Path]:
         from savgs_ident.report.model import response_columns
@@ -300,8 +312,6 @@ class _Posterior(_Presenter["Posterior"]):
         return () if result.trusted else (f"{'; '.join(result.convergence.reasons)}.",)
 
     def page(self, result: "Posterior") -> str | None:
-        if not _is_quarter_car(result.model):
-            return None
         from savgs_ident.report.posterior.page import posterior_html
 
         return posterior_html(result, result.origin.with_versions(self.packages))
@@ -311,12 +321,6 @@ class _Posterior(_Presenter["Posterior"]):
         from savgs_ident.report.posterior.figures import corner_figure, profile_figure, trace_figure
 
         identified = result.of_role("identified")
-        predicted: Figures = {}
-        if _is_quarter_car(result.model):
-            predicted = {
-                "predicted sprung_accel": lambda: predictive_figure(result, 0),
-                "predicted susp_deflection": lambda: predictive_figure(result, 1),
-            }
         return {
             "corner": lambda: corner_figure(result),
             **{f"trace {each.name}": partial(trace_figure, result, each) for each in identified},
@@ -325,7 +329,10 @@ class _Posterior(_Presenter["Posterior"]):
                 for each in identified
                 if each.profile is not None
             },
-            **predicted,
+            **{
+                f"predicted {each.name}": partial(predictive_figure, result, c)
+                for c, each in enumerate(result.model.channels)
+            },
         }
 
     def write(self, result: "Posterior", folder: Path, progress: Progress) -> Iterator[Path]:
@@ -358,7 +365,7 @@ class _Diagnosis(_Presenter["Diagnosis"]):
         return () if result.trusted else result.warnings
 
     def page(self, result: "Diagnosis") -> str | None:
-        if not _is_quarter_car(result.given):
+        if result.measured is None:
             return None
         from savgs_ident.report.diagnosis.page import diagnosis_html
 
@@ -368,19 +375,18 @@ class _Diagnosis(_Presenter["Diagnosis"]):
         from savgs_ident.report.diagnosis.bode import diagnosis_bode_figure
         from savgs_ident.report.diagnosis.drawing import rig_figure
         from savgs_ident.report.diagnosis.figures import force_figure, gap_map_figure, shrink_figure
-        from savgs_ident.report.diagnosis.text import law_label
 
-        if not _is_quarter_car(result.given):
+        if result.measured is None:
             return {"shrink": lambda: shrink_figure(result)}
+        names = [each.name for each in result.given.channels]
+        drawing: Figures = {"ports": lambda: rig_figure(result)} if _is_quarter_car(result.given) else {}
         return {
-            "gap sprung_accel": lambda: gap_map_figure(result, "sprung_accel"),
-            "gap susp_deflection": lambda: gap_map_figure(result, "susp_deflection"),
-            "ports": lambda: rig_figure(result),
+            **{f"gap {name}": partial(gap_map_figure, result, name) for name in names},
+            **drawing,
             "shrink": lambda: shrink_figure(result),
-            "bode sprung_accel": lambda: diagnosis_bode_figure(result, 0),
-            "bode susp_deflection": lambda: diagnosis_bode_figure(result, 1),
+            **{f"bode {name}": partial(diagnosis_bode_figure, result, c) for c, name in enumerate(names)},
             **{
-                f"force {number}": partial(force_figure, loop, law_label(result, loop.port))
+                f"force {number}": partial(force_figure, result, loop)
                 for number, loop in enumerate(result.loops)
             },
         }

@@ -12,10 +12,10 @@ _FIGURES = {
     "FIT": "bode",
     "COMPARISON": "bode",
     "SIMULATED_RESPONSE": "simulate",
-    "POSTERIOR": "predicted sprung_accel",
-    "DIAGNOSIS": "bode sprung_accel",
+    "POSTERIOR": "predicted",
+    "DIAGNOSIS": "bode",
 }
-"""By presenter, the name of the figure that shows the response."""
+"""By presenter, the first word of the name of the figure that shows the response."""
 
 
 def plot_bode(result: Result) -> "Figure":
@@ -26,9 +26,10 @@ def plot_bode(result: Result) -> "Figure":
 
     Raises :class:`InputError` for a result that has no frequency response.
     """
-    if result.presenter not in _FIGURES:
+    names = [each for each in result.figure_names if each.split(" ")[0] == _FIGURES.get(result.presenter)]
+    if not names:
         raise InputError(
             f"a {type(result).__name__} has no frequency response",
             remedy="choose among its figures: " + ", ".join(result.figure_names),
         )
-    return result.figure(_FIGURES[result.presenter])
+    return result.figure(names[0])

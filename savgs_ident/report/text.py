@@ -15,10 +15,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, isfinite, isinf, log10
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
+
+if TYPE_CHECKING:
+    from savgs_ident.plants.model import Model
 
 MINUS = "\u2212"
 """A minus as long as a plus."""
@@ -141,12 +145,21 @@ def significant(value: float | None, digits: int = 4) -> str:
 
 @dataclass(frozen=True)
 class ChannelLabel:
-    """How a channel is shown: ``title``, ``unit``, ``scale`` from SI to that unit, and unit per metre of road."""
+    """How a channel is shown.
+
+    Attributes:
+        title: its name in words.
+        unit: in which its values are shown.
+        scale: from SI to that unit.
+        per_input: unit of its response to the input.
+        input: that input in a word or two.
+    """
 
     title: str
     unit: str
     scale: float
-    per_road: str
+    per_input: str
+    input: str = "road"
 
     @property
     def heading(self) -> str:
@@ -160,20 +173,40 @@ READINGS: Mapping[str, ChannelLabel] = MappingProxyType(
         "susp_deflection": ChannelLabel("suspension deflection", "mm", 1e3, "m per m"),
     }
 )
-"""The channels whose response to the road is identified, by name, in the order of
-:data:`savgs_ident.plants.quarter_car.sensors.RESPONSE_CHANNELS` (which would load JAX)."""
+"""The channels of a quarter car that recordings are looked through for, where no model says more (and JAX is not
+loaded)."""
+
+_UNIT_WORDS: Mapping[str, str] = MappingProxyType({"m": "metre", "rad": "radian", "N": "newton"})
+_SHOWN_UNITS: Mapping[str, tuple[str, float]] = MappingProxyType({"m": ("mm", 1e3)})
 
 
-ROAD = "road_height"
-"""The input that it is the response to."""
+def channel_labels(model: "Model") -> dict[str, ChannelLabel]:
+    """How the channels of a model's plant are shown, by name in their order, as responses to its first input."""
+    driven = model.plant.inputs[0]
+    return {
+        each.name: ChannelLabel(
+            each.about,
+            *_SHOWN_UNITS.get(each.unit, (unit_text(each.unit), 1.0)),
+            f"{unit_text(each.unit)} per {unit_text(driven.unit)}",
+            driven.about,
+        )
+        for each in model.channels
+    }
 
 
-def channel_label(name: str) -> ChannelLabel:
-    """How the channel ``name`` is shown: as listed, any other by its name and in SI."""
+def per_input_words(model: "Model") -> str:
+    """What first harmonics are divided by, in words: "per metre of road"."""
+    driven = model.plant.inputs[0]
+    return f"per {_UNIT_WORDS.get(driven.unit, unit_text(driven.unit))} of {driven.about}"
+
+
+def channel_label(name: str, model: "Model | None" = None) -> ChannelLabel:
+    """How the channel ``name`` is shown: as a model's plant declares it or as listed, others by name and in SI."""
     # Only here: the command line prints errors without numpy, which recordings load.
     from savgs_ident.recordings.recording import CANONICAL_UNITS
 
-    if name in READINGS:
-        return READINGS[name]
+    known = READINGS if model is None else channel_labels(model)
+    if name in known:
+        return known[name]
     unit = unit_text(CANONICAL_UNITS.get(name, "1"))
     return ChannelLabel(name, unit, 1.0, f"{unit} per m")

@@ -68,7 +68,7 @@ def frequency_axis(axes: Axes, lowest: float, highest: float, labelled: bool = T
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.tick_params(axis="x", labelbottom=labelled)
     if labelled:
-        axes.set_xlabel("road frequency [Hz]")
+        axes.set_xlabel("frequency [Hz]")
 
 
 def magnitude_axis(axes: Axes) -> None:

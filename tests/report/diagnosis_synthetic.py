@@ -144,7 +144,7 @@ def unconverged(diagnosis: Diagnosis) -> Diagnosis:
 def hostile(diagnosis: Diagnosis, text: str) -> Diagnosis:
     """The same, with ``text`` wherever a name can come from a file or from outside."""
     first, *others = diagnosis.candidates
-    table = replace(diagnosis.rig, name=text)
+    table = replace(diagnosis.given.rig, name=text)
     return replace(
         diagnosis,
         model=text,

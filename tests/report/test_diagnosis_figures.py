@@ -50,7 +50,7 @@ def test_the_bode_figure_has_units_every_model_and_every_point(diagnosis: Diagno
         assert [axes.get_ylabel().split("[")[1] for axes in figure.axes] == [
             per_road, "deg]", "% of the response]"
         ]  # fmt: skip
-        assert figure.axes[2].get_xlabel() == "road frequency [Hz]"
+        assert figure.axes[2].get_xlabel() == "frequency [Hz]"
         told = [text.get_text() for text in figure.legends[0].get_texts()]
         assert told == [
             "before, as given", "recalibrated", "with rail_stribeck", "measured, ± 2 sd", "noise of the measurement"
@@ -84,7 +84,7 @@ def test_every_kind_of_verdict_is_drawn_without_an_empty_panel(by_kind: dict[str
             shrink_figure(diagnosis),
             *(diagnosis_bode_figure(diagnosis, c) for c in compared_channels(diagnosis)),
             *(gap_map_figure(diagnosis, channel) for channel in gap_channels(diagnosis)),
-            *(force_figure(loop, law_label(diagnosis, loop.port)) for loop in diagnosis.loops),
+            *(force_figure(diagnosis, loop) for loop in diagnosis.loops),
         ]
         assert len(figures) == (6 if kind == "none" else 10)
         for figure in figures:
@@ -151,7 +151,7 @@ def test_the_map_names_channel_units_and_dwells(diagnosis: Diagnosis) -> None:
     above, below = figure.axes[:2]
     assert above.get_title(loc="left") == "gap [noise sd]"
     assert below.get_title(loc="left") == "gap [% of the response]"
-    assert below.get_xlabel() == "road frequency of the dwell [Hz]"
+    assert below.get_xlabel() == "frequency of the dwell [Hz]"
     assert above.get_ylabel() == "harmonic order"
     told = [text.get_text() for text in below.get_xticklabels()]
     assert told[0] == "0.5"
@@ -161,7 +161,7 @@ def test_the_map_names_channel_units_and_dwells(diagnosis: Diagnosis) -> None:
 
 def test_a_loop_is_drawn_whole_over_velocity_and_displacement(diagnosis: Diagnosis) -> None:
     loop = diagnosis.loops[1]
-    figure = force_figure(replace(loop, displacement=loop.displacement + 0.45), "law of rail_stribeck")
+    figure = force_figure(diagnosis, replace(loop, displacement=loop.displacement + 0.45))
     left, right = figure.axes
     assert left.get_xlabel() == "velocity [mm/s]"
     assert right.get_xlabel() == "displacement [mm]"
@@ -181,7 +181,7 @@ def test_a_loop_without_a_law_has_one_line_and_ways_are_in_millimetres(
     by_kind: dict[str, Diagnosis],
 ) -> None:
     loop = by_kind["unknown"].loops[0]
-    figure = force_figure(replace(loop, unit="m", inferred=1e-5 * loop.inferred), "")
+    figure = force_figure(by_kind["unknown"], replace(loop, unit="m", inferred=1e-5 * loop.inferred))
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["inferred"]
     assert figure.axes[0].get_ylabel() == "signal [mm]"
     assert law_label(by_kind["several"], "sensor.sprung_accel") == "law of accel_lag"
@@ -222,7 +222,7 @@ def test_names_in_figures_are_neither_formulas_nor_missing_glyphs(diagnosis: Dia
         shrink_figure(attacked),
         diagnosis_bode_figure(attacked, 0),
         gap_map_figure(attacked, HOSTILE),
-        force_figure(attacked.loops[0], law_label(attacked, HOSTILE)),
+        force_figure(attacked, attacked.loops[0]),
     ]
     for figure in figures:
         assert embed(figure, "hostile").width > 300

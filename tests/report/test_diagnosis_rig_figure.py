@@ -10,17 +10,16 @@ from matplotlib.patches import Circle, Rectangle
 from numpy.testing import assert_allclose
 
 from savgs_ident.diagnosis.result import Diagnosis
-from savgs_ident.plants.quarter_car.ports import PORTS
+from savgs_ident.plants.quarter_car.ports import LOCATION_WORDS, PORTS
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.report.diagnosis.drawing import port_marks, rig_figure, rig_points
-from savgs_ident.report.diagnosis.text import PORT_WORDS
 from savgs_ident.report.theme import BLUE, ORANGE
 
 from .diagnosis_synthetic import KINDS, SHARES
 
 
 def test_the_linkage_is_drawn_at_the_hardpoints_of_the_rig(diagnosis: Diagnosis, rig: Rig) -> None:
-    at, p = rig_points(diagnosis.rig.parameters), rig.parameters
+    at, p = rig_points(diagnosis.given.table), rig.parameters
     assert (p["C_y"].value, p["C_z"].value) == at.C
     assert hypot(at.F[0] - at.G[0], at.F[1] - at.G[1]) == pytest.approx(p["l_SL"].value)
     assert at.carriages[1] - at.carriages[0] == pytest.approx(p["l_tb"].value)
@@ -36,15 +35,15 @@ def test_the_linkage_is_drawn_at_the_hardpoints_of_the_rig(diagnosis: Diagnosis,
 
 
 def test_every_port_has_a_place_a_name_and_its_share(diagnosis: Diagnosis) -> None:
-    assert set(PORT_WORDS) == {port.location for port in PORTS}
+    assert set(LOCATION_WORDS) == {port.location for port in PORTS}
     marks = {mark.port: mark for mark in port_marks(diagnosis)}
-    assert set(marks) == set(PORT_WORDS)
+    assert set(marks) == set(LOCATION_WORDS)
     for port, (share, _) in SHARES.items():
         assert marks[port].share == share
         assert marks[port].place is not None
     figure = rig_figure(diagnosis)
     texts = [text.get_text() for text in figure.axes[0].texts]
-    assert set(PORT_WORDS.values()) <= set(texts)
+    assert set(LOCATION_WORDS.values()) <= set(texts)
     assert "94 %" in texts
     bars = [
         patch.get_width()

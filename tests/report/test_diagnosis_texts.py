@@ -167,7 +167,7 @@ def test_a_diagnosis_with_nothing_beside_its_verdict_has_a_page(diagnosis: Diagn
     bare = replace(
         diagnosis, ports=(), map=(), cycle=(), loops=(), by_channel={}, further=None, next_tests=(),
         not_judgeable=(), confusable=(), warnings=(), candidates=diagnosis.candidates[:1],
-        parameters=diagnosis.rig.parameters.as_dict(), identified=diagnosis.rig.parameters.as_dict(),
+        parameters=diagnosis.given.table.as_dict(), identified=diagnosis.given.table.as_dict(),
     )  # fmt: skip
     page = Reader(diagnosis_html(bare, replace(ORIGIN, warnings=())))
     text = " ".join(page.texts)

@@ -17,7 +17,7 @@ from savgs_ident.fit.result import Fit
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.report.campaigns.inspect import campaign_figure
 from savgs_ident.report.fit.bode import bode_figure, response_figure
-from savgs_ident.report.text import ROAD
+from savgs_ident.report.text import READINGS
 from savgs_ident.report.theme import DPI, printable, write_figure
 from savgs_ident.responses.summary import CampaignSummary, inspect
 from savgs_ident.simulate.frequency_response import ModelCurve, model_curve
@@ -37,7 +37,13 @@ def curves(mass_on_spring: Callable[..., NDArray[np.complex128]]) -> list[ModelC
 @pytest.fixture(scope="module")
 def bode(fit: Fit, curves: list[ModelCurve]) -> Figure:
     residuals = whitened(fit.measured, fit.channels, fit.predicted, fit.used)
-    return bode_figure("A title", measured_points(fit.measured, fit.channels, ROAD), curves, residuals)
+    return bode_figure(
+        "A title",
+        measured_points(fit.measured, fit.channels, "road_height"),
+        curves,
+        residuals,
+        tuple(READINGS.values()),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +92,13 @@ def test_nothing_solved_and_one_channel_only_is_drawn(fit: Fit, tmp_path: Path) 
     other = replace(fit.measured, channels=("road_height", "sprung_accel", "something_else"))
     open_curve = ModelCurve("m", np.array([0.5, 6.0]), np.full((2, 2), np.nan + 0j), np.full((2, 2), np.nan))
     residuals = np.full((8, 2, 6, 2), np.nan)
-    figure = bode_figure("open", measured_points(other, fit.channels, ROAD), [open_curve], residuals)
+    figure = bode_figure(
+        "open",
+        measured_points(other, fit.channels, "road_height"),
+        [open_curve],
+        residuals,
+        tuple(READINGS.values()),
+    )
     png, _ = write_figure(tmp_path, "bode", figure)
     assert png.stat().st_size > 10_000
 
@@ -104,7 +116,7 @@ def test_pictures_are_valid_files_of_the_size_asked_for(bode: Figure, tmp_path: 
 def test_the_same_figure_gives_the_same_bytes(curves: list[ModelCurve], tmp_path: Path) -> None:
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        write_figure(tmp_path / name, "r", response_figure("title", curves))
+        write_figure(tmp_path / name, "r", response_figure("title", curves, tuple(READINGS.values())))
     for suffix in ("png", "pdf"):
         one, two = (tmp_path / name / f"r.{suffix}" for name in ("one", "two"))
         assert one.read_bytes() == two.read_bytes()
@@ -114,7 +126,7 @@ def test_names_in_a_figure_are_neither_formulas_nor_missing_glyphs(
     curves: list[ModelCurve], tmp_path: Path
 ) -> None:
     named = [replace(curve, label=HOSTILE) for curve in curves]
-    figure = response_figure(HOSTILE, named)
+    figure = response_figure(HOSTILE, named, tuple(READINGS.values()))
     write_figure(tmp_path, "r", figure)
     shown = figure.legends[0].get_texts()[0].get_text()
     assert "[bold red]" in shown
@@ -145,5 +157,5 @@ def test_a_response_at_a_single_frequency_is_seen(
     frequency = np.array([2.0])
     road, ok = np.full(1, 0.01375 + 0.0j), np.ones(1, dtype=np.bool_)
     curve = model_curve("one", frequency, mass_on_spring(frequency, 0.3), road, ok)
-    figure = response_figure("one point", [curve])
+    figure = response_figure("one point", [curve], tuple(READINGS.values()))
     assert all(axes.get_lines()[0].get_marker() == "o" for axes in figure.axes)

@@ -58,6 +58,11 @@ class RigModel:
         return " + ".join((f"frictionless {self.rig.name}", *self.effects))
 
     @property
+    def plant(self) -> type[QuarterCar]:
+        """What the rig declares: coordinates, inputs, channels, ports."""
+        return QuarterCar
+
+    @property
     def channels(self) -> tuple[Channel, ...]:
         """What the rig's sensors read."""
         return QuarterCar.channels

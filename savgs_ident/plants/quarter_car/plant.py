@@ -52,6 +52,7 @@ from savgs_ident.plants.quarter_car.ports import (
     DAMPER,
     FRAME,
     LINK,
+    LOCATION_WORDS,
     MOUNT,
     PLATE,
     PORTS,
@@ -164,6 +165,7 @@ class QuarterCar(AbstractPlant):
     ports: ClassVar[tuple[Port, ...]] = PORTS
     outputs: ClassVar[tuple[Output, ...]] = OUTPUTS
     conditions: ClassVar[tuple[OperatingCondition, ...]] = CONDITIONS
+    location_words: ClassVar[Mapping[str, str]] = LOCATION_WORDS
 
     def prepare(self, p: Values) -> SectionCurves:
         """Kinematics and inertia of a parameter set, for many evaluations of it."""

@@ -29,6 +29,9 @@ frame     frame          plate and rail, up           force on the frame, up [N]
 ========= ============== ============================ ============================================
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from savgs_ident.effects.base import Inertia, Number, Port, PortKind
 
 RAIL = Port(
@@ -215,3 +218,20 @@ PORTS = (
 
 FORCE_PORTS = {port.location: port for port in PORTS if port.kind is PortKind.FORCE}
 """The force ports by location: there is one at each."""
+
+LOCATION_WORDS: Mapping[str, str] = MappingProxyType(
+    {
+        "rail": "rail",
+        "strut": "strut",
+        "suspension": "wishbone joints",
+        "tyre_radial": "tyre, radial",
+        "tyre_lateral": "tyre, lateral",
+        "link": "link and drive",
+        "road": "road plate",
+        "frame": "frame",
+        "inertia": "masses",
+        "sensor.sprung_accel": "accelerometer",
+        "sensor.susp_deflection": "potentiometer",
+    }
+)
+"""The locations as an engineer calls them."""

@@ -270,7 +270,7 @@ def _usable(response: HarmonicResponse | None, name: str) -> bool:
 
 def _draw_response(axes: Axes, summary: CampaignSummary, name: str) -> None:
     magnitude_axis(axes)
-    axes.set_ylabel(f"first harmonic [{channel_label(name).per_road} of road]")
+    axes.set_ylabel(f"first harmonic [{channel_label(name).per_input} of road]")
     for sweep in summary.sweeps:
         _draw_sweep(axes, sweep, name)
     response = summary.response

@@ -126,7 +126,7 @@ def ride_figure(design: Design) -> Figure:
         panels = figure.subplots(1, len(READINGS))
         for c, (axes, shown) in enumerate(zip(panels, READINGS.values(), strict=True)):
             axes.set_title(shown.title)
-            axes.set_ylabel(f"magnitude [{shown.per_road} of road]")
+            axes.set_ylabel(f"magnitude [{shown.per_input} of road]")
             axes.plot(RIDE, np.abs(passive[:, c]), label="passive, link held", **_BOUND)
             axes.plot(RIDE, np.abs(active[:, c]), label="active, loop closed", **_MAIN)
             magnitude_axis(axes)

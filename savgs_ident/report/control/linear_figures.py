@@ -110,7 +110,7 @@ def responses_figure(small: SmallMotions) -> Figure:
         grid = figure.subplots(2, len(READINGS), squeeze=False, height_ratios=(1.2, 1.0))
         for c, (column, shown) in enumerate(zip(grid.T, READINGS.values(), strict=True)):
             column[0].set_title(shown.title)
-            column[0].set_ylabel(f"magnitude [{shown.per_road} of road]")
+            column[0].set_ylabel(f"magnitude [{shown.per_input} of road]")
             column[1].set_ylabel("difference to the nonlinear rig [%]")
             nonlinear = small.nonlinear[:, c]
             column[0].plot(small.frequency, np.abs(nonlinear), label="nonlinear rig", **_NONLINEAR)
@@ -135,7 +135,7 @@ def described_figure(test: CamMotions) -> Figure:
         upper, lower = figure.subplots(2, len(READINGS), squeeze=False)
         for c, (axes, shown) in enumerate(zip(upper, READINGS.values(), strict=True)):
             axes.set_title(shown.title)
-            axes.set_ylabel(f"magnitude [{shown.per_road} of road]")
+            axes.set_ylabel(f"magnitude [{shown.per_input} of road]")
             axes.plot(
                 described.frequency,
                 np.abs(test.quasi_linear[:, c]),

@@ -17,7 +17,7 @@ from savgs_ident.diagnosis.result import Diagnosis, Responses
 from savgs_ident.fit.residuals import measured_points
 from savgs_ident.report.diagnosis.text import model_label
 from savgs_ident.report.panels import LINES, draw_magnitude, draw_phase
-from savgs_ident.report.text import READINGS, ROAD, channel_label
+from savgs_ident.report.text import channel_labels
 from savgs_ident.report.theme import PALE, frequency_axis, magnitude_axis, new_figure, styled
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.frequency_response import ModelCurve, model_curve
@@ -43,8 +43,8 @@ def compared_dwells(diagnosis: Diagnosis) -> tuple[HarmonicResponse, Responses]:
 
 
 def first_harmonic_gap(diagnosis: Diagnosis, c: int) -> FirstHarmonicGap:
-    """The gap of channel ``c`` of :data:`READINGS` dwell by dwell."""
-    (measured, answers), name = compared_dwells(diagnosis), tuple(READINGS)[c]
+    """The gap of the plant's channel ``c`` dwell by dwell."""
+    (measured, answers), name = compared_dwells(diagnosis), diagnosis.given.channels[c].name
     if name not in measured.channels:
         nothing = np.full(len(measured.tests), np.nan)
         return FirstHarmonicGap(nothing, nothing, nothing, nothing)
@@ -61,17 +61,20 @@ def first_harmonic_gap(diagnosis: Diagnosis, c: int) -> FirstHarmonicGap:
 
 
 def compared_channels(diagnosis: Diagnosis) -> tuple[int, ...]:
-    """The channels of :data:`READINGS` whose first harmonic is compared anywhere."""
+    """The places of the channels whose first harmonic is compared anywhere."""
     return tuple(
-        c for c in range(len(READINGS)) if np.any(np.isfinite(first_harmonic_gap(diagnosis, c).recalibrated))
+        c
+        for c in range(len(diagnosis.given.channels))
+        if np.any(np.isfinite(first_harmonic_gap(diagnosis, c).recalibrated))
     )
 
 
 def diagnosis_bode_figure(diagnosis: Diagnosis, c: int) -> Figure:
-    """Magnitude, phase and gap of the first harmonic of channel ``c`` of :data:`READINGS`."""
-    shown = channel_label(tuple(READINGS)[c])
-    points, curves = measured_points(compared_dwells(diagnosis)[0], tuple(READINGS), ROAD), _curves(diagnosis)
-    frequency = compared_dwells(diagnosis)[0].frequency
+    """Magnitude, phase and gap of the first harmonic of the plant's channel ``c``."""
+    labels, driven = channel_labels(diagnosis.given), diagnosis.given.plant.inputs[0].name
+    shown, measured = tuple(labels.values())[c], compared_dwells(diagnosis)[0]
+    points, curves = measured_points(measured, tuple(labels), driven), _curves(diagnosis)
+    frequency = measured.frequency
     with styled():
         figure = new_figure(4.5, 7.6)
         figure.set_layout_engine("none")
@@ -80,7 +83,7 @@ def diagnosis_bode_figure(diagnosis: Diagnosis, c: int) -> Figure:
         magnitude, phase, gap = panels
         figure.suptitle(shown.title, y=0.985, fontsize=10.0, fontweight="bold")
         draw_magnitude(magnitude, curves, points, c, shown)
-        draw_phase(phase, curves, points, c)
+        draw_phase(phase, curves, points, c, shown)
         _draw_gap(gap, frequency, first_harmonic_gap(diagnosis, c))
         for axes in panels:
             frequency_axis(axes, float(frequency[0]), float(frequency[-1]), labelled=axes is gap)
@@ -106,7 +109,7 @@ def _explain(figure: Figure, axes: Axes) -> None:
 def _curves(diagnosis: Diagnosis) -> list[ModelCurve]:
     """The models, the last one first: it has the strongest line."""
     measured, answers = compared_dwells(diagnosis)
-    road = measured.harmonics[:, measured.channel(ROAD), 1]
+    driven = measured.harmonics[:, measured.channel(diagnosis.given.plant.inputs[0].name), 1]
     found = []
     for label, harmonics in (
         (model_label(diagnosis), answers.after),
@@ -114,7 +117,7 @@ def _curves(diagnosis: Diagnosis) -> list[ModelCurve]:
         ("before, as given", answers.before),
     ):
         solved = np.all(np.isfinite(harmonics[:, :, 1]), axis=1)
-        found.append(model_curve(label, measured.frequency, harmonics, road, solved))
+        found.append(model_curve(label, measured.frequency, harmonics, driven, solved))
     return found
 
 

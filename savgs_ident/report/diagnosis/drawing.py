@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.diagnosis.result import Diagnosis
-from savgs_ident.report.diagnosis.text import port_words
+from savgs_ident.plants.quarter_car.ports import LOCATION_WORDS
 from savgs_ident.report.text import DASH, percentage
 from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, PALE, new_figure, printable, styled
 
@@ -323,7 +323,7 @@ def port_places(at: RigPoints) -> Mapping[str, Point]:
 
 def port_marks(diagnosis: Diagnosis) -> tuple[PortMark, ...]:
     """Every port with its mark; those that the picture has no place for are named below on the left."""
-    places = port_places(rig_points(diagnosis.rig.parameters))
+    places = port_places(rig_points(diagnosis.given.table))
     shares = {each.port: each.share for each in diagnosis.ports}
     names_at = {port: (_LEFT_EDGE, z) for port, z in zip(_LEFT_ROWS, _LEFT_HEIGHTS, strict=True)}
     names_at |= {port: (_RIGHT_EDGE, z) for port, z in zip(_RIGHT_ROWS, _RIGHT_HEIGHTS, strict=True)}
@@ -346,7 +346,7 @@ def rig_figure(diagnosis: Diagnosis) -> Figure:
         axes.set_axis_off()
         axes.set_xlim(_LEFT, _LEFT + WIDTH / _SCALE)
         axes.set_ylim(_BOTTOM, _BOTTOM + HEIGHT / _SCALE)
-        _draw_rig(axes, rig_points(diagnosis.rig.parameters))
+        _draw_rig(axes, rig_points(diagnosis.given.table))
         _draw_marks(axes, port_marks(diagnosis))
         return figure
 
@@ -384,7 +384,13 @@ def _draw_name(axes: Axes, mark: PortMark) -> None:
     colour = ORANGE if mark.named else BLUE
     weight = "bold" if mark.named else "normal"
     axes.text(
-        y, z + 0.028, printable(port_words(mark.port)), fontsize=9.0, fontweight=weight, color=INK, zorder=5
+        y,
+        z + 0.028,
+        printable(LOCATION_WORDS.get(mark.port, mark.port)),
+        fontsize=9.0,
+        fontweight=weight,
+        color=INK,
+        zorder=5,
     )
     axes.add_patch(Rectangle((y, z - 0.013), _BAR, 0.026, facecolor=PALE, edgecolor="none", zorder=5))
     if known:

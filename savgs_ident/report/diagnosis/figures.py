@@ -24,8 +24,8 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocat
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.result import Diagnosis, ForceLoop, MapCell
-from savgs_ident.report.diagnosis.text import port_words
-from savgs_ident.report.text import READINGS, channel_label, unit_text
+from savgs_ident.report.diagnosis.text import law_label, port_words
+from savgs_ident.report.text import channel_label, unit_text
 from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, PALE, new_figure, printable, styled
 
 NOISE = 2.0
@@ -60,7 +60,7 @@ def gap_table(
 def gap_map_figure(diagnosis: Diagnosis, channel: str) -> Figure:
     """The map of one channel."""
     frequency, orders, sigma, percent = gap_table(diagnosis.map, channel)
-    title = channel_label(channel).title
+    title = channel_label(channel, diagnosis.given).title
     with styled():
         figure = new_figure(4.5, 5.4)
         figure.set_layout_engine("none")
@@ -77,7 +77,7 @@ def gap_map_figure(diagnosis: Diagnosis, channel: str) -> Figure:
             "gap [% of the response]",
         )
         above.tick_params(axis="x", labelbottom=False)
-        below.set_xlabel("road frequency of the dwell [Hz]")
+        below.set_xlabel("frequency of the dwell [Hz]")
         return figure
 
 
@@ -161,7 +161,7 @@ _ROW = 0.42
 def shrink_rows(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
     """The gaps [%] by row and model; rows are all channels together, each one, and a further recording."""
     both = {"both channels": diagnosis.shrink} if len(diagnosis.by_channel) > 1 else {}
-    named = {_title(name): each for name, each in diagnosis.by_channel.items()}
+    named = {_short(name, diagnosis): each for name, each in diagnosis.by_channel.items()}
     rows = {
         title: {
             "before": 100.0 * each.before,
@@ -179,6 +179,11 @@ def shrink_rows(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
             "noise alone": 100.0 * diagnosis.further.floor,
         }
     return rows
+
+
+def _short(name: str, diagnosis: Diagnosis) -> str:
+    known = any(each.name == name for each in diagnosis.given.channels)
+    return channel_label(name, diagnosis.given).title.split(" ")[-1] if known else name
 
 
 def shrink_figure(diagnosis: Diagnosis) -> Figure:
@@ -207,10 +212,6 @@ def shrink_figure(diagnosis: Diagnosis) -> Figure:
         return figure
 
 
-def _title(name: str) -> str:
-    return channel_label(name).title.split(" ")[-1] if name in READINGS else name
-
-
 def _draw_row(axes: Axes, place: int, gaps: Mapping[str, float], labelled: bool) -> None:
     known = {name: max(gap, _LEAST) for name, gap in gaps.items() if isfinite(gap)}
     ends = [known[name] for name in ("before", "recalibrated", "after") if name in known]
@@ -236,7 +237,6 @@ def _scale(axes: Axes) -> None:
 MOST_LOOPS = 6
 """So many loops are drawn at most."""
 
-_MILLI = 1e3
 _SMALL_UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "N": ("N", 1.0)}
 _ARROW_AT = 0.12
 """Where on the period the arrow is that says which way the loop is run through."""
@@ -250,28 +250,29 @@ def spread_loops(loops: tuple[ForceLoop, ...]) -> tuple[ForceLoop, ...]:
     return tuple(loops[place] for place in chosen)
 
 
-def force_figure(loop: ForceLoop, law: str) -> Figure:
-    """One loop over velocity (left) and displacement (right); ``law`` is what the legend calls its law."""
+def force_figure(diagnosis: Diagnosis, loop: ForceLoop) -> Figure:
+    """One loop over velocity (left) and displacement (right), beside the law of the named effects."""
     unit, scale = _SMALL_UNITS.get(loop.unit, (loop.unit, 1.0))
+    way, factor = _SMALL_UNITS.get(loop.motion_unit, (loop.motion_unit, 1.0))
     with styled():
         figure = new_figure(4.5, 3.0)
         figure.set_layout_engine("none")
         places = {"left": 0.15, "right": 0.97, "bottom": 0.165, "top": 0.79, "wspace": 0.1}
         left, right = figure.subplots(1, 2, sharey=True, gridspec_kw=places)
         figure.suptitle(
-            printable(f"{port_words(loop.port)} at {loop.frequency_hz:.3g} Hz"),
+            printable(f"{port_words(diagnosis, loop.port)} at {loop.frequency_hz:.3g} Hz"),
             y=0.985,
             fontsize=10.0,
             fontweight="bold",
         )
         for axes, motion in ((left, loop.velocity), (right, _from_middle(loop.displacement))):
-            _draw_diagnosis_force(axes, _MILLI * motion, scale * loop.inferred, "inferred")
+            _draw_diagnosis_force(axes, factor * motion, scale * loop.inferred, "inferred")
             if loop.law.size:
-                _draw_law(axes, _MILLI * motion, scale * loop.law, law)
+                _draw_law(axes, factor * motion, scale * loop.law, law_label(diagnosis, loop.port))
             axes.xaxis.set_major_locator(MaxNLocator(4))
         left.set_ylabel(printable(f"{_quantity(loop.unit)} [{unit_text(unit)}]"))
-        left.set_xlabel("velocity [mm/s]")
-        right.set_xlabel("displacement [mm]")
+        left.set_xlabel(f"velocity [{way}/s]")
+        right.set_xlabel(f"displacement [{way}]")
         left.yaxis.set_label_coords(-0.24, 0.5)
         handles, labels = left.get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.55, 0.925), ncols=2)

@@ -17,7 +17,7 @@ from savgs_ident.core.output import write_json
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.presentation import Origin
 from savgs_ident.diagnosis.result import Candidate, CyclePosition, Diagnosis, ForceLoop, PortShare, Shrink
-from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.report.diagnosis.bode import compared_channels, diagnosis_bode_figure, first_harmonic_gap
 from savgs_ident.report.diagnosis.drawing import rig_figure
 from savgs_ident.report.diagnosis.figures import (
@@ -38,7 +38,6 @@ from savgs_ident.report.diagnosis.text import (
     estimate_words,
     gain_words,
     gap_percentage,
-    law_label,
     port_words,
     probability_words,
     references,
@@ -49,10 +48,11 @@ from savgs_ident.report.diagnosis.text import (
 from savgs_ident.report.html import Picture, embed, render_page
 from savgs_ident.report.text import (
     DASH,
-    READINGS,
     channel_label,
+    channel_labels,
     decimal,
     numeral,
+    per_input_words,
     percentage,
     signed,
     unit_text,
@@ -136,7 +136,7 @@ def candidate_row(each: Candidate, diagnosis: Diagnosis) -> CandidateRow:
     """One line of the table of hypotheses."""
     return CandidateRow(
         name=str(each.hypothesis),
-        about=about_candidate(each),
+        about=about_candidate(diagnosis, each),
         named=bool(each.effects) and each.effects == diagnosis.verdict.effects,
         probability=probability_words(each.probability),
         bar=_bar(each.probability),
@@ -153,7 +153,7 @@ def port_row(each: PortShare, diagnosis: Diagnosis) -> PortRow:
     named = each.port in diagnosis.verdict.ports
     return PortRow(
         each.port,
-        port_words(each.port),
+        port_words(diagnosis, each.port),
         named,
         percentage(each.share),
         _bar(each.share),
@@ -162,9 +162,13 @@ def port_row(each: PortShare, diagnosis: Diagnosis) -> PortRow:
 
 
 def shrink_table(diagnosis: Diagnosis) -> tuple[ShrinkRow, ...]:
-    """Both channels together, each channel, and the recording that took no part, if there is one."""
-    rows = [_shrink_row("Both channels together", diagnosis.shrink)]
-    rows += [_shrink_row(channel_label(name).heading, each) for name, each in diagnosis.by_channel.items()]
+    """All channels together, each channel, and the recording that took no part, if there is one."""
+    both = len(diagnosis.given.channels) == 2
+    rows = [_shrink_row("Both channels together" if both else "All channels together", diagnosis.shrink)]
+    rows += [
+        _shrink_row(channel_label(name, diagnosis.given).heading, each)
+        for name, each in diagnosis.by_channel.items()
+    ]
     if diagnosis.further is not None:
         other = diagnosis.further
         rows.append(
@@ -180,10 +184,10 @@ def shrink_table(diagnosis: Diagnosis) -> tuple[ShrinkRow, ...]:
     return tuple(rows)
 
 
-def cycle_row(each: CyclePosition) -> CycleRow:
+def cycle_row(each: CyclePosition, diagnosis: Diagnosis) -> CycleRow:
     """One line of the table of where in the cycle."""
     shares = (percentage(share, 0) for share in (each.reversal, each.between, each.mid_stroke))
-    return CycleRow(channel_label(each.channel).heading, *shares)
+    return CycleRow(channel_label(each.channel, diagnosis.given).heading, *shares)
 
 
 def parameter_table(diagnosis: Diagnosis) -> tuple[ParameterRow, ...]:
@@ -208,8 +212,8 @@ def _bar(share: float) -> Bar:
 
 
 def _parameter_rows(diagnosis: Diagnosis) -> Iterator[ParameterRow]:
-    given = diagnosis.rig.parameters
-    known = {each.name: each for effect in CATALOGUE.values() for each in effect.parameters} | dict(given)
+    given, catalogue = diagnosis.given.table, diagnosis.given.catalogue
+    known = {each.name: each for effect in catalogue.values() for each in effect.parameters} | dict(given)
     for name in dict.fromkeys((*diagnosis.parameters, *diagnosis.identified)):
         recalibrated, identified = diagnosis.parameters.get(name), diagnosis.identified.get(name)
         before = given[name].value if name in given else None
@@ -246,7 +250,7 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
     return render_page(
         "diagnosis.html.j2",
         {
-            "rig": diagnosis.rig.name,
+            "rig": diagnosis.given.plant_name,
             "origin": origin,
             "alarm": alarm(diagnosis),
             "verdict": verdict,
@@ -254,6 +258,7 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "sentence": verdict.sentence.replace(" %", "\u00a0%"),
             "named": " + ".join(verdict.effects) or "its verdict",
             "baseline": baseline_sentence(diagnosis),
+            "per_input": per_input_words(diagnosis.given),
             "facts": _facts(diagnosis),
             "warnings": diagnosis.warnings,
             "rig_picture": _rig(diagnosis),
@@ -263,7 +268,7 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "lawful": any(each.law.size for each in diagnosis.loops),
             "shown": [candidate_row(each, diagnosis) for each in shown],
             "rest": [candidate_row(each, diagnosis) for each in rest],
-            "references": references(verdict.effects),
+            "references": references(diagnosis),
             "parameters": [
                 (each.name, each.about, each.given, each.recalibrated, each.identified, each.moved, each.unit)
                 for each in parameter_table(diagnosis)
@@ -273,7 +278,7 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "maps": [_map(diagnosis, channel) for channel in gap_channels(diagnosis)],
             "cycle": [
                 (each.name, each.reversal, each.between, each.mid_stroke)
-                for each in map(cycle_row, diagnosis.cycle)
+                for each in (cycle_row(one, diagnosis) for one in diagnosis.cycle)
             ],
             "next_tests": [
                 (each.test, " from ".join(each.separates), decimal(each.expected_sigma, 1))
@@ -324,9 +329,14 @@ def _facts(diagnosis: Diagnosis) -> tuple[dict[str, object], ...]:
     )
 
 
-def _rig(diagnosis: Diagnosis) -> Picture:
-    shares = ", ".join(f"{port_words(each.port)} {percentage(each.share, 0)}" for each in diagnosis.ports)
-    named = " and ".join(map(port_words, diagnosis.verdict.ports)) or "none"
+def _rig(diagnosis: Diagnosis) -> Picture | None:
+    """The ports in the drawing of the quarter car; there is none of other plants."""
+    if not isinstance(diagnosis.given, RigModel):
+        return None
+    shares = ", ".join(
+        f"{port_words(diagnosis, each.port)} {percentage(each.share, 0)}" for each in diagnosis.ports
+    )
+    named = " and ".join(port_words(diagnosis, port) for port in diagnosis.verdict.ports) or "none"
     words = f"The rig with its ports. Named port: {named}. Shares of the gap: {shares or 'not known'}."
     return embed(rig_figure(diagnosis), words)
 
@@ -341,18 +351,18 @@ def _bode(diagnosis: Diagnosis, c: int) -> Picture:
             ("after", gap.after),
         )
     ]
-    title = channel_label(tuple(READINGS)[c]).title
-    words = f"Magnitude, phase and gap of the {title} over road frequency; largest gap {', '.join(largest)}."
+    title = tuple(channel_labels(diagnosis.given).values())[c].title
+    words = f"Magnitude, phase and gap of the {title} over frequency; largest gap {', '.join(largest)}."
     return embed(diagnosis_bode_figure(diagnosis, c), words)
 
 
 def _loop(diagnosis: Diagnosis, loop: ForceLoop) -> Picture:
     largest = float(np.max(np.abs(loop.inferred), initial=0.0))
     words = (
-        f"Signal inferred at the {port_words(loop.port)} over velocity and displacement at"
+        f"Signal inferred at the {port_words(diagnosis, loop.port)} over velocity and displacement at"
         f" {loop.frequency_hz:.3g} Hz; it reaches {largest:.3g} {loop.unit}."
     )
-    return embed(force_figure(loop, law_label(diagnosis, loop.port)), words)
+    return embed(force_figure(diagnosis, loop), words)
 
 
 def _shrink(diagnosis: Diagnosis) -> Picture:
@@ -366,7 +376,7 @@ def _shrink(diagnosis: Diagnosis) -> Picture:
 
 def _map(diagnosis: Diagnosis, channel: str) -> Picture:
     frequency, orders, sigma, _ = gap_table(diagnosis.map, channel)
-    words = f"Gap of the {channel_label(channel).title} by dwell and harmonic order."
+    words = f"Gap of the {channel_label(channel, diagnosis.given).title} by dwell and harmonic order."
     known = np.where(np.isfinite(sigma), np.abs(sigma), -1.0)
     k, d = np.unravel_index(np.argmax(known), known.shape)
     words += f" Largest: {known[k, d]:.0f} standard deviations in order {orders[k]} at {frequency[d]:.3g} Hz."

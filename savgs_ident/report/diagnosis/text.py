@@ -18,10 +18,8 @@ from savgs_ident.diagnosis.result import (
     NotJudgeable,
     Shrink,
 )
-from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.report.text import (
     DASH,
-    READINGS,
     channel_label,
     decimal,
     interval,
@@ -32,23 +30,6 @@ from savgs_ident.report.text import (
     table,
     unit_text,
 )
-
-PORT_WORDS: Mapping[str, str] = MappingProxyType(
-    {
-        "rail": "rail",
-        "strut": "strut",
-        "suspension": "wishbone joints",
-        "tyre_radial": "tyre, radial",
-        "tyre_lateral": "tyre, lateral",
-        "link": "link and drive",
-        "road": "road plate",
-        "frame": "frame",
-        "inertia": "masses",
-        "sensor.sprung_accel": "accelerometer",
-        "sensor.susp_deflection": "potentiometer",
-    }
-)
-"""The ports as an engineer calls them."""
 
 KIND_WORDS: Mapping[str, str] = MappingProxyType(
     {"none": "nothing", "effect": "one effect", "several": "several effects", "unknown": "unknown"}
@@ -66,26 +47,28 @@ def alarm(diagnosis: Diagnosis) -> str | None:
     return "Not converged: this verdict must not be used."
 
 
-def port_words(port: str) -> str:
+def port_words(diagnosis: Diagnosis, port: str) -> str:
     """A port in words; its name where there are none."""
-    return PORT_WORDS.get(port, port)
+    return diagnosis.given.plant.location_words.get(port, port)
 
 
-def symptoms(effects: tuple[str, ...]) -> tuple[str, ...]:
+def symptoms(diagnosis: Diagnosis, effects: tuple[str, ...]) -> tuple[str, ...]:
     """What each effect that the catalogue has is known by, a sentence each."""
-    texts = (CATALOGUE[name].symptom for name in effects if name in CATALOGUE)
+    catalogue = diagnosis.given.catalogue
+    texts = (catalogue[name].symptom for name in effects if name in catalogue)
     return tuple(f"{text[:1].upper()}{text[1:]}." for text in texts)
 
 
-def references(effects: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
-    """The effects that the catalogue has, each with where its law is from."""
-    return tuple((name, CATALOGUE[name].reference) for name in effects if name in CATALOGUE)
+def references(diagnosis: Diagnosis) -> tuple[tuple[str, str], ...]:
+    """The named effects that the catalogue has, each with where its law is from."""
+    catalogue = diagnosis.given.catalogue
+    return tuple((name, catalogue[name].reference) for name in diagnosis.verdict.effects if name in catalogue)
 
 
-def about_candidate(candidate: Candidate) -> str:
+def about_candidate(diagnosis: Diagnosis, candidate: Candidate) -> str:
     """What a hypothesis says, in a sentence."""
     if candidate.effects:
-        return " ".join(symptoms(candidate.effects))
+        return " ".join(symptoms(diagnosis, candidate.effects))
     if candidate.hypothesis == NONE:
         return "The recalibrated baseline is complete."
     return "An effect that is not in the catalogue."
@@ -109,15 +92,15 @@ def model_label(diagnosis: Diagnosis) -> str:
     if verdict.effects:
         return f"with {' + '.join(verdict.effects)}"
     if verdict.kind == "unknown":
-        where = f" at the {port_words(verdict.ports[0])}" if verdict.ports else ""
+        where = f" at the {port_words(diagnosis, verdict.ports[0])}" if verdict.ports else ""
         return f"with the learned law{where}"
     return "after (nothing added)"
 
 
 def law_label(diagnosis: Diagnosis, port: str) -> str:
     """What the law of the named effects at a port is called in a legend."""
-    named = diagnosis.verdict.effects
-    there = [name for name in named if name in CATALOGUE and CATALOGUE[name].port.location == port]
+    named, known = diagnosis.verdict.effects, diagnosis.given.catalogue
+    there = [name for name in named if name in known and known[name].port.location == port]
     return f"law of {' + '.join(there or named)}"
 
 
@@ -228,7 +211,10 @@ def _gap(diagnosis: Diagnosis) -> RenderableType:
         return (name, *map(gap_percentage, gaps), closed_words(each))
 
     rows = [cells("together", diagnosis.shrink)]
-    rows += [cells(_channel(name), each) for name, each in diagnosis.by_channel.items()]
+    rows += [
+        cells(channel_label(name, diagnosis.given).title.removeprefix("sprung-mass "), each)
+        for name, each in diagnosis.by_channel.items()
+    ]
     if diagnosis.further is not None:
         other = diagnosis.further
         gaps = (other.before, other.recalibrated, other.after, other.floor)
@@ -237,13 +223,10 @@ def _gap(diagnosis: Diagnosis) -> RenderableType:
     return table("Gap by model", headers, rows)
 
 
-def _channel(name: str) -> str:
-    return channel_label(name).title.removeprefix("sprung-mass ") if name in READINGS else name
-
-
 def _ports(diagnosis: Diagnosis) -> list[RenderableType]:
     shown = [
-        f"{port_words(each.port)} {percentage(each.share, 0)}" for each in diagnosis.ports[:_SHOWN_PORTS]
+        f"{port_words(diagnosis, each.port)} {percentage(each.share, 0)}"
+        for each in diagnosis.ports[:_SHOWN_PORTS]
     ]
     text = "Share of the recalibrated gap explained by a law at one port: "
     return [plain(f"{text}{', '.join(shown)}."), plain("")] if shown else []

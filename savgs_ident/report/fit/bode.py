@@ -1,6 +1,6 @@
 """The Bode figure: measurement, identified model and model without friction, a column for each channel.
 
-From the top: magnitude and phase of the first harmonic per metre of road, peak to peak as the paper plots it,
+From the top: magnitude and phase of the first harmonic per unit of the input, peak to peak as the paper plots it,
 and what the identified model leaves of each harmonic, in noise standard deviations.
 """
 
@@ -19,25 +19,33 @@ from savgs_ident.report.panels import (
     draw_residuals,
     fix_labels,
 )
-from savgs_ident.report.text import READINGS
+from savgs_ident.report.text import ChannelLabel
 from savgs_ident.report.theme import frequency_axis, new_figure, printable, styled
 from savgs_ident.simulate.frequency_response import ModelCurve
 
+_COLUMN = 5.25
+"""Width of a column [in]."""
+
 
 def bode_figure(
-    title: str, measured: MeasuredPoints, curves: Sequence[ModelCurve], residuals: NDArray[np.float64]
+    title: str,
+    measured: MeasuredPoints,
+    curves: Sequence[ModelCurve],
+    residuals: NDArray[np.float64],
+    labels: Sequence[ChannelLabel],
 ) -> Figure:
     """Draw ``measured`` against up to three ``curves``, the one that matters most first.
 
-    ``residuals`` are the whitened residuals of the first, (D, 2, K, 2), NaN where not used.
+    ``residuals`` are the whitened residuals of the first, (D, C, K, 2), NaN where not used; ``labels`` say how the C
+    channels are shown.
     """
     with styled():
-        figure = new_figure(10.5, 13.0)
-        grid = figure.subplots(4, len(READINGS), squeeze=False, height_ratios=(1.25, 0.9, 1.25, 0.9))
-        for c, (column, shown) in enumerate(zip(grid.T, READINGS.values(), strict=True)):
+        figure = new_figure(_COLUMN * len(labels), 13.0)
+        grid = figure.subplots(4, len(labels), squeeze=False, height_ratios=(1.25, 0.9, 1.25, 0.9))
+        for c, (column, shown) in enumerate(zip(grid.T, labels, strict=True)):
             column[0].set_title(shown.title)
             draw_magnitude(column[0], curves, measured, c, shown)
-            draw_phase(column[1], curves, measured, c)
+            draw_phase(column[1], curves, measured, c, shown)
             draw_peak_to_peak(column[2], curves, measured, c, shown)
             draw_residuals(column[3], measured.frequency, residuals[:, c])
             for axes in column:
@@ -49,16 +57,16 @@ def bode_figure(
         return figure
 
 
-def response_figure(title: str, curves: Sequence[ModelCurve]) -> Figure:
+def response_figure(title: str, curves: Sequence[ModelCurve], labels: Sequence[ChannelLabel]) -> Figure:
     """Magnitude, phase and peak to peak of up to three simulated ``curves``."""
     with styled():
-        figure = new_figure(10.5, 10.0)
-        grid = figure.subplots(3, len(READINGS), squeeze=False, height_ratios=(1.25, 0.9, 1.25))
+        figure = new_figure(_COLUMN * len(labels), 10.0)
+        grid = figure.subplots(3, len(labels), squeeze=False, height_ratios=(1.25, 0.9, 1.25))
         frequency = np.concatenate([curve.frequency for curve in curves])
-        for c, (column, shown) in enumerate(zip(grid.T, READINGS.values(), strict=True)):
+        for c, (column, shown) in enumerate(zip(grid.T, labels, strict=True)):
             column[0].set_title(shown.title)
             draw_magnitude(column[0], curves, None, c, shown)
-            draw_phase(column[1], curves, None, c)
+            draw_phase(column[1], curves, None, c, shown)
             draw_peak_to_peak(column[2], curves, None, c, shown)
             for axes in column:
                 _mark_solved(axes)

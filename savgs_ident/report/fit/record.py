@@ -20,7 +20,7 @@ from savgs_ident.fit.residuals import (
 )
 from savgs_ident.fit.result import Fit
 from savgs_ident.recordings.recording import CANONICAL_UNITS
-from savgs_ident.report.text import READINGS, ROAD
+from savgs_ident.report.text import READINGS
 
 
 def fit_record(fit: Fit) -> dict[str, object]:
@@ -130,7 +130,7 @@ def _dwell_channel(fit: Fit, d: int, c: int, sigma: NDArray[np.float64]) -> dict
 
 def bode_record(compared: Comparison) -> dict[str, object]:
     """The JSON object of ``bode``; first harmonics per metre of road, phase against the road, SI."""
-    points = measured_points(compared.measured, tuple(READINGS), ROAD)
+    points = measured_points(compared.measured, tuple(READINGS), compared.rig_model.plant.inputs[0].name)
     model, frictionless = compared.model.curve(""), compared.frictionless.curve("")
     gap = gaps(compared.measured, tuple(READINGS), compared.model.harmonics, compared.used)
     return {

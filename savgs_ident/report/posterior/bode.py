@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from savgs_ident.fit.residuals import measured_points
 from savgs_ident.inference.result import Posterior
 from savgs_ident.report.panels import draw_magnitude, draw_phase, phase_deg
-from savgs_ident.report.text import READINGS, ROAD, channel_label
+from savgs_ident.report.text import channel_labels
 from savgs_ident.report.theme import BLUE, INK, ORANGE, frequency_axis, new_figure, styled
 from savgs_ident.simulate.frequency_response import ModelCurve
 
@@ -25,13 +25,13 @@ _LEAST_SHOWN = 2.0
 
 @dataclass(frozen=True)
 class Band:
-    """First harmonics of one channel per metre of road, over D dwells; NaN where nothing is compared.
+    """First harmonics of one channel per unit of the input, over D dwells; NaN where nothing is compared.
 
     Attributes:
         frequency: [Hz], (D,).
-        middle: mean of the model at the draws [unit/m], complex, (D,).
-        measured: as measured [unit/m], complex, (D,).
-        magnitude: ends of the 95 % band of the magnitude [unit/m], (2, D).
+        middle: mean of the model at the draws [unit/input], complex, (D,).
+        measured: as measured [unit/input], complex, (D,).
+        magnitude: ends of the 95 % band of the magnitude [unit/input], (2, D).
         phase: ends of the 95 % band of the phase about that of ``middle`` [rad], (2, D).
         inside: whether the measured magnitude and phase together lie within 95 %, (D,).
     """
@@ -51,13 +51,14 @@ class Band:
 
 
 def predictive_band(posterior: Posterior, c: int) -> Band:
-    """The band of the first harmonic of channel ``c`` of :data:`READINGS`."""
+    """The band of the first harmonic of the plant's channel ``c``."""
     predictive, measured = posterior.predictive, posterior.measured
-    points = measured_points(measured, tuple(READINGS), ROAD)
-    road = measured.harmonics[:, measured.channel(ROAD), 1]
+    input_name = posterior.model.plant.inputs[0].name
+    points = measured_points(measured, [each.name for each in posterior.model.channels], input_name)
+    driven = measured.harmonics[:, measured.channel(input_name), 1]
     used = predictive.used[:, c, 1]
-    repeated = np.where(used, predictive.replicated[:, :, c, 1] / road, np.nan)
-    middle = np.where(used, np.mean(predictive.model[:, :, c, 1], axis=0) / road, np.nan)
+    repeated = np.where(used, predictive.replicated[:, :, c, 1] / driven, np.nan)
+    middle = np.where(used, np.mean(predictive.model[:, :, c, 1], axis=0) / driven, np.nan)
     turned = np.angle(repeated * np.conj(middle))
     return Band(
         frequency=measured.frequency,
@@ -71,7 +72,7 @@ def predictive_band(posterior: Posterior, c: int) -> Band:
 
 def predictive_figure(posterior: Posterior, c: int) -> Figure:
     """Magnitude, phase and distance from the band of one channel."""
-    band, shown = predictive_band(posterior, c), channel_label(tuple(READINGS)[c])
+    band, shown = predictive_band(posterior, c), tuple(channel_labels(posterior.model).values())[c]
     curve = _curve(band)
     with styled():
         figure = new_figure(4.5, 7.2)
@@ -81,7 +82,7 @@ def predictive_figure(posterior: Posterior, c: int) -> Figure:
         magnitude, phase, misses = panels
         magnitude.set_title(shown.title)
         draw_magnitude(magnitude, [curve], None, 0, shown)
-        draw_phase(phase, [curve], None, 0)
+        draw_phase(phase, [curve], None, 0, shown)
         middle = phase_deg(band.middle)
         _draw_band(magnitude, band.frequency, band.magnitude)
         _draw_band(phase, band.frequency, middle + np.degrees(band.phase))

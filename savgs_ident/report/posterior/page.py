@@ -39,12 +39,12 @@ from savgs_ident.report.posterior.text import (
 )
 from savgs_ident.report.text import (
     DASH,
-    READINGS,
-    channel_label,
+    channel_labels,
     count,
     decimal,
     interval,
     numeral,
+    per_input_words,
     percentage,
     signed,
     unit_text,
@@ -220,8 +220,9 @@ def posterior_html(posterior: Posterior, origin: Origin) -> str:
             "profiles": _profiles(posterior),
             "predictive": predictive_sentence(posterior),
             "bode": [_bode(posterior, c) for c in _compared(posterior)],
-            "channels": [shown.title for shown in READINGS.values()],
+            "channels": [shown.title for shown in channel_labels(posterior.model).values()],
             "orders": order_rows(posterior),
+            "per_input": per_input_words(posterior.model),
             "checks": checks(posterior),
             "diagnostics": [diagnostic_row(each) for each in (*identified, *nuisance)],
         },
@@ -292,15 +293,15 @@ def _profiles(posterior: Posterior) -> list[Picture]:
 
 def _compared(posterior: Posterior) -> list[int]:
     """The channels whose first harmonic is compared anywhere."""
-    return [c for c in range(len(READINGS)) if np.any(posterior.predictive.used[:, c, 1])]
+    return [c for c in range(len(posterior.model.channels)) if np.any(posterior.predictive.used[:, c, 1])]
 
 
 def _bode(posterior: Posterior, c: int) -> Picture:
     band = predictive_band(posterior, c)
     compared = np.isfinite(band.measured)
-    title = channel_label(tuple(READINGS)[c]).title
+    title = tuple(channel_labels(posterior.model).values())[c].title
     words = (
-        f"Magnitude and phase of the {title} over road frequency, measured against the 95 % predictive band:"
+        f"Magnitude and phase of the {title} over frequency, measured against the 95 % predictive band:"
         f" {np.sum(band.inside & compared)} of {np.sum(compared)} first harmonics are inside."
     )
     return embed(predictive_figure(posterior, c), words)
