@@ -365,8 +365,6 @@ class _Diagnosis(_Presenter["Diagnosis"]):
         return () if result.trusted else result.warnings
 
     def page(self, result: "Diagnosis") -> str | None:
-        if result.measured is None:
-            return None
         from savgs_ident.report.diagnosis.page import diagnosis_html
 
         return diagnosis_html(result, result.origin.with_versions(self.packages))
@@ -374,21 +372,23 @@ class _Diagnosis(_Presenter["Diagnosis"]):
     def figures(self, result: "Diagnosis") -> Figures:
         from savgs_ident.report.diagnosis.bode import diagnosis_bode_figure
         from savgs_ident.report.diagnosis.drawing import rig_figure
+        from savgs_ident.report.diagnosis.drive import drive_figure
         from savgs_ident.report.diagnosis.figures import force_figure, gap_map_figure, shrink_figure
 
+        shrink: Figures = {"shrink": lambda: shrink_figure(result)}
+        loops: Figures = {
+            f"force {number}": partial(force_figure, result, loop) for number, loop in enumerate(result.loops)
+        }
         if result.measured is None:
-            return {"shrink": lambda: shrink_figure(result)}
+            return {"drive": lambda: drive_figure(result), **shrink, **loops}
         names = [each.name for each in result.given.channels]
         drawing: Figures = {"ports": lambda: rig_figure(result)} if _is_quarter_car(result.given) else {}
         return {
             **{f"gap {name}": partial(gap_map_figure, result, name) for name in names},
             **drawing,
-            "shrink": lambda: shrink_figure(result),
+            **shrink,
             **{f"bode {name}": partial(diagnosis_bode_figure, result, c) for c, name in enumerate(names)},
-            **{
-                f"force {number}": partial(force_figure, result, loop)
-                for number, loop in enumerate(result.loops)
-            },
+            **loops,
         }
 
     def write(self, result: "Diagnosis", folder: Path, progress: Progress) -> Iterator[Path]:

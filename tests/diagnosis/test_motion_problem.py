@@ -137,6 +137,10 @@ def test_where_nothing_is_missing_nothing_is_named() -> None:
     assert gap.trusted
     assert set(gap.by_channel) == {"drive_force"}
     assert "force of the drive" in str(gap)
+    page = gap.to_html()
+    assert "The force of the drive along the measured motion" in page
+    assert "No first harmonic was compared" not in page
+    assert set(gap.figure_names) >= {"drive", "shrink"}
 
 
 @pytest.mark.slow

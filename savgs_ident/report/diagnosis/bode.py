@@ -62,6 +62,8 @@ def first_harmonic_gap(diagnosis: Diagnosis, c: int) -> FirstHarmonicGap:
 
 def compared_channels(diagnosis: Diagnosis) -> tuple[int, ...]:
     """The places of the channels whose first harmonic is compared anywhere."""
+    if diagnosis.measured is None:
+        return ()
     return tuple(
         c
         for c in range(len(diagnosis.given.channels))

@@ -16,10 +16,19 @@ from savgs_ident.core.files import write_bytes
 from savgs_ident.core.output import write_json
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.presentation import Origin
-from savgs_ident.diagnosis.result import Candidate, CyclePosition, Diagnosis, ForceLoop, PortShare, Shrink
+from savgs_ident.diagnosis.result import (
+    Candidate,
+    CyclePosition,
+    Diagnosis,
+    DriveForces,
+    ForceLoop,
+    PortShare,
+    Shrink,
+)
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.report.diagnosis.bode import compared_channels, diagnosis_bode_figure, first_harmonic_gap
 from savgs_ident.report.diagnosis.drawing import rig_figure
+from savgs_ident.report.diagnosis.drive import drive_figure, drive_words
 from savgs_ident.report.diagnosis.figures import (
     force_figure,
     gap_channels,
@@ -263,6 +272,7 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "warnings": diagnosis.warnings,
             "rig_picture": _rig(diagnosis),
             "ports": [port_row(each, diagnosis) for each in diagnosis.ports],
+            "drive": _drive(diagnosis),
             "bode": [_bode(diagnosis, c) for c in compared_channels(diagnosis)],
             "loops": [_loop(diagnosis, each) for each in spread_loops(diagnosis.loops)],
             "lawful": any(each.law.size for each in diagnosis.loops),
@@ -339,6 +349,13 @@ def _rig(diagnosis: Diagnosis) -> Picture | None:
     named = " and ".join(port_words(diagnosis, port) for port in diagnosis.verdict.ports) or "none"
     words = f"The rig with its ports. Named port: {named}. Shares of the gap: {shares or 'not known'}."
     return embed(rig_figure(diagnosis), words)
+
+
+def _drive(diagnosis: Diagnosis) -> Picture | None:
+    """The force along a motion; there is none of dwells."""
+    if not isinstance(diagnosis.responses, DriveForces):
+        return None
+    return embed(drive_figure(diagnosis), drive_words(diagnosis))
 
 
 def _bode(diagnosis: Diagnosis, c: int) -> Picture:
