@@ -131,13 +131,14 @@ def test_a_plant_with_more_coordinates_and_a_campaign_of_dwells_are_refused() ->
         si.diagnose(si.PlantModel(si.TwoMass(), si.TwoMass.parameters), response, held_out=motion)
 
 
-def test_where_nothing_is_missing_nothing_is_named() -> None:
+def test_where_nothing_is_missing_nothing_is_named(tmp_path: Path) -> None:
     gap = si.diagnose(_axis(), driven_motion(recorded_axis({}, 0)))
     assert (gap.verdict.kind, gap.verdict.effects) == ("none", ())
     assert gap.trusted
     assert set(gap.by_channel) == {"drive_force"}
     assert "force of the drive" in str(gap)
-    page = gap.to_html()
+    gap.to_html(tmp_path / "gap.html")
+    page = (tmp_path / "gap.html").read_text()
     assert "The force of the drive along the measured motion" in page
     assert "No first harmonic was compared" not in page
     assert set(gap.figure_names) >= {"drive", "shrink"}
