@@ -31,7 +31,6 @@ from savgs_ident.inference.find_map import find_map, refine, search_of
 from savgs_ident.inference.prior import bounds_of, values_at
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.measured import measured_response
@@ -148,7 +147,7 @@ def alarm_bench(
         plant, data = quarter_car_problem(measured, rig, settings)
         problem = recalibrate(plant, data, values, progress, settings.constants)
         odds = alarm_odds(select_model(problem, progress).weighed)
-    level = data.test * len(RESPONSE_CHANNELS) + plant.channel
+    level = data.test * len(plant.channels) + plant.channel
     return AlarmBench(problem, odds, _degrees_of_freedom(measured, problem), level, seed)
 
 
@@ -156,8 +155,8 @@ def _degrees_of_freedom(measured: HarmonicResponse, problem: DiagnosisProblem) -
     """Of the noise level behind each row, (m,)."""
     if measured.covariance_dof is None:
         return np.full(problem.data.measured.size, np.inf)
-    channels = [name for name in RESPONSE_CHANNELS if name in measured.channels]
-    first = {RESPONSE_CHANNELS.index(name): measured.channel(name) for name in channels}
+    channels = enumerate(problem.plant.channels)
+    first = {c: measured.channel(name) for c, name in channels if name in measured.channels}
     places = np.array([first[channel] for channel in problem.plant.channel])
     return np.asarray(measured.covariance_dof[problem.data.test, places, 1])
 
