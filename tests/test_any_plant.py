@@ -5,6 +5,7 @@ import re
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import savgs_ident as si
@@ -95,7 +96,21 @@ def test_a_fit_shows_itself(fit: si.Fit) -> None:
     record = json.loads(fit.to_json())
     assert record["parameters"]["k"]["unit"] == "N/m"
     assert set(record["gap"]) == {"sprung_accel", "susp_deflection", "together"}
-    assert fit.figure_names == ()
+    assert fit.figure_names == ("bode",)
+    figure = si.plot_bode(fit)
+    assert figure.axes[0].get_ylabel() == "magnitude [m/s² per m of road]"
+
+
+def test_a_model_is_compared_and_what_is_saved_is_read_back(
+    model: si.PlantModel, measured: si.HarmonicResponse, fit: si.Fit, tmp_path: Path
+) -> None:
+    compared = si.compare(fit.model, measured)
+    assert compared.trusted
+    assert np.max(np.abs(compared.model.harmonics - fit.predicted)) < 1e-6
+    record = json.loads(compared.to_json())
+    assert len(record["channels"]["susp_deflection"]["identified"]["per_metre_of_road"]) == len(DWELLS)
+    paths = fit.save(tmp_path / "fit")
+    assert {path.name for path in paths} == {"fit.json", "bode.png", "bode.pdf"}
 
 
 @pytest.mark.slow

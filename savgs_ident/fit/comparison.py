@@ -11,11 +11,7 @@ from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.core.status import Status
 from savgs_ident.fit.residuals import comparable
 from savgs_ident.fit.result import Fit
-from savgs_ident.plants.quarter_car.model import RigModel
-from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
-from savgs_ident.recordings.recording import Campaign
-from savgs_ident.responses.dwells import estimate_response
+from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.frequency_response import (
@@ -24,33 +20,37 @@ from savgs_ident.simulate.frequency_response import (
     simulate_between,
     simulate_response,
 )
+from savgs_ident.simulate.measured import Measurements, campaign_of, measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
 @dataclass(frozen=True)
 class Comparison(Result):
-    """A model and the same without its effects (SimQC), held against D measured dwells.
+    """A model and the same without its effects, held against D measured dwells.
 
     Attributes:
-        rig_model: the model.
         measured: what it is held against.
-        model: its response.
-        frictionless: its response without effects.
-        used: which entries are compared, (D, 2, orders + 1): only dwells that the model solved.
+        model: the response of the model.
+        frictionless: that without its effects.
+        used: which entries are compared, (D, C, orders + 1): only dwells that the model solved.
     """
 
     presenter: ClassVar[str] = "COMPARISON"
 
-    rig_model: RigModel
     measured: HarmonicResponse
     model: SimulatedResponse
     frictionless: SimulatedResponse
     used: NDArray[np.bool_]
 
     @property
+    def given(self) -> Model:
+        """The model."""
+        return self.model.model
+
+    @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects in the model."""
-        return self.rig_model.effects
+        return self.given.effects
 
     @property
     def trusted(self) -> bool:
@@ -62,48 +62,46 @@ class Comparison(Result):
 
         The second is the first where the model has no effects.
         """
-        rig, effects = self.rig_model.rig, self.effects
-        if not effects:
-            found = simulate_between(rig, effects, self.model)
+        if not self.effects:
+            found = simulate_between(self.model)
             return found, found
         # A solver needs one core and leaves Python free: both take the time of one.
         with ThreadPoolExecutor(1) as pool:
-            other = pool.submit(simulate_between, disable_effects(rig, effects), effects, self.frictionless)
-            return simulate_between(rig, effects, self.model), other.result()
+            other = pool.submit(simulate_between, self.frictionless)
+            return simulate_between(self.model), other.result()
 
 
 def compare(
-    model: RigModel, campaign: Campaign, orders: int = 9, progress: Progress = no_progress
+    model: Model, measured: Measurements, orders: int = 9, progress: Progress = no_progress
 ) -> Comparison:
-    """Hold a model against a campaign, harmonic orders up to ``orders``, without fitting anything.
+    """Hold a model against a campaign or the response of its dwells, orders up to ``orders``; nothing is fitted.
 
     Raises :class:`InputError` for a campaign that cannot be used.
     """
     use_persistent_cache()
-    progress("estimating responses")
-    measured = estimate_response(campaign, orders)
-    excitation = measured_excitation(QuarterCar, measured, model.rig.parameters)
+    response = measured_response(measured, orders, None, progress, model.plant)
+    excitation = measured_excitation(model.plant, response, model.table)
     progress("solving the model at the dwells")
-    with_effects = simulate_response(model.rig, model.effects, excitation, measured.orders)
-    progress("solving SimQC at the dwells")
-    bare = disable_effects(model.rig, model.effects)
-    frictionless = simulate_response(bare, model.effects, excitation, measured.orders)
-    used = comparable(measured, RESPONSE_CHANNELS, measured.orders) & with_effects.ok[:, None, None]
-    origin = model.origin(campaign, measured.warnings)
-    return Comparison(model, measured, with_effects, frictionless, used, origin=origin)
+    with_effects = simulate_response(model, excitation, response.orders)
+    progress("solving it without effects at the dwells")
+    frictionless = simulate_response(disable_effects(model), excitation, response.orders)
+    names = [each.name for each in model.channels]
+    used = comparable(response, names, response.orders) & with_effects.ok[:, None, None]
+    origin = model.origin(campaign_of(measured), response.warnings)
+    return Comparison(response, with_effects, frictionless, used, origin=origin)
 
 
 def comparison_of(fit: Fit) -> Comparison:
     """The identified model of a fit held against what it was fitted to; nothing is solved anew."""
-    excitation = measured_excitation(QuarterCar, fit.measured, fit.rig.parameters)
+    model: Model = fit.model
+    excitation = measured_excitation(model.plant, fit.measured, model.table)
     status = tuple(
         Status.CONVERGED if np.isfinite(each).all() else Status.STALLED for each in fit.frictionless
     )
     return Comparison(
-        fit.model,
         fit.measured,
-        SimulatedResponse(excitation, fit.predicted, fit.dwell_status),
-        SimulatedResponse(excitation, fit.frictionless, status),
+        SimulatedResponse(model, excitation, fit.predicted, fit.dwell_status),
+        SimulatedResponse(disable_effects(model), excitation, fit.frictionless, status),
         fit.used,
         origin=replace(fit.origin, effects=fit.effects),
     )

@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from rich.console import Group, RenderableType
 
 from savgs_ident.core.presentation import Origin
+from savgs_ident.effects.base import per
 from savgs_ident.export.gather import Gathered
-from savgs_ident.recordings.recording import CANONICAL_UNITS
-from savgs_ident.report.text import READINGS, channel_label, fixed, plain, table
+from savgs_ident.plants.base import Input
+from savgs_ident.report.text import channel_labels, fixed, per_input_key, plain, table
 from savgs_ident.report.theme import BLUE, GREY, new_figure, styled
 from savgs_ident.simulate.frequency_response import (
     DURATION_S,
     HIGHEST_HZ,
     LOWEST_HZ,
     RATE_HZ,
-    ModelCurve,
     SimulatedResponse,
     SimulatedSweep,
 )
@@ -27,61 +27,73 @@ from savgs_ident.simulate.frequency_response import (
 
 def response_record(solved: SimulatedResponse) -> dict[str, object]:
     """Frequencies, how each was solved, and the response of each channel, SI; None where not solved."""
-    curve = solved.curve("")
+    curve, driven, key = solved.curve(""), solved.model.plant.inputs[0], per_input_key(solved.model)
     return {
         "schema": 1,
         "kind": "periodic",
         "effects": list(solved.origin.effects),
         "frequency_hz": solved.frequency,
         "status": [status.name.lower() for status in solved.status],
-        "road_peak_to_peak_m": 2.0 * np.abs(np.asarray(solved.excitation.harmonics["road_height"])[:, 1]),
-        "channels": {name: _channel(solved, curve, c, name) for c, name in enumerate(READINGS)},
+        f"{_key(driven)}_peak_to_peak_{driven.unit}": 2.0 * np.abs(solved.driven),
+        "channels": {
+            each.name: {
+                "unit": each.unit,
+                "amplitude": np.abs(curve.transfer[:, c] * solved.driven),
+                key: np.abs(curve.transfer[:, c]),
+                "phase_deg": np.degrees(np.angle(curve.transfer[:, c])),
+                "peak_to_peak": curve.peak_to_peak[:, c],
+            }
+            for c, each in enumerate(solved.model.channels)
+        },
     }
 
 
-def response_columns(record: Mapping[str, Any]) -> dict[str, Sequence[object]]:
+def response_columns(solved: SimulatedResponse) -> dict[str, Sequence[object]]:
     """The same as columns headed by name and unit; an empty cell where not solved."""
+    record: Mapping[str, Any] = response_record(solved)
+    driven, key = solved.model.plant.inputs[0], per_input_key(solved.model)
     columns: dict[str, Sequence[object]] = {
         "frequency [Hz]": record["frequency_hz"],
         "status": record["status"],
-        "road peak to peak [m]": record["road_peak_to_peak_m"],
+        f"{driven.about} peak to peak [{driven.unit}]": list(2.0 * np.abs(solved.driven)),
     }
     for name, channel in record["channels"].items():
         unit = channel["unit"]
         columns[f"{name} first harmonic [{unit}]"] = _cells(channel["amplitude"])
-        columns[f"{name} per road [{unit}/m]"] = _cells(channel["per_metre_of_road"])
-        columns[f"{name} phase to road [deg]"] = _cells(channel["phase_deg"])
+        columns[f"{name} per {driven.about} [{per(unit, driven.unit)}]"] = _cells(channel[key])
+        columns[f"{name} phase to {driven.about} [deg]"] = _cells(channel["phase_deg"])
         columns[f"{name} peak to peak [{unit}]"] = _cells(channel["peak_to_peak"])
     return columns
 
 
-def response_text(title: str, record: Mapping[str, Any]) -> RenderableType:
+def response_text(solved: SimulatedResponse) -> RenderableType:
     """The responses as a table."""
+    record: Mapping[str, Any] = response_record(solved)
+    key = per_input_key(solved.model)
     headers = ["f\n[Hz]"]
     columns = [[fixed(value, 3) for value in record["frequency_hz"]]]
-    for name, shown in READINGS.items():
+    for name, shown in channel_labels(solved.model).items():
         channel = record["channels"][name]
-        headers += [f"{_SHORT[name]}\n[{shown.per_input}]", "phase\n[deg]", f"p-p\n[{shown.unit}]"]
-        columns.append([fixed(value, 3) for value in channel["per_metre_of_road"]])
+        headers += [
+            f"{shown.title.split(' ')[-1]}\n[{shown.per_input}]",
+            "phase\n[deg]",
+            f"p-p\n[{shown.unit}]",
+        ]
+        columns.append([fixed(value, 3) for value in channel[key]])
         columns.append([fixed(value, 1) for value in channel["phase_deg"]])
         columns.append([fixed(shown.scale * value, 3) for value in channel["peak_to_peak"]])
     headers.append("solution")
     columns.append([status.replace("_", " ") for status in record["status"]])
-    return table(title, headers, zip(*columns, strict=True), texts=(len(headers) - 1,))
+    return table(
+        f"Periodic response to the {solved.model.plant.inputs[0].about}",
+        headers,
+        zip(*columns, strict=True),
+        texts=(len(headers) - 1,),
+    )
 
 
-_SHORT = {"sprung_accel": "accel", "susp_deflection": "deflection"}
-
-
-def _channel(solved: SimulatedResponse, curve: ModelCurve, c: int, name: str) -> dict[str, object]:
-    transfer = curve.transfer[:, c]
-    return {
-        "unit": CANONICAL_UNITS[name],
-        "amplitude": np.abs(transfer * np.asarray(solved.excitation.harmonics["road_height"])[:, 1]),
-        "per_metre_of_road": np.abs(transfer),
-        "phase_deg": np.degrees(np.angle(transfer)),
-        "peak_to_peak": curve.peak_to_peak[:, c],
-    }
+def _key(driven: Input) -> str:
+    return driven.about.replace(" ", "_")
 
 
 def _cells(values: Sequence[float]) -> list[object]:
@@ -100,31 +112,31 @@ def sweep_record(sweep: SimulatedSweep) -> dict[str, object]:
         "duration_s": DURATION_S,
         "rate_hz": RATE_HZ,
         "channels": {
-            name: {"unit": CANONICAL_UNITS[name]} | _largest(sweep, values)
-            for name, values in zip(READINGS, sweep.readings, strict=True)
+            each.name: {"unit": each.unit} | _largest(sweep, values)
+            for each, values in zip(sweep.model.channels, sweep.readings, strict=True)
         },
     }
 
 
 def sweep_columns(sweep: SimulatedSweep) -> dict[str, Sequence[object]]:
     """The series, headed as a recording of a rig is."""
-    series = {"time": sweep.time, "road_height": sweep.road} | dict(
-        zip(READINGS, sweep.readings, strict=True)
-    )
-    units = {"time": "s"} | dict(CANONICAL_UNITS)
-    return {
-        f"{name} [{units[name]}]": [f"{value:.9g}" for value in values] for name, values in series.items()
-    }
+    driven = sweep.model.plant.inputs[0]
+    series = [("time", "s", sweep.time), (driven.name, driven.unit, sweep.driven)]
+    for each, values in zip(sweep.model.channels, sweep.readings, strict=True):
+        series.append((each.name, each.unit, values))
+    return {f"{name} [{unit}]": [f"{value:.9g}" for value in values] for name, unit, values in series}
 
 
-def sweep_text(record: Mapping[str, Any]) -> RenderableType:
+def sweep_text(sweep: SimulatedSweep) -> RenderableType:
     """The largest readings and where they are."""
+    record: Mapping[str, Any] = sweep_record(sweep)
+    labels = channel_labels(sweep.model)
     rows = [
         (
-            channel_label(name).title,
-            channel_label(name).unit,
-            fixed(channel_label(name).scale * channel["largest"], 3),
-            fixed(channel_label(name).scale * channel["smallest"], 3),
+            labels[name].title,
+            labels[name].unit,
+            fixed(labels[name].scale * channel["largest"], 3),
+            fixed(labels[name].scale * channel["smallest"], 3),
             fixed(channel["peak_frequency_hz"], 3),
         )
         for name, channel in record["channels"].items()
@@ -136,11 +148,12 @@ def sweep_text(record: Mapping[str, Any]) -> RenderableType:
 
 
 def sweep_figure(sweep: SimulatedSweep) -> Figure:
-    """Both readings over time, with the frequency of the cam on top."""
+    """The readings over time, with the frequency of the input on top."""
+    labels = channel_labels(sweep.model).values()
     with styled():
         figure = new_figure(10.5, 6.5)
-        panels = figure.subplots(len(READINGS), 1, sharex=True)
-        for axes, shown, values in zip(panels, READINGS.values(), sweep.readings, strict=True):
+        panels = figure.subplots(len(sweep.readings), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, shown, values in zip(panels, labels, sweep.readings, strict=True):
             axes.plot(sweep.time, shown.scale * values, color=BLUE, linewidth=0.7)
             axes.set_ylabel(f"{shown.title}\n[{shown.unit}]")
             axes.axhline(0.0, color=GREY, linewidth=0.6)
@@ -150,7 +163,7 @@ def sweep_figure(sweep: SimulatedSweep) -> Figure:
         top = panels[0].secondary_xaxis(
             "top", functions=(lambda t: LOWEST_HZ + per_second * t, lambda f: (f - LOWEST_HZ) / per_second)
         )
-        top.set_xlabel("road frequency [Hz]")
+        top.set_xlabel("frequency [Hz]")
         return figure
 
 

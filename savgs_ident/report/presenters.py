@@ -92,18 +92,11 @@ class _Identified(_Presenter[Shown]):
     def comparison(self, result: Shown) -> "Comparison":
         raise NotImplementedError
 
-    def drawn(self, result: Shown) -> bool:
-        """Whether there are figures of it: they show the quarter car on its road."""
-        del result
-        return True
-
     def figures(self, result: Shown) -> Figures:
-        return {"bode": lambda: comparison_figure(self.comparison(result))} if self.drawn(result) else {}
+        return {"bode": lambda: comparison_figure(self.comparison(result))}
 
     def write(self, result: Shown, folder: Path, progress: Progress) -> Iterator[Path]:
         yield write_json(folder / f"{self.stem}.json", self.record(result))
-        if not self.drawn(result):
-            return
         yield from self.more(result, folder)
         yield from draw_comparison(self.comparison(result), folder, progress)
 
@@ -136,15 +129,14 @@ class _Fit(_Identified["Fit"]):
             return ("the model's periodic motion was not found in every dwell.",)
         return ("the data cannot tell every free parameter.",)
 
-    def drawn(self, result: "Fit") -> bool:
-        return _is_quarter_car(result.estimated)
-
     def comparison(self, result: "Fit") -> "Comparison":
         from savgs_ident.fit.comparison import comparison_of
 
         return comparison_of(result)
 
     def more(self, result: "Fit", folder: Path) -> Iterator[Path]:
+        if not _is_quarter_car(result.estimated):
+            return
         from savgs_ident.plants.quarter_car.rig import write_rig
 
         write_rig(result.model.rig, folder / "model.toml")
@@ -187,23 +179,18 @@ def comparison_figure(comparison: "Comparison", progress: Progress = no_progress
         solving = pool.submit(comparison.between)
         from savgs_ident.fit.residuals import measured_points, whitened
         from savgs_ident.report.fit.bode import bode_figure
-        from savgs_ident.report.text import READINGS
+        from savgs_ident.report.text import channel_labels
     model, frictionless = solving.result()
-    label = "identified model" if comparison.rig_model.rig.provenance else "model as drawn"
-    curves = [model.curve(label)]
+    given, measured = comparison.given, comparison.measured
+    curves = [model.curve("model as drawn" if given.is_drawing else "identified model")]
     if comparison.effects:
-        curves.append(frictionless.curve("the same without friction (SimQC)"))
+        curves.append(frictionless.curve("the same without effects"))
     progress("drawing")
-    residuals = whitened(comparison.measured, tuple(READINGS), comparison.model.harmonics, comparison.used)
-    driven = comparison.rig_model.plant.inputs[0].name
-    title = f"Model and measurement: {Path(comparison.origin.data).name}"
-    return bode_figure(
-        title,
-        measured_points(comparison.measured, tuple(READINGS), driven),
-        curves,
-        residuals,
-        tuple(READINGS.values()),
-    )
+    labels, driven = channel_labels(given), given.plant.inputs[0].name
+    points = measured_points(measured, tuple(labels), driven)
+    residuals = whitened(measured, tuple(labels), comparison.model.harmonics, comparison.used)
+    title = f"Model and measurement: {Path(comparison.origin.data).name or given.plant_name}"
+    return bode_figure(title, points, curves, residuals, tuple(labels.values()))
 
 
 class _CampaignSummary(_Presenter["CampaignSummary"]):
@@ -243,27 +230,23 @@ class _SimulatedResponse(_Presenter["SimulatedResponse"]):
     def text(self, result: "SimulatedResponse") -> RenderableType:
         from savgs_ident.report.model import response_text
 
-        return response_text("Periodic response to the cam", self.record(result))
+        return response_text(result)
 
     def doubts(self, result: "SimulatedResponse") -> tuple[str, ...]:
         return () if result.trusted else (_UNSOLVED,)
 
     def figures(self, result: "SimulatedResponse") -> Figures:
         from savgs_ident.report.fit.bode import response_figure
-        from savgs_ident.report.text import READINGS
+        from savgs_ident.report.text import channel_labels
 
-        effects = result.origin.effects
-        label = "with " + ", ".join(effects) if effects else "SimQC (without friction)"
-        return {
-            "simulate": lambda: response_figure(
-                "Simulated response", [result.curve(label)], tuple(READINGS.values())
-            )
-        }
+        effects, labels = result.origin.effects, tuple(channel_labels(result.model).values())
+        curve = result.curve("with " + ", ".join(effects) if effects else "without effects")
+        return {"simulate": lambda: response_figure("Simulated response", [curve], labels)}
 
     def more(self, result: "SimulatedResponse", folder: Path) -> Iterator[Path]:
         from savgs_ident.report.model import response_columns
 
-        yield write_table(folder / "simulate.csv", response_columns(self.record(result)))
+        yield write_table(folder / "simulate.csv", response_columns(result))
 
 
 class _SimulatedSweep(_Presenter["SimulatedSweep"]):
@@ -277,7 +260,7 @@ class _SimulatedSweep(_Presenter["SimulatedSweep"]):
     def text(self, result: "SimulatedSweep") -> RenderableType:
         from savgs_ident.report.model import sweep_text
 
-        return sweep_text(self.record(result))
+        return sweep_text(result)
 
     def doubts(self, result: "SimulatedSweep") -> tuple[str, ...]:
         return () if result.trusted else (_UNSOLVED,)

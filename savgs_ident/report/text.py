@@ -200,6 +200,12 @@ def per_input_words(model: "Model") -> str:
     return f"per {_UNIT_WORDS.get(driven.unit, unit_text(driven.unit))} of {driven.about}"
 
 
+def per_input_key(model: "Model") -> str:
+    """The same as a key of JSON objects: "per_metre_of_road"."""
+    driven = model.plant.inputs[0]
+    return f"per_{_UNIT_WORDS.get(driven.unit, 'unit')}_of_{driven.about}".replace(" ", "_")
+
+
 def channel_label(name: str, model: "Model | None" = None) -> ChannelLabel:
     """How the channel ``name`` is shown: as a model's plant declares it or as listed, others by name and in SI."""
     # Only here: the command line prints errors without numpy, which recordings load.

@@ -1,13 +1,12 @@
-"""The response of a model over frequency: periodic motions at many frequencies, and a sweep of the cam.
+"""The response of a model over frequency: periodic motions at many frequencies, and a sweep.
 
-Under the road and the link of measured dwells a model answers at the frequencies of the dwells. For a smooth curve
-it is also solved between them: road and link then move as in the dwells to either side, their harmonics interpolated
-over frequency. As many frequencies are added as there are dwells, in the widest gaps, for arrays of the same shape
+Under the inputs of measured dwells a model answers at the frequencies of the dwells. For a smooth curve it is also
+solved between them: the inputs then move as in the dwells to either side, their harmonics interpolated over
+frequency. As many frequencies are added as there are dwells, in the widest gaps, for arrays of the same shape
 need no second compilation.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import jax
@@ -19,27 +18,22 @@ from savgs_ident.core.presentation import Result
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import as_values
 from savgs_ident.plants.base import Excitation
-from savgs_ident.plants.quarter_car.actuation import RigSource, held_link
-from savgs_ident.plants.quarter_car.catalogue import EFFECTS, build_model, model_parameters
-from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.road import sweep_road
-from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
+from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import peak_to_peak
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.mesh import Layout, layout_for
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
-from savgs_ident.simulate.transient import simulate_transient
 
 
 @dataclass(frozen=True)
 class ModelCurve:
-    """A model's response at F frequencies, channels as in ``RESPONSE_CHANNELS``.
+    """A model's response at F frequencies, in the C channels of its plant.
 
     Attributes:
         label: what the legend calls it.
         frequency: [Hz], (F,), increasing.
-        transfer: complex first harmonic per metre of road [unit/m], (F, 2); NaN where not solved.
-        peak_to_peak: [unit], (F, 2); NaN where not solved.
+        transfer: complex first harmonic per unit of the first input, (F, C); NaN where not solved.
+        peak_to_peak: [unit], (F, C); NaN where not solved.
     """
 
     label: str
@@ -52,15 +46,15 @@ def model_curve(
     label: str,
     frequency: NDArray[np.float64],
     harmonics: NDArray[np.complex128],
-    road: NDArray[np.complex128],
+    driven: NDArray[np.complex128],
     solved: NDArray[np.bool_],
 ) -> ModelCurve:
-    """The curve of ``harmonics`` (F, 2, K) under a road whose first harmonics [m] are ``road`` (F,).
+    """The curve of ``harmonics`` (F, C, K) under an input whose first harmonics are ``driven`` (F,).
 
     Frequencies that are not ``solved`` (F,) are left open.
     """
     every = np.ones(harmonics.shape, dtype=np.bool_)
-    transfer = np.where(solved[:, None], harmonics[:, :, 1] / road[:, None], np.nan)
+    transfer = np.where(solved[:, None], harmonics[:, :, 1] / driven[:, None], np.nan)
     reach = np.where(solved[:, None], peak_to_peak(harmonics, every), np.nan)
     return ModelCurve(label, frequency, transfer, reach)
 
@@ -70,13 +64,15 @@ class SimulatedResponse(Result):
     """Harmonics of the readings of a model under an excitation of F frequencies.
 
     Attributes:
-        excitation: what drove the rig.
-        harmonics: complex, (F, 2, orders + 1), channels as in ``RESPONSE_CHANNELS``, SI.
+        model: what was solved.
+        excitation: what drove it.
+        harmonics: complex, (F, C, orders + 1), in the channels of its plant, SI.
         status: whether each was found, length F.
     """
 
     presenter: ClassVar[str] = "SIMULATED_RESPONSE"
 
+    model: Model
     excitation: Excitation
     harmonics: NDArray[np.complex128]
     status: tuple[Status, ...]
@@ -96,10 +92,14 @@ class SimulatedResponse(Result):
         """Which were found, (F,)."""
         return np.array([status.ok for status in self.status], dtype=np.bool_)
 
+    @property
+    def driven(self) -> NDArray[np.complex128]:
+        """First harmonics of the first input [its unit], (F,)."""
+        return np.asarray(self.excitation.harmonics[self.model.plant.inputs[0].name])[:, 1]
+
     def curve(self, label: str) -> ModelCurve:
         """As a curve for a figure."""
-        road = np.asarray(self.excitation.harmonics["road_height"])[:, 1]
-        return model_curve(label, self.frequency, self.harmonics, road, self.ok)
+        return model_curve(label, self.frequency, self.harmonics, self.driven, self.ok)
 
 
 _DRAWN = PeriodicSettings(adaptations=1)
@@ -107,33 +107,31 @@ _DRAWN = PeriodicSettings(adaptations=1)
 
 
 def simulate_response(
-    rig: Rig,
-    effects: Sequence[str],
+    model: Model,
     excitation: Excitation,
     orders: int,
     settings: PeriodicSettings | None = None,
     layout: Layout | None = None,
 ) -> SimulatedResponse:
-    """The periodic motions of a rig with the named effects; the rest as in :func:`simulate_periodic`."""
-    table = model_parameters(rig, effects)
-    p = as_values(table.as_dict())
-    model = build_model(rig, effects)
-    solution = simulate_periodic(model, p, excitation, settings, layout)
-    return SimulatedResponse(excitation, np.asarray(harmonics(model, p, solution, orders)), solution.status())
+    """The periodic motions of a model; the rest as in :func:`simulate_periodic`."""
+    plant, p = model.build(), as_values(model.table.as_dict())
+    solution = simulate_periodic(plant, p, excitation, settings, layout)
+    found = np.asarray(harmonics(plant, p, solution, orders))
+    return SimulatedResponse(model, excitation, found, solution.status())
 
 
-def simulate_between(rig: Rig, effects: Sequence[str], known: SimulatedResponse) -> SimulatedResponse:
+def simulate_between(known: SimulatedResponse) -> SimulatedResponse:
     """``known`` and as many frequencies again, see :func:`interpolate_excitation`, as one."""
     layout = layout_for(known.frequency, _DRAWN.nodes, _DRAWN.slow)
     orders = known.harmonics.shape[2] - 1
     added = interpolate_excitation(known.excitation)
-    return merge_responses(known, simulate_response(rig, effects, added, orders, _DRAWN, layout))
+    return merge_responses(known, simulate_response(known.model, added, orders, _DRAWN, layout))
 
 
-def disable_effects(rig: Rig, effects: Sequence[str]) -> Rig:
-    """The rig with the named effects at their null: the same compiled model then shows it without them."""
-    nulls = {name: value for effect in effects for name, value in EFFECTS[effect].null.items()}
-    return replace(rig, parameters=model_parameters(rig, effects).with_values(nulls))
+def disable_effects(model: Model) -> Model:
+    """The model with its effects at their null: the same compiled plant then shows it without them."""
+    nulls = (model.catalogue[effect].null for effect in model.effects)
+    return model.with_values({name: value for null in nulls for name, value in null.items()})
 
 
 def merge_responses(one: SimulatedResponse, other: SimulatedResponse) -> SimulatedResponse:
@@ -142,6 +140,7 @@ def merge_responses(one: SimulatedResponse, other: SimulatedResponse) -> Simulat
     excitation = jax.tree.map(lambda a, b: jnp.concatenate([a, b])[order], one.excitation, other.excitation)
     status = one.status + other.status
     return SimulatedResponse(
+        one.model,
         excitation,
         np.concatenate([one.harmonics, other.harmonics])[order],
         tuple(status[i] for i in order),
@@ -186,12 +185,21 @@ LOWEST_HZ, HIGHEST_HZ, DURATION_S, RATE_HZ = 0.0, 3.0, 60.0, 500.0
 
 @dataclass(frozen=True)
 class SimulatedSweep(Result):
-    """``time`` [s], ``road`` [m] and ``readings`` (2, n), SI, channels as in ``RESPONSE_CHANNELS``."""
+    """A motion of a model under a swept input.
+
+    Attributes:
+        model: what was solved.
+        time: [s], (n,).
+        driven: its first input [unit of that], (n,).
+        readings: of the C channels of its plant, SI, (C, n).
+        status: how the integration ended.
+    """
 
     presenter: ClassVar[str] = "SIMULATED_SWEEP"
 
+    model: Model
     time: NDArray[np.float64]
-    road: NDArray[np.float64]
+    driven: NDArray[np.float64]
     readings: NDArray[np.float64]
     status: Status
 
@@ -202,16 +210,5 @@ class SimulatedSweep(Result):
 
     @property
     def frequency(self) -> NDArray[np.float64]:
-        """Frequency of the cam at each instant [Hz], (n,)."""
+        """Frequency of the input at each instant [Hz], (n,)."""
         return LOWEST_HZ + (HIGHEST_HZ - LOWEST_HZ) * self.time / DURATION_S
-
-
-def integrate_sweep(rig: Rig, effects: Sequence[str]) -> SimulatedSweep:
-    """The sweep of a rig with the named effects, the link held at its nominal angle."""
-    p = as_values(model_parameters(rig, effects).as_dict())
-    time = np.linspace(0.0, DURATION_S, round(DURATION_S * RATE_HZ) + 1)
-    cam, angle = rig.parameters.values_of(("cam_peak_to_peak", "psi_nominal"))
-    road = sweep_road(cam, LOWEST_HZ, HIGHEST_HZ, DURATION_S)
-    solution = simulate_transient(build_model(rig, effects), p, RigSource(road, held_link(angle)), time)
-    readings = np.stack([np.asarray(getattr(solution.readings, name)) for name in RESPONSE_CHANNELS])
-    return SimulatedSweep(time, np.asarray(solution.inputs.road.height), readings, solution.status())

@@ -11,22 +11,27 @@ from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.core.values import as_values
 from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.model import Model
+from savgs_ident.plants.quarter_car.actuation import RigSource, held_link
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.road import cam_excitation
+from savgs_ident.plants.quarter_car.road import cam_excitation, sweep_road
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse, unbiased_peak_to_peak
 from savgs_ident.simulate.excitation import measured_excitation, recorded_names
 from savgs_ident.simulate.frequency_response import (
+    DURATION_S,
+    HIGHEST_HZ,
+    LOWEST_HZ,
+    RATE_HZ,
     SimulatedResponse,
     SimulatedSweep,
-    integrate_sweep,
     simulate_response,
 )
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
+from savgs_ident.simulate.transient import simulate_transient
 
 DWELLS = (
     0.5, 0.8, 1.1, 1.4, 1.6, 1.75, 1.85, 1.95, 2.0, 2.05, 2.15, 2.25, 2.3, 2.35, 2.4, 2.45, 2.55, 2.65, 2.75,
@@ -57,16 +62,21 @@ def simulate(
     use_persistent_cache()
     excitation = _excitation(model, frequency, campaign, orders)
     progress(f"solving {excitation.frequency.shape[0]} periodic motions")
-    return replace(
-        simulate_response(model.rig, model.effects, excitation, orders), origin=model.origin(campaign)
-    )
+    return replace(simulate_response(model, excitation, orders), origin=model.origin(campaign))
 
 
 def simulate_sweep(model: RigModel, progress: Progress = no_progress) -> SimulatedSweep:
-    """A sweep of the cam from 0 to 3 Hz in 60 s, from standstill."""
+    """A sweep of the cam from 0 to 3 Hz in 60 s, from standstill, the link held at its nominal angle."""
     use_persistent_cache()
     progress("integrating a sweep of 60 s")
-    return replace(integrate_sweep(model.rig, model.effects), origin=model.origin())
+    table = model.table
+    cam, angle = table.values_of(("cam_peak_to_peak", "psi_nominal"))
+    time = np.linspace(0.0, DURATION_S, round(DURATION_S * RATE_HZ) + 1)
+    source = RigSource(sweep_road(cam, LOWEST_HZ, HIGHEST_HZ, DURATION_S), held_link(angle))
+    solution = simulate_transient(model.build(), as_values(table.as_dict()), source, time)
+    readings = np.stack([np.asarray(getattr(solution.readings, each.name)) for each in model.channels])
+    road = np.asarray(solution.inputs.road.height)
+    return SimulatedSweep(model, time, road, readings, solution.status(), origin=model.origin())
 
 
 def simulate_dwells(

@@ -19,8 +19,7 @@ from savgs_ident.fit.residuals import (
     whitened,
 )
 from savgs_ident.fit.result import Fit
-from savgs_ident.recordings.recording import CANONICAL_UNITS
-from savgs_ident.report.text import READINGS
+from savgs_ident.report.text import per_input_key
 
 
 def fit_record(fit: Fit) -> dict[str, object]:
@@ -129,10 +128,12 @@ def _dwell_channel(fit: Fit, d: int, c: int, sigma: NDArray[np.float64]) -> dict
 
 
 def bode_record(compared: Comparison) -> dict[str, object]:
-    """The JSON object of ``bode``; first harmonics per metre of road, phase against the road, SI."""
-    points = measured_points(compared.measured, tuple(READINGS), compared.rig_model.plant.inputs[0].name)
+    """The JSON object of ``bode``; first harmonics per unit of the input, phase against it, SI."""
+    given = compared.given
+    names, key = [each.name for each in given.channels], per_input_key(given)
+    points = measured_points(compared.measured, names, given.plant.inputs[0].name)
     model, frictionless = compared.model.curve(""), compared.frictionless.curve("")
-    gap = gaps(compared.measured, tuple(READINGS), compared.model.harmonics, compared.used)
+    gap = gaps(compared.measured, names, compared.model.harmonics, compared.used)
     return {
         "schema": 1,
         "effects": list(compared.effects),
@@ -142,13 +143,13 @@ def bode_record(compared: Comparison) -> dict[str, object]:
         "converged": compared.trusted,
         "gap": {name: _gap(entry) for name, entry in gap.items()},
         "channels": {
-            name: {
-                "unit": CANONICAL_UNITS[name],
-                "measured": _measured(points, c),
-                "identified": _transfer(model.transfer[:, c], model.peak_to_peak[:, c]),
-                "simqc": _transfer(frictionless.transfer[:, c], frictionless.peak_to_peak[:, c]),
+            each.name: {
+                "unit": each.unit,
+                "measured": _measured(points, c, key),
+                "identified": _transfer(model.transfer[:, c], model.peak_to_peak[:, c], key),
+                "simqc": _transfer(frictionless.transfer[:, c], frictionless.peak_to_peak[:, c], key),
             }
-            for c, name in enumerate(READINGS)
+            for c, each in enumerate(given.channels)
         },
     }
 
@@ -157,17 +158,17 @@ def _gap(gap: Gap) -> dict[str, float]:
     return {"relative": gap.relative, "floor": gap.floor, "sigma": gap.sigma}
 
 
-def _measured(points: MeasuredPoints, c: int) -> dict[str, object]:
-    return _transfer(points.transfer[:, c], points.peak_to_peak[:, c]) | {
-        "per_metre_of_road_sd": points.magnitude_sd[:, c],
+def _measured(points: MeasuredPoints, c: int, key: str) -> dict[str, object]:
+    return _transfer(points.transfer[:, c], points.peak_to_peak[:, c], key) | {
+        f"{key}_sd": points.magnitude_sd[:, c],
         "phase_sd_deg": np.degrees(points.phase_sd[:, c]),
         "peak_to_peak_sd": points.peak_to_peak_sd[:, c],
     }
 
 
-def _transfer(transfer: NDArray[np.complex128], reach: NDArray[np.float64]) -> dict[str, object]:
+def _transfer(transfer: NDArray[np.complex128], reach: NDArray[np.float64], key: str) -> dict[str, object]:
     return {
-        "per_metre_of_road": np.abs(transfer),
+        key: np.abs(transfer),
         "phase_deg": np.degrees(np.angle(transfer)),
         "peak_to_peak": reach,
     }
