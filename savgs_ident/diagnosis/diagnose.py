@@ -189,14 +189,7 @@ def _diagnose(
     held = {**held, **last, UNKNOWN: linear if law is None else law.held}
 
     base, model = problem.base, _corrected_model(refitted, evidence, law)
-    rows = Rows(
-        before=problem.given,
-        recalibrated=held[NONE].rows,
-        after=held[model.hypothesis].rows,
-        channel=plant.channel,
-        channels=plant.channels,
-    )
-    together, by_channel = shrinks(data, rows)
+    together, by_channel = shrinks(data, _left_out_rows(problem, held, model))
     # Before what is named was refitted: the alternatives were not.
     alternatives = indistinguishable(selected.weighed, selected.chosen, problem.constants)
     verdict = write_verdict(refitted, evidence, alternatives, together)
@@ -207,9 +200,7 @@ def _diagnose(
         parameters=base.values,
         identified=model.fit.values,
         verdict=verdict,
-        ports=tuple(
-            PortShare(each.name, each.share, each.free_input_share) for each in evidence.localisations
-        ),
+        ports=_port_shares(evidence),
         map=plant.gap_map(data, base.prediction.rows),
         cycle=plant.cycle_positions(data, base.prediction.rows),
         candidates=candidates_of(
@@ -228,6 +219,23 @@ def _diagnose(
         warnings=write_warnings(refitted, evidence, model.fit, together),
         learned=None if law is None else _offered(law),
         wall_s=time.perf_counter() - began,
+    )
+
+
+def _port_shares(evidence: DiagnosisEvidence) -> tuple[PortShare, ...]:
+    return tuple(PortShare(each.name, each.share, each.free_input_share) for each in evidence.localisations)
+
+
+def _left_out_rows(
+    problem: DiagnosisProblem, held: Mapping[Hypothesis, HeldOut], model: "_CorrectedModel"
+) -> Rows:
+    """Rows of the tests when each was left out, by the three models."""
+    return Rows(
+        before=problem.given,
+        recalibrated=held[NONE].rows,
+        after=held[model.hypothesis].rows,
+        channel=problem.plant.channel,
+        channels=problem.plant.channels,
     )
 
 

@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.core.values import as_values
-from savgs_ident.plants.base import Excitation
+from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.actuation import RigSource, held_link
 from savgs_ident.plants.quarter_car.model import RigModel
@@ -124,16 +125,27 @@ def simulate_dwells(
     lost = [f"{f:g} Hz" for f, status in zip(hertz, solution.status(), strict=True) if not status.ok]
     if lost:
         raise InputError("there is no periodic motion at " + ", ".join(lost), remedy="change the amplitudes")
-    names, inputs = recorded_names(plant), len(plant.inputs)
-    found = np.zeros((hertz.size, len(names), orders + 1), complex)
+    true = np.zeros((hertz.size, len(recorded_names(plant)), orders + 1), complex)
     for c, row in enumerate(rows.values()):
-        found[:, c, :2] = row
-    found[:, inputs:] = np.asarray(harmonics(plant, p, solution, orders))
+        true[:, c, :2] = row
+    true[:, len(plant.inputs) :] = np.asarray(harmonics(plant, p, solution, orders))
+    return _measured(plant, hertz, true, noise, samples, np.random.default_rng(seed))
+
+
+def _measured(
+    plant: AbstractPlant,
+    hertz: NDArray[np.float64],
+    true: NDArray[np.complex128],
+    noise: Mapping[str, float],
+    samples: int,
+    random: np.random.Generator,
+) -> HarmonicResponse:
+    """What sensors with ``noise`` [unit of each channel] show of ``true`` harmonics (D, C, K) [unit of each]."""
+    names = recorded_names(plant)
     sample_sd = np.array([noise.get(name, 0.0) for name in names])
     # A sine that is fitted to n samples is known to the noise times the square root of 2 / n in each part.
     sd = sample_sd * np.sqrt(2.0 / samples)
-    random = np.random.default_rng(seed)
-    found += sd[:, None] * (random.standard_normal((2, *found.shape)).T @ [1.0, 1j]).T
+    found = true + sd[:, None] * (random.standard_normal((2, *true.shape)).T @ [1.0, 1j]).T
     found[:, :, 0] = found[:, :, 0].real
     covariance = np.broadcast_to((sd**2)[:, None, None, None] * np.eye(2), (*found.shape, 2, 2)).copy()
     valid = np.ones(found.shape, np.bool_)
