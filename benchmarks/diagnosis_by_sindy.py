@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from benchmarks.outcome import Outcome, Tell
 from savgs_ident.diagnosis.model_selection import recalibrate
-from savgs_ident.diagnosis.quarter_car import quarter_car_problem
-from savgs_ident.diagnosis.result import DiagnosisSettings
+from savgs_ident.diagnosis.quarter_car import SIMTR, quarter_car_problem
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig
 from savgs_ident.recordings.read import read_campaign
@@ -151,7 +150,7 @@ def read_trial(folder: Path, rig: Rig) -> Trial:
     answer = json.loads((folder / "answer.json").read_text())["answer"]
     verdict = json.loads((folder / "diagnosis.json").read_text())["verdict"]
     campaign = read_campaign(folder / "campaign")
-    measured = estimate_response(campaign.only(recorded_names(QuarterCar)), DiagnosisSettings().orders)
+    measured = estimate_response(campaign.only(recorded_names(QuarterCar)), SIMTR.orders)
     names, library, residual = regression_of(measured, rig)
     return Trial(
         kind=answer["kind"],
@@ -165,7 +164,7 @@ def read_trial(folder: Path, rig: Rig) -> Trial:
 
 def regression_of(measured: Any, rig: Rig) -> tuple[tuple[str, ...], Real, Real]:
     """Names, library and residual of a measured response, calibration projected out."""
-    plant, data = quarter_car_problem(measured, rig, DiagnosisSettings())
+    plant, data = quarter_car_problem(measured, rig, SIMTR)
     problem = recalibrate(plant, data, {}, lambda line: None)
     base, terms = problem.base, problem.plant.candidates
     weight = 1.0 / np.sqrt(problem.data.variance)

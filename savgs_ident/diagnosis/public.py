@@ -60,11 +60,11 @@ def diagnose(
         raise InputError(
             "a held-out motion goes with a measured motion alone", remedy="diagnose each campaign by itself"
         )
-    response = measured_response(measured, orders, max_frequency, progress, model.build())
+    response = measured_response(measured, model.plant, orders, max_frequency, progress)
     campaign = campaign_of(measured)
     if isinstance(model, RigModel):
         rig, settings, values = baseline_of(model, orders, without)
-        sweep = None if campaign is None else first_sweep(campaign)
+        sweep = None if campaign is None else first_sweep(campaign, model.plant)
         found = diagnose_response(response, rig, settings, values, progress, sweep)
     else:
         given, settings, values = model.before, *_asked(model, orders, without)

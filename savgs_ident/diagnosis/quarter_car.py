@@ -9,10 +9,13 @@ from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
 from savgs_ident.plants.quarter_car.damper import damper_curve
-from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
+
+SIMTR = DiagnosisSettings("simtr", MODELS["simtr"], FREE)
+"""The paper's model as the baseline, with the parameters that the paper identifies."""
 
 
 def diagnose_response(
@@ -31,7 +34,7 @@ def diagnose_response(
     Look at ``converged`` of the result. Raises :class:`InputError` for a response that cannot be used, for names
     that do not exist, and for a rig whose baseline has no periodic motion.
     """
-    settings = settings or DiagnosisSettings()
+    settings = settings or SIMTR
     plant, data = quarter_car_problem(measured, rig, settings)
     given = RigModel(rig, settings.baseline)
     return diagnose_dwells(plant, data, measured, given, settings, values or {}, progress, sweep)

@@ -16,12 +16,9 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Result
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.plants.model import Model
-from savgs_ident.plants.quarter_car.model import RigModel
-from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import PeriodicSettings
 
@@ -145,13 +142,13 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Learned:
-    """A correction for something unknown: a force at a port, fitted on the nonlinear rig.
+    """A correction for something unknown: a force at a port, fitted on the nonlinear plant.
 
     Attributes:
         effect: its name as an effect of a model.
         port: name of the port.
         parameters: its coefficients with their 95 % intervals.
-        identified: all its numbers, and those of the rig that were fitted beside it, SI, by name.
+        identified: all its numbers, and those of the plant that were fitted beside it, SI, by name.
     """
 
     effect: str
@@ -314,11 +311,11 @@ class Diagnosis(Result):
     """A whole diagnosis.
 
     Attributes:
-        model: name of the baseline, "simqc" or "simtr", or the name of the rig file's own.
+        model: name of the baseline.
         effects: names of the effects in the baseline.
         given: the model as known before any fit.
         parameters: parameters of the recalibrated baseline, SI, by name.
-        identified: parameters of the rig with the named effects, SI, by name.
+        identified: parameters of the plant with the named effects, SI, by name.
         verdict: the verdict.
         ports: shares of all ports, largest first.
         map: the gap by channel, frequency and order.
@@ -367,22 +364,9 @@ class Diagnosis(Result):
     learned: Learned | None = None
 
     @property
-    def rig(self) -> Rig:
-        """The quarter car as known before any fit; raises :class:`InputError` where another plant was diagnosed."""
-        if not isinstance(self.given, RigModel):
-            raise InputError(
-                f"{self.given.name} is no rig with a file", remedy="take diagnosis.given instead"
-            )
-        return self.given.rig
-
-    @property
     def trusted(self) -> bool:
         """Whether every search that the verdict stands on ended well."""
         return self.converged
-
-
-FREE = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
-"""Parameters that the baseline identifies where it has them."""
 
 
 @dataclass(frozen=True)
@@ -399,9 +383,9 @@ class DiagnosisSettings:
         constants: what the verdict is decided by.
     """
 
-    model: str = "simtr"
-    baseline: tuple[str, ...] = ("rail_coulomb", "tyre_friction")
-    free: tuple[str, ...] = FREE
+    model: str = ""
+    baseline: tuple[str, ...] = ()
+    free: tuple[str, ...] = ()
     orders: int = 9
     without: tuple[str, ...] = ()
     periodic: PeriodicSettings = field(default_factory=PeriodicSettings)

@@ -79,7 +79,7 @@ def compare(
     Raises :class:`InputError` for a campaign that cannot be used.
     """
     use_persistent_cache()
-    response = measured_response(measured, orders, None, progress, model.plant)
+    response = measured_response(measured, model.plant, orders, None, progress)
     excitation = measured_excitation(model.plant, response, model.table)
     progress("solving the model at the dwells")
     with_effects = simulate_response(model, excitation, response.orders)

@@ -62,7 +62,7 @@ def fit_with(
     use_persistent_cache()
     drawing = model.before
     names = drawing.free(free)
-    response = measured_response(measured, settings.orders, max_frequency, progress, model.build())
+    response = measured_response(measured, model.plant, settings.orders, max_frequency, progress)
     found = fit_least_squares(response, drawing, free=names, settings=settings, progress=progress)
     return replace(found, origin=model.origin(campaign_of(measured), response.warnings))
 

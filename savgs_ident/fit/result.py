@@ -7,13 +7,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import spelled_out
 from savgs_ident.core.presentation import Result, package_versions
 from savgs_ident.core.status import Status
 from savgs_ident.plants.model import Model
-from savgs_ident.plants.quarter_car.model import RigModel
-from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 PACKAGES = ("jax", "optimistix", "numpy", "scipy")
@@ -119,20 +116,13 @@ class Fit(Result):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects in the model, () for SimQC."""
+        """Names of the effects in the model."""
         return self.estimated.effects
 
     @property
     def channels(self) -> tuple[str, ...]:
         """Names of the C channels of the plant."""
         return tuple(each.name for each in self.estimated.channels)
-
-    @property
-    def rig(self) -> Rig:
-        """The quarter car with the estimated values; raises :class:`InputError` where another plant was fitted."""
-        if not isinstance(self.estimated, RigModel):
-            raise InputError(f"{self.estimated.name} is no rig with a file", remedy="take fit.model instead")
-        return self.estimated.rig
 
     @property
     def trusted(self) -> bool:

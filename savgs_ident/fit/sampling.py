@@ -90,7 +90,7 @@ def _measured(
 ) -> HarmonicResponse:
     if measured is not None:
         model = identified.model if isinstance(identified, Fit) else identified
-        return measured_response(measured, orders, max_frequency, progress, model.build())
+        return measured_response(measured, model.plant, orders, max_frequency, progress)
     if isinstance(identified, Fit):
         return identified.measured
     raise InputError("a model alone has no posterior", remedy="give the campaign, or the fit")

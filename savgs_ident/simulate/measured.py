@@ -3,7 +3,6 @@
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.plants.base import AbstractPlant
-from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
@@ -22,10 +21,10 @@ def campaign_of(measured: Measurements) -> Campaign | None:
 
 def measured_response(
     measured: Measurements,
+    plant: AbstractPlant | type[AbstractPlant],
     orders: int,
     max_frequency: float | None = None,
     progress: Progress = no_progress,
-    plant: AbstractPlant | type[AbstractPlant] = QuarterCar,
 ) -> HarmonicResponse:
     """The response of the dwells up to ``max_frequency`` [Hz], orders 0..``orders``, in the channels of ``plant``.
 
@@ -39,9 +38,9 @@ def measured_response(
     return up_to_frequency(estimate_response(only, orders, plant.inputs[0].name), max_frequency)
 
 
-def first_sweep(campaign: Campaign) -> SweepResponse | None:
+def first_sweep(campaign: Campaign, plant: AbstractPlant | type[AbstractPlant]) -> SweepResponse | None:
     """The response along the first sweep of a campaign; None if there is none that can be used."""
-    for recording in campaign.only(recorded_names(QuarterCar)).of_kind("sweep"):
+    for recording in campaign.only(recorded_names(plant)).of_kind("sweep"):
         try:
             return estimate_sweep_response(recording, source=campaign.source)
         except InputError:

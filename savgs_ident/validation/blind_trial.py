@@ -22,9 +22,9 @@ import numpy as np
 from savgs_ident.core.errors import InputError, blamed_on
 from savgs_ident.core.files import is_begun, record_of
 from savgs_ident.core.output import prepare_folder, write_json
-from savgs_ident.diagnosis.quarter_car import diagnose_response
-from savgs_ident.diagnosis.result import DiagnosisSettings
+from savgs_ident.diagnosis.quarter_car import SIMTR, diagnose_response
 from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, parse_rig
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import Recording
@@ -88,11 +88,10 @@ class Plan:
 
     def bench(self) -> Bench:
         """The rig and what it is put through."""
-        settings = DiagnosisSettings()
         programme = Programme(
             dwells=DWELLS[(len(DWELLS) - 1) % self.every :: self.every], sweep=SWEEP if self.sweep else 0.0
         )
-        return Bench(parse_rig(self.sheet, self.rig), settings.baseline, settings.free, programme)
+        return Bench(parse_rig(self.sheet, self.rig), SIMTR.baseline, SIMTR.free, programme)
 
 
 @dataclass(frozen=True)
@@ -157,10 +156,10 @@ def run_trial(plan: Plan, draw: Draw, diagnose: Diagnose, out: Path, number: int
 
 def diagnose_folder(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
     """The diagnosis of a recorded campaign as its ``diagnosis.json`` has it."""
-    settings = DiagnosisSettings(without=without)
+    settings = replace(SIMTR, without=without)
     campaign = read_campaign(folder)
-    measured = measured_response(campaign, settings.orders)
-    diagnosis = diagnose_response(measured, rig, settings, sweep=first_sweep(campaign))
+    measured = measured_response(campaign, QuarterCar, settings.orders)
+    diagnosis = diagnose_response(measured, rig, settings, sweep=first_sweep(campaign, QuarterCar))
     origin = RigModel(rig, settings.baseline).origin(campaign, measured.warnings)
     record: Mapping[str, Any] = json.loads(replace(diagnosis, origin=origin).to_json())
     return record

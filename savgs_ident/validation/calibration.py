@@ -218,7 +218,7 @@ def calibrate(
         marks |= {"sampler": sampler, "every": every, "seed": seed}
         kept = Kept(prepare_folder(Path(folder)) / FILE, marks, resume)
     done = [] if kept is None else kept.earlier(trial_reader())
-    response = measured_response(campaign, SamplingSettings.orders, None, progress)
+    response = measured_response(campaign, model.plant, SamplingSettings.orders, None, progress)
     question = question_about(model, every_so_many(response, every))
     asked = _Asked(question, SamplingSettings(sampler, target_ess=DRAWS, seed=seed))
     progress("preparing")

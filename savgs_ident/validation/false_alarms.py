@@ -220,7 +220,7 @@ def false_alarms(
         marks |= {"max_frequency": max_frequency, "orders": orders, "seed": seed}
         kept = Kept(prepare_folder(Path(folder)) / FILE, marks, resume)
     done = [] if kept is None else kept.earlier(read_draw)
-    measured = measured_response(campaign, orders, max_frequency, progress)
+    measured = measured_response(campaign, model.plant, orders, max_frequency, progress)
     asked = _Asked(measured, rig, settings, values, seed)
     bench = asked.bench(progress)
     found = run_trials(

@@ -5,23 +5,24 @@ from pathlib import Path
 
 import numpy as np
 
+from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.simulate.measured import first_sweep
 
 
 def test_the_first_sweep_that_can_be_used_is_taken(nominal_campaign: Path) -> None:
     campaign = read_campaign(nominal_campaign)
-    sweep = first_sweep(campaign)
+    sweep = first_sweep(campaign, QuarterCar)
     assert sweep is not None
     assert sweep.test == campaign.of_kind("sweep")[0].name
     assert set(sweep.channels) >= {"sprung_accel", "susp_deflection"}
     assert sweep.frequency.max() > 2.5
     np.testing.assert_allclose(sweep.road_amplitude[sweep.frequency > 0.5], 0.01375, rtol=0.01)
     dwells = replace(campaign, recordings=campaign.of_kind("dwell"))
-    assert first_sweep(dwells) is None
+    assert first_sweep(dwells, QuarterCar) is None
     whole = campaign.of_kind("sweep")[0]
     blind = replace(
         whole, channels={name: each for name, each in whole.channels.items() if name != "road_height"}
     )
-    assert first_sweep(replace(campaign, recordings=(blind,))) is None
-    assert first_sweep(replace(campaign, recordings=(blind, whole))) is not None
+    assert first_sweep(replace(campaign, recordings=(blind,)), QuarterCar) is None
+    assert first_sweep(replace(campaign, recordings=(blind, whole)), QuarterCar) is not None

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
-from savgs_ident.diagnosis.result import FREE
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
 from savgs_ident.plants.quarter_car.damper import damper_curve
+from savgs_ident.plants.quarter_car.model import FREE
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.read import read_campaign

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from savgs_ident.diagnosis.result import FREE
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
+from savgs_ident.plants.quarter_car.model import FREE
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import Campaign

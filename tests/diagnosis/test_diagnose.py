@@ -1,10 +1,12 @@
 """Whole diagnoses of the laboratory's labelled campaigns: named, located, closed, within intervals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.diagnosis.quarter_car import diagnose_response
+from savgs_ident.diagnosis.quarter_car import SIMTR, diagnose_response
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.plants.quarter_car.rig import Rig
 
@@ -58,13 +60,13 @@ def test_a_stribeck_rail_is_found_in_a_few_dwells(measure: Measure, rig: Rig) ->
 
 def test_an_effect_that_does_not_exist_is_refused(measure: Measure, rig: Rig) -> None:
     with pytest.raises(InputError, match="there is no effect 'rail_stribek'"):
-        diagnose_response(measure("nominal"), rig, DiagnosisSettings(without=("rail_stribek",)))
+        diagnose_response(measure("nominal"), rig, replace(SIMTR, without=("rail_stribek",)))
 
 
 @pytest.mark.slow
 def test_an_effect_of_the_baseline_cannot_be_left_out(measure: Measure, rig: Rig) -> None:
     with pytest.raises(InputError, match="'rail_coulomb' is part of the baseline"):
-        diagnose_response(measure("nominal"), rig, DiagnosisSettings(without=("rail_coulomb",)))
+        diagnose_response(measure("nominal"), rig, replace(SIMTR, without=("rail_coulomb",)))
 
 
 @pytest.mark.slow
@@ -94,7 +96,7 @@ def test_both_frictions_are_found_from_the_frictionless_baseline(measure: Measur
 def test_what_the_catalogue_lacks_is_called_unknown(
     measure: Measure, rig: Rig, name: str, without: str, port: str
 ) -> None:
-    diagnosis = diagnose_response(measure(name), rig, DiagnosisSettings(without=(without,)))
+    diagnosis = diagnose_response(measure(name), rig, replace(SIMTR, without=(without,)))
     assert diagnosis.verdict.kind == "unknown"
     assert diagnosis.verdict.ports == (port,)
     assert diagnosis.shrink.share_closed > 0.9

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from savgs_ident.diagnosis.result import DiagnosisSettings
+from savgs_ident.diagnosis.quarter_car import SIMTR
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.periodic import PeriodicSettings
@@ -37,7 +37,7 @@ def test_campaigns_with_nothing_missing_give_no_alarm_and_one_with_a_gap_does(
     measure: Measure, rig: Rig
 ) -> None:
     """On six dwells; the same number draws the same campaign."""
-    settings = DiagnosisSettings(periodic=PeriodicSettings(nodes=128, adaptations=1))
+    settings = replace(SIMTR, periodic=PeriodicSettings(nodes=128, adaptations=1))
     few = {
         name: only(measure(name), np.isin(np.round(measure(name).frequency, 2), DWELLS))
         for name in ("nominal", "stribeck_rail")

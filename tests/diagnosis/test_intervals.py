@@ -8,8 +8,7 @@ from scipy.stats import chi2
 
 from savgs_ident.diagnosis.candidates import WITHIN
 from savgs_ident.diagnosis.model_selection import DiagnosisProblem, recalibrate
-from savgs_ident.diagnosis.quarter_car import quarter_car_problem
-from savgs_ident.diagnosis.result import DiagnosisSettings
+from savgs_ident.diagnosis.quarter_car import SIMTR, quarter_car_problem
 from savgs_ident.inference.find_map import LaplaceFit, find_map, refine
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import AbstractCoordinate
@@ -65,7 +64,7 @@ def test_the_profile_falls_at_the_ends_of_an_interval_as_it_should(
 ) -> None:
     response = measure(recording)
     few = only(response, np.isin(np.round(response.frequency, 2), FEW))
-    problem = recalibrate(*quarter_car_problem(few, rig, DiagnosisSettings()), {}, lambda _: None)
+    problem = recalibrate(*quarter_car_problem(few, rig, SIMTR), {}, lambda _: None)
     (term,) = (each for each in problem.plant.candidates if each.name == effect)
     own = {each.name for each in term.coordinates}
     start = problem.base.values | {each.name: each.centre + 0.5 * each.scale for each in term.amplitudes}
