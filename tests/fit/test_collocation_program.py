@@ -46,7 +46,7 @@ def posed(few: HarmonicResponse, rig: Rig) -> Posed:
     near = simulate_periodic(task.problem.model, task.problem.fixed, task.excitation)
     points = radau_points(near.mesh)
     layout, free = points.mesh.layout, task.problem.free
-    unknowns = unknowns_of(task.problem.model, len(free.names), layout.total, len(FEW))
+    unknowns = unknowns_of(task, points)
     rng = np.random.default_rng(1)
     samples = Samples(rng.uniform(0.0, 2.0 * np.pi, 300), 0.01 * rng.standard_normal(300), 1e-3)
     misfit = misfit_of(samples, np.asarray(points.mesh.phase)[layout.dwell == 0])
@@ -103,9 +103,9 @@ def test_the_objective_counts_samples_and_priors(posed: Posed) -> None:
     w[unknowns.zeros[0, 1]] = zero = 0.3
     found = 0.5 * w @ (quadratic.curvature @ w) - quadratic.slope @ w + quadratic.rest
     here = posed.points.mesh.layout.dwell == 0
-    deflection = 1e-2 * w[unknowns.at_points[here, -1]]
+    deflection = unknowns.readings[1] * w[unknowns.at_points[here, -1]]
     weights: csr_array = interpolation(np.asarray(posed.points.mesh.phase)[here], posed.samples.phase)
-    left = (posed.samples.values - weights @ deflection - 1e-2 * zero) / posed.samples.sd
+    left = (posed.samples.values - weights @ deflection - unknowns.readings[1] * zero) / posed.samples.sd
     known = w[: unknowns.parameters] / posed.task.problem.free.widths
     assert found == pytest.approx(0.5 * (left @ left + known @ known), rel=1e-10)
     assert quadratic.samples == 300

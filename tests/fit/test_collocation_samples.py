@@ -76,7 +76,7 @@ def test_phases_count_from_the_top_of_the_road_on_each_clock() -> None:
             "sprung_accel": Channel("sprung_accel", "m/s^2", fast, accel),
         },
     )
-    found = samples_of(recording, frequency, {"sprung_accel": 0.05})
+    found = samples_of(recording, "road_height", frequency, {"sprung_accel": 0.05})
     assert set(found) == {"sprung_accel"}
     samples = found["sprung_accel"]
     assert samples.values.size == 1699

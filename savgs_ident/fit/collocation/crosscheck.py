@@ -3,7 +3,7 @@
     found = fit_by_collocation(campaign, measured, model, free=FREE)
     found.by_name["mu_r"].value, found.by_name["mu_r"].stderr
 
-It starts from the rig file's values and the periodic motions there. Parameters known to a tolerance are
+It starts from the model's values and the periodic motions there. Parameters known to a tolerance are
 estimated along under their priors, as in the fit.
 
 IPOPT on a program, and how it ended.
@@ -51,8 +51,8 @@ from savgs_ident.fit.least_squares import INFORMED
 from savgs_ident.fit.minimise import Spread, spread_of
 from savgs_ident.fit.result import Estimate
 from savgs_ident.inference.problem import ProblemSettings, Task, plan_task
+from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model
-from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
@@ -269,10 +269,9 @@ def fit_by_collocation(
 ) -> CollocationFit:
     """Estimate ``free`` parameters of a model from the samples of the dwells of ``measured``.
 
-    The response gives frequencies, noise, and the harmonics of road and link; the samples of acceleration and
-    deflection come from ``campaign``. ``progress`` is told what is going on. Raises :class:`InputError` for
-    names that do not exist or that the model does not use, and for recordings that do not belong to the
-    response. Look at ``status`` of the result.
+    The response gives frequencies, noise, and the harmonics of the inputs; the samples of the channels come from
+    ``campaign``. ``progress`` is told what is going on. Raises :class:`InputError` for names that do not exist or that
+    the model does not use, and for recordings that do not belong to the response. Look at ``status`` of the result.
     """
     began, tell = time.perf_counter(), progress or _silent
     settings = settings or CollocationSettings()
@@ -282,7 +281,7 @@ def fit_by_collocation(
     near = simulate_periodic(task.problem.model, task.problem.fixed, task.excitation, settings.periodic)
     points = radau_points(near.mesh)
     tell("gathering the samples")
-    misfits = _misfits(campaign, measured, points)
+    misfits = _misfits(campaign, measured, model.plant, points)
     tell("telling CasADi the equations")
     program = _program(task, points, misfits)
     tell(f"IPOPT: {program.unknowns.size} unknowns, {program.quadratic.samples} samples")
@@ -296,23 +295,28 @@ def _silent(line: str) -> None:
     del line
 
 
-def _misfits(campaign: Campaign, measured: HarmonicResponse, points: Points) -> list[dict[int, Misfit]]:
+def _misfits(
+    campaign: Campaign,
+    measured: HarmonicResponse,
+    plant: AbstractPlant | type[AbstractPlant],
+    points: Points,
+) -> list[dict[int, Misfit]]:
     """For each dwell the misfit of each response channel that was recorded."""
-    misfits = []
+    misfits, driven = [], plant.inputs[0].name
+    names = [each.name for each in plant.channels]
     for dwell, recording in enumerate(find_recordings(campaign, measured)):
         nodes = np.asarray(points.mesh.phase)[points.mesh.layout.dwell == dwell]
         sd = {
             name: float(measured.noise_sd[dwell, measured.channel(name)])
-            for name in RESPONSE_CHANNELS
+            for name in names
             if name in measured.channels and measured.noise_sd[dwell, measured.channel(name)] > 0.0
         }
-        samples = samples_of(recording, float(measured.frequency[dwell]), sd)
-        misfits.append({RESPONSE_CHANNELS.index(name): misfit_of(s, nodes) for name, s in samples.items()})
+        samples = samples_of(recording, driven, float(measured.frequency[dwell]), sd)
+        misfits.append({names.index(name): misfit_of(s, nodes) for name, s in samples.items()})
     return misfits
 
 
 def _program(task: Task, points: Points, misfits: list[dict[int, Misfit]]) -> Program:
-    free, layout = task.problem.free, points.mesh.layout
-    unknowns = unknowns_of(task.problem.model, len(free.names), layout.total, len(layout.counts))
-    quadratic = assemble_objective(unknowns, points, misfits, free.widths)
+    unknowns = unknowns_of(task, points)
+    quadratic = assemble_objective(unknowns, points, misfits, task.problem.free.widths)
     return assemble_program(task.problem, unknowns, points, task.excitation, quadratic)

@@ -12,7 +12,7 @@ step leads downhill.
 
 The equations of one point, told to CasADi: the model's residual, and what the sensors read.
 
-Where the optimisation starts: the rig file's values, and the periodic motions there.
+Where the optimisation starts: the model's values, and the periodic motions there.
 """
 
 from typing import NamedTuple
@@ -24,14 +24,11 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 
-from savgs_ident.fit.collocation.transcription import READINGS, Misfit, Points, Unknowns, step_rule
+from savgs_ident.effects.base import InputSignal
+from savgs_ident.fit.collocation.transcription import Misfit, Points, Unknowns, step_rule
 from savgs_ident.inference.problem import Problem, Task
 from savgs_ident.plants.base import Excitation, Motion
-from savgs_ident.plants.quarter_car.dynamics import Coordinates
-from savgs_ident.plants.quarter_car.inputs import Inputs
-from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Road
-from savgs_ident.simulate.excitation import inputs_at
+from savgs_ident.simulate.excitation import signals_at
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.symbolic.translate import to_casadi
 
@@ -67,8 +64,8 @@ def assemble_objective(
             entries = coo_array(misfit.curvature)
             rows.append(places[entries.row])
             columns.append(places[entries.col])
-            values.append(READINGS[channel] ** 2 * entries.data)
-            slope[places] += READINGS[channel] * misfit.slope
+            values.append(unknowns.readings[channel] ** 2 * entries.data)
+            slope[places] += unknowns.readings[channel] * misfit.slope
             rest += misfit.rest
             count += misfit.samples
     unused = _unseen(unknowns, misfits)
@@ -94,22 +91,28 @@ def _unseen(unknowns: Unknowns, misfits: list[dict[int, Misfit]]) -> NDArray[np.
 def point_equations(problem: Problem, unknowns: Unknowns) -> ca.Function:
     """(z, u, drive) -> equations, all in units of their typical sizes.
 
-    ``z`` are the unknowns of a point, ``u`` the parameters' coordinates, ``drive`` road height [m] and velocity
-    [m/s], link angle [rad] and velocity [rad/s].
+    ``z`` are the unknowns of a point, ``u`` the parameters' coordinates, ``drive`` value and rate of each input
+    [SI].
     """
-    states, partners = unknowns.states, unknowns.partners
+    states, partners, plant = unknowns.states, unknowns.partners, problem.model
+    n, signals = len(plant.coordinates), len(plant.inputs)
 
     def equations(z: Array, u: Array, drive: Array) -> Array:
         here = jnp.asarray(unknowns.scale) * z
         x, y, readings = jnp.split(here, [states, states + partners])
         p = problem.parameters(u)
-        motion = Motion(Coordinates(x[0], x[1]), Coordinates(x[2], x[3]), Coordinates(y[0], y[1]))
-        inputs = Inputs(Road(drive[0], drive[1]), Link(drive[2], drive[3]))
-        balance = problem.model.residual(p, motion, x[4:], y[2:], inputs)
-        seen = jnp.stack(problem.model.read(p, motion, x[4:], y[2:], inputs))
+        parts = (x[:n], x[n : 2 * n], y[:n])
+        motion = Motion(*(plant.coordinate_type(*(part[i] for i in range(n))) for part in parts))
+        inputs = plant.drive(tuple(InputSignal(drive[2 * i], drive[2 * i + 1]) for i in range(signals)))
+        balance = plant.residual(p, motion, x[2 * n :], y[n:], inputs)
+        seen = jnp.stack(plant.read(p, motion, x[2 * n :], y[n:], inputs))
         return jnp.concatenate([balance, seen - readings]) / jnp.asarray(unknowns.residual_scale)
 
-    inputs = {"z": np.zeros(unknowns.width), "u": np.zeros(unknowns.parameters), "drive": np.zeros(4)}
+    inputs = {
+        "z": np.zeros(unknowns.width),
+        "u": np.zeros(unknowns.parameters),
+        "drive": np.zeros(2 * signals),
+    }
     return to_casadi("point", equations, inputs, ["equations"])
 
 
@@ -150,8 +153,8 @@ def assemble_program(
 
 
 def _drive(problem: Problem, points: Points, excitation: Excitation) -> NDArray[np.float64]:
-    at = inputs_at(problem.model, excitation, points.mesh)
-    return np.stack([np.asarray(part) for part in (*at.road, *at.link)])
+    signals, _ = signals_at(problem.model, excitation, points.mesh)
+    return np.stack([np.asarray(part) for signal in signals for part in signal])
 
 
 def _scaled_rule(unknowns: Unknowns, points: Points, frequency: NDArray[np.float64]) -> csc_array:
@@ -159,7 +162,8 @@ def _scaled_rule(unknowns: Unknowns, points: Points, frequency: NDArray[np.float
     states, scale = unknowns.states, unknowns.scale
     seconds = points.step / (2.0 * np.pi * frequency[points.mesh.layout.dwell[::2]])
     at = unknowns.at_points
-    velocities = [2, 3]
+    q = len(unknowns.coordinates)
+    velocities = list(range(q, 2 * q))
     partners = list(range(states, states + unknowns.partners))
     rule = step_rule(points, seconds, at[:, :states], at[:, velocities + partners])
     rule.resize((rule.shape[0], unknowns.size))
@@ -208,7 +212,7 @@ def as_casadi(matrix: csc_array) -> ca.DM:
 def start_vector(task: Task, program: Program, points: Points, near: PeriodicSolution) -> NDArray[np.float64]:
     """All unknowns, scaled [1], (n,).
 
-    The rig's values, the motions ``near`` them, and what the sensors would read of these.
+    The model's values, the motions ``near`` them, and what the sensors would read of these.
     """
     unknowns = program.unknowns
     w = np.zeros(unknowns.size)

@@ -27,75 +27,75 @@ is a quadratic form of (m, o): thousands of samples become a band matrix over th
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, hstack
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.plants.base import AbstractPlant
-from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
+from savgs_ident.core.values import Values
+from savgs_ident.inference.problem import Task
+from savgs_ident.plants.base import AbstractPlant, find_rest, nominal_inputs, standing
 from savgs_ident.recordings.recording import Campaign, Recording
 from savgs_ident.responses.fundamental import group_by_clock, highest_fitted_order
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.periodic_fit import fit_periodic, plan_basis
 from savgs_ident.simulate.mesh import Mesh
 
-COORDINATES = (1e-2, 3e-2)
-"""Typical displacement of z_s [m] and theta_LW [rad]."""
-
-VELOCITIES = (0.1, 0.3)
-"""Their typical rates [1/s]."""
-
-ACCELERATIONS = (1.0, 3.0)
-"""Theirs in turn [1/s^2]."""
-
 PACE = 10.0
 """Typical rate of change of an internal state, in its typical sizes [1/s]."""
-
-READINGS = (1.0, 1e-2)
-"""Typical acceleration [m/s^2] and deflection [m] that the sensors read."""
-
-BALANCES = (320.0, 20.0)
-"""Typical force [N] and moment [N m] in the two equations of motion."""
 
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Sizes and scales.
+    """Sizes and scales of the unknowns of a plant with q coordinates, s internal states and C channels.
 
-    ``parameters`` n, ``points`` P, ``dwells`` D, ``internal`` sizes of internal states [SI].
+    Attributes:
+        parameters: n.
+        points: P.
+        dwells: D.
+        coordinates: typical displacement, rate and acceleration of each coordinate [SI], (q, 3).
+        internal: typical sizes of the internal states [SI], (s,).
+        readings: of what the sensors read [SI], (C,).
+        balances: of the terms in the equations of motion [SI], (q,).
     """
 
     parameters: int
     points: int
     dwells: int
+    coordinates: tuple[tuple[float, float, float], ...]
     internal: tuple[float, ...]
+    readings: tuple[float, ...]
+    balances: tuple[float, ...]
 
     @property
     def states(self) -> int:
         """Entries of x."""
-        return 4 + len(self.internal)
+        return 2 * len(self.coordinates) + len(self.internal)
 
     @property
     def partners(self) -> int:
         """Entries of y."""
-        return 2 + len(self.internal)
+        return len(self.coordinates) + len(self.internal)
 
     @property
     def width(self) -> int:
         """Unknowns of a point."""
-        return self.states + self.partners + len(RESPONSE_CHANNELS)
+        return self.states + self.partners + len(self.readings)
 
     @property
     def size(self) -> int:
         """All unknowns."""
-        return self.parameters + self.points * self.width + self.dwells * len(RESPONSE_CHANNELS)
+        return self.parameters + self.points * self.width + self.dwells * len(self.readings)
 
     @property
     def scale(self) -> NDArray[np.float64]:
         """Typical sizes of the unknowns of a point [SI], (width,)."""
         rates = tuple(PACE * size for size in self.internal)
-        return np.array([*COORDINATES, *VELOCITIES, *self.internal, *ACCELERATIONS, *rates, *READINGS])
+        ways, velocities, accelerations = zip(*self.coordinates, strict=True)
+        return np.array([*ways, *velocities, *self.internal, *accelerations, *rates, *self.readings])
 
     @property
     def residual_scale(self) -> NDArray[np.float64]:
@@ -103,7 +103,7 @@ class Unknowns:
 
         The model's residual, then what the sensors read.
         """
-        return np.array([*BALANCES, *(PACE * size for size in self.internal), *READINGS])
+        return np.array([*self.balances, *(PACE * size for size in self.internal), *self.readings])
 
     @property
     def at_points(self) -> NDArray[np.intp]:
@@ -114,13 +114,8 @@ class Unknowns:
     @property
     def zeros(self) -> NDArray[np.intp]:
         """Places of the sensors' zeros, (D, C)."""
-        count = self.dwells * len(RESPONSE_CHANNELS)
+        count = self.dwells * len(self.readings)
         return np.arange(self.size - count, self.size).reshape(self.dwells, -1)
-
-
-def unknowns_of(model: AbstractPlant, parameters: int, points: int, dwells: int) -> Unknowns:
-    """The unknowns for a model."""
-    return Unknowns(parameters, points, dwells, tuple(state.scale for state in model.states))
 
 
 A = np.array([[5.0 / 12.0, -1.0 / 12.0], [3.0 / 4.0, 1.0 / 4.0]])
@@ -140,6 +135,45 @@ class Points(NamedTuple):
     mesh: Mesh
     step: NDArray[np.float64]
     before: NDArray[np.intp]
+
+
+def unknowns_of(task: Task, points: Points) -> Unknowns:
+    """The unknowns of a task at its points.
+
+    A reading is as large as the largest first harmonic that was measured, a balance as what the typical
+    accelerations do in it.
+    """
+    plant, measured = task.problem.model, task.measured
+    at, layout = plant.coordinates, points.mesh.layout
+    readings = [
+        float(np.max(np.abs(measured.harmonics[:, measured.channel(each.name), 1])))
+        if each.name in measured.channels
+        else 1.0
+        for each in plant.channels
+    ]
+    return Unknowns(
+        parameters=len(task.problem.free.names),
+        points=layout.total,
+        dwells=len(layout.counts),
+        coordinates=tuple((each.size, each.rate_size, each.acceleration_size) for each in at),
+        internal=tuple(state.scale for state in plant.states),
+        readings=tuple(readings),
+        balances=tuple(_inertia_forces(plant, task.problem.fixed)),
+    )
+
+
+def _inertia_forces(plant: AbstractPlant, p: Values) -> NDArray[np.float64]:
+    """What the coordinates' typical accelerations do in the equations of motion about rest [SI], (q,)."""
+    u, q = nominal_inputs(plant, p), len(plant.coordinates)
+    rest = find_rest(plant, p, u)
+    motion = standing(plant, rest.q)
+
+    def balance(acceleration: Array) -> Array:
+        moving = motion._replace(qdd=plant.coordinate_type(*acceleration))
+        return plant.residual(p, moving, rest.s, jnp.zeros_like(rest.s), u)[:q]
+
+    inertia = np.abs(np.asarray(jax.jacfwd(balance)(jnp.zeros(q))))
+    return np.asarray(inertia @ np.array([each.acceleration_size for each in plant.coordinates]))
 
 
 def radau_points(mesh: Mesh) -> Points:
@@ -184,8 +218,6 @@ def step_rule(
     size = 1 + int(max(states.max(), rates.max()))
     return csr_array(coo_array((values, (rows, columns)), shape=(total * width, size)))
 
-
-ROAD = "road_height"
 
 _POINTS = 4
 """Nodes that a sample is interpolated between: a cubic."""
@@ -238,18 +270,20 @@ def find_recordings(campaign: Campaign, measured: HarmonicResponse) -> tuple[Rec
     return tuple(by_name[test] for test in measured.tests)
 
 
-def samples_of(recording: Recording, frequency: float, sd: dict[str, float]) -> dict[str, Samples]:
+def samples_of(
+    recording: Recording, driven: str, frequency: float, sd: dict[str, float]
+) -> dict[str, Samples]:
     """Samples of the channels named in ``sd``, those that were recorded.
 
     ``frequency`` [Hz] is the dwell's measured fundamental, ``sd`` the noise of one sample by channel [unit].
-    Phases count from where the road's fundamental is at its highest, as those of the harmonics do.
+    Phases count from where the fundamental of the input ``driven`` is at its highest, as those of the harmonics do.
     """
-    road = recording.channels[ROAD]
-    middle = 0.5 * float(road.time[0] + road.time[-1])
+    imposed = recording.channels[driven]
+    middle = 0.5 * float(imposed.time[0] + imposed.time[-1])
     groups = group_by_clock(recording, middle, {})
-    lead = next(group for group in groups if ROAD in group.names)
+    lead = next(group for group in groups if driven in group.names)
     highest = highest_fitted_order(lead, frequency)
-    height = lead.values[lead.names.index(ROAD)][None]
+    height = lead.values[lead.names.index(driven)][None]
     fit = fit_periodic(plan_basis(lead.time, frequency, highest), height, highest, 0)
     ahead = float(np.angle(fit.amplitude[0, 1]))
     found = {}
