@@ -270,8 +270,8 @@ def fit_by_collocation(
     """Estimate ``free`` parameters of a model from the samples of the dwells of ``measured``.
 
     The response gives frequencies, noise, and the harmonics of the inputs; the samples of the channels come from
-    ``campaign``. ``progress`` is told what is going on. Raises :class:`InputError` for names that do not exist or that
-    the model does not use, and for recordings that do not belong to the response. Look at ``status`` of the result.
+    ``campaign``. ``progress`` is told what is going on. Raises :class:`InputError` for names that do not exist or
+    that the model does not use, and for recordings that do not belong to the response. Look at its ``status``.
     """
     began, tell = time.perf_counter(), progress or _silent
     settings = settings or CollocationSettings()
