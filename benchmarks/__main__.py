@@ -47,11 +47,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     began = time.perf_counter()
     size = (QUICK if options.quick else FULL)._replace(trials=options.trials)
 
-    def tell(line: str) -> None:
+    def progress(line: str) -> None:
         print(f"{time.perf_counter() - began:7.1f} s  {line}", file=sys.stderr, flush=True)
 
     machine = describe_machine()
-    outcome = run_suite(options.only or NAMES, size, tell)
+    outcome = run_suite(options.only or NAMES, size, progress)
     notes = (f"{len(size.dwells_hz)} dwells.", *outcome.notes)
     print_table(make_table(outcome.figures, notes, machine))
     if options.json is not None:

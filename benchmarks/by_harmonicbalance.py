@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
-from benchmarks.outcome import Outcome, Tell
+from benchmarks.outcome import Outcome, Progress
 from benchmarks.task import ORDERS, TOLERANCE_PERCENT, Harmonics, Task, errors_percent
 from savgs_ident.effects.base import PortSignals
 from savgs_ident.effects.bristle import Presliding, bristle
@@ -55,13 +55,13 @@ class Attempt(NamedTuple):
     orders: int
 
 
-def measure(task: Task, reference: Harmonics, tell: Tell) -> Outcome:
+def measure(task: Task, reference: Harmonics, progress: Progress) -> Outcome:
     """Time of the dwells that reach the tolerance, and the error of those that do not."""
     force, found, missed, start = compile_force(task), [], [], None
     for dwell in reversed(range(task.frequency.size)):
         attempts = []
         for orders in LADDER:
-            tell(f"harmonicbalance: {task.frequency[dwell]:g} Hz, {orders} orders")
+            progress(f"harmonicbalance: {task.frequency[dwell]:g} Hz, {orders} orders")
             attempts.append(solve(task, force, dwell, orders, start, reference))
             if attempts[-1].error <= TOLERANCE_PERCENT:
                 break
@@ -77,8 +77,10 @@ def measure(task: Task, reference: Harmonics, tell: Tell) -> Outcome:
         "derivative has the wrong sign)."
     ]
     if missed:
-        told = ", ".join(f"{task.frequency[i]:g} Hz {each.error:.2g} %" for i, each in reversed(missed))
-        notes.append(f"harmonicbalance: no solution within the tolerance at {told}; these are not counted.")
+        missing = ", ".join(f"{task.frequency[i]:g} Hz {each.error:.2g} %" for i, each in reversed(missed))
+        notes.append(
+            f"harmonicbalance: no solution within the tolerance at {missing}; these are not counted."
+        )
     figures = {"harmonicbalance_dwells_solved": float(len(found))}
     if found:
         figures |= {

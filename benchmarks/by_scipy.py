@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.integrate import odeint
 
 from benchmarks.motion import SAMPLES, STATE_SCALE, period_harmonics, settling_periods, state_rates
-from benchmarks.outcome import Outcome, Tell
+from benchmarks.outcome import Outcome, Progress
 from benchmarks.task import Harmonics, Task, errors_percent
 from benchmarks.timing import timed
 
@@ -26,7 +26,7 @@ MOST_STEPS = 1_000_000
 _INSIDE = 20_000
 
 
-def measure(task: Task, reference: Harmonics, tell: Tell) -> Outcome:
+def measure(task: Task, reference: Harmonics, progress: Progress) -> Outcome:
     """Time and error of all dwells."""
     rates = jax.jit(lambda state, t, omega: state_rates(task, state, omega * t, omega))
     np.asarray(rates(task.rest, 0.0, 1.0))
@@ -39,7 +39,7 @@ def measure(task: Task, reference: Harmonics, tell: Tell) -> Outcome:
 
     began = time.perf_counter()
     for frequency, periods in zip(task.frequency, settling_periods(task.frequency, SETTLING_S), strict=True):
-        tell(f"scipy: {frequency:g} Hz")
+        progress(f"scipy: {frequency:g} Hz")
         omega = 2.0 * np.pi * frequency
         states.append(integrate_dwell(right_side, task.rest, frequency, periods, (omega,)))
     seconds, dwells = time.perf_counter() - began, task.frequency.size

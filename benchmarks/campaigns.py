@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pandas as pd
 
-from benchmarks.outcome import Outcome, Tell
+from benchmarks.outcome import Outcome, Progress
 from benchmarks.processes import Ran, run_process
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
 
@@ -23,18 +23,18 @@ NOISE = 0.3
 _STANDSTILL = "standstill"
 
 
-def measure(tell: Tell, count: int = COUNT) -> Outcome:
+def measure(progress: Progress, count: int = COUNT) -> Outcome:
     """Times of the whole command on one process and on two, and the ratio."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        tell(f"campaigns: writing {count}")
+        progress(f"campaigns: writing {count}")
         write_campaigns(folder / "data", count)
         environment = {"SAVGS_IDENT_CACHE": str(folder / "cache")}
-        tell("campaigns: compiling")
+        progress("campaigns: compiling")
         first = _run(folder / "data" / "run00.csv.gz", 1, folder / "first", environment)
         ran = []
         for workers in (1, 2):
-            tell(f"campaigns: {count} on {workers} at a time")
+            progress(f"campaigns: {count} on {workers} at a time")
             ran.append(_run(folder / "data", workers, folder / f"out{workers}", environment))
         different = _results(folder / "out1") != _results(folder / "out2")
     codes = {each.code for each in (first, *ran)} - {0}

@@ -11,7 +11,7 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 from scipy.integrate import odeint
 
-from benchmarks.outcome import Outcome, Tell
+from benchmarks.outcome import Outcome, Progress
 from benchmarks.timing import median_time, timed
 from savgs_ident.control.closed_loop.programme import harmonic_test, sweep_test
 from savgs_ident.control.closed_loop.run import (
@@ -44,7 +44,7 @@ TOLERANCE = 1e-6
 """Tolerance of LSODA, relative and absolute in SI."""
 
 
-def measure(tell: Tell) -> Outcome:
+def measure(progress: Progress) -> Outcome:
     """Times, and the difference of the two deflections: rms over rms."""
     # The compiler as the program sets it up, which has to come before anything is computed: run this one by itself.
     use_persistent_cache()
@@ -52,15 +52,15 @@ def measure(tell: Tell) -> Outcome:
     model, p = build_model(rig, effects), as_values(model_parameters(rig, effects).as_dict())
     loop = loop_around(p, controller_for(model, p, DEFAULT_WEIGHTS))
     cam = float(p["cam_peak_to_peak"])
-    tell("closed loop: sweep of 60 s")
+    progress("closed loop: sweep of 60 s")
     sweep = sweep_test(cam).road
     run_loop(model, p, sweep, loop, 60.0)
     sweep_s = median_time(lambda: run_loop(model, p, sweep, loop, 60.0), REPEATS)
-    tell(f"closed loop: {SECONDS:g} s at {FREQUENCY:g} Hz")
+    progress(f"closed loop: {SECONDS:g} s at {FREQUENCY:g} Hz")
     road = harmonic_test(cam, FREQUENCY).road
     ours = run_loop(model, p, road, loop, SECONDS)
     ours_s = median_time(lambda: run_loop(model, p, road, loop, SECONDS), REPEATS)
-    tell("closed loop: the same by scipy")
+    progress("closed loop: the same by scipy")
     samples = _ByScipy(loop_case(model, p, road, loop, SECONDS))
     samples.run(1)
     theirs, scipy_s = timed(lambda: samples.run(round(SECONDS * loop.rate)))

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from benchmarks.campaign import read_dwells, response_of
-from benchmarks.outcome import Outcome, Tell
+from benchmarks.outcome import Outcome, Progress
 from savgs_ident.fit.collocation.crosscheck import fit_by_collocation
 from savgs_ident.fit.least_squares import fit_least_squares
 from savgs_ident.fit.result import Estimate
@@ -12,14 +12,14 @@ from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
 
 
-def measure(dwells_hz: Sequence[float], tell: Tell) -> Outcome:
+def measure(dwells_hz: Sequence[float], progress: Progress) -> Outcome:
     """The paper's four parameters from the samples by IPOPT, beside those from the harmonics."""
     campaign, rig, effects = read_dwells(dwells_hz), read_rig(default_rig_path()), MODELS["simtr"]
     measured = response_of(campaign)
-    tell("collocation: the fit to compare with")
+    progress("collocation: the fit to compare with")
     by_harmonics = fit_least_squares(measured, RigModel(rig, effects), free=FREE)
-    tell("collocation")
-    by_samples = fit_by_collocation(campaign, measured, RigModel(rig, effects), free=FREE, progress=tell)
+    progress("collocation")
+    by_samples = fit_by_collocation(campaign, measured, RigModel(rig, effects), free=FREE, progress=progress)
     took = Outcome({"collocation_s": by_samples.wall_s})
     if not by_samples.status.ok:
         return took + Outcome({}, (f"collocation: NOT SOLVED: {by_samples.status.advice}.",))

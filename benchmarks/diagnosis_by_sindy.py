@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.outcome import Outcome, Tell
+from benchmarks.outcome import Outcome, Progress
 from savgs_ident.diagnosis.model_selection import recalibrate
 from savgs_ident.diagnosis.quarter_car import SIMTR, quarter_car_problem
 from savgs_ident.plants.quarter_car.plant import QuarterCar
@@ -67,13 +67,13 @@ class Marks(NamedTuple):
     nothing: int
 
 
-def measure(folder: Path, tell: Tell) -> Outcome:
+def measure(folder: Path, progress: Progress) -> Outcome:
     """Both on the trials of one effect or none in a folder that ``savgs-ident blind`` wrote."""
     folders = [each for each in sorted(folder.glob("trial_*")) if _is_wanted(each)]
     trials: list[Trial] = []
     for each in side_by_side(partial(_one_of, folders), range(len(folders)), os.cpu_count() or 1):
         trials.append(each)
-        tell(f"sindy: {len(trials)} of {len(folders)} trials")
+        progress(f"sindy: {len(trials)} of {len(folders)} trials")
     if not trials:
         return Outcome({}, (f"sindy: no trials in {folder}; `savgs-ident blind --out {folder}` makes some.",))
     ours = marks_of([each.ours for each in trials], trials)

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-Tell = Callable[[str], None]
-"""Told what is going on, a line at a time."""
+Progress = Callable[[str], None]
+"""Called with a sentence on what is being done."""
 
 
 @dataclass(frozen=True)

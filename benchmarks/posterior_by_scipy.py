@@ -7,17 +7,17 @@ of the likelihood takes (:mod:`benchmarks.scipy_likelihood`) and how many evalua
 
 from collections.abc import Sequence
 
-from benchmarks.outcome import Outcome, Tell
+from benchmarks.outcome import Outcome, Progress
 from benchmarks.posterior_problem import pose_posterior
 from benchmarks.scipy_likelihood import time_likelihood
 from benchmarks.stretch_moves import LONG_ENOUGH, Stretching, stretch
 
 
-def measure(dwells_hz: Sequence[float], integrations: int, most_steps: int, tell: Tell) -> Outcome:
+def measure(dwells_hz: Sequence[float], integrations: int, most_steps: int, progress: Progress) -> Outcome:
     """Effective draws per second, extrapolated."""
-    posed = pose_posterior(dwells_hz, tell)
-    stretching = stretch(posed, most_steps, tell)
-    return extrapolated(stretching, time_likelihood(posed, integrations, tell), integrations)
+    posed = pose_posterior(dwells_hz, progress)
+    stretching = stretch(posed, most_steps, progress)
+    return extrapolated(stretching, time_likelihood(posed, integrations, progress), integrations)
 
 
 def extrapolated(stretching: Stretching, evaluation_s: float, integrations: int) -> Outcome:

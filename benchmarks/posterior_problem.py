@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from benchmarks.campaign import read_dwells, response_of
-from benchmarks.outcome import Tell
+from benchmarks.outcome import Progress
 from savgs_ident.inference.posterior_mode import expand
 from savgs_ident.inference.problem import Problem
 from savgs_ident.inference.sample import Question, case_of, locate, plan
@@ -48,13 +48,13 @@ class PosteriorProblem(NamedTuple):
         return self.surrogate.points(ends)
 
 
-def pose_posterior(dwells_hz: Sequence[float], tell: Tell) -> PosteriorProblem:
+def pose_posterior(dwells_hz: Sequence[float], progress: Progress) -> PosteriorProblem:
     """The posterior of the paper's four parameters given the shipped dwells at these frequencies [Hz]."""
     measured = response_of(read_dwells(dwells_hz))
     question = Question(measured, RigModel(read_rig(default_rig_path()), MODELS["simtr"]), {}, FREE)
     task = plan(question, SamplingSettings())
     case = case_of(task)
-    mode = locate(case, task, question, tell)
+    mode = locate(case, task, question, progress)
     return PosteriorProblem(
-        task.problem, task.excitation, expand(case, mode.linearisation_point, tell).surrogate
+        task.problem, task.excitation, expand(case, mode.linearisation_point, progress).surrogate
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import get_args
 
-from benchmarks.outcome import Outcome, Tell
+from benchmarks.outcome import Outcome, Progress
 from benchmarks.processes import Ran, run_process
 from savgs_ident.inference.result import Sampler
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
@@ -16,7 +16,7 @@ NOT_TRUSTED = 1
 """Exit code of a run that gave a result and does not vouch for it."""
 
 
-def measure_posterior(target_ess: float, tell: Tell) -> Outcome:
+def measure_posterior(target_ess: float, progress: Progress) -> Outcome:
     """Effective draws per second of whole processes, and how long the slower one takes, with programs cached.
 
     The model is what ``savgs-ident fit`` makes of the shipped campaign. For each sampler a first run, with
@@ -24,7 +24,7 @@ def measure_posterior(target_ess: float, tell: Tell) -> Outcome:
     """
     campaign, seconds, total = str(default_campaign_path()), [], Outcome()
     with TemporaryDirectory() as folder:
-        tell("posterior: the fit that it starts from")
+        progress("posterior: the fit that it starts from")
         run_process([*CLI, "fit", campaign, "--out", str(Path(folder) / "fit"), "--quiet"])
 
         def run(sampler: str, target: float) -> Ran:
@@ -33,9 +33,9 @@ def measure_posterior(target_ess: float, tell: Tell) -> Outcome:
             return run_process([*CLI, "posterior", *places, *options])
 
         for sampler in get_args(Sampler):
-            tell(f"posterior: {sampler}, filling the cache")
+            progress(f"posterior: {sampler}, filling the cache")
             run(sampler, 1.0)
-            tell(f"posterior: {sampler}, to an effective sample size of {target_ess:g}")
+            progress(f"posterior: {sampler}, to an effective sample size of {target_ess:g}")
             ran = run(sampler, target_ess)
             total += outcome_of(sampler, ran)
             seconds.append(ran.seconds)

@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from benchmarks.outcome import Outcome, Tell
+from benchmarks.outcome import Outcome, Progress
 from benchmarks.write_long_mcap import write_long_mcap
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
 
@@ -38,24 +38,24 @@ def run_process(arguments: Sequence[str], environment: Mapping[str, str] | None 
     return Ran(*json.loads(ran.stdout))
 
 
-def measure_fit(tell: Tell) -> Outcome:
+def measure_fit(progress: Progress) -> Outcome:
     """``savgs-ident fit`` on the shipped campaign, without and with compiled programs in the cache."""
-    return _cold_and_cached("fit", (), tell)
+    return _cold_and_cached("fit", (), progress)
 
 
-def measure_diagnosis(tell: Tell) -> Outcome:
+def measure_diagnosis(progress: Progress) -> Outcome:
     """``savgs-ident diagnose`` on the shipped campaign, from the baseline without any friction; both as above."""
-    return _cold_and_cached("diagnose", ("--model", "simqc"), tell)
+    return _cold_and_cached("diagnose", ("--model", "simqc"), progress)
 
 
-def _cold_and_cached(command: str, options: Sequence[str], tell: Tell) -> Outcome:
+def _cold_and_cached(command: str, options: Sequence[str], progress: Progress) -> Outcome:
     with TemporaryDirectory() as folder:
         arguments = ["-m", "savgs_ident.cli", command, str(default_campaign_path()), *options]
         arguments += ["--out", str(Path(folder) / "out"), "--quiet"]
         environment = {"SAVGS_IDENT_CACHE": str(Path(folder) / "cache")}
-        tell(f"{command}: first time")
+        progress(f"{command}: first time")
         cold = run_process(arguments, environment)
-        tell(f"{command}: with the cache")
+        progress(f"{command}: with the cache")
         cached = run_process(arguments, environment)
     ended = {cold.code, cached.code} - {0}
     return Outcome(
@@ -68,14 +68,14 @@ def _cold_and_cached(command: str, options: Sequence[str], tell: Tell) -> Outcom
     )
 
 
-def measure_mcap(minutes: float, tell: Tell) -> Outcome:
+def measure_mcap(minutes: float, progress: Progress) -> Outcome:
     """Reading a long MCAP campaign of JSON messages with six channels each."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "long.mcap"
-        tell(f"mcap: writing {minutes:g} minutes")
+        progress(f"mcap: writing {minutes:g} minutes")
         samples = write_long_mcap(path, minutes, RATE_HZ)
         size_mb = path.stat().st_size / 1e6
-        tell("mcap: reading")
+        progress("mcap: reading")
         ran = run_process(["-m", "benchmarks.read_whole", str(path)])
     if ran.code != 0:
         return Outcome({}, (f"mcap: reading ended with exit code {ran.code}",))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from benchmarks.by_scipy import SETTLING_S, integrate_dwell
 from benchmarks.motion import driven_rates, settling_periods
-from benchmarks.outcome import Tell
+from benchmarks.outcome import Progress
 from benchmarks.posterior_problem import PosteriorProblem
 from savgs_ident.core.values import Values
 from savgs_ident.inference.problem import Problem
@@ -87,13 +87,13 @@ class ScipyDwells:
         )
 
 
-def time_likelihood(posed: PosteriorProblem, integrations: int, tell: Tell) -> float:
+def time_likelihood(posed: PosteriorProblem, integrations: int, progress: Progress) -> float:
     """Time of a whole evaluation [s], from so many integrations of single dwells, each at a draw of its own."""
     dwells, count = ScipyDwells(posed.problem, posed.excitation), posed.excitation.frequency.size
     seconds = np.zeros((integrations // count, count))
     points = posed.draw(seconds.size, SEED)
     for at in range(len(seconds)):
-        tell(f"scipy likelihood: {at * count} of {seconds.size} integrations")
+        progress(f"scipy likelihood: {at * count} of {seconds.size} integrations")
         for dwell in range(count):
             integrate = dwells.integration(points[at * count + dwell, :-2], dwell)
             began = time.perf_counter()

@@ -1,7 +1,7 @@
 """How many evaluations emcee's own move needs for an independent draw.
 
 An ensemble of twice as many walkers as there are dimensions stretches between its members, on the surrogate
-of the posterior to second order: that costs next to nothing, and the move cannot tell it from the posterior.
+of the posterior to second order: that costs next to nothing, and the move cannot distinguish it from the posterior.
 The move does not care about affine maps either, so the coordinates are those in which the surrogate is given.
 Walkers begin at independent draws; nothing is burnt. Each step of a walker is one evaluation of the
 likelihood, and an independent draw takes as many as the autocorrelation time, in steps, says.
@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from benchmarks.outcome import Tell
+from benchmarks.outcome import Progress
 from benchmarks.posterior_problem import PosteriorProblem
 from savgs_ident.core.transforms import FreeVector
 from savgs_ident.inference.surrogate import Surrogate
@@ -48,7 +48,7 @@ class Stretching(NamedTuple):
         return self.steps >= LONG_ENOUGH * self.autocorrelation
 
 
-def stretch(posed: PosteriorProblem, most_steps: int, tell: Tell) -> Stretching:
+def stretch(posed: PosteriorProblem, most_steps: int, progress: Progress) -> Stretching:
     """Run until the estimate is trusted, ``most_steps`` at most."""
     surrogate, free = posed.straight, posed.problem.free
     size = surrogate.centre.size
@@ -71,7 +71,7 @@ def stretch(posed: PosteriorProblem, most_steps: int, tell: Tell) -> Stretching:
         found = Stretching(
             THINNING * autocorrelation_time(np.concatenate(seen)), THINNING * BLOCK * len(seen)
         )
-        tell(f"stretch moves: {found.steps} steps, autocorrelation time {found.autocorrelation:.0f}")
+        progress(f"stretch moves: {found.steps} steps, autocorrelation time {found.autocorrelation:.0f}")
         if found.trusted or found.steps >= most_steps:
             return found
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.outcome import Outcome, Tell
+from benchmarks.outcome import Outcome, Progress
 from benchmarks.task import DWELLS_HZ
 
 NAMES = (
@@ -38,73 +38,73 @@ class Size(NamedTuple):
     campaigns: int = 32
 
 
-def run_suite(names: Sequence[str], size: Size, tell: Tell) -> Outcome:
+def run_suite(names: Sequence[str], size: Size, progress: Progress) -> Outcome:
     """Run the named benchmarks; a peer brings our own figures along, to be compared with."""
-    outcome = _processes(names, size, tell)
+    outcome = _processes(names, size, progress)
     if {"response", *PEERS} & set(names):
-        outcome += _responses(names, size.dwells_hz, tell)
+        outcome += _responses(names, size.dwells_hz, progress)
     # What follows compiles, and what times compilation has gone before.
     if "posterior-scipy" in names:
         from benchmarks import posterior_by_scipy
 
-        outcome += posterior_by_scipy.measure(size.dwells_hz, size.integrations, size.stretch_steps, tell)
+        outcome += posterior_by_scipy.measure(size.dwells_hz, size.integrations, size.stretch_steps, progress)
     if "collocation" in names:
         from benchmarks import cross_check
 
-        outcome += cross_check.measure(size.dwells_hz, tell)
+        outcome += cross_check.measure(size.dwells_hz, progress)
     if "sindy" in names:
         from benchmarks import diagnosis_by_sindy
 
-        outcome += diagnosis_by_sindy.measure(size.trials, tell)
+        outcome += diagnosis_by_sindy.measure(size.trials, progress)
     if "closed-loop" in names:
         from benchmarks import closed_loop
 
-        outcome += closed_loop.measure(tell)
+        outcome += closed_loop.measure(progress)
     return outcome + Outcome(speedups(outcome.figures) | posterior_speedup(outcome.figures, size.dwells_hz))
 
 
-def _processes(names: Sequence[str], size: Size, tell: Tell) -> Outcome:
+def _processes(names: Sequence[str], size: Size, progress: Progress) -> Outcome:
     outcome = Outcome()
     if "fit" in names:
         from benchmarks.processes import measure_fit
 
-        outcome += measure_fit(tell)
+        outcome += measure_fit(progress)
     if {"posterior", "posterior-scipy"} & set(names):
         from benchmarks.posterior_process import measure_posterior
 
-        outcome += measure_posterior(size.target_ess, tell)
+        outcome += measure_posterior(size.target_ess, progress)
     if "diagnosis" in names:
         from benchmarks.processes import measure_diagnosis
 
-        outcome += measure_diagnosis(tell)
+        outcome += measure_diagnosis(progress)
     if "mcap" in names:
         from benchmarks.processes import measure_mcap
 
-        outcome += measure_mcap(size.mcap_minutes, tell)
+        outcome += measure_mcap(size.mcap_minutes, progress)
     if "campaigns" in names:
         from benchmarks import campaigns
 
-        outcome += campaigns.measure(tell, size.campaigns)
+        outcome += campaigns.measure(progress, size.campaigns)
     return outcome
 
 
-def _responses(names: Sequence[str], dwells_hz: tuple[float, ...], tell: Tell) -> Outcome:
+def _responses(names: Sequence[str], dwells_hz: tuple[float, ...], progress: Progress) -> Outcome:
     from benchmarks import by_diffrax, by_harmonicbalance, by_package, by_scipy
     from benchmarks.task import make_task
 
     task = make_task(dwells_hz)
     integrate = by_diffrax.make_integrator(task)
-    tell("reference: tight time integration")
+    progress("reference: tight time integration")
     reference = by_diffrax.integrate_reference(task, integrate)
-    tell("this package")
+    progress("this package")
     outcome = by_package.measure(task, reference)
     if "diffrax" in names:
-        tell("diffrax")
+        progress("diffrax")
         outcome += by_diffrax.measure(task, integrate, reference)
     if "scipy" in names:
-        outcome += by_scipy.measure(task, reference, tell)
+        outcome += by_scipy.measure(task, reference, progress)
     if "harmonicbalance" in names:
-        outcome += by_harmonicbalance.measure(task, reference, tell)
+        outcome += by_harmonicbalance.measure(task, reference, progress)
     return outcome
 
 

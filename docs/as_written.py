@@ -155,21 +155,21 @@ def with_arguments(lines: list[str]) -> list[str]:
     out = [*lines[:at]]
     for line in section:
         begins = line.startswith("    ") and not line.startswith("     ") and ": " in line
-        name, _, told = line.strip().partition(": ")
-        out.append(f":param {name}: {told}" if begins else f"    {line.strip()}" if line.strip() else "")
+        name, _, text = line.strip().partition(": ")
+        out.append(f":param {name}: {text}" if begins else f"    {line.strip()}" if line.strip() else "")
     return [*out, "", *lines[at + 1 + len(section) :]]
 
 
 def fields_of(name: str, lines: list[str]) -> list[str]:
     """Every public field and property of a class, with type, default and what its docstring says of it."""
-    told = _attributes(lines)
+    text = _attributes(lines)
     node, module = _definition(name)
     out = [""]
     for field, kind, written, value, own in _fields(node, module):
         out += [f".. py:{kind}:: {field}", "   :no-index-entry:"]
         out += [f"   :type: {written}"] if written else []
         out += [f"   :value: {value}"] if value else []
-        out += ["", *(f"   {line}" for line in as_text(own or told.get(field, []))), ""]
+        out += ["", *(f"   {line}" for line in as_text(own or text.get(field, []))), ""]
     return out
 
 

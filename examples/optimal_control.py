@@ -59,9 +59,9 @@ def solve(folder: Path, hold: bool) -> tuple[np.ndarray, np.ndarray]:
     x = problem.variable(len(rest), STEPS + 1)
     y = problem.variable(len(rest) - 2, STEPS)
     angle, velocity = problem.variable(1, STEPS + 1), problem.variable(1, STEPS)
-    heights, climbs = road((np.arange(STEPS) + 0.5) * step)
+    heights, rates = road((np.arange(STEPS) + 0.5) * step)
     middles = 0.5 * (x[:, :-1] + x[:, 1:])
-    u = ca.vertcat(heights[None], climbs[None], 0.5 * (angle[:-1] + angle[1:]), velocity)
+    u = ca.vertcat(heights[None], rates[None], 0.5 * (angle[:-1] + angle[1:]), velocity)
 
     problem.subject_to(ca.vec(residual.map(STEPS)(middles, y, u, ca.repmat(ca.DM(p), 1, STEPS))) == 0.0)
     problem.subject_to(ca.vec(x[:, 1:] - x[:, :-1] - step * ca.vertcat(middles[2:4, :], y)) == 0.0)

@@ -160,7 +160,7 @@ def run_campaigns(
         workers: campaigns at a time on this machine, each on one core; as many as there are cores if left out.
         scheduler: address of a Dask cluster to work on instead.
         command: what the results say that they were made by.
-        progress: is told what is being done.
+        progress: called with a sentence on what is being done.
 
     A campaign that fails is a row that says why, the others go on. Raises :class:`InputError` for what concerns all:
     an argument, the rig, the settings, the folder, the cluster.
@@ -295,8 +295,8 @@ def _what_is_there(
         try:
             origin = made_from(each.path, channels, rig, settings)
         except (InputError, OSError) as error:
-            told = error if isinstance(error, InputError) else f"{each.source}: {error.strerror or error}"
-            rows.append(_failed(each, one_line(told), unreadable=True))
+            message = error if isinstance(error, InputError) else f"{each.source}: {error.strerror or error}"
+            rows.append(_failed(each, one_line(message), unreadable=True))
             continue
         kept = kept_result(out / each.name, origin.digest)
         if kept is None:

@@ -1,6 +1,6 @@
 """Many campaigns of one rig together: a row each, in the order of time, and what follows from all of them.
 
-Times count where every campaign that was read tells when it began; otherwise the order is that of the names, and a
+Times count where every campaign that was read says when it began; otherwise the order is that of the names, and a
 trend is one over the number in that order.
 """
 
@@ -30,7 +30,7 @@ class RowStatus(StrEnum):
 
 @dataclass(frozen=True)
 class Identified:
-    """A free parameter of one campaign, SI; ``stderr`` is infinite where the data cannot tell it.
+    """A free parameter of one campaign, SI; ``stderr`` is infinite where the data do not identify it.
 
     ``own_stderr`` is its part that is not the same in all campaigns (:mod:`savgs_ident.campaigns.trends`).
     """
@@ -93,7 +93,8 @@ class CampaignStudy(Result):
         by_time: whether ``place`` is a time, otherwise it is the number in order, from 1.
         place: of each row, (n,), [``per``] from the first campaign; NaN where a time is not known.
         per: what trends are per: "hour", "day" or "campaign".
-        trends: of the parameters, from the campaigns that are to be trusted; without those that no campaign tells.
+        trends: of the parameters, from the campaigns that are to be trusted; none of those that no campaign
+            identifies.
         notes: what else the reader should know, one sentence each.
         settings: what the results were made with besides data and rig.
     """
@@ -135,8 +136,8 @@ class CampaignStudy(Result):
     def values(self, name: str) -> NDArray[np.float64]:
         """Value, standard error and its own part of a parameter in every row, NaN where there is none: (3, n)."""
         known = (row.parameters.get(name) for row in self.rows)
-        told = [(e.value, e.stderr, e.own_stderr) if e else 3 * (np.nan,) for e in known]
-        return np.array(told).reshape(-1, 3).T
+        entry = [(e.value, e.stderr, e.own_stderr) if e else 3 * (np.nan,) for e in known]
+        return np.array(entry).reshape(-1, 3).T
 
 
 def row_of(
@@ -157,8 +158,8 @@ def row_of(
         chi2_per_dof=None if ratio is None else float(ratio),
         parameters={
             each: _identified(each, record)
-            for each, told in record["parameters"].items()
-            if told["free"] and told["value"] is not None
+            for each, entry in record["parameters"].items()
+            if entry["free"] and entry["value"] is not None
         },
         data_sha256=data_sha256,
     )
@@ -186,15 +187,15 @@ def study_campaigns(rows: Sequence[CampaignRow], order: Callable[[str], Any]) ->
 
 
 def _identified(name: str, record: Mapping[str, Any]) -> Identified:
-    told, others = record["parameters"][name], record["parameters"]
-    stderr = np.inf if told["stderr"] is None else float(told["stderr"])
+    entry, others = record["parameters"][name], record["parameters"]
+    stderr = np.inf if entry["stderr"] is None else float(entry["stderr"])
     known = [each for each, other in others.items() if not other["free"] and other["prior_sd"]]
     share = common_share(
         [record["correlation"][name][each] or 0.0 for each in known],
         [others[each]["stderr"] or 0.0 for each in known],
         [others[each]["prior_sd"] for each in known],
     )
-    return Identified(float(told["value"]), stderr, float(np.sqrt(1.0 - share)) * stderr, str(told["unit"]))
+    return Identified(float(entry["value"]), stderr, float(np.sqrt(1.0 - share)) * stderr, str(entry["unit"]))
 
 
 def _followed(rows: Sequence[CampaignRow], place: NDArray[np.float64], name: str) -> Trend | None:
@@ -208,8 +209,8 @@ def _followed(rows: Sequence[CampaignRow], place: NDArray[np.float64], name: str
 
 
 def _counts(row: CampaignRow, name: str) -> bool:
-    told = row.parameters.get(name)
-    return row.status is RowStatus.ok and told is not None and 0.0 < told.stderr < np.inf
+    entry = row.parameters.get(name)
+    return row.status is RowStatus.ok and entry is not None and 0.0 < entry.stderr < np.inf
 
 
 def _why_not(record: Mapping[str, Any]) -> str:
@@ -217,7 +218,7 @@ def _why_not(record: Mapping[str, Any]) -> str:
         return str(record["advice"])
     if not record["converged"]:
         return "the model's periodic motion was not found in every dwell"
-    return "the data cannot tell every free parameter"
+    return "the data do not identify every free parameter"
 
 
 def _order_notes(by_time: bool, starts: Sequence[float], read: Sequence[object]) -> tuple[str, ...]:
@@ -229,9 +230,9 @@ def _order_notes(by_time: bool, starts: Sequence[float], read: Sequence[object])
         return ("All recordings began at the same time: the order is that of their names.",)
     if starts:
         return (
-            f"Only {len(starts)} of {len(read)} recordings tell when they began: the order is that of their names.",
+            f"Only {len(starts)} of {len(read)} recordings say when they began: the order is that of their names.",
         )
-    return ("The recordings do not tell when they began: the order is that of their names.",)
+    return ("The recordings do not say when they began: the order is that of their names.",)
 
 
 def _copies(rows: Sequence[CampaignRow]) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ first, whether all are one number: the weighted mean, and the chi2 of the estima
 Where the estimates scatter more than their errors say (the chi2 about the mean, or about the line, is exceeded by
 chance in less than 5 % of cases), something else differs from campaign to campaign. The errors are then widened to
 the scatter, by sqrt(chi2/dof), and since that is known from these few estimates only, intervals are Student's. The
-line is judged by the scatter about the line: the chi2 about the mean would count the trend itself as scatter.
+line is compared with the scatter about the line: the chi2 about the mean would count the trend itself as scatter.
 
 Errors here are those that differ from campaign to campaign. What all have in common
 (:mod:`savgs_ident.campaigns.trends`) moves all estimates alike: it is in the error of the mean in full, and in

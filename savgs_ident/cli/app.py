@@ -50,9 +50,9 @@ class Commands(TyperGroup):
             code = super().main(*args, **options | {"standalone_mode": False})
         except _UsageError as error:
             code = error.exit_code
-            told = error.format_message()
-            if told:  # Without any word the help has been shown, and that is all there is to say.
-                sentence = told if told.endswith("?") else f"{told.rstrip('.')}."
+            message = error.format_message()
+            if message:  # Without any word the help has been shown, and that is all there is to say.
+                sentence = message if message.endswith("?") else f"{message.rstrip('.')}."
                 print_error(f"Error: {sentence} Remedy: see {self._asked(error, options)} --help.")
         except OSError as error:
             code = refused(error)

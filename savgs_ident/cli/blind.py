@@ -1,4 +1,4 @@
-"""``savgs-ident blind``: how often the diagnosis is right about effects that it was not told of."""
+"""``savgs-ident blind``: how often the diagnosis is right about effects that it does not know."""
 
 import os
 from pathlib import Path

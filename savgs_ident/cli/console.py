@@ -62,11 +62,11 @@ class Progress:
         Without a terminal nothing is said, for the message has been.
         """
 
-        def tell(done: float) -> None:
+        def report(done: float) -> None:
             if self.status is not None:
                 self(f"{message} ({100.0 * done:.0f} %)")
 
-        return tell
+        return report
 
 
 @dataclass(frozen=True)

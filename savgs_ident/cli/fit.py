@@ -42,11 +42,11 @@ def fit(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> int:
-    """Identify the rig from a campaign: parameters with errors, how well they fit, what the data can tell.
+    """Identify the rig from a campaign: parameters with errors, how well they fit, what the data identify.
 
     Writes fit.json, model.toml (the identified rig), bode.png and bode.pdf.
 
-    Exit code 1 if the fit did not converge or the data cannot tell every parameter.
+    Exit code 1 if the fit did not converge or the data do not identify every parameter.
 
     Example: savgs-ident fit campaign.csv.gz --free mu_r c_sd --max-frequency 4
     """

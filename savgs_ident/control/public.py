@@ -67,7 +67,7 @@ def design(
         rigs: on how many rigs the controller is tried.
         order: states of the controller; as many as it gets if left out.
         rate: of the computer that runs it [Hz].
-        progress: is told what is being done.
+        progress: called with a sentence on what is being done.
 
     Look at ``trusted`` of the result. Raises :class:`InputError` where the weights admit no controller, the order is
     not possible, or a file cannot be used.
@@ -110,7 +110,7 @@ def close_loop(
         posterior: what other rigs are drawn from, as in :func:`design`.
         rigs: on how many other rigs the loop is run.
         causes: run it also without friction, limits and noise, one at a time: why it is so.
-        progress: is told what is being done.
+        progress: called with a sentence on what is being done.
 
     Look at ``trusted`` of the result. Raises :class:`InputError` for a file that cannot be used and a controller that
     was designed for another link angle.

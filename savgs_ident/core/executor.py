@@ -319,7 +319,7 @@ def _connected(address: str) -> Iterator["Client"]:
         raise InputError(
             "Dask is not installed", source="--scheduler", remedy="pip install 'savgs-ident[cluster]'"
         ) from error
-    # What matters is told in our words.
+    # What matters is reported in our own words.
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     until = time.monotonic() + ANSWER_S
@@ -351,5 +351,5 @@ def _no_answer(address: str, what: str) -> InputError:
     return InputError(
         f"the Dask scheduler at {address} {what}",
         source="--scheduler",
-        remedy="start `dask scheduler` and `dask worker ADDRESS`, and give the address that it tells",
+        remedy="start `dask scheduler` and `dask worker ADDRESS`, and give the address that it prints",
     )

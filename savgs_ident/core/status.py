@@ -15,7 +15,7 @@ class Status(Enum):
     MAX_ITERATIONS = "stopped at the iteration limit before converging: raise the limit or start nearer"
     STALLED = "no step reduced the residual: the problem is stiff or not smooth here, refine the time grid"
     NOT_FINITE = "met a value that is not finite: a parameter has left the range where the model exists"
-    NOT_IDENTIFIABLE = "the data cannot tell every free parameter: see the identifiability verdict"
+    NOT_IDENTIFIABLE = "the data do not identify every free parameter: see the identifiability verdict"
 
     @property
     def ok(self) -> bool:

@@ -250,7 +250,7 @@ def move_inside(parameter: Parameter, value: float) -> float:
     """``value`` [unit of the parameter] itself, or a hundredth of the room off the bound that it is on.
 
     Room is the distance of the bounds or, with one bound, from it to the table's value, or the tolerance.
-    Raises :class:`InputError` for a value outside the bounds, or on a bound where nothing tells the room.
+    Raises :class:`InputError` for a value outside the bounds, or on a bound where nothing gives the room.
     """
     if not parameter.lower <= value <= parameter.upper:
         raise InputError(
@@ -274,7 +274,7 @@ def _room(parameter: Parameter) -> float:
         room = max(abs(parameter.value - origin), parameter.tolerance)
     if room == 0.0:
         raise InputError(
-            f"nothing tells the scale of parameter '{parameter.name}'",
+            f"nothing gives the scale of parameter '{parameter.name}'",
             remedy="give it a tolerance, another bound, or a start value off its bound",
         )
     return room
@@ -299,7 +299,7 @@ class FreeVector(eqx.Module):
     It holds no arrays: close over it or pass it through any JAX transformation.
 
     Raises :class:`InputError` for a name that the table does not have, a name given twice, a tolerated
-    parameter without tolerance or on its bound, an identified one whose scale nothing tells.
+    parameter without tolerance or on its bound, an identified one whose scale nothing gives.
     """
 
     identified: tuple[str, ...] = eqx.field(static=True)

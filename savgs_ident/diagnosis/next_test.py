@@ -1,4 +1,4 @@
-"""The next test: the one that would best tell two hypotheses apart that this campaign hardly can.
+"""The next test: the one that would best distinguish two hypotheses that this campaign hardly distinguishes.
 
 Both are taken as fitted to this campaign and predict further ones, under each of the conditions that the plant
 declares: a larger input, another mean of one, more payload. The difference that the rival could not make up by

@@ -48,7 +48,7 @@ def diagnose(
         without: effects to leave out of the catalogue.
         orders: highest harmonic order to compare.
         max_frequency: leave out faster dwells [Hz].
-        progress: is told what is being done.
+        progress: called with a sentence on what is being done.
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a campaign that cannot be used, for names that
     do not exist, and for a model without periodic motion.

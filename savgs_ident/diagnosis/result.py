@@ -75,9 +75,9 @@ class Verdict:
         kind: nothing, one effect, several, or something that the catalogue does not have.
         effects: their names.
         ports: where they act; for an unknown one, the port that explains it best.
-        confusable_with: effects that this campaign cannot tell from those named.
+        confusable_with: effects that this campaign cannot distinguish from those named.
         sentence: the verdict in one sentence.
-        confusable_ports: of something unknown, ports that this campaign cannot tell from the one named.
+        confusable_ports: of something unknown, ports that this campaign cannot distinguish from the one named.
         another_law: whether what is named acts by another law than the catalogue's.
     """
 
@@ -169,7 +169,7 @@ class Candidate:
         share_closed: share that it explains of what the recalibrated baseline leaves beyond the noise, all
             tests; NaN where it leaves nothing.
         parameters: those of its effects.
-        refitted: whether it was fitted in full, or judged by its score alone.
+        refitted: whether it was fitted in full, or assessed by its score alone.
     """
 
     hypothesis: Hypothesis
@@ -324,7 +324,7 @@ class Diagnosis(Result):
         shrink: the gap over held-out tests, both channels together.
         by_channel: the same by channel.
         further: the gap of a recording that took no part, if there is one: a sweep, another motion.
-        next_tests: tests that would tell apart what this campaign cannot.
+        next_tests: tests that would distinguish what this campaign cannot.
         not_judgeable: effects that this campaign cannot show.
         confusable: pairs of effects that look alike in this campaign.
         loops: inferred signals at the named port.

@@ -219,7 +219,7 @@ class AbstractLaw(eqx.Module):
         return ()
 
     def suits(self, port: Port) -> bool:
-        """Whether it can act at a port without more than the port tells."""
+        """Whether it can act at a port without more than the port declares."""
         return port.kind is self.kind
 
 

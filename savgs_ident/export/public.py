@@ -65,7 +65,7 @@ def export(
         samples: how many of them, evenly spread over all.
         diagnosis: a diagnosis or a ``diagnosis.json``: the effects that it names, or the force that it learned, join
             the model with the numbers of its fit.
-        progress: is told what is being done.
+        progress: called with a sentence on what is being done.
 
     Look at ``trusted`` of the result. Raises :class:`InputError` for an unknown format, for what a format cannot
     hold, and for files that cannot be used or do not belong together.

@@ -1,1 +1,1 @@
-"""Least squares on measured responses, and what they can tell."""
+"""Least squares on measured responses, and what they identify."""

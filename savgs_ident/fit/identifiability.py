@@ -17,26 +17,27 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
+from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
-from savgs_ident.fit.minimise import Minimiser, Minimum, Progress, spread_of
+from savgs_ident.fit.minimise import Minimiser, Minimum, spread_of
 from savgs_ident.fit.result import Verdict
 from savgs_ident.inference.problem import Pins, Problem, Task
 from savgs_ident.plants.base import Excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 
-TOLD = 0.25
-"""A free parameter is told if its standard error is below this share of its value."""
+LARGEST_SD = 0.25
+"""A free parameter is identifiable if its standard error is below this share of its value."""
 
 MEMBER = 0.3
-"""A parameter belongs to an untold direction if its share of the unit direction is above this."""
+"""A parameter belongs to a direction that is not identifiable if its share of the unit direction is above this."""
 
 
-def untold_groups(names: tuple[str, ...], covariance: NDArray[np.float64]) -> tuple[tuple[str, ...], ...]:
+def confounded_groups(names: tuple[str, ...], covariance: NDArray[np.float64]) -> tuple[tuple[str, ...], ...]:
     """Groups of free parameters that trade off, from the covariance of their logarithms (n, n)."""
     variance, axes = np.linalg.eigh(covariance)
     groups: list[set[str]] = []
     for spread, axis in zip(np.sqrt(np.maximum(variance, 0.0)), axes.T, strict=True):
-        if spread > TOLD:
+        if spread > LARGEST_SD:
             members = {name for name, share in zip(names, axis, strict=True) if abs(share) > MEMBER}
             touching = [group for group in groups if group & members]
             groups = [g for g in groups if g not in touching] + [members.union(*touching)]
@@ -66,25 +67,25 @@ def verdict_of(
 ) -> Verdict:
     """The verdict for free parameters ``names`` whose logarithms have ``covariance`` (n, n).
 
-    ``bounds`` holds 95 % lower bounds of parameters that are not told [SI], ``advice`` which tests would help.
+    ``bounds`` holds 95 % lower bounds of unidentifiable parameters [SI], ``advice`` which tests would help.
     """
     sd = np.sqrt(np.diag(covariance))
-    groups = untold_groups(names, covariance)
+    groups = confounded_groups(names, covariance)
     in_group = {name for group in groups for name in group}
-    told = [n for n in names if n not in in_group and sd[names.index(n)] <= TOLD]
+    identifiable = [n for n in names if n not in in_group and sd[names.index(n)] <= LARGEST_SD]
     sentences = []
-    if told:
-        figures = ", ".join(f"{name} to {100.0 * sd[names.index(name)]:.2g} %" for name in told)
-        sentences.append(f"These data tell {figures}.")
+    if identifiable:
+        figures = ", ".join(f"{name} to {100.0 * sd[names.index(name)]:.2g} %" for name in identifiable)
+        sentences.append(f"These data identify {figures}.")
     for group in groups:
         sentences += _about_group(group, names, values, units, covariance)
-    untold = [n for n in names if n not in told and n not in in_group]
-    sentences += [f"These data do not tell {name}." for name in untold]
+    unknown = [n for n in names if n not in identifiable and n not in in_group]
+    sentences += [f"These data do not identify {name}." for name in unknown]
     sentences += [
         f"{name} is at least {bound:.3g} {units[name]} (95 %, profile likelihood)."
         for name, bound in bounds.items()
     ]
-    return Verdict(not groups and not untold, (*sentences, *advice), groups)
+    return Verdict(not groups and not unknown, (*sentences, *advice), groups)
 
 
 def _about_group(
@@ -95,12 +96,12 @@ def _about_group(
     covariance: NDArray[np.float64],
 ) -> list[str]:
     if len(group) == 1:
-        return [f"These data do not tell {group[0]}."]
-    sentences = [f"{' and '.join(group)} cannot be told apart: they trade off along a line."]
+        return [f"These data do not identify {group[0]}."]
+    sentences = [f"{' and '.join(group)} cannot be distinguished: they trade off along a line."]
     if len(group) == 2:
         pair = (group[0], group[1])
         label, error = known_combination(pair, names, covariance)
-        if error <= TOLD:
+        if error <= LARGEST_SD:
             first, second = values[pair[0]], values[pair[1]]
             value = first / second if "/" in label else first * second
             unit = f"{units[pair[0]]}/({units[pair[1]]})" if "/" in label else "(SI)"
@@ -241,7 +242,7 @@ def _sine_in(driven: str, excitation: Excitation, frequency: NDArray[np.float64]
 
 
 def propose_dwells(minimiser: Minimiser, best: Minimum, settings: PeriodicSettings) -> tuple[Proposal, ...]:
-    """The best dwell of every family that would tell all free parameters; empty if none would."""
+    """The best dwell of every family that would identify all free parameters; empty if none would."""
     free = len(minimiser.problem.free.identified)
 
     def worst(jacobian: NDArray[np.float64]) -> float:
@@ -251,7 +252,7 @@ def propose_dwells(minimiser: Minimiser, best: Minimum, settings: PeriodicSettin
     for candidate in candidates(best.solution.excitation, minimiser.problem.model.inputs[0].name):
         proposals = _proposals(minimiser, best, candidate, settings, worst)
         leader = min(proposals, key=lambda each: each.worst_sd, default=None)
-        if leader is not None and leader.worst_sd <= TOLD:
+        if leader is not None and leader.worst_sd <= LARGEST_SD:
             leaders.append(leader)
     return tuple(leaders)
 
@@ -284,8 +285,8 @@ EXPLAINED = 2.0
 """chi2 per datum up to which the data count as explained."""
 
 
-def judge(task: Task, minimiser: Minimiser, best: Minimum, tell: Progress) -> Verdict:
-    """What the data tell about the free parameters at ``best``."""
+def assess(task: Task, minimiser: Minimiser, best: Minimum, progress: Progress) -> Verdict:
+    """What the data say of the free parameters at ``best``."""
     problem, table = task.problem, task.table
     names = problem.free.identified
     values = {name: float(value) for name, value in problem.parameters(best.u).items()}
@@ -295,13 +296,13 @@ def judge(task: Task, minimiser: Minimiser, best: Minimum, tell: Progress) -> Ve
     covariance = _log_covariance(problem, best, values)
     bounds: dict[str, float] = {}
     advice: tuple[str, ...] = ()
-    if np.sqrt(np.diag(covariance)).max() > TOLD:
-        for group in untold_groups(names, covariance):
+    if np.sqrt(np.diag(covariance)).max() > LARGEST_SD:
+        for group in confounded_groups(names, covariance):
             name = group[-1]  # The others follow it along the line that they trade off along.
-            tell(f"looking for a lower bound of {name}")
-            bound = lower_bound(minimiser, best, name, tell)
+            progress(f"looking for a lower bound of {name}")
+            bound = lower_bound(minimiser, best, name, progress)
             bounds |= {} if bound is None else {name: bound}
-        tell("looking for a test that would help")
+        progress("looking for a test that would help")
         advice = advice_of(task, minimiser, best)
     verdict = verdict_of(names, values, units, covariance, bounds, advice)
     return replace(verdict, sentences=(*_misfit(problem, best), *verdict.sentences))
@@ -319,12 +320,12 @@ def _misfit(problem: Problem, best: Minimum) -> tuple[str, ...]:
 
 
 def advice_of(task: Task, minimiser: Minimiser, best: Minimum) -> tuple[str, ...]:
-    """In words, which further dwells would tell every free parameter; one sentence."""
+    """In words, which further dwells would identify every free parameter; one sentence."""
     proposals = propose_dwells(minimiser, best, task.settings.periodic)
     if not proposals:
         return ("No single further dwell that was considered would help.",)
     tests = "; ".join(f"{each.test} (to {100.0 * each.worst_sd:.2g} %)" for each in proposals)
-    return (f"What would tell every free parameter: {tests}.",)
+    return (f"What would identify every free parameter: {tests}.",)
 
 
 def _log_covariance(problem: Problem, best: Minimum, values: dict[str, float]) -> np.ndarray:

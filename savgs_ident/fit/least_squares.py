@@ -16,9 +16,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from savgs_ident.core.presentation import Progress
 from savgs_ident.core.values import as_values
-from savgs_ident.fit.identifiability import EXPLAINED, judge
-from savgs_ident.fit.minimise import Minimiser, Minimum, Progress, spread_of
+from savgs_ident.fit.identifiability import EXPLAINED, assess
+from savgs_ident.fit.minimise import Minimiser, Minimum, spread_of
 from savgs_ident.fit.result import Estimate, Fit, Verdict
 from savgs_ident.inference.problem import ProblemSettings, Quantity, Task, plan_task
 from savgs_ident.plants.model import Model
@@ -55,7 +56,7 @@ class FitSettings:
 
 
 class Outcome(NamedTuple):
-    """Where a fit ended: the response ``as_given`` before it, every start, the best, what it tells.
+    """Where a fit ended: the response ``as_given`` before it, every start, the best, what it identifies.
 
     ``as_given`` are complex harmonics [unit of the reading], (D, C, orders + 1).
     """
@@ -104,8 +105,8 @@ def _estimates(task: Task, best: Minimum) -> tuple[tuple[Estimate, ...], np.ndar
     covariance = spread.covariance * np.outer(slope, slope)
     widths, estimates = problem.free.widths, []
     for place, name in enumerate(problem.free.names):
-        told = spread.sd[place] < INFORMED * widths[place] or name in problem.free.tolerated
-        stderr = float(np.sqrt(covariance[place, place])) if told else np.inf
+        known = spread.sd[place] < INFORMED * widths[place] or name in problem.free.tolerated
+        stderr = float(np.sqrt(covariance[place, place])) if known else np.inf
         free = name in problem.free.identified
         known = task.table[name]
         estimates.append(
@@ -149,30 +150,30 @@ def fit_least_squares(
 ) -> Fit:
     """Fit ``free`` parameters of a model to a measured response.
 
-    ``progress`` is told what is going on. Raises :class:`InputError` for names that do not exist or that the
+    ``progress`` is called with what is being done. Raises :class:`InputError` for names that do not exist or that the
     model does not use, and for a response that cannot be used. Look at ``trusted`` of the result.
     """
-    began, tell = time.perf_counter(), progress or _silent
+    began, report = time.perf_counter(), progress or _silent
     settings = settings or FitSettings()
     task = plan_task(measured, model, free, settings.problem)
     problem = task.problem
 
-    tell("solving the model as given")
+    report("solving the model as given")
     first = simulate_periodic(problem.model, problem.fixed, task.excitation, task.settings.periodic)
     as_given = np.asarray(harmonics(problem.model, problem.fixed, first, problem.orders))
-    tell("preparing the fit")
+    report("preparing the fit")
     minimiser = Minimiser(problem)
     first_u, *others = _starts(task, settings.starts)
-    tried = [minimiser.minimise(first_u, first, settings.steps, tell, enough=ROUGHLY)]
+    tried = [minimiser.minimise(first_u, first, settings.steps, report, enough=ROUGHLY)]
     for u in others:
         if tried[0].status.ok and tried[0].cost < EXPLAINED * problem.target.entries:
             break
-        tell("trying another start")
-        tried.append(_from_start(task, minimiser, u, min(EXPLORING, settings.steps), tell))
+        report("trying another start")
+        tried.append(_from_start(task, minimiser, u, min(EXPLORING, settings.steps), report))
     best = min(tried, key=lambda each: each.cost if np.isfinite(each.cost) else np.inf)
-    tell("refining on nodes adapted to the result")
-    best = _refined(task, minimiser, best, settings.steps, tell)
-    verdict = judge(task, minimiser, best, tell)
+    report("refining on nodes adapted to the result")
+    best = _refined(task, minimiser, best, settings.steps, report)
+    verdict = assess(task, minimiser, best, report)
     return assemble_fit(task, Outcome(as_given, tuple(tried), best, verdict, time.perf_counter() - began))
 
 
@@ -191,16 +192,16 @@ def _starts(task: Task, most: int) -> list[Array]:
     return starts
 
 
-def _from_start(task: Task, minimiser: Minimiser, u: Array, steps: int, tell: Progress) -> Minimum:
+def _from_start(task: Task, minimiser: Minimiser, u: Array, steps: int, report: Progress) -> Minimum:
     p = task.problem.parameters(u)
     near = simulate_periodic(task.problem.model, p, task.excitation, task.settings.periodic)
-    return minimiser.minimise(u, near, steps, tell, enough=ROUGHLY)
+    return minimiser.minimise(u, near, steps, report, enough=ROUGHLY)
 
 
-def _refined(task: Task, minimiser: Minimiser, best: Minimum, steps: int, tell: Progress) -> Minimum:
+def _refined(task: Task, minimiser: Minimiser, best: Minimum, steps: int, report: Progress) -> Minimum:
     if not np.isfinite(best.cost):
         return best
     p, layout = task.problem.parameters(best.u), best.solution.mesh.layout
     limit = task.settings.periodic.iterations
     near = adapt(task.problem.model, p, best.solution, layout, limit)
-    return minimiser.minimise(best.u, near, steps, tell)
+    return minimiser.minimise(best.u, near, steps, report)

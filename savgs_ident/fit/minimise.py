@@ -4,10 +4,10 @@ Taking the steps from Python costs nothing beside the model and lets each one be
 is evaluated, residuals and Jacobian, before the optimiser is asked for its step.
 
 A direction of the coordinates along which the residuals do not change has no covariance. It is given a large one
-instead of a wrong one: the inverse information is capped at :data:`UNTOLD`, so that correlations stay meaningful.
+instead of a wrong one: the inverse information is capped at :data:`LARGEST_SPREAD`, to keep correlations
+meaningful.
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -18,13 +18,11 @@ import optimistix as optx
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
+from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
 from savgs_ident.inference.problem import Evaluation, Linearised, Pins, Problem, evaluate, evaluate_beside
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.program_cache import placed
-
-Progress = Callable[[str], None]
-"""Is told what is going on, a line at a time."""
 
 TOLERANCE = 1e-2
 """Change of coordinates and of what the optimiser is given at which it stops by itself."""
@@ -32,7 +30,7 @@ TOLERANCE = 1e-2
 SHARPNESS = 30.0
 """Residuals are given to the optimiser in this part of a standard deviation. It damps the first step by one of
 its units of information on every coordinate: a whole standard deviation would hold back the tolerances, of
-which data and prior together hardly tell more."""
+which data and prior together hardly hold more."""
 
 
 NOTHING = 1e-10
@@ -112,7 +110,7 @@ class Minimiser(eqx.Module):
         pins: Pins | None = None,
         enough: float = 1e-6,
     ) -> Minimum:
-        """Minimise from ``u``, on the nodes of the solution ``near`` there, parameters pinned as told.
+        """Minimise from ``u``, on the nodes of the solution ``near`` there, parameters pinned as given.
 
         The last step is the one after which the linearisation promises to lower the sum of squares by less
         than the share ``enough``, or that the optimiser takes for its last and that lowered it by no more.
@@ -151,8 +149,8 @@ def _minimum(found: Evaluation, status: Status) -> Minimum:
     return Minimum(u, np.asarray(residual)[:rows], np.asarray(jacobian)[:rows], found.solution, status)
 
 
-UNTOLD = 1e3
-"""Standard deviation given to an untold direction [1]: a thousand e-folds of an identified parameter."""
+LARGEST_SPREAD = 1e3
+"""Standard deviation given to an unidentifiable direction [1]: a thousand e-folds of an identified parameter."""
 
 
 class Spread(NamedTuple):
@@ -168,8 +166,8 @@ class Spread(NamedTuple):
 
 def spread_of(jacobian: NDArray[np.float64]) -> Spread:
     """The spread for residuals of unit variance with ``jacobian`` (m, n), priors among the rows."""
-    # Fewer residuals than coordinates leave directions untold; the thin decomposition would drop them.
+    # Fewer residuals than coordinates leave directions without information; the thin decomposition would drop them.
     missing = max(0, jacobian.shape[1] - jacobian.shape[0])
     _, singular, axes = np.linalg.svd(np.pad(jacobian, ((0, missing), (0, 0))), full_matrices=False)
-    sd = 1.0 / np.maximum(singular, 1.0 / UNTOLD)
+    sd = 1.0 / np.maximum(singular, 1.0 / LARGEST_SPREAD)
     return Spread((axes.T * sd**2) @ axes)

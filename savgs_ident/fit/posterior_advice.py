@@ -6,7 +6,13 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.fit.identifiability import TOLD, advice_of, known_combination, untold_groups, verdict_of
+from savgs_ident.fit.identifiability import (
+    LARGEST_SD,
+    advice_of,
+    confounded_groups,
+    known_combination,
+    verdict_of,
+)
 from savgs_ident.fit.minimise import Minimiser
 from savgs_ident.inference.posterior_mode import PosteriorMode
 from savgs_ident.inference.problem import Task
@@ -43,7 +49,7 @@ def sentences_of(
     verdict = verdict_of(names, values, units, covariance, {}, advice)
     return (
         *verdict.sentences,
-        *_tied(names, covariance, untold_groups(names, covariance)),
+        *_tied(names, covariance, confounded_groups(names, covariance)),
         *_discrepancy(marginals),
         *_added(identified),
         *_laplace(identified),
@@ -57,16 +63,16 @@ def log_covariance(names: Sequence[str], draws: Mapping[str, NDArray[np.float64]
 
 
 def _tied(
-    names: tuple[str, ...], covariance: NDArray[np.float64], untold: Sequence[tuple[str, ...]]
+    names: tuple[str, ...], covariance: NDArray[np.float64], confounded: Sequence[tuple[str, ...]]
 ) -> list[str]:
-    """Pairs that are told, but trade off: what is known of them together."""
+    """Pairs that are identifiable, but trade off: what is known of them together."""
     deviation = np.sqrt(np.diag(covariance))
     found = []
     for i, one in enumerate(names):
         for j, other in enumerate(names[:i]):
             tied = abs(covariance[i, j]) > TIED * deviation[i] * deviation[j]
-            told = max(deviation[i], deviation[j]) <= TOLD
-            if tied and told and not any({one, other} <= set(group) for group in untold):
+            known = max(deviation[i], deviation[j]) <= LARGEST_SD
+            if tied and known and not any({one, other} <= set(group) for group in confounded):
                 label, error = known_combination((other, one), names, covariance)
                 found.append(
                     f"{other} and {one} trade off along a line: {label} is known to {100.0 * error:.2g} %, "
@@ -103,16 +109,16 @@ def _laplace(identified: Sequence[Marginal]) -> list[str]:
         return [
             f"The posterior is not normal: its curvature at the mode misjudges the spread of {', '.join(off)}."
         ]
-    return [f"The curvature at the mode tells the same standard deviations to {100.0 * CLOSE:.0f} %."]
+    return [f"The curvature at the mode gives the same standard deviations to {100.0 * CLOSE:.0f} %."]
 
 
 def advise(task: Task, mode: PosteriorMode, draws: Mapping[str, NDArray[np.float64]]) -> tuple[str, ...]:
-    """Sentences on dwells that would help; none if all identified parameters are told.
+    """Sentences on dwells that would help; none if all parameters are identifiable.
 
     ``draws`` (s,) are in SI, by name.
     """
     covariance = log_covariance(task.problem.free.identified, draws)
-    if np.sqrt(np.diag(covariance)).max() <= TOLD:
+    if np.sqrt(np.diag(covariance)).max() <= LARGEST_SD:
         return ()
     minimiser = Minimiser(task.problem)
     known = minimiser.evaluate(

@@ -25,7 +25,7 @@ def fit(
     max_frequency: float | None = None,
     progress: Progress = no_progress,
 ) -> Fit:
-    """Identify a model: parameters with errors, how well they fit, what the data can tell.
+    """Identify a model: parameters with errors, how well they fit, what the data identify.
 
     Args:
         model: the rig, or another plant, with its effects; one that was identified before starts from what was known
@@ -37,7 +37,7 @@ def fit(
         peak_to_peak: fit peak-to-peak values only, as the paper did.
         fixed_tolerances: hold what is known to a tolerance at its value instead of estimating it along.
         max_frequency: leave out faster dwells [Hz].
-        progress: is told what is being done.
+        progress: called with a sentence on what is being done.
 
     Look at ``trusted`` of the result. Raises :class:`InputError` for a campaign that cannot be used and for unknown
     parameters.

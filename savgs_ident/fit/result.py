@@ -1,4 +1,4 @@
-"""What a fit gives: estimates with their covariance, residuals, and what the data can and cannot tell."""
+"""What a fit gives: estimates with their covariance, residuals, and what the data identify and what they do not."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ PACKAGES = ("jax", "optimistix", "numpy", "scipy")
 class Estimate:
     """One estimated parameter in SI.
 
-    ``stderr`` is its standard error; ``free`` tells an identified parameter from one that was known to a
+    ``stderr`` is its standard error; ``free`` distinguishes an identified parameter from one that was known to a
     tolerance and estimated along. For the latter ``prior`` and ``prior_sd`` say what was known before.
     """
 
@@ -36,10 +36,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the data can tell, in words.
+    """What the data identify, in words.
 
     Attributes:
-        identifiable: whether every free parameter is told.
+        identifiable: whether every free parameter is identified.
         sentences: the verdict, one statement each.
         confounded: groups of free parameters that trade off against each other.
     """
@@ -65,7 +65,7 @@ class Fit(Result):
         prior_chi2: squared deviations of all parameters from what was known before, in its standard deviations.
         status: how the optimisation ended, over all dwells.
         dwell_status: whether the model's periodic solution converged, per dwell.
-        verdict: what the data can and cannot tell.
+        verdict: what the data identify and what they do not.
         measured: the response that was fitted.
         orders: highest harmonic order used.
         used: which entries of ``predicted`` were fitted, (D, C, orders + 1).
@@ -126,7 +126,7 @@ class Fit(Result):
 
     @property
     def trusted(self) -> bool:
-        """Whether the fit converged everywhere and every free parameter is told by the data."""
+        """Whether the fit converged everywhere and every free parameter is identified by the data."""
         return self.status.ok and all(each.ok for each in self.dwell_status) and self.verdict.identifiable
 
     @property

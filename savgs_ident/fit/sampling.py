@@ -49,7 +49,7 @@ def sample(
         seed: of all random numbers.
         chain: file in which the chain is kept after every step.
         resume: go on with the chain that is there.
-        progress: is told what is being done.
+        progress: called with a sentence on what is being done.
 
     Look at ``trusted`` of the result. Raises :class:`InputError` for a model without campaign, a campaign that cannot
     be used, a model without periodic motion, and a chain of another question.

@@ -1,7 +1,7 @@
 """Whether chains have converged, and what their draws say beside what was known before.
 
 R-hat and effective sample sizes are rank-normalised (Vehtari, Gelman, Simpson, Carpenter and Buerkner, Bayesian
-Analysis 16, 2021); the autocorrelation time is emcee's, of all chains together; the Pareto index of the weights tells
+Analysis 16, 2021); the autocorrelation time is emcee's, of all chains together; the Pareto index of the weights shows
 whether the surrogate covers the posterior. Beside the marginals of the draws stand the prior, the Laplace
 approximation and the profile of the density, both of the surrogate, which is exact at its centre and of second order
 about it.

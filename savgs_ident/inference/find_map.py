@@ -7,7 +7,7 @@ evidence by Laplace's method: a normal density with the precision I + J' W J of 
 rows' variance.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import log
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
 from savgs_ident.inference.noise_scales import NoiseScales, linearised_optimum, log_determinant, noise_scales
 from savgs_ident.inference.observations import Data, Plant, Prediction, Term
@@ -31,10 +32,6 @@ LEVEL = 0.1
 
 ROUGH = 2.0
 """Rise that is promised, but not found, up to which a mode is as good: friction makes the density rough."""
-
-
-Progress = Callable[[str], None]
-"""Is told what is going on, a line at a time."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +114,7 @@ def find_map(
     """The mode of the baseline with ``terms`` from ``start`` (SI, centres where not given).
 
     The parameters ``held`` (SI, by name) stay where they are said to be. The mode is found where a step promises a
-    rise of less than ``level``. ``progress`` is told the density at every step.
+    rise of less than ``level``. ``progress`` is called with the density at every step.
     """
     coordinates = search.plant.nuisances + tuple(c for term in terms for c in term.coordinates)
     names = tuple(term.name for term in terms)

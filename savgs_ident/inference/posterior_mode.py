@@ -16,9 +16,10 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
+from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status, joint_status
 from savgs_ident.inference.exact import Anchor, ExactModel, anchor_at, in_parallel, rows_and_slopes
-from savgs_ident.inference.find_map import LaplaceFit, Progress, find_map, search_of
+from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.inference.observations import Prediction, Term
 from savgs_ident.inference.prior import Coordinates, Prior, sheet_coordinate
@@ -28,7 +29,7 @@ from savgs_ident.simulate.periodic import PeriodicSolution, adapt
 
 LONGEST = 1.0
 """Longest axis [unconstrained coordinates]: an e-fold of an identified parameter, a tolerance of the others. A
-direction that the data do not tell is explored by as much."""
+direction that the data do not identify is explored by as much."""
 
 LEAST = 1e-4
 """Least standard deviation of a scale's coordinate."""
@@ -158,7 +159,7 @@ class CasePlant:
 
 
 def find_mode(
-    case: Case, u: Float[Array, " n"], warm_start: PeriodicSolution, tell: Progress
+    case: Case, u: Float[Array, " n"], warm_start: PeriodicSolution, report: Progress
 ) -> PosteriorMode:
     """The mode from free coordinates ``u`` (n,), where the model has the motions ``warm_start``.
 
@@ -167,10 +168,10 @@ def find_mode(
     search = search_of(CasePlant(case), case.likelihood.data)
     values = case.problem.parameters(u)
     start = {name: float(values[name]) for name in case.problem.free.names}
-    found = find_map(search, (), start, warm_start, level=LEVEL, progress=tell)
+    found = find_map(search, (), start, warm_start, level=LEVEL, progress=report)
     if found.status.ok:
         finer = search.plant.refined((), found.values, found.prediction.warm_start)
-        found = find_map(search, (), found.values, finer, level=LEVEL, progress=tell)
+        found = find_map(search, (), found.values, finer, level=LEVEL, progress=report)
     return PosteriorMode(_linearisation_point(case, found), found.status)
 
 
@@ -214,12 +215,12 @@ class Expansion(NamedTuple):
     surrogate: Surrogate
 
 
-def expand(case: Case, at: LinearisationPoint, tell: Progress) -> Expansion:
+def expand(case: Case, at: LinearisationPoint, report: Progress) -> Expansion:
     """The expansion about a linearisation point."""
     linear = linear_surrogate(case, at)
     axes = np.asarray(linear.scale)[:-2, :-2]
     weight = 1.0 / np.sqrt(np.asarray(case.likelihood.spread(linear.centre)))
-    tell(f"second derivatives of the response along {axes.shape[1]} axes")
+    report(f"second derivatives of the response along {axes.shape[1]} axes")
     anchor = anchor_at(case.problem, jnp.asarray(at.point[:-2]), at.solution)
     second = _second_derivatives(case, at, anchor, axes, weight)
     bent = (bend_of(second, weight), triangular_map_of(second, np.asarray(linear.slope), weight))

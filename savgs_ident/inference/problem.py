@@ -139,10 +139,10 @@ def peak_to_peak_target(measured: HarmonicResponse, channels: Sequence[Channel])
     sd = measured.peak_to_peak_sd[:, places]
     used = measured.valid[:, places] & present[None, :, None]
     used[:, :, 0] = False
-    told = used[:, :, 1] & (sd > 0.0)
-    if not told.any():
+    known = used[:, :, 1] & (sd > 0.0)
+    if not known.any():
         raise InputError("no peak-to-peak value of the response can be used", remedy="record longer dwells")
-    weight = np.where(told, 1.0 / np.where(told, sd, 1.0), 0.0)
+    weight = np.where(known, 1.0 / np.where(known, sd, 1.0), 0.0)
     return PeakToPeakTarget(jnp.asarray(measured.peak_to_peak[:, places]), jnp.asarray(weight), used)
 
 

@@ -1,4 +1,4 @@
-"""What sampling gives: draws with their convergence, marginals, what the model predicts, what is told in words."""
+"""What sampling gives: draws with their convergence, marginals, predictions, and sentences on what they mean."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -140,7 +140,7 @@ class Posterior(Result):
         convergence: whether they may be used.
         predictive: what they predict.
         measured: the response that they follow from.
-        sentences: what the data tell, in words.
+        sentences: what the data say, in words.
         wall_s: time taken, from the response to the last draw [s].
     """
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from savgs_ident import __version__
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.presentation import Progress
 from savgs_ident.inference.diagnostics import (
     enough,
     judge_chains,
@@ -33,7 +34,6 @@ from savgs_ident.inference.diagnostics import (
     precise,
 )
 from savgs_ident.inference.exact import ExactModel
-from savgs_ident.inference.find_map import Progress
 from savgs_ident.inference.likelihood import likelihood_of, values_of
 from savgs_ident.inference.posterior_mode import Case, Expansion, PosteriorMode, expand, find_mode
 from savgs_ident.inference.prior import Prior
@@ -149,15 +149,15 @@ def sample_posterior(
     ``convergence.converged`` of the result. Raises :class:`InputError` for a question that makes no sense, a
     model without periodic motion where the search begins, and a chain of another question.
     """
-    began, tell = time.perf_counter(), progress or _silent
+    began, report = time.perf_counter(), progress or _silent
     task = plan(question, settings)
     case = case_of(task)
     checkpoint = _checkpoint(question, settings, chain, resume)
-    mode = locate(case, task, question, tell)
-    expansion = expand(case, mode.linearisation_point, tell)
-    chains = _run(expansion, settings, checkpoint, began, tell)
+    mode = locate(case, task, question, report)
+    expansion = expand(case, mode.linearisation_point, report)
+    chains = _run(expansion, settings, checkpoint, began, report)
     wall_s = time.perf_counter() - began
-    tell("summing up")
+    report("summing up")
     return _summed_up(
         _Answer(task, case, mode, expansion, chains), question, settings, wall_s, describe or _nothing
     )
@@ -177,18 +177,18 @@ def case_of(task: Task) -> Case:
     return Case(task.problem, likelihood_of(target), Prior(task.problem.free))
 
 
-def locate(case: Case, task: Task, question: Question, tell: Progress) -> PosteriorMode:
+def locate(case: Case, task: Task, question: Question, report: Progress) -> PosteriorMode:
     """The mode, looked for from the question's values.
 
     Raises :class:`InputError` if the model has no periodic motion there.
     """
-    tell("solving the model")
+    report("solving the model")
     start = task.table.as_dict() | dict(question.values)
     u = case.problem.free.to_unconstrained(start)
     near = simulate_periodic(
         case.problem.model, case.problem.parameters(u), task.excitation, task.settings.periodic
     )
-    mode = find_mode(case, u, near, tell)
+    mode = find_mode(case, u, near, report)
     if not np.isfinite(mode.linearisation_point.value):
         raise InputError(
             "the model has no periodic motion at these parameters",
@@ -228,7 +228,7 @@ def _checkpoint(
 
 
 def _run(
-    expansion: Expansion, settings: SamplingSettings, checkpoint: Checkpoint, began: float, tell: Progress
+    expansion: Expansion, settings: SamplingSettings, checkpoint: Checkpoint, began: float, report: Progress
 ) -> Chains:
     """Chains until they are long enough or time is up.
 
@@ -240,7 +240,7 @@ def _run(
             chains = next(sampler)
             mixing = [mixing_of(chains.points[:, :, place]) for place in range(count)]
             ess, spent = least_ess(mixing), time.perf_counter() - began
-            tell(
+            report(
                 f"{settings.sampler}: {len(chains.points)} steps of {chains.points.shape[1]} chains, effective "
                 f"sample size {ess:.0f} of {settings.target_ess:.0f}, {spent:.0f} s"
             )

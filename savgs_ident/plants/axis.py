@@ -86,7 +86,7 @@ PARAMETERS = ParameterTable(
         Parameter("g", 9.80665, "m/s^2", about="acceleration of free fall"),
     )
 )
-"""Round numbers for such an axis; what a recording tells is estimated."""
+"""Round numbers for such an axis; what a recording identifies is estimated."""
 
 
 class Axis(AbstractPlant):

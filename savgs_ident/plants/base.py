@@ -219,7 +219,7 @@ class AbstractPlant(eqx.Module):
         """The equations of motion out of balance, (n,) [SI], and a record of the forces on the way to them.
 
         ``p`` are the parameters with all changes by effects made. ``acting`` is asked for the effects' forces at
-        every force port, for the deflections at every series port, and told the load that each of these carries.
+        every force port, for the deflections at every series port, and given the load that each of these carries.
         """
 
     @abstractmethod

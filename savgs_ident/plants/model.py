@@ -213,8 +213,8 @@ class PlantModel:
         origin = Origin(rig=self.name, effects=self.effects, warnings=tuple(warnings))
         if campaign is None:
             return origin
-        told = (*campaign.warnings, *warnings)
-        return replace(origin, data=campaign.source, data_sha256=campaign.sha256, warnings=told)
+        every = (*campaign.warnings, *warnings)
+        return replace(origin, data=campaign.source, data_sha256=campaign.sha256, warnings=every)
 
 
 def _open(each: Parameter) -> bool:

@@ -214,7 +214,7 @@ class AxisRecording:
         source: file it came from.
         time: [s], (n,).
         position: of the carriage, [m], (n,).
-        reference: where the carriage was told to be, [m], (n,).
+        reference: where the carriage was to be, [m], (n,).
         force: of the drive, [N], (n,).
     """
 

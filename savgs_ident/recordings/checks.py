@@ -256,7 +256,7 @@ def _unknown(recording: Recording, place: DataLocation) -> tuple[DataWarning, ..
     return (
         place.warning(
             "test_kind_unknown",
-            "what kind of test this is cannot be told from its name",
+            "what kind of test this is does not follow from its name",
             "call it dwell_<f>Hz, sweep... or standstill, by events, a test column or the file's name",
         ),
     )

@@ -127,7 +127,7 @@ class _Fit(_Identified["Fit"]):
             return (f"{result.status.advice}.",)
         if not all(status.ok for status in result.dwell_status):
             return ("the model's periodic motion was not found in every dwell.",)
-        return ("the data cannot tell every free parameter.",)
+        return ("the data do not identify every free parameter.",)
 
     def comparison(self, result: "Fit") -> "Comparison":
         from savgs_ident.fit.comparison import comparison_of

@@ -46,7 +46,7 @@ def estimate_response(campaign: Campaign, orders: int = 15, driven: str = ROAD) 
     seen in periodic data: stamps are taken as true up to their rate, which is checked.
 
     Dwells that cannot be used are left out with a warning: ``no_road_motion``, ``too_few_periods`` (3 are
-    needed to tell noise from signal), ``not_determined``. Further warnings: ``frequency_differs``,
+    needed to separate noise from signal), ``not_determined``. Further warnings: ``frequency_differs``,
     ``not_steady``, ``clock_rate_differs``, ``noise_above_standstill``, ``folded_orders``.
 
     Raises :class:`InputError` when ``orders`` is below 1 or no dwell can be used.
@@ -122,7 +122,7 @@ def _start_frequency(
     if periods < FEWEST_PERIODS - 0.3:
         return refuse(
             "too_few_periods",
-            f"{periods:.1f} periods are recorded, {FEWEST_PERIODS} are needed to tell noise from signal",
+            f"{periods:.1f} periods are recorded, {FEWEST_PERIODS} are needed to separate noise from signal",
             f"record at least {FEWEST_PERIODS / frequency:.3g} s",
         )
     if highest_valid_order(lead, frequency, 1) < 1:

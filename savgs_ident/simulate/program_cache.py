@@ -52,12 +52,12 @@ class _UntoldError(Exception):
 def fingerprint(function: Callable[..., Any], args: tuple[Any, ...]) -> str | None:
     """A digest of ``function`` of this package and the structure of its arguments; None if it has none."""
     try:
-        told = [_origin(function), *_description(args)]
+        parts = [_origin(function), *_description(args)]
     except _UntoldError:
         return None
-    told += [_SOURCE, jax.default_backend(), *map(version, _TRACERS)]
-    told += [f"{setting} {getattr(jax.config, setting)}" for setting in _SETTINGS]
-    return hashlib.sha256("\n".join(told).encode()).hexdigest()
+    parts += [_SOURCE, jax.default_backend(), *map(version, _TRACERS)]
+    parts += [f"{setting} {getattr(jax.config, setting)}" for setting in _SETTINGS]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
 TRACED = (
@@ -282,6 +282,6 @@ def make_room_for_programs() -> None:
 
 
 def mapped_regions() -> int:
-    """Regions of memory [1] that this process has mapped; 0 where the system does not tell."""
+    """Regions of memory [1] that this process has mapped; 0 where the system does not say."""
     maps = Path("/proc/self/maps")
     return maps.read_bytes().count(b"\n") if maps.exists() else 0

@@ -55,7 +55,7 @@ def simulate(
         frequency: of the cam [Hz]; 28 from 0.5 to 6 if empty.
         campaign: road and link as in its dwells instead.
         orders: highest harmonic order.
-        progress: is told what is being done.
+        progress: called with a sentence on what is being done.
 
     A motion that was not found has its status in the result. Raises :class:`InputError` for a frequency that is not
     above zero.
@@ -101,7 +101,7 @@ def simulate_dwells(
         samples: samples of each channel in a test.
         orders: highest harmonic order.
         seed: of all random numbers.
-        progress: is told what is being done.
+        progress: called with a sentence on what is being done.
 
     Raises :class:`InputError` for names that the plant does not have, a channel without noise, a frequency that is
     not above zero, and a test without periodic motion.

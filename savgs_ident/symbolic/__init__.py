@@ -1,1 +1,1 @@
-"""The model in another language: functions written in JAX, told to CasADi operation by operation."""
+"""The model in another language: functions written in JAX, translated to CasADi operation by operation."""

@@ -1,4 +1,4 @@
-"""Blind trials: how often the diagnosis is right about effects that it was not told of.
+"""Blind trials: how often the diagnosis is right about effects that it does not know.
 
     study = blind("out/blind", trials=60, seed=1)
     print(study)                            # the rates with their intervals, and where it was wrong
@@ -100,7 +100,7 @@ def blind(
         again: diagnose the recordings in the folder anew; keep none of the marks.
         jobs: trials at a time on this machine; one for each core if left out.
         scheduler: address of a Dask cluster to work on instead, whose workers see the folder under the same path.
-        progress: is told what is being done.
+        progress: called with a sentence on what is being done.
 
     Raises :class:`InputError` for a rig that cannot be read, and for a folder with trials of something else.
     """
@@ -142,8 +142,8 @@ def plan_of(job: Job, sheet: bytes, kept: Path) -> Plan:
     """
     seed = job.seed
     if seed is None:
-        told = marks_in(kept).get("seed")
-        seed = told if type(told) is int and told >= 0 else secrets.randbits(32)
+        kept_seed = marks_in(kept).get("seed")
+        seed = kept_seed if type(kept_seed) is int and kept_seed >= 0 else secrets.randbits(32)
     return Plan(job.rig or default_rig_path(), sheet, seed, job.shares, job.every, job.sweep)
 
 

@@ -43,7 +43,7 @@ STANDS_OUT = 8.0
 that it does so by five however noise and tolerances fall."""
 
 TOLD_APART = 5.0
-"""Standard deviations from which on two effects can be told apart."""
+"""Standard deviations from which on two effects can be distinguished."""
 
 NUDGE = 0.02
 """Share of an effect's size by which it is changed for a slope."""
@@ -285,7 +285,7 @@ def draw_rig(bench: Bench, random: np.random.Generator) -> dict[str, float]:
 def draw_answer(bench: Bench, shares: Shares, number: int, random: np.random.Generator) -> Answer:
     """The truth of a trial; the same for the same state of ``random``.
 
-    Raises :class:`InputError` if nothing that can be judged was drawn in :data:`ATTEMPTS` attempts.
+    Raises :class:`InputError` if nothing that can be assessed was drawn in :data:`ATTEMPTS` attempts.
     """
     kind = shares.draw(random)
     drawing = drawing_of(bench, draw_rig(bench, random))
@@ -296,14 +296,14 @@ def draw_answer(bench: Bench, shares: Shares, number: int, random: np.random.Gen
         if answer is not None:
             return answer
     raise InputError(
-        f"nothing of kind '{kind}' that can be judged was drawn",
+        f"nothing of kind '{kind}' that can be assessed was drawn",
         source=f"trial {number}",
         remedy="name another --seed",
     )
 
 
 def _draw(kind: Drawn, drawing: Drawing, number: int, random: np.random.Generator) -> Answer | None:
-    """An answer of a kind; None if what was drawn cannot be judged."""
+    """An answer of a kind; None if what was drawn cannot be assessed."""
     names = [name for name in CATALOGUE if name not in drawing.bench.baseline]
     many = {"none": 0, "effect": 1, "two": 2, "unknown": 1}[kind]
     chosen = [str(name) for name in random.choice(names, many, replace=False)]

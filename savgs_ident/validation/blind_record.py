@@ -12,7 +12,7 @@ The same recordings give the same bytes. Numbers are written to what the logger 
 
 The seal: nobody can change the answer of a trial after its recordings were handed over and go unnoticed.
 
-Beside the recordings stands a digest of the answer together with a salt, so that it tells nothing of the answer;
+Beside the recordings stands a digest of the answer together with a salt, so that it reveals nothing of the answer;
 answer and salt lie elsewhere, and are opened when the diagnosis has spoken. The seal holds the digest of the
 recordings, too.
 

@@ -1,8 +1,8 @@
 """How well a diagnosis did: its ``diagnosis.json`` against the answer. Pure functions.
 
 An effect counts as named by its own name. Where the draw found that another effect does the same to the campaign,
-so that nobody can tell which it is, naming that one counts too, if the verdict says that it cannot tell the two
-apart. The port of something unknown counts as found, too, where the verdict says that it cannot tell it from the one
+so that nothing shows which it is, naming that one counts too, if the verdict says that it cannot distinguish the two.
+The port of something unknown counts as found, too, where the verdict says that it cannot distinguish it from the one
 that it names. Marks that do not apply to a kind of trial are None.
 
 What many trials say together: rates with their intervals, and who is taken for whom. Pure functions.
@@ -61,7 +61,7 @@ class Score:
         unknown_recognised: the verdict is unknown; of trials whose effect is not in the catalogue.
         both_named: both drawn effects and no other are named; of trials with two.
         share_closed: share of the explainable gap that the diagnosis closed, on tests held out; None if there
-            is none or the diagnosis does not tell.
+            is none or the diagnosis does not say.
         intervals: of the effects' parameters, where the verdict names all of them and no other.
         wall_s: how long the diagnosis took [s].
     """
@@ -229,7 +229,7 @@ class Rate:
 
 
 def rates_of(scores: Sequence[Score]) -> dict[str, Rate]:
-    """All rates by name, in the order in which they are told."""
+    """All rates by name, in the order in which they are reported."""
     held = [interval.holds for score in scores for interval in score.intervals.values()]
     closed = [score.share_closed for score in scores if score.named_right or score.both_named]
     return {

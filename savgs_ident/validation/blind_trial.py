@@ -179,7 +179,7 @@ def _diagnosed(diagnose: Diagnose, folder: Path, rig: Rig, without: tuple[str, .
 def draw_and_record(plan: Plan, bench: Bench, number: int) -> Drawn:
     """A rig drawn in secret, and its campaign by the transient simulator.
 
-    Raises :class:`InputError` if none that can be judged, or none that comes to a steady motion, is found.
+    Raises :class:`InputError` if none that can be assessed, or none that comes to a steady motion, is found.
     """
     for attempt in range(DRAWS):
         random = np.random.default_rng((plan.seed, number, attempt))
@@ -215,8 +215,8 @@ def _is_recorded(folder: Path, plan: Plan, number: int) -> bool:
     whole = all(path.is_file() for path in (campaign / "seal.json", campaign / FILE, folder / "answer.json"))
     if not whole:
         return False
-    told = _read(folder / "answer.json", lambda record: (record.get("trial"), record.get("settings")))
-    return told == (number, plan.marks())
+    known = _read(folder / "answer.json", lambda record: (record.get("trial"), record.get("settings")))
+    return known == (number, plan.marks())
 
 
 def _folder(out: Path, number: int) -> Path:

@@ -208,7 +208,7 @@ def false_alarms(
         channels: the map that the campaign was read with, by which an earlier run is recognised.
         jobs: draws at a time on this machine; one for each core if left out.
         scheduler: address of a Dask cluster to work on instead.
-        progress: is told what is being done.
+        progress: called with a sentence on what is being done.
 
     Raises :class:`InputError` as :func:`diagnose` does, and for draws of something else in the folder.
     """

@@ -1,4 +1,4 @@
-"""Effects that do the same to a campaign: nobody can tell from it which of them the rig has.
+"""Effects that do the same to a campaign: nothing in it shows which of them the rig has.
 
 To first order about the rig without any it is seen which ones may: effects without states by their derivatives, those
 with states by what they do along its motion, for several of their shapes.

@@ -75,6 +75,6 @@ def _bench(model: RigModel, programme: Programme) -> Bench:
 
 
 def _begun(recording: Recording, start: float) -> Recording:
-    """The recording with a clock that tells the date, ``start`` being its first instant [s since 1970]."""
+    """The recording with a clock that has the date, ``start`` being its first instant [s since 1970]."""
     channels = {name: replace(each, time=each.time + start) for name, each in recording.channels.items()}
     return replace(recording, channels=channels)

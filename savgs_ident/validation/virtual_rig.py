@@ -75,7 +75,7 @@ class Sensors:
 
     Attributes:
         rate: sampling rate [Hz].
-        jitter: rms error of the sampling instants [s]; the stamps tell the true ones.
+        jitter: rms error of the sampling instants [s]; the stamps give the true ones.
         accel: rms noise of the acceleration [m/s^2].
         deflection: of the deflection [m].
         road: of the road's height [m].

@@ -73,7 +73,7 @@ def test_without_times_the_order_is_that_of_names_with_their_numbers(tmp_path: P
         "campaign",
         [1.0, 2.0, 3.0],
     )
-    assert "Only 2 of 3 recordings tell when they began" in record["notes"][0]
+    assert "Only 2 of 3 recordings say when they began" in record["notes"][0]
 
 
 def test_campaigns_that_scatter_widen_the_errors_and_it_is_said(
@@ -102,7 +102,7 @@ def test_a_failed_campaign_is_told_and_the_rest_is_finished(
     assert run(week, out=out) == NOT_TRUSTED
     said = capsys.readouterr().err.splitlines()
     assert "Failed: bad: ValueError: no good" in said
-    assert "Not to be trusted: vague: the data cannot tell every free parameter." in said
+    assert "Not to be trusted: vague: the data do not identify every free parameter." in said
     assert said[-1].startswith("1 of 10 campaigns failed and 1 of 10 campaigns is not to be trusted")
     record = record_of(out)
     assert record["counts"] == {"ok": 8, "not trusted": 1, "failed": 1}

@@ -135,10 +135,10 @@ def test_a_fit_that_did_not_converge_is_code_1_with_the_reason(again: Any, fitte
 
 
 def test_data_that_cannot_tell_are_code_1_with_the_verdict(again: Any, fitted: Any) -> None:
-    blind = Verdict(False, ("mu_t and ydot_Hth cannot be told apart.",), (("mu_t", "ydot_Hth"),))
+    blind = Verdict(False, ("mu_t and ydot_Hth cannot be distinguished.",), (("mu_t", "ydot_Hth"),))
     done = again(replace(fitted[2], verdict=blind))
     assert done.exit_code == 1
-    assert "- mu_t and ydot_Hth cannot be told apart." in done.stdout
+    assert "- mu_t and ydot_Hth cannot be distinguished." in done.stdout
 
 
 def test_a_sound_fit_is_code_0(again: Any, fitted: Any) -> None:

@@ -198,7 +198,7 @@ def test_faults_are_named(rig: Rig) -> None:
     with pytest.raises(InputError, match="its value is a bound"):
         tolerated_bijection(IDENTIFIED["compliance from null"])
     for parameter in (Parameter("a", 0.0, "1", lower=0.0), Parameter("b", 0.0, "1")):
-        with pytest.raises(InputError, match="nothing tells the scale"):
+        with pytest.raises(InputError, match="nothing gives the scale"):
             FreeVector(ParameterTable((parameter,)), (parameter.name,))
 
 

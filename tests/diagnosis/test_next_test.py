@@ -1,4 +1,4 @@
-"""Tests that would tell two hypotheses apart."""
+"""Tests that would distinguish two hypotheses."""
 
 from dataclasses import replace
 

@@ -29,7 +29,7 @@ TRUTH: Mapping[str, float] = {
 """What the nominal recordings were made with, where it is not (or not to be taken) from the rig sheet [SI]."""
 
 FEW = (1.4, 2.0, 2.35, 3.0, 4.0, 5.0, 5.5, 6.0)
-"""Dwells that tell all four parameters [Hz]."""
+"""Dwells that identify all four parameters [Hz]."""
 
 _BY_DWELL = (
     "frequency", "frequency_sd", "harmonics", "covariance", "valid", "peak_to_peak", "peak_to_peak_sd",

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from savgs_ident.fit.identifiability import TOLD, known_combination, untold_groups, verdict_of
-from savgs_ident.fit.minimise import UNTOLD, spread_of
+from savgs_ident.fit.identifiability import LARGEST_SD, confounded_groups, known_combination, verdict_of
+from savgs_ident.fit.minimise import LARGEST_SPREAD, spread_of
 
 NAMES = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
 VALUES = {"mu_r": 0.03, "mu_t": 0.3, "ydot_Hth": 0.06, "c_sd": 5400.0}
@@ -29,22 +29,24 @@ def _words(covariance: NDArray[np.float64], bounds: dict[str, float] | None = No
 
 def test_well_told_parameters_form_no_group_and_are_listed_with_their_errors() -> None:
     covariance = np.diag([0.01, 0.02, 0.03, 0.005]) ** 2
-    assert untold_groups(NAMES, covariance) == ()
+    assert confounded_groups(NAMES, covariance) == ()
     verdict = verdict_of(NAMES, VALUES, UNITS, covariance, {}, ())
     assert verdict.identifiable
     assert verdict.confounded == ()
-    assert verdict.sentences == ("These data tell mu_r to 1 %, mu_t to 2 %, ydot_Hth to 3 %, c_sd to 0.5 %.",)
+    assert verdict.sentences == (
+        "These data identify mu_r to 1 %, mu_t to 2 %, ydot_Hth to 3 %, c_sd to 0.5 %.",
+    )
 
 
 def test_a_pair_that_grows_together_is_known_by_its_ratio() -> None:
     covariance = _covariance(0.01, ((0.0, 1.0, 1.0, 0.0), 30.0))
-    assert untold_groups(NAMES, covariance) == (("mu_t", "ydot_Hth"),)
+    assert confounded_groups(NAMES, covariance) == (("mu_t", "ydot_Hth"),)
     verdict = verdict_of(NAMES, VALUES, UNITS, covariance, {"ydot_Hth": 0.043}, ("Do this.",))
     assert not verdict.identifiable
     assert verdict.confounded == (("mu_t", "ydot_Hth"),)
     assert verdict.sentences == (
-        "These data tell mu_r to 1 %, c_sd to 1 %.",
-        "mu_t and ydot_Hth cannot be told apart: they trade off along a line.",
+        "These data identify mu_r to 1 %, c_sd to 1 %.",
+        "mu_t and ydot_Hth cannot be distinguished: they trade off along a line.",
         "What is known is mu_t/ydot_Hth = 5 1/(m/s), to 1.4 %.",
         "ydot_Hth is at least 0.043 m/s (95 %, profile likelihood).",
         "Do this.",
@@ -60,10 +62,10 @@ def test_a_pair_of_which_one_grows_as_the_other_shrinks_is_known_by_its_product(
 
 
 def test_a_parameter_without_influence_stands_alone() -> None:
-    covariance = _covariance(0.01, ((1.0, 0.0, 0.0, 0.0), UNTOLD))
-    assert untold_groups(NAMES, covariance) == (("mu_r",),)
+    covariance = _covariance(0.01, ((1.0, 0.0, 0.0, 0.0), LARGEST_SPREAD))
+    assert confounded_groups(NAMES, covariance) == (("mu_r",),)
     words = _words(covariance)
-    assert "These data do not tell mu_r." in words
+    assert "These data do not identify mu_r." in words
     assert "apart" not in words
 
 
@@ -74,18 +76,18 @@ def test_a_pair_of_which_nothing_is_known_has_no_combination() -> None:
 
 def test_directions_that_share_a_parameter_make_one_group() -> None:
     covariance = _covariance(0.01, ((1.0, 1.0, 0.0, 0.0), 30.0), ((1.0, -1.0, 1.5, 0.0), 20.0))
-    assert untold_groups(NAMES, covariance) == (("mu_r", "mu_t", "ydot_Hth"),)
-    assert "mu_r and mu_t and ydot_Hth cannot be told apart" in _words(covariance)
+    assert confounded_groups(NAMES, covariance) == (("mu_r", "mu_t", "ydot_Hth"),)
+    assert "mu_r and mu_t and ydot_Hth cannot be distinguished" in _words(covariance)
 
 
 def test_two_pairs_are_two_groups() -> None:
     covariance = _covariance(0.01, ((1.0, 0.0, 0.0, 1.0), 30.0), ((0.0, 1.0, 1.0, 0.0), 20.0))
-    assert sorted(untold_groups(NAMES, covariance)) == [("mu_r", "c_sd"), ("mu_t", "ydot_Hth")]
+    assert sorted(confounded_groups(NAMES, covariance)) == [("mu_r", "c_sd"), ("mu_t", "ydot_Hth")]
 
 
 @pytest.mark.parametrize(("share", "told"), [(0.99, True), (1.01, False)])
 def test_the_limit_is_a_share_of_the_value(share: float, told: bool) -> None:
-    covariance = _covariance(0.01, ((0.0, 0.0, 0.0, 1.0), share * TOLD))
+    covariance = _covariance(0.01, ((0.0, 0.0, 0.0, 1.0), share * LARGEST_SD))
     assert verdict_of(NAMES, VALUES, UNITS, covariance, {}, ()).identifiable is told
 
 
@@ -99,8 +101,8 @@ def test_a_verdict_is_consistent_whatever_the_covariance(seed: int, scale: float
     members = [name for group in verdict.confounded for name in group]
     assert len(members) == len(set(members))
     if verdict.identifiable:
-        assert np.max(np.sqrt(np.diag(covariance))) <= TOLD
-    if np.max(np.linalg.eigvalsh(covariance)) <= TOLD**2:
+        assert np.max(np.sqrt(np.diag(covariance))) <= LARGEST_SD
+    if np.max(np.linalg.eigvalsh(covariance)) <= LARGEST_SD**2:
         assert verdict.identifiable
 
 
@@ -119,6 +121,6 @@ def test_a_direction_without_information_has_a_large_spread_and_leaves_the_other
     jacobian = np.array([[10.0, -10.0, 0.0], [0.0, 0.0, 5.0]])
     spread = spread_of(jacobian)
     assert spread.sd[2] == pytest.approx(0.2)
-    assert spread.sd[:2] == pytest.approx([UNTOLD / np.sqrt(2.0)] * 2, rel=1e-6)
+    assert spread.sd[:2] == pytest.approx([LARGEST_SPREAD / np.sqrt(2.0)] * 2, rel=1e-6)
     difference = np.array([1.0, -1.0, 0.0])
     assert difference @ spread.covariance @ difference == pytest.approx(0.01, rel=1e-3)

@@ -110,7 +110,7 @@ def test_it_is_far_better_than_what_it_started_from(nominal: Fit, measured: Harm
 
 @pytest.mark.slow
 def test_fixed_tolerances_on_a_rig_that_is_as_drawn(bench: Bench, few: HarmonicResponse) -> None:
-    """With spring and tyre as they truly are and all else exact, few dwells tell the four parameters."""
+    """With spring and tyre as they truly are and all else exact, few dwells identify the four parameters."""
     problem = bench.task.problem
     assert problem.free.tolerated == ()
     found = bench.fit(np.asarray(problem.target.measured))

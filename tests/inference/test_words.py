@@ -58,7 +58,7 @@ def test_two_that_trade_off_are_named_with_what_is_known(correlation: float, lab
         f"mu_t and ydot trade off along a line: {label} is known to {error:.2g} %, "
         "they themselves to 5 % and 4 %." in said
     )
-    assert "These data tell mu_t to 5 %, ydot to 4 %." in said
+    assert "These data identify mu_t to 5 %, ydot to 4 %." in said
 
 
 def test_two_that_hardly_correlate_are_not() -> None:
@@ -67,15 +67,15 @@ def test_two_that_hardly_correlate_are_not() -> None:
 
 def test_one_that_is_not_told_is_said_to_be_so() -> None:
     said = _said(_log_normal(0.0, second=0.6), advice=("A dwell at 5 Hz would help.",))
-    assert "These data do not tell ydot." in said
-    assert "These data tell mu_t to 5 %." in said
+    assert "These data do not identify ydot." in said
+    assert "These data identify mu_t to 5 %." in said
     assert "A dwell at 5 Hz would help." in said
 
 
 def test_two_that_cannot_be_told_apart_are_said_to_be_so_once() -> None:
     said = _said(_log_normal(0.999, first=0.6, second=0.6))
     assert [each for each in said if "trade off" in each] == [
-        "mu_t and ydot cannot be told apart: they trade off along a line."
+        "mu_t and ydot cannot be distinguished: they trade off along a line."
     ]
     error = 100.0 * 0.6 * np.sqrt(2.0 * 0.001)
     assert any(each.startswith("What is known is mu_t/ydot = ") and f"{error:.2g} %" in each for each in said)

@@ -89,7 +89,7 @@ def fit(measured: HarmonicResponse, rig: Rig) -> Fit:
         prior_chi2=0.6,
         status=Status.CONVERGED,
         dwell_status=(Status.CONVERGED,) * FREQUENCY.size,
-        verdict=Verdict(True, ("The data tell all free parameters.",)),
+        verdict=Verdict(True, ("The data identify all free parameters.",)),
         measured=measured,
         orders=ORDERS,
         used=used,

@@ -33,7 +33,7 @@ CORRELATION = np.array(
 )
 AUTOCORRELATION = 3.0
 SENTENCES = (
-    "The data tell mu_r to 1.0 %, mu_t to 0.56 %, ydot_Hth to 0.65 % and c_sd to 0.47 %.",
+    "The data identify mu_r to 1.0 %, mu_t to 0.56 %, ydot_Hth to 0.65 % and c_sd to 0.47 %.",
     "mu_t and ydot_Hth trade off along a line: their ratio is known to 0.3 %.",
     "A dwell above 4.5 Hz separates them best.",
 )

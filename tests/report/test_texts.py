@@ -73,7 +73,7 @@ def test_the_text_of_a_fit_says_parameters_quality_and_verdict(fit: Fit) -> None
     ):
         assert part in text
     assert "Strongest correlation: mu_r with c_sd, -0.50" in text
-    assert "The data tell all free parameters." in text
+    assert "The data identify all free parameters." in text
     assert re.search(r"k_t .*-0\.8", text), "a tolerance parameter stands with its shift"
     assert text.index("mu_r") < text.index("chi2/dof") < text.index("Verdict")
 
@@ -114,7 +114,7 @@ def test_a_dwell_that_was_not_solved_is_not_converged(fit: Fit) -> None:
 
 
 def test_data_that_cannot_tell_are_converged_but_not_trusted(fit: Fit) -> None:
-    blind = Verdict(False, ("mu_t and ydot_Hth cannot be told apart.",), (("mu_t", "ydot_Hth"),))
+    blind = Verdict(False, ("mu_t and ydot_Hth cannot be distinguished.",), (("mu_t", "ydot_Hth"),))
     origin = Origin(warnings=(DataWarning("odd", "something is odd"),))
     record = as_json(fit_record(replace(fit, verdict=blind, origin=origin)))
     assert record["converged"] is True

@@ -3,7 +3,7 @@
     reading / truth = cos(tilt) = 1 - v
 
 with the versine v = 1 - cos(tilt) [1], in which the reading is linear; 0.0075 is 7 deg, and hardly anyone mounts a
-sensor further off. It looks like a gain below one, and nothing in the readings can tell the two apart.
+sensor further off. It looks like a gain below one, and nothing in the readings can distinguish the two.
 
 Source: Titterton and Weston 2004, Strapdown Inertial Navigation Technology, on misalignment.
 """
@@ -32,7 +32,7 @@ class Tilt(AbstractSensorLaw):
         return {"versine": Parameter("versine", 0.0075, "1", lower=0.0, upper=0.5, about=about)}
 
     def suits(self, port: Port) -> bool:
-        """Nowhere without more than a port tells: it is a gain below one."""
+        """Nowhere without more than a port declares: it is a gain below one."""
         return False
 
     def transfer(self, v: Values, frequency: Float[Array, "*f"]) -> Complex[Array, "*f"]:

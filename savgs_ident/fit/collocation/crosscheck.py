@@ -8,12 +8,12 @@ estimated along under their priors, as in the fit.
 
 IPOPT on a program, and how it ended.
 
-What the samples tell about the parameters, from the solved program.
+What the samples say of the parameters, from the solved program.
 
 The constraints fix the motions once the parameters are given: J_z dz = -J_u du. So the objective's curvature,
 taken along, is the information on parameters and sensors' zeros; the latter are eliminated.
 
-What the cross-check found, with what the samples tell about it.
+What the cross-check found, with what the samples say of it.
 """
 
 import time
@@ -151,7 +151,7 @@ def information(program: Program, w: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def spread_at(program: Program, w: NDArray[np.float64]) -> Spread:
-    """The spread of the parameters' coordinates; directions that the samples do not tell as in a fit.
+    """The spread of the parameters' coordinates; directions that the samples do not identify as in a fit.
 
     ``w`` [1], (m,), are the scaled unknowns of the solution.
     """
@@ -203,12 +203,12 @@ def assemble_result(task: Task, program: Program, end: Solution, wall_s: float) 
     spread = spread_at(program, end.w) if end.status.ok else Spread(np.full((n, n), np.nan))
     slope = np.asarray(problem.slopes(u))
     prior = float(np.sum(np.asarray(problem.free.prior_residuals(u)) ** 2))
-    told = len(problem.free.identified) + program.unknowns.zeros.size
+    known = len(problem.free.identified) + program.unknowns.zeros.size
     return CollocationFit(
         estimates=_estimates(task, u, slope * _told(spread, problem.free)),
         covariance=np.asarray(spread.covariance * np.outer(slope, slope), np.float64),
         chi2=2.0 * end.objective - prior,
-        dof=program.quadratic.samples - told,
+        dof=program.quadratic.samples - known,
         prior_chi2=prior,
         status=end.status,
         iterations=end.iterations,
@@ -270,24 +270,26 @@ def fit_by_collocation(
     """Estimate ``free`` parameters of a model from the samples of the dwells of ``measured``.
 
     The response gives frequencies, noise, and the harmonics of the inputs; the samples of the channels come from
-    ``campaign``. ``progress`` is told what is going on. Raises :class:`InputError` for names that do not exist or
-    that the model does not use, and for recordings that do not belong to the response. Look at its ``status``.
+    ``campaign``. ``progress`` is called with what is being done. Look at the ``status`` of the result.
+
+    Raises :class:`InputError` for names that do not exist or that the model does not use, and for recordings that do
+    not belong to the response.
     """
-    began, tell = time.perf_counter(), progress or _silent
+    began, report = time.perf_counter(), progress or _silent
     settings = settings or CollocationSettings()
     planned = ProblemSettings(fixed_tolerances=settings.fixed_tolerances, periodic=settings.periodic)
     task = plan_task(measured, model, free, planned)
-    tell("solving the model as given")
+    report("solving the model as given")
     near = simulate_periodic(task.problem.model, task.problem.fixed, task.excitation, settings.periodic)
     points = radau_points(near.mesh)
-    tell("gathering the samples")
+    report("gathering the samples")
     misfits = _misfits(campaign, measured, model.plant, points)
-    tell("telling CasADi the equations")
+    report("translating the equations")
     program = _program(task, points, misfits)
-    tell(f"IPOPT: {program.unknowns.size} unknowns, {program.quadratic.samples} samples")
+    report(f"IPOPT: {program.unknowns.size} unknowns, {program.quadratic.samples} samples")
     start = start_vector(task, program, points, near)
     end = solve_program(program, start, settings.iterations, settings.tolerance)
-    tell(f"IPOPT: {end.iterations} iterations, {end.status.advice}")
+    report(f"IPOPT: {end.iterations} iterations, {end.status.advice}")
     return assemble_result(task, program, end, time.perf_counter() - began)
 
 

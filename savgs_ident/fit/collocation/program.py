@@ -1,7 +1,7 @@
 """The whole optimisation: an objective, constraints and their exact derivatives.
 
 Constraints are the equations of the points, and the rule of the steps, which is linear. The equations of a point
-know the parameters and the unknowns of that point only: so one small dense Jacobian, told to CasADi once and
+know the parameters and the unknowns of that point only: so one small dense Jacobian, translated to CasADi once and
 evaluated at all points, is put in its places of the large sparse one.
 
 What is minimised: samples and priors, quadratic in the unknowns.
@@ -10,7 +10,7 @@ As Hessian IPOPT is given that of the objective alone (Gauss-Newton): where resi
 the constraints weighs little, and along the constraints the objective is convex from the start, so that every
 step leads downhill.
 
-The equations of one point, told to CasADi: the model's residual, and what the sensors read.
+The equations of one point, translated to CasADi: the model's residual, and what the sensors read.
 
 Where the optimisation starts: the model's values, and the periodic motions there.
 """

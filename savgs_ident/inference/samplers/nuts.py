@@ -23,7 +23,7 @@ own. K is reversible because
 A proposal must start from the state that the chain is in. To go on from the last *proposal* instead, accepted or not,
 is right only where proposals are independent of where they start.
 
-The tail of the weights w at the proposals, which are nearly draws of s, tells whether the surrogate covers the
+The tail of the weights w at the proposals, which are nearly draws of s, shows whether the surrogate covers the
 posterior: its Pareto index k is reported.
 """
 

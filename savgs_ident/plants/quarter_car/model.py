@@ -163,8 +163,8 @@ class RigModel:
         origin = Origin(model=self.rig.source, rig=self.rig.name, effects=self.effects)
         if campaign is None:
             return origin
-        told = (*campaign.warnings, *warnings)
-        return replace(origin, data=campaign.source, data_sha256=campaign.sha256, warnings=told)
+        every = (*campaign.warnings, *warnings)
+        return replace(origin, data=campaign.source, data_sha256=campaign.sha256, warnings=every)
 
     def _values_before(self) -> dict[str, float]:
         before = self.rig.provenance.get("before", {})
