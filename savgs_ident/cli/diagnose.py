@@ -82,8 +82,8 @@ def diagnose(
 
     Exit code 1 if a search that the verdict stands on did not converge.
 
-    Examples: savgs-ident diagnose campaign.csv.gz --model simqc
-              savgs-ident diagnose axis.mat --plant axis --held-out axis_again.mat
+    Example: savgs-ident diagnose campaign.csv.gz --model simqc
+    Example: savgs-ident diagnose axis.mat --plant axis --held-out axis_again.mat
     """
     import savgs_ident as si
     from savgs_ident.core.output import prepare_folder

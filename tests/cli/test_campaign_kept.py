@@ -58,6 +58,7 @@ def _unsealed(path: Path) -> None:
     (path / "done.json").write_text("{")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("harm", [_lost, _cut, _unsealed])
 def test_what_is_not_whole_is_done_anew(week: Path, tmp_path: Path, harm: Callable[[Path], None]) -> None:
     out, seen = tmp_path / "out", []

@@ -241,6 +241,7 @@ def test_tables_are_shown_without_json(again: Any, designed: Any) -> None:
         assert words in done.stdout
 
 
+@pytest.mark.slow
 def test_an_unstable_loop_is_code_1_with_the_reason(again: Any, designed: Any) -> None:
     margins = replace(designed[2].digital_margins, stable=False)
     done = again(replace(designed[2], digital_margins=margins), "--json")

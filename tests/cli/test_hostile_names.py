@@ -57,6 +57,7 @@ def _harmless(page: Path) -> None:
     assert any("<script>alert(1)" in text for text in reader.texts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some_now(FILES), ids=range(len(FILES)))
 def test_a_file_of_any_name_is_read_and_nothing_is_written_elsewhere(
     installed: Installed, short_campaign: Path, name: bytes
@@ -89,6 +90,7 @@ def test_a_test_and_a_column_of_any_name(installed: Installed, short_campaign: P
     }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("topic", [EVIL, "/" + "t" * 5000, "two\nlines\x1b[31m"])
 def test_a_topic_of_any_name(installed: Installed, topic: str) -> None:
     with (installed.folder / "run.mcap").open("wb") as stream:

@@ -23,6 +23,7 @@ def _slow_but(name: str, room: int = 30_000) -> tuple[pytest.MarkDecorator, ...]
     return () if name in FAST and room == 30_000 else (pytest.mark.slow,)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "more", "room", "refused", "kept"),
     [

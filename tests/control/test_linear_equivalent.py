@@ -251,6 +251,7 @@ def distributed(small: SmallMotions) -> TwoMasses:
     return small.masses["(8), masses distributed, too"]
 
 
+@pytest.mark.slow
 def test_distributed_masses_weigh_in_heave_what_the_lumped_ones_do(
     distributed: TwoMasses, numbers: Values
 ) -> None:

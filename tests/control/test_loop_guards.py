@@ -77,12 +77,14 @@ def test_the_law_sees_what_the_sensors_show(friction: QuarterCar, numbers: Value
     assert np.std(deaf.signals.sprung_accel) > 0.1
 
 
+@pytest.mark.slow
 def test_a_motion_beyond_the_linkage_is_none(friction: QuarterCar, numbers: Values, loop: Loop) -> None:
     run = run_loop(friction, numbers, cam(2.0, 0.4).road, passive(loop, numbers), TEST.duration)
     assert run.status is Status.NOT_FINITE
     assert not measure_ride(run, TEST).stable
 
 
+@pytest.mark.slow
 def test_a_law_that_begins_at_another_angle_says_that_it_doubts(
     friction: QuarterCar, numbers: Values, loop: Loop
 ) -> None:

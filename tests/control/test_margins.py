@@ -86,6 +86,7 @@ def test_a_sampled_loop_ends_at_half_its_rate(k: float) -> None:
     assert not _of((k + 1.5) / (z - 0.5)).stable
 
 
+@pytest.mark.slow
 @given(k=st.floats(0.05, 0.25), lag=st.floats(0.01, 10.0), resonance=st.floats(0.3, 0.9))
 def test_the_peak_of_the_sensitivity_is_the_largest_of_a_brute_sweep(
     k: float, lag: float, resonance: float

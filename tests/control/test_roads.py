@@ -33,6 +33,7 @@ def test_the_standard_is_read_as_it_is_printed() -> None:
     assert pytest.approx((0.011, 2.83)) == BAND
 
 
+@pytest.mark.slow
 @over("grade", GEOMETRIC_MEAN)
 @over("speed", [5.0, 20.0, 40.0])
 def test_the_spectrum_of_a_road_is_that_of_its_class_at_any_speed(grade: str, speed: float) -> None:

@@ -87,6 +87,7 @@ def test_increasing(case: Case, ends: tuple[float, float]) -> None:
     assert float(case.forward(low)) < float(case.forward(high))
 
 
+@pytest.mark.slow
 @every_case
 def test_the_slope_is_that_of_finite_differences(case: Case) -> None:
     points = jnp.array([-3.3, -1.01, -0.2, 0.0, 0.7, 1.9, 4.1])

@@ -107,6 +107,7 @@ def test_the_column_of_a_mount_is_that_of_the_model_that_has_one(
     assert _relative(columns[1][:, 0], expected, data) < 0.06
 
 
+@pytest.mark.slow
 def test_a_frame_that_is_marched_answers_its_load_as_an_oscillator_does(
     plant_and_data: Case, start: PeriodicSolution
 ) -> None:

@@ -53,6 +53,7 @@ def test_the_force_of_the_rails_friction_is_that_of_its_bristle(
     assert np.sqrt(np.mean((tanh - expected) ** 2)) > 0.1 * size, "a tanh would pass for the bristle"
 
 
+@pytest.mark.slow
 def test_the_force_of_a_mount_does_to_the_response_what_the_mount_does(
     plant_and_data: Case, start: PeriodicSolution
 ) -> None:

@@ -131,6 +131,7 @@ def test_a_plant_with_more_coordinates_and_a_campaign_of_dwells_are_refused() ->
         si.diagnose(si.PlantModel(si.TwoMass(), si.TwoMass.parameters), response, held_out=motion)
 
 
+@pytest.mark.slow
 def test_where_nothing_is_missing_nothing_is_named(tmp_path: Path) -> None:
     gap = si.diagnose(_axis(), driven_motion(recorded_axis({}, 0)))
     assert (gap.verdict.kind, gap.verdict.effects) == ("none", ())

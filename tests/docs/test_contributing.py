@@ -82,6 +82,7 @@ def test_the_law_vanishes_at_its_null_brakes_and_is_found_at_ports(monkeypatch: 
     assert found["tyre_eddy_brake"].parameters[0].unit == "N s/m"
 
 
+@pytest.mark.slow
 def test_the_name_joins_the_quarter_car(rig: Rig) -> None:
     effect = _example("rail_eddy_brake").RAIL_EDDY_BRAKE
     bare = build_model(rig, ())
@@ -123,6 +124,7 @@ def test_the_pendulum_answers_as_its_closed_form_says_where_the_angle_is_small()
     assert np.max(np.abs(angle[:, 2:])) < 2e-4 * np.max(np.abs(wanted))
 
 
+@pytest.mark.slow
 def test_friction_at_the_pivot_shows_in_the_third_order_and_is_found_by_the_fit() -> None:
     shaken = _example("shaken_pendulum")
     angle = shaken.measured.harmonics[:, shaken.measured.channel("angle")]

@@ -5,6 +5,7 @@ and sensors that err are no mechanisms.
 """
 
 import numpy as np
+import pytest
 
 from savgs_ident.effects.effect import Effect
 
@@ -14,6 +15,7 @@ from .cycles import along_a_cycle
 from .kinds import MECHANISMS, effects_of
 
 
+@pytest.mark.slow
 @over("seed", range(3))
 @over("effect", effects_of(*MECHANISMS))
 def test_it_adds_no_energy_over_a_cycle(effect: Effect, numbers: dict[str, float], seed: int) -> None:

@@ -95,6 +95,7 @@ def test_a_contact_that_sticks_has_limits_and_a_port_that_does_not_a_bristle_of_
     assert "spindle_friction" in EFFECTS
 
 
+@pytest.mark.slow
 @each_effect
 def test_it_is_nothing_at_its_null_and_tells_itself_there(effect: Effect) -> None:
     null = _values(effect, null=True)

@@ -82,6 +82,7 @@ def test_it_comes_back_from_far_away(bench: Bench, start: dict[str, float]) -> N
     assert np.asarray(far.u) == pytest.approx(np.asarray(near.u), abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [*AWAY, {"mu_t": 0.05, "ydot_Hth": 0.3}], ids=str)
 def test_converged_means_that_nothing_is_left_to_gain(bench: Bench, start: dict[str, float]) -> None:
     """In whichever minimum it ends: a step that was rejected must not pass for the last one."""

@@ -78,6 +78,7 @@ def slopes(
     return {name: np.asarray(along(p, still | {name: np.asarray(1.0)})) for name in numbers}
 
 
+@pytest.mark.slow
 def test_every_parameter_of_the_drawing_counts_and_no_other(
     rig: Rig, slopes: dict[str, NDArray[np.float64]]
 ) -> None:
@@ -124,6 +125,7 @@ def test_the_residual_is_made_of_what_can_be_translated(simtr: QuarterCar, numbe
     assert sum(used[name] for name in TABLE_LOOK_UP) <= 2
 
 
+@pytest.mark.slow
 def test_curves_of_the_linkage_are_its_closed_form(numbers: dict[str, float]) -> None:
     """Over the whole range of the curves."""
     p = as_values(shifted(numbers, 3))

@@ -113,6 +113,7 @@ def test_pictures_are_valid_files_of_the_size_asked_for(bode: Figure, tmp_path: 
     assert pdf.read_bytes().rstrip().endswith(b"%%EOF")
 
 
+@pytest.mark.slow
 def test_the_same_figure_gives_the_same_bytes(curves: list[ModelCurve], tmp_path: Path) -> None:
     for name in ("one", "two"):
         (tmp_path / name).mkdir()

@@ -45,6 +45,7 @@ def errors_of(response: HarmonicResponse, harmonics: Any) -> Any:
     return np.stack([error.real, error.imag], axis=-1)
 
 
+@pytest.mark.slow
 def test_mean_error_lies_within_its_standard_error(drawn: tuple[HarmonicResponse, Any]) -> None:
     response, harmonics = drawn
     error = errors_of(response, harmonics)

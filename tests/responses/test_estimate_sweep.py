@@ -75,6 +75,7 @@ def test_response_is_the_linear_one_with_its_known_bias() -> None:
     assert np.max(np.abs(bias)[settled]) > np.max(error)
 
 
+@pytest.mark.slow
 def test_deviation_is_the_scatter_of_repeated_sweeps() -> None:
     runs = [estimate_sweep_response(sweep(seed, 3e-4)) for seed in range(12)]
     c = runs[0].channel("susp_deflection")

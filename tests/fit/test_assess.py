@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from savgs_ident.fit.identifiability import EXPLAINED, judge
+from savgs_ident.fit.identifiability import EXPLAINED, assess
 from savgs_ident.plants.quarter_car.model import FREE
 
 from .bench import TRUTH, Bench, silent
@@ -10,7 +10,7 @@ from .bench import TRUTH, Bench, silent
 
 def test_a_model_that_explains_the_data_is_not_complained_of(bench: Bench) -> None:
     found = bench.fit(bench.predicted(TRUTH) + bench.noise(4))
-    verdict = judge(bench.task, bench.minimiser, found, silent)
+    verdict = assess(bench.task, bench.minimiser, found, silent)
     assert not any("does not explain" in sentence for sentence in verdict.sentences)
 
 
@@ -22,6 +22,6 @@ def test_a_model_that_lacks_something_is_said_first(bench: Bench) -> None:
     entries = bench.task.problem.target.entries
     excess = float(np.sum(found.residual**2)) / (entries - len(FREE))
     assert excess > EXPLAINED
-    first = judge(bench.task, bench.minimiser, found, silent).sentences[0]
+    first = assess(bench.task, bench.minimiser, found, silent).sentences[0]
     assert first.startswith("The model does not explain these data")
     assert f"chi2/dof = {excess:.3g}" in first
