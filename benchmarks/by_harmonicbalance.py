@@ -30,10 +30,9 @@ from savgs_ident.effects.bristle import Presliding, bristle
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
-from savgs_ident.plants.quarter_car.inputs import Inputs
 from savgs_ident.plants.quarter_car.kinematics import suspension_travel
 from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Road
+from savgs_ident.plants.quarter_car.tyre import Inputs, Road
 
 LADDER = (40, 60, 80)
 """Orders that are tried, in turn."""

@@ -24,7 +24,7 @@ from savgs_ident.recordings.checks_signal import (
     check_time,
     find_longest_constant,
 )
-from savgs_ident.recordings.recording import Channel, Recording
+from savgs_ident.recordings.recording import RecordedChannel, Recording
 
 RESPONSES = ("sprung_accel", "susp_deflection")
 """Channels of which a test with a moving road needs at least one."""
@@ -70,7 +70,7 @@ def screen(
 
 def screen_test(recording: Recording, source: str) -> tuple[Recording, tuple[DataWarning, ...]]:
     """One test with cleaned channels; raises :class:`InputError` where it cannot be used."""
-    channels: dict[str, Channel] = {}
+    channels: dict[str, RecordedChannel] = {}
     warnings: list[DataWarning] = []
     longest_gap = inf if recording.kind == "other" else LONGEST_GAP
     for name, channel in recording.channels.items():
@@ -164,7 +164,7 @@ def check_test(recording: Recording, place: DataLocation) -> tuple[DataWarning, 
     )
 
 
-def measure_frequency(road: Channel) -> float:
+def measure_frequency(road: RecordedChannel) -> float:
     """Frequency [Hz] of the road from its upward crossings of mid height (hysteresis a fifth of its travel).
 
     0 where it does not cross twice.

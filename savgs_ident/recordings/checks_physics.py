@@ -18,7 +18,7 @@ import numpy as np
 from savgs_ident.core.errors import DataWarning
 from savgs_ident.recordings.channels import STANDARD_GRAVITY
 from savgs_ident.recordings.checks_signal import DataLocation
-from savgs_ident.recordings.recording import Channel, Recording
+from savgs_ident.recordings.recording import RecordedChannel, Recording
 
 _LOW_HZ = 1.25
 """Half of the lowest resonance that a rig of this kind has, about."""
@@ -98,7 +98,7 @@ def _deflects(dwells: list[Recording], source: str) -> tuple[DataWarning, ...]:
     )
 
 
-def _correlation(one: Channel, other: Channel) -> float:
+def _correlation(one: RecordedChannel, other: RecordedChannel) -> float:
     """Correlation of two channels with clocks of their own, on the clock of the first."""
     there = np.interp(one.time, other.time, other.values)
     spread = float(np.std(one.values) * np.std(there))

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording
+from savgs_ident.recordings.recording import CANONICAL_UNITS, RecordedChannel, Recording
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ _FILL = "fill the time column, and check its unit"
 _MIND_UNIT = "check the unit of the time column (s, ms or us)"
 
 
-def check_stamps(channel: Channel, place: DataLocation) -> None:
+def check_stamps(channel: RecordedChannel, place: DataLocation) -> None:
     """Raises :class:`InputError` where a sample has no time, or one that is none."""
     bad = np.flatnonzero(~(np.abs(channel.time) <= _LONGEST_S))
     if bad.size:
@@ -65,8 +65,8 @@ def check_stamps(channel: Channel, place: DataLocation) -> None:
 
 
 def check_time(
-    channel: Channel, place: DataLocation, longest_gap: float = LONGEST_GAP
-) -> tuple[Channel, tuple[DataWarning, ...]]:
+    channel: RecordedChannel, place: DataLocation, longest_gap: float = LONGEST_GAP
+) -> tuple[RecordedChannel, tuple[DataWarning, ...]]:
     """The channel with repeated stamps removed, and warnings.
 
     ``longest_gap`` is how long a gap may be, as a share of the record.
@@ -92,7 +92,9 @@ def check_time(
     return channel, (*warnings, *_jumps(channel, median, longest_gap, place))
 
 
-def _without_repeats(channel: Channel, place: DataLocation) -> tuple[Channel, tuple[DataWarning, ...]]:
+def _without_repeats(
+    channel: RecordedChannel, place: DataLocation
+) -> tuple[RecordedChannel, tuple[DataWarning, ...]]:
     repeated = np.diff(channel.time, prepend=-np.inf) == 0.0
     count = int(np.count_nonzero(repeated))
     if count == 0:
@@ -116,7 +118,7 @@ def _without_repeats(channel: Channel, place: DataLocation) -> tuple[Channel, tu
 
 
 def _jumps(
-    channel: Channel, median: float, longest_gap: float, place: DataLocation
+    channel: RecordedChannel, median: float, longest_gap: float, place: DataLocation
 ) -> tuple[DataWarning, ...]:
     steps = np.diff(channel.time)
     jumps = np.flatnonzero(steps > _JUMP_STEPS * median)
@@ -149,8 +151,8 @@ _REGULAR = 1.5
 
 
 def check_missing(
-    channel: Channel, place: DataLocation, longest_gap: float = LONGEST_GAP
-) -> tuple[Channel | None, tuple[DataWarning, ...]]:
+    channel: RecordedChannel, place: DataLocation, longest_gap: float = LONGEST_GAP
+) -> tuple[RecordedChannel | None, tuple[DataWarning, ...]]:
     """The channel without its missing samples; None where there is nothing else.
 
     Regularly missing samples are those of a slower sensor in a faster table, and no fault. Raises
@@ -201,7 +203,7 @@ def _is_slower_sensor(kept: NDArray[np.float64], grid: NDArray[np.float64]) -> b
     return bool(inner and kept[0] - grid[0] <= _REGULAR * step and grid[-1] - kept[-1] <= _REGULAR * step)
 
 
-def check_possible(channel: Channel, place: DataLocation) -> None:
+def check_possible(channel: RecordedChannel, place: DataLocation) -> None:
     """Raises :class:`InputError` where a value is larger than any rig of this kind gives."""
     bound, suspect = LARGEST[channel.name]
     worst = int(np.argmax(np.abs(channel.values)))
@@ -214,7 +216,7 @@ def check_possible(channel: Channel, place: DataLocation) -> None:
         )
 
 
-def find_longest_constant(channel: Channel) -> tuple[float, float]:
+def find_longest_constant(channel: RecordedChannel) -> tuple[float, float]:
     """Length [s] and start [s] of the longest run of one and the same value."""
     edges = np.flatnonzero(np.diff(channel.values)) + 1
     starts = np.concatenate([[0], edges])

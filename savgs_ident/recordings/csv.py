@@ -33,7 +33,13 @@ from savgs_ident.recordings.channels import (
     split_header,
 )
 from savgs_ident.recordings.csv_table import GZIP_MAGIC, CsvHead, CsvTable, TextBlocks, read_head
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording, classify_test, unix_time
+from savgs_ident.recordings.recording import (
+    CANONICAL_UNITS,
+    RecordedChannel,
+    Recording,
+    classify_test,
+    unix_time,
+)
 
 _MOST_REPEATS = 20
 """A test that comes back more often than this is not a repeated test but a table out of order."""
@@ -202,7 +208,7 @@ def _split_tests(
                 kind=kind,
                 frequency_hz=frequency,
                 channels={
-                    channel: Channel(
+                    channel: RecordedChannel(
                         channel, CANONICAL_UNITS[channel], clock, values[start:stop], labels[channel]
                     )
                     for channel, values in channels.items()

@@ -49,7 +49,13 @@ from savgs_ident.recordings.mcap_timing import (
     pair_events,
     parse_event,
 )
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording, classify_test, unix_time
+from savgs_ident.recordings.recording import (
+    CANONICAL_UNITS,
+    RecordedChannel,
+    Recording,
+    classify_test,
+    unix_time,
+)
 
 
 def read_mcap(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading:
@@ -355,7 +361,7 @@ def _split_tests(
         spans = (Span(path.stem, start, None, None),)
     recordings = []
     for span in spans:
-        channels: dict[str, Channel] = {}
+        channels: dict[str, RecordedChannel] = {}
         for data, time in zip(topics, times, strict=True):
             channels |= _channels_within(span, data, time)
         kind, named = classify_test(span.name)
@@ -366,7 +372,7 @@ def _split_tests(
     return tuple(recordings), tuple(warnings)
 
 
-def _channels_within(span: Span, data: TopicData, time: NDArray[np.int64]) -> dict[str, Channel]:
+def _channels_within(span: Span, data: TopicData, time: NDArray[np.int64]) -> dict[str, RecordedChannel]:
     inside = time >= span.start
     if span.stop is not None:
         inside &= time <= span.stop
@@ -377,7 +383,7 @@ def _channels_within(span: Span, data: TopicData, time: NDArray[np.int64]) -> di
     contiguous = whole.stop - whole.start == picked.size
     clock = 1e-9 * (time[whole if contiguous else picked] - span.start).astype(np.float64)
     return {
-        binding.channel: Channel(
+        binding.channel: RecordedChannel(
             binding.channel,
             CANONICAL_UNITS[binding.channel],
             clock,

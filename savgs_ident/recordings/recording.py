@@ -43,7 +43,7 @@ TestKind = Literal["dwell", "sweep", "standstill", "other"]
 
 
 @dataclass(frozen=True)
-class Channel:
+class RecordedChannel:
     """One measured signal: ``time`` [s] and ``values`` [``unit``], both of shape (n,), read-only."""
 
     name: str
@@ -76,7 +76,7 @@ class Recording:
     name: str
     kind: TestKind
     frequency_hz: float | None
-    channels: Mapping[str, Channel]
+    channels: Mapping[str, RecordedChannel]
     start: float | None = None
 
     def __post_init__(self) -> None:

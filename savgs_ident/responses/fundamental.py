@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.recordings.recording import Channel, Recording
+from savgs_ident.recordings.recording import RecordedChannel, Recording
 from savgs_ident.responses.periodic_fit import (
     PeriodicBasis,
     fit_periodic,
@@ -71,7 +71,7 @@ def group_by_clock(
     Samples that are not finite are left out, and so are channels with fewer than 16 others. ``stretch``
     multiplies the time of a channel whose clock runs slow; 1 where it is not named.
     """
-    found: list[tuple[NDArray[np.float64], float, list[Channel]]] = []
+    found: list[tuple[NDArray[np.float64], float, list[RecordedChannel]]] = []
     for channel in recording.channels.values():
         factor = stretch.get(channel.name, 1.0)
         for time, other, members in found:
@@ -90,9 +90,9 @@ def _same(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
     return one is other or np.array_equal(one, other)
 
 
-def _split_by_gaps(time: NDArray[np.float64], members: list[Channel]) -> list[ClockGroup]:
+def _split_by_gaps(time: NDArray[np.float64], members: list[RecordedChannel]) -> list[ClockGroup]:
     """One group for each pattern of usable samples."""
-    patterns: dict[bytes, tuple[NDArray[np.bool_], list[Channel]]] = {}
+    patterns: dict[bytes, tuple[NDArray[np.bool_], list[RecordedChannel]]] = {}
     for channel in members:
         usable = np.isfinite(channel.values) & np.isfinite(time)
         patterns.setdefault(usable.tobytes(), (usable, []))[1].append(channel)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording
+from savgs_ident.recordings.recording import CANONICAL_UNITS, RecordedChannel, Recording
 from savgs_ident.responses.harmonic_response import SweepResponse
 
 ROAD = "road_height"
@@ -94,18 +94,20 @@ def estimate_sweep_response(
     )
 
 
-def _usable(channel: Channel | None) -> Channel | None:
+def _usable(channel: RecordedChannel | None) -> RecordedChannel | None:
     """The channel without samples that are not finite."""
     if channel is None:
         return None
     keep = np.isfinite(channel.values) & np.isfinite(channel.time)
     if np.count_nonzero(keep) < 2:
         return None
-    return Channel(channel.name, channel.unit, channel.time[keep], channel.values[keep], channel.source)
+    return RecordedChannel(
+        channel.name, channel.unit, channel.time[keep], channel.values[keep], channel.source
+    )
 
 
 def _road_windows(
-    test: str, road: Channel, cycles: float, overlap: float, source: str
+    test: str, road: RecordedChannel, cycles: float, overlap: float, source: str
 ) -> tuple[list[LocalPhase], NDArray[np.float64]]:
     """Local phases and the windows' first and last instants [s], (W, 2)."""
     times = crossing_times(road.time, road.values)
@@ -200,7 +202,7 @@ def _zero_of_chord(time: NDArray[np.float64], height: NDArray[np.float64]) -> fl
 
 
 def _channel_response(
-    channel: Channel | None, phases: list[LocalPhase], windows: NDArray[np.float64]
+    channel: RecordedChannel | None, phases: list[LocalPhase], windows: NDArray[np.float64]
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.bool_]]:
     """Response, standard deviation and validity of one channel at every window, each (W,)."""
     response = np.zeros(len(phases), dtype=np.complex128)

@@ -38,9 +38,8 @@ from savgs_ident.inference.sample import SAMPLERS, Question, plan
 from savgs_ident.inference.samplers.chains import SamplingSettings, new_checkpoint
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.responses.selection import every_so_many
 from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.measured import measured_response
+from savgs_ident.simulate.measured import every_so_many, measured_response
 from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.validation.trials import Kept, marks_of, once_a_process, run_trials
@@ -160,6 +159,41 @@ def calibrator(question: Question, settings: SamplingSettings) -> Calibrator:
     return Calibrator(task, case, settings, middle, question.free)
 
 
+BINS = 8
+"""Bars of a rank histogram."""
+
+LEAST, MOST = 0.90, 0.99
+"""Coverage of 95 % intervals, all parameters together, that counts as right."""
+
+UNEVEN = 1e-3
+"""Probability of an uneven rank histogram, times the number of parameters, below which ranks are wrong."""
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How often intervals held the truth, and how even its ranks are.
+
+    Attributes:
+        inside: share of the intervals of each parameter that held its true value [1].
+        uniformity: probability of a rank histogram of each at least as uneven [1].
+        overall: share of all intervals that held the truth [1].
+    """
+
+    inside: Mapping[str, float]
+    uniformity: Mapping[str, float]
+    overall: float
+
+    @property
+    def even(self) -> bool:
+        """Whether no rank histogram is more uneven than chance allows."""
+        return all(each > UNEVEN / len(self.uniformity) for each in self.uniformity.values())
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether coverage and ranks are what they should be."""
+        return bool(self.inside) and LEAST <= self.overall <= MOST and self.even
+
+
 @dataclass(frozen=True)
 class CalibrationStudy(Result):
     """The trials, and the parameters that were ranked, identified ones first."""
@@ -172,7 +206,19 @@ class CalibrationStudy(Result):
     @property
     def trusted(self) -> bool:
         """Whether coverage and ranks are what they should be."""
-        return not self.doubts
+        return self.coverage.calibrated
+
+    @property
+    def coverage(self) -> Coverage:
+        """Coverage and ranks; a trial whose mode was not found counts as one whose intervals miss."""
+        solved = sum(trial.solved for trial in self.trials)
+        ranked = [trial for trial in self.trials if trial.solved and trial.found]
+        held = {name: sum(trial.inside[name] for trial in ranked) for name in self.names}
+        return Coverage(
+            inside={name: count / max(solved, 1) for name, count in held.items()},
+            uniformity={name: uniformity([trial.rank[name] for trial in ranked]) for name in self.names},
+            overall=sum(held.values()) / max(solved * len(self.names), 1),
+        )
 
 
 def calibrate(
@@ -265,7 +311,7 @@ def trial_reader() -> Callable[[Mapping[str, object]], Trial]:
     return trial
 
 
-def uniformity(ranks: list[int], bins: int = 8) -> float:
+def uniformity(ranks: list[int], bins: int = BINS) -> float:
     """Probability of a rank histogram at least as uneven as this one, if ranks were uniform (chi2 test)."""
     counts = np.bincount(np.array(ranks, dtype=int) * bins // (RANKED + 1), minlength=bins)
     expected = len(ranks) / bins

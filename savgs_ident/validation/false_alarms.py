@@ -161,6 +161,10 @@ def _degrees_of_freedom(measured: HarmonicResponse, problem: DiagnosisProblem) -
     return np.asarray(measured.covariance_dof[problem.data.test, places, 1])
 
 
+MOST = 0.02
+"""Rate of false alarms that is allowed."""
+
+
 @dataclass(frozen=True)
 class AlarmStudy(Result):
     """Campaigns with nothing missing, diagnosed, and the log ``odds`` of the campaign that they are like."""
@@ -173,7 +177,22 @@ class AlarmStudy(Result):
     @property
     def trusted(self) -> bool:
         """Whether there are as few alarms as there may be."""
-        return not self.doubts
+        return bool(self.solved) and self.alarms <= MOST * len(self.solved)
+
+    @property
+    def solved(self) -> tuple[float, ...]:
+        """Log odds of the draws that could be solved."""
+        return tuple(each.odds for each in self.draws if each.odds is not None)
+
+    @property
+    def alarms(self) -> int:
+        """How many of the draws were false alarms."""
+        return sum(each.alarm for each in self.draws)
+
+    @property
+    def rate_at_most(self) -> float:
+        """The rate of false alarms that they leave possible [1]."""
+        return rate_bound(self.alarms, len(self.solved))
 
 
 def false_alarms(

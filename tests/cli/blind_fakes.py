@@ -18,7 +18,7 @@ import numpy as np
 from savgs_ident.cli.console import Reporter
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.read import read_campaign
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording
+from savgs_ident.recordings.recording import CANONICAL_UNITS, RecordedChannel, Recording
 from savgs_ident.validation.blind import Job, run_blind
 from savgs_ident.validation.blind_trial import Drawn, Plan
 from savgs_ident.validation.virtual_rig import Bench
@@ -67,7 +67,9 @@ def _test(
     time_ = np.arange(count) / 500.0
     wave = np.cos(2.0 * np.pi * frequency * time_) if frequency else np.zeros(count)
     channels = {
-        each: Channel(each, CANONICAL_UNITS[each], time_, size * wave + 1e-4 * random.standard_normal(count))
+        each: RecordedChannel(
+            each, CANONICAL_UNITS[each], time_, size * wave + 1e-4 * random.standard_normal(count)
+        )
         for each, size in {"road_height": 0.01, "sprung_accel": 2.0, "susp_deflection": 0.01}.items()
     }
     return Recording(name, kind, frequency, channels)

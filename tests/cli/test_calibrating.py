@@ -14,7 +14,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
 from savgs_ident.report.validation.calibration import calibration_figure, calibration_record
-from savgs_ident.validation.calibration import RANKED, Trial
+from savgs_ident.validation.calibration import RANKED, CalibrationStudy, Trial
 from savgs_ident.validation.trials import known_trials, marks_of
 
 NAMES = ("mu_r", "c_sd")
@@ -124,8 +124,8 @@ def test_what_is_no_list_of_trials_is_refused(tmp_path: Path, campaign: Path) ->
 
 
 def test_a_right_sampler_is_found_right_and_a_bold_one_is_not() -> None:
-    right = calibration_record(_trials(200, 0.95, 2), NAMES, ("x",))
-    bold = calibration_record(_trials(200, 0.7, 3), NAMES, ("x",))
+    right = calibration_record(CalibrationStudy(tuple(_trials(200, 0.95, 2)), NAMES))
+    bold = calibration_record(CalibrationStudy(tuple(_trials(200, 0.7, 3)), NAMES))
     assert right["calibrated"] is True
     assert bold["calibrated"] is False
     assert bold["coverage"] == pytest.approx(0.7, abs=0.08)
@@ -136,21 +136,21 @@ def test_a_sampler_whose_draws_lie_too_high_is_found_out_by_its_ranks() -> None:
         Trial(n, True, True, 100.0, dict.fromkeys(NAMES, n % 12), dict.fromkeys(NAMES, True))
         for n in range(200)
     ]
-    record = calibration_record(trials, NAMES, ("x",))
+    record = calibration_record(CalibrationStudy(tuple(trials), NAMES))
     assert record["ranks_even"] is False
     assert record["calibrated"] is False
 
 
 def test_a_mode_that_was_not_found_counts_as_a_miss() -> None:
     lost = [Trial(100 + n, True, False, 0.0, {}, {}) for n in range(40)]
-    record = calibration_record([*_trials(60, 1.0, 4), *lost], NAMES, ("x",))
+    record = calibration_record(CalibrationStudy((*_trials(60, 1.0, 4), *lost), NAMES))
     assert record["coverage"] == pytest.approx(0.6)
     assert record["mode_not_found"] == 40
     assert record["calibrated"] is False
 
 
 def test_the_picture_has_a_panel_for_every_parameter() -> None:
-    figure = calibration_figure(_trials(50, 0.95, 5), NAMES)
+    figure = calibration_figure(CalibrationStudy(tuple(_trials(50, 0.95, 5)), NAMES))
     assert isinstance(figure, Figure)
     titles = [axes.get_title() for axes in figure.axes if axes.get_visible()]
     assert titles == list(NAMES)

@@ -31,9 +31,9 @@ from savgs_ident.effects.base import (
 )
 from savgs_ident.effects.effect import Effect, effect_at
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS
 from savgs_ident.plants.quarter_car.ports import ACCEL, RAIL, ROAD
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.harmonics import harmonics

@@ -12,7 +12,7 @@ from savgs_ident.diagnosis.sweep import along, first_harmonic, frequencies_of, s
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.read import read_campaign
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Channel, Recording
+from savgs_ident.recordings.recording import CANONICAL_UNITS, RecordedChannel, Recording
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import SweepResponse
 from savgs_ident.responses.sweeps import estimate_sweep_response
@@ -129,7 +129,7 @@ def test_the_rig_swept_in_time_answers_as_predicted(rig: Rig, nominal_campaign) 
     times, readings = sweep_readings(model, plant.values({}), 60.0, 3.0, 500.0)
     road = 0.01375 * np.sin(np.pi * RATE * times**2)
     channels = {
-        name: Channel(name, CANONICAL_UNITS[name], times, values)
+        name: RecordedChannel(name, CANONICAL_UNITS[name], times, values)
         for name, values in zip(
             ("road_height", "sprung_accel", "susp_deflection"), (road, *readings), strict=True
         )

@@ -71,6 +71,6 @@ def test_names_lead_to_where_they_are_told(built: Path) -> None:
     page = (built / "reference" / "savgs_ident.fit.result.html").read_text(encoding="utf-8")
     assert 'href="savgs_ident.plants.quarter_car.rig.html#savgs_ident.plants.quarter_car.rig.Rig"' in page
     assert (
-        'href="savgs_ident.plants.quarter_car.sensors.html#savgs_ident.plants.quarter_car.sensors.RESPONSE_CHANNELS"'
+        'href="savgs_ident.plants.quarter_car.plant.html#savgs_ident.plants.quarter_car.plant.RESPONSE_CHANNELS"'
         in page
     )

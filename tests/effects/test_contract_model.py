@@ -14,9 +14,8 @@ from savgs_ident.core.values import Values
 from savgs_ident.effects.base import AbstractSensorLaw, AbstractSeriesLaw, Fundamental
 from savgs_ident.effects.effect import Effect
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
-from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS, QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
 
 from ..in_one_test import over
 from ..plants.instants import as_values, draw_instants, inputs_of, motion_of

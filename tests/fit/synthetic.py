@@ -10,10 +10,10 @@ from scipy.interpolate import PchipInterpolator
 
 from savgs_ident.core.values import as_values
 from savgs_ident.plants.quarter_car.catalogue import build_model, model_parameters
+from savgs_ident.plants.quarter_car.plant import read_sensors
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.road import cam_excitation
-from savgs_ident.plants.quarter_car.sensors import read_sensors
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, Channel, Recording
+from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, RecordedChannel, Recording
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 
 STROKE = 0.0275
@@ -60,8 +60,8 @@ def synthetic_campaign(
     return Campaign("synthetic", tuple(recordings), (), "")
 
 
-def _channel(name: str, time: NDArray[np.float64], values: NDArray[np.float64]) -> Channel:
-    return Channel(name, CANONICAL_UNITS[name], time, values)
+def _channel(name: str, time: NDArray[np.float64], values: NDArray[np.float64]) -> RecordedChannel:
+    return RecordedChannel(name, CANONICAL_UNITS[name], time, values)
 
 
 def _sampled(

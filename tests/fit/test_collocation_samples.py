@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from savgs_ident.fit.collocation.transcription import Samples, interpolation, misfit_of, samples_of
-from savgs_ident.recordings.recording import Channel, Recording
+from savgs_ident.recordings.recording import RecordedChannel, Recording
 
 
 def _nodes(seed: int, count: int = 24) -> NDArray[np.float64]:
@@ -72,8 +72,8 @@ def test_phases_count_from_the_top_of_the_road_on_each_clock() -> None:
         "dwell",
         frequency,
         {
-            "road_height": Channel("road_height", "m", slow, road),
-            "sprung_accel": Channel("sprung_accel", "m/s^2", fast, accel),
+            "road_height": RecordedChannel("road_height", "m", slow, road),
+            "sprung_accel": RecordedChannel("sprung_accel", "m/s^2", fast, accel),
         },
     )
     found = samples_of(recording, "road_height", frequency, {"sprung_accel": 0.05})

@@ -6,8 +6,8 @@ import pytest
 from savgs_ident.fit.result import Fit
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE
+from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
 
 from .bench import FEW, TRUTH, Bench

@@ -21,7 +21,7 @@ from savgs_ident.plants.quarter_car.road import (
     sweep_road,
     tabulated_road,
 )
-from savgs_ident.recordings.recording import Channel, Recording
+from savgs_ident.recordings.recording import RecordedChannel, Recording
 
 TIMES = np.linspace(0.0, 4.0, 401)
 
@@ -169,8 +169,8 @@ def test_a_road_is_read_from_a_file(tmp_path: Path) -> None:
 def test_recorded_motions_are_imposed_as_they_are() -> None:
     times = np.linspace(0.0, 1.0, 51)
     channels = {
-        "road_height": Channel("road_height", "m", times, 0.01 * np.sin(times)),
-        "link_angle": Channel("link_angle", "rad", times, 1.57 + 0.001 * np.cos(times)),
+        "road_height": RecordedChannel("road_height", "m", times, 0.01 * np.sin(times)),
+        "link_angle": RecordedChannel("link_angle", "rad", times, 1.57 + 0.001 * np.cos(times)),
     }
     test = Recording("dwell", "dwell", 1.0, channels)
     road, link = recorded_road(test), recorded_link(test)

@@ -15,9 +15,8 @@ from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import AbstractSensorLaw, Family, Port, Role
 from savgs_ident.effects.effect import effect_at
-from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.plant import QuarterCar, Readings, read_sensors
 from savgs_ident.plants.quarter_car.ports import ACCEL
-from savgs_ident.plants.quarter_car.sensors import Readings, read_sensors
 from savgs_ident.simulate.transient import through_sensors
 
 from .instants import as_values

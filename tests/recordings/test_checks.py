@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from savgs_ident.recordings.checks import measure_frequency
 from savgs_ident.recordings.checks_signal import check_clipping
 from savgs_ident.recordings.read import read_campaign
-from savgs_ident.recordings.recording import Campaign, Channel, Recording
+from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 
 Signals = dict[str, NDArray[np.float64]]
 Change = Callable[[Signals], Signals]
@@ -226,7 +226,9 @@ def test_a_last_line_without_its_end_may_be_cut(read: Callable[..., Campaign]) -
 
 def _tone(values: NDArray[np.float64], name: str = "a") -> Recording:
     time = np.arange(values.size) / 500.0
-    return Recording(name, "dwell", 1.0, {"sprung_accel": Channel("sprung_accel", "m/s^2", time, values)})
+    return Recording(
+        name, "dwell", 1.0, {"sprung_accel": RecordedChannel("sprung_accel", "m/s^2", time, values)}
+    )
 
 
 @given(
@@ -264,7 +266,9 @@ def test_an_end_that_another_test_exceeds_is_no_end_of_range() -> None:
 @given(frequency=st.floats(0.5, 6.0), phase=st.floats(0.0, 6.28))
 def test_the_frequency_of_the_road_is_measured(frequency: float, phase: float) -> None:
     time = np.arange(500) / 50.0
-    road = Channel("road_height", "m", time, 0.014 * np.sin(2 * np.pi * frequency * time + phase) + 0.002)
+    road = RecordedChannel(
+        "road_height", "m", time, 0.014 * np.sin(2 * np.pi * frequency * time + phase) + 0.002
+    )
     assert measure_frequency(road) == pytest.approx(frequency, rel=0.02)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.report.validation.calibration import alarms_figure, alarms_record, alarms_text
-from savgs_ident.validation.false_alarms import NullDraw
+from savgs_ident.validation.false_alarms import AlarmStudy, NullDraw
 
 
 def _draws(count: int, alarms: int) -> list[NullDraw]:
@@ -19,7 +19,7 @@ def _draws(count: int, alarms: int) -> list[NullDraw]:
 
 def test_one_alarm_in_fifty_is_allowed() -> None:
     for alarms, right in ((0, True), (2, True), (3, False)):
-        record = alarms_record(_draws(100, alarms), -0.2, ("savgs-ident",))
+        record = alarms_record(AlarmStudy(tuple(_draws(100, alarms)), -0.2))
         assert record["few_enough"] is right
         assert record["alarms"] == alarms
         assert record["named"] == [["rail_viscous"]] * alarms
@@ -27,7 +27,7 @@ def test_one_alarm_in_fifty_is_allowed() -> None:
 
 
 def test_what_could_not_be_solved_is_told_and_not_counted() -> None:
-    record = alarms_record([*_draws(40, 0), NullDraw(40, None, False, ())], 812.0, ())
+    record = alarms_record(AlarmStudy((*_draws(40, 0), NullDraw(40, None, False, ())), 812.0))
     assert (record["drawn"], record["not_solved"]) == (40, 1)
     text = alarms_text(record)
     assert "Of 40 campaigns like this one with nothing missing (1 more could not be solved)" in text
@@ -36,13 +36,13 @@ def test_what_could_not_be_solved_is_told_and_not_counted() -> None:
 
 
 def test_nothing_solved_is_nothing_shown() -> None:
-    record = alarms_record([NullDraw(0, None, False, ())], 1.0, ())
+    record = alarms_record(AlarmStudy((NullDraw(0, None, False, ()),), 1.0))
     assert record["few_enough"] is False
     assert "at most 100.0 %" in alarms_text(record)
 
 
 def test_the_histogram_holds_all_draws_and_both_lines() -> None:
-    (axes,) = alarms_figure(_draws(60, 0), 900.0).axes
+    (axes,) = alarms_figure(AlarmStudy(tuple(_draws(60, 0)), 900.0)).axes
     assert sum(patch.get_height() for patch in axes.patches) == 60
     assert "[nat]" in axes.get_xlabel()
     legend = [text.get_text() for text in axes.get_legend().get_texts()]

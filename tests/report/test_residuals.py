@@ -17,7 +17,7 @@ from savgs_ident.fit.residuals import (
     whitened,
 )
 from savgs_ident.fit.result import Fit
-from savgs_ident.plants.quarter_car.sensors import RESPONSE_CHANNELS
+from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS
 from savgs_ident.report.text import READINGS
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, Channel, Recording
+from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, RecordedChannel, Recording
 
 Noise = Callable[[np.random.Generator, int], NDArray[np.float64]]
 
@@ -64,7 +64,7 @@ def dwell(
         turns = np.exp(2j * np.pi * frequency * np.outer(time - zero, order))
         clean = (turns @ signal.harmonics).real + signal.drift * (time - start)
         stamps = start + (time - start) / signal.clock
-        channels[label] = Channel(
+        channels[label] = RecordedChannel(
             label, CANONICAL_UNITS[label], stamps, clean + signal.noise(rng, count), "synthetic"
         )
     return Recording(name, "dwell", frequency, channels)

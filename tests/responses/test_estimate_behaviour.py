@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.recordings.recording import Campaign, Channel, Recording
+from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse, signal_to_noise
 
@@ -110,7 +110,7 @@ def test_moving_the_clock_changes_nothing(synthetic: Any, bus: Any) -> None:
     rng = np.random.default_rng(14)
     before = synthetic.dwell(rng, bus, 1.4, 7.3)
 
-    def later(channel: Channel) -> Channel:
+    def later(channel: RecordedChannel) -> RecordedChannel:
         return replace(channel, time=channel.time + 512.0)
 
     after = change(before, **dict.fromkeys(bus, later))
@@ -176,7 +176,7 @@ def test_a_clock_that_runs_slow_is_found_and_mended(synthetic: Any, bus: Any) ->
 
 
 def test_a_third_without_samples_is_left_out_not_interpolated(synthetic: Any, bus: Any) -> None:
-    def holed(channel: Channel) -> Channel:
+    def holed(channel: RecordedChannel) -> RecordedChannel:
         values = channel.values.copy()
         values[values.size // 4 : values.size // 2] = np.nan
         return replace(channel, values=values)
@@ -211,7 +211,7 @@ def test_coarse_steps_of_a_sensor_do_not_vanish_from_the_covariance(synthetic: A
 def test_a_decaying_dwell_is_called_unsteady(synthetic: Any, bus: Any) -> None:
     dwell = synthetic.dwell(np.random.default_rng(20), bus, 2.2, 6.4)
 
-    def decaying(channel: Channel) -> Channel:
+    def decaying(channel: RecordedChannel) -> RecordedChannel:
         return replace(channel, values=channel.values * np.exp(-channel.time / 20.0))
 
     response = estimate_response(synthetic.campaign(change(dwell, sprung_accel=decaying)))
@@ -224,12 +224,12 @@ def test_noise_far_above_standstill_is_told(synthetic: Any, bus: Any) -> None:
     rng = np.random.default_rng(21)
     dwell = synthetic.dwell(rng, bus, 2.2, 6.4, name="dwell_a")
     time = np.arange(2000) / 200.0
-    quiet = Channel("sprung_accel", "m/s^2", time, 0.02 * rng.standard_normal(time.size))
+    quiet = RecordedChannel("sprung_accel", "m/s^2", time, 0.02 * rng.standard_normal(time.size))
     still = Recording("standstill", "standstill", None, {"sprung_accel": quiet})
     response = estimate_response(synthetic.campaign(dwell, still))
     (warning,) = [w for w in response.warnings if w.code == "noise_above_standstill"]
     assert (warning.channel, warning.test) == ("sprung_accel", "dwell_a")
-    same = Channel("sprung_accel", "m/s^2", time, 0.05 * rng.standard_normal(time.size))
+    same = RecordedChannel("sprung_accel", "m/s^2", time, 0.05 * rng.standard_normal(time.size))
     calm = Recording("standstill", "standstill", None, {"sprung_accel": same})
     assert codes(estimate_response(synthetic.campaign(dwell, calm))) == set()
 

@@ -8,7 +8,7 @@ import pytest
 import scipy.signal
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.recordings.recording import Channel, Recording
+from savgs_ident.recordings.recording import RecordedChannel, Recording
 from savgs_ident.responses.sweeps import estimate_sweep_response
 
 RATE = 0.05
@@ -33,9 +33,9 @@ def sweep(seed: int, noise: float, duration: float = 60.0) -> Recording:
     road = road + 1e-5 * rng.standard_normal(time.size)
     half = time[::2] + 3e-4
     channels = {
-        "road_height": Channel("road_height", "m", time, road),
-        "susp_deflection": Channel("susp_deflection", "m", time, measured),
-        "link_angle": Channel("link_angle", "rad", half, 2.0 * np.interp(half, time, road)),
+        "road_height": RecordedChannel("road_height", "m", time, road),
+        "susp_deflection": RecordedChannel("susp_deflection", "m", time, measured),
+        "link_angle": RecordedChannel("link_angle", "rad", half, 2.0 * np.interp(half, time, road)),
     }
     return Recording("sweep", "sweep", None, channels)
 

@@ -12,8 +12,8 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.plant import read_sensors
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.sensors import read_sensors
 from savgs_ident.symbolic.translate import to_casadi
 
 from ..plants.instants import draw_instants, inputs_of, motion_of, shifted

@@ -15,11 +15,10 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import AbstractSource
 from savgs_ident.plants.profiles import AbstractProfile, Constant, Sine, tabulated
-from savgs_ident.plants.quarter_car.inputs import Inputs
 from savgs_ident.plants.quarter_car.plant import Loads, QuarterCar
 from savgs_ident.plants.quarter_car.road import RoadMotion
 from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Road
+from savgs_ident.plants.quarter_car.tyre import Inputs, Road
 from savgs_ident.recordings.recording import Recording
 
 Scalar = Float[Array, ""]

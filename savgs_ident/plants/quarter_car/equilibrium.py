@@ -12,11 +12,10 @@ from jaxtyping import Array, Float
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import find_rest, standing
 from savgs_ident.plants.quarter_car.dynamics import Coordinates, SectionCurves
-from savgs_ident.plants.quarter_car.inputs import Inputs
 from savgs_ident.plants.quarter_car.kinematics import suspension_travel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Road
+from savgs_ident.plants.quarter_car.tyre import Inputs, Road
 
 
 class Equilibrium(NamedTuple):

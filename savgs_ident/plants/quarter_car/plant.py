@@ -45,8 +45,7 @@ from savgs_ident.plants.quarter_car.dynamics import (
     section_curves,
     weight,
 )
-from savgs_ident.plants.quarter_car.inputs import Inputs
-from savgs_ident.plants.quarter_car.kinematics import strut_length
+from savgs_ident.plants.quarter_car.kinematics import strut_length, suspension_travel
 from savgs_ident.plants.quarter_car.ports import (
     CARCASS,
     DAMPER,
@@ -63,9 +62,28 @@ from savgs_ident.plants.quarter_car.ports import (
     TYRE_LATERAL,
     TYRE_RADIAL,
 )
-from savgs_ident.plants.quarter_car.sensors import Readings, read_sensors
 from savgs_ident.plants.quarter_car.strut import Link, Strut, strut, strut_at_rest
-from savgs_ident.plants.quarter_car.tyre import Contact, Road, contact, radial_force
+from savgs_ident.plants.quarter_car.tyre import Contact, Inputs, Road, contact, radial_force
+
+RESPONSE_CHANNELS = ("sprung_accel", "susp_deflection")
+"""The channels that a model predicts, in the order of :class:`Readings`."""
+
+
+class Readings(NamedTuple):
+    """Sprung-mass acceleration [m/s^2] and suspension deflection [m], as indicated.
+
+    The deflection counts from the drawing's nominal state; a recording counts from its own standstill, so the
+    means of the two are not comparable, everything else is.
+    """
+
+    sprung_accel: Float[Array, ""]
+    susp_deflection: Float[Array, ""]
+
+
+def read_sensors(p: Values, theta_LW: Float[Array, ""], acceleration: Float[Array, ""]) -> Readings:
+    """Indicated values at a wishbone angle [rad] and a sprung-mass acceleration [m/s^2], gains included."""
+    return Readings(p["accel_gain"] * acceleration, p["deflection_gain"] * suspension_travel(p, theta_LW))
+
 
 COORDINATES = (
     Coordinate("z_s", "m", "height of the sprung mass, up positive", 1e-2, 1e-1, 1.0),

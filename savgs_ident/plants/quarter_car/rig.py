@@ -20,15 +20,29 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import partial
 from itertools import pairwise
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from types import MappingProxyType
 
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import InlineTable, Table
+
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import write_bytes
-from savgs_ident.core.parameter import ParameterTable
+from savgs_ident.core.parameter import Parameter, ParameterTable
 from savgs_ident.plants.quarter_car.rig_toml import (
-    compose_rig,
+    DAMPER_SECTION,
+    DAMPER_TITLE,
+    DAMPER_UNITS,
+    EXTRA_SECTION,
+    EXTRA_TITLE,
+    PROVENANCE_SECTION,
+    SCHEMA,
+    SECTION_OF,
+    SECTIONS,
+    UNIT_OF,
+    check_unit,
     parse_damper,
     parse_name,
     parse_parameters,
@@ -36,6 +50,12 @@ from savgs_ident.plants.quarter_car.rig_toml import (
 )
 
 _PACKAGE = Path(__file__).resolve().parents[2]
+
+_HEAD = (
+    "SI units; tolerance is one standard deviation of what is known beforehand, 0 (left out) means exact",
+    "or, for a parameter that is to be identified, that only its bounds are known.",
+)
+_DEFAULTS = {"tolerance": 0.0, "lower": -inf, "upper": inf, "about": "", "source": ""}
 
 
 @dataclass(frozen=True)
@@ -128,8 +148,63 @@ def write_rig(rig: Rig, path: str | Path) -> None:
 
 
 def rig_text(rig: Rig) -> str:
-    """What :func:`write_rig` writes; raises as it does."""
-    return compose_rig(rig.name, rig.parameters, rig.damper_velocity, rig.damper_force, rig.provenance)
+    """What :func:`write_rig` writes, section by section, one line a parameter; raises as it does."""
+    missing = [entry for entry in SECTION_OF if entry not in rig.parameters]
+    if missing:
+        raise InputError(f"the rig has no parameter '{missing[0]}'", remedy="write a whole rig")
+    document = tomlkit.document()
+    for line in _HEAD:
+        document.add(tomlkit.comment(line))
+    document.add("schema", tomlkit.item(SCHEMA))
+    document.add("name", tomlkit.item(rig.name))
+    for key, section in SECTIONS.items():
+        document.add(key, _compose_section(section.title, [rig.parameters[entry] for entry in section.units]))
+    document.add(DAMPER_SECTION, _compose_damper(rig.damper_velocity, rig.damper_force))
+    extra = [entry for entry in rig.parameters.entries if entry.name not in SECTION_OF]
+    if extra:
+        document.add(EXTRA_SECTION, _compose_section(EXTRA_TITLE, extra))
+    if rig.provenance:
+        document.add(PROVENANCE_SECTION, _compose_provenance(rig.provenance))
+    return tomlkit.dumps(document)
+
+
+def _compose_section(title: str, entries: list[Parameter]) -> Table:
+    table = tomlkit.table()
+    table.add(tomlkit.comment(title))
+    for entry in entries:
+        unit = check_unit(entry.unit, f"parameter '{entry.name}'", UNIT_OF.get(entry.name))
+        optional = {key: getattr(entry, key) for key in _DEFAULTS if getattr(entry, key) != _DEFAULTS[key]}
+        table.add(entry.name, _inline({"value": entry.value, "unit": unit} | optional))
+    table.add(tomlkit.nl())
+    return table
+
+
+def _compose_damper(velocity: tuple[float, ...], force: tuple[float, ...]) -> Table:
+    table = tomlkit.table()
+    table.add(tomlkit.comment(DAMPER_TITLE))
+    table.add("velocity", _inline({"values": list(velocity), "unit": DAMPER_UNITS["velocity"]}))
+    table.add("force", _inline({"values": list(force), "unit": DAMPER_UNITS["force"]}))
+    table.add(tomlkit.nl())
+    return table
+
+
+def _compose_provenance(provenance: Mapping[str, object]) -> Table:
+    table = tomlkit.table()
+    for key, value in provenance.items():
+        try:
+            table.add(key, tomlkit.item(value))
+        except (TOMLKitError, TypeError, ValueError) as error:
+            raise InputError(
+                f"provenance.{key} cannot be written as TOML: {error}",
+                remedy="give texts, numbers, lists and tables of these",
+            ) from error
+    return table
+
+
+def _inline(fields: Mapping[str, object]) -> InlineTable:
+    table = tomlkit.inline_table()
+    table.update(fields)
+    return table
 
 
 def _shipped(relative: str) -> Path:

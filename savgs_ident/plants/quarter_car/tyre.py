@@ -6,15 +6,18 @@ c = r_free - s >= 0 pushes along that axis; a plate without friction answers wit
 F_tz = radial / cos a, so that the power of F_tz at H is exactly that of the radial force.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.core.values import Values
+from savgs_ident.effects.base import Fundamental
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.dynamics import Section
 from savgs_ident.plants.quarter_car.kinematics import Pair
+from savgs_ident.plants.quarter_car.strut import Link
 
 
 class Road(NamedTuple):
@@ -67,3 +70,12 @@ def radial_force(p: Values, touch: Contact, extra: Float[Array, ""]) -> Float[Ar
     """Radial force [N], never pulling, ``extra`` [N] being what effects add."""
     pressed = p["k_t"] * touch.compression + p["c_t"] * touch.compression_rate + extra
     return jnp.where(touch.compression > 0.0, jnp.maximum(pressed, 0.0), 0.0)
+
+
+class Inputs(NamedTuple):
+    """What drives the rig: road and link; the cam behind the road and what is imposed at ports, if anything."""
+
+    road: Road
+    link: Link
+    cam: Fundamental | None = None
+    imposed: Mapping[str, Array] | None = None

@@ -15,7 +15,7 @@ from matplotlib.ticker import MultipleLocator
 from rich.console import Group, RenderableType
 
 from savgs_ident.core.output import warning_record
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, Channel
+from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, RecordedChannel
 from savgs_ident.report.text import READINGS, channel_label, fixed, plain, significant, table
 from savgs_ident.report.theme import (
     BLUE,
@@ -63,9 +63,9 @@ def summary_record(summary: CampaignSummary) -> dict[str, object]:
     }
 
 
-def _present(campaign: Campaign) -> dict[str, list[Channel]]:
+def _present(campaign: Campaign) -> dict[str, list[RecordedChannel]]:
     """The records of each channel by name, canonical order first."""
-    found: dict[str, list[Channel]] = {name: [] for name in CANONICAL_UNITS}
+    found: dict[str, list[RecordedChannel]] = {name: [] for name in CANONICAL_UNITS}
     for recording in campaign.recordings:
         for name, channel in recording.channels.items():
             found.setdefault(name, []).append(channel)

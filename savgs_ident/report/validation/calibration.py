@@ -1,6 +1,6 @@
 """False alarms and the calibration of the posterior: JSON objects, sentences, tables and figures."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,33 +11,28 @@ from scipy.stats import binom
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.report.text import decimal, percentage, plain, table
 from savgs_ident.report.theme import BLUE, INK, ORANGE, PALE, new_figure, printable, styled
-from savgs_ident.validation.calibration import INTERVAL, RANKED, Trial, uniformity
-from savgs_ident.validation.false_alarms import CONFIDENCE, NullDraw, rate_bound
-
-MOST = 0.02
-"""Rate of false alarms that is allowed."""
+from savgs_ident.validation.calibration import BINS, INTERVAL, RANKED, CalibrationStudy
+from savgs_ident.validation.false_alarms import CONFIDENCE, AlarmStudy
 
 
-def alarms_record(draws: Sequence[NullDraw], odds: float, command: Sequence[str]) -> dict[str, Any]:
+def alarms_record(study: AlarmStudy) -> dict[str, Any]:
     """How many of the draws were false alarms, the rate that they leave possible, and all odds.
 
     Odds are log odds.
     """
-    solved = [each.odds for each in draws if each.odds is not None]
-    alarms = sum(each.alarm for each in draws)
     return {
         "schema": 1,
-        "few_enough": bool(solved) and alarms <= MOST * len(solved),
-        "drawn": len(solved),
-        "not_solved": len(draws) - len(solved),
-        "alarms": alarms,
-        "rate_at_most": rate_bound(alarms, len(solved)),
+        "few_enough": study.trusted,
+        "drawn": len(study.solved),
+        "not_solved": len(study.draws) - len(study.solved),
+        "alarms": study.alarms,
+        "rate_at_most": study.rate_at_most,
         "confidence": CONFIDENCE,
         "threshold": DEFAULTS.alarm_log_odds,
-        "odds": odds,
-        "drawn_odds": solved,
-        "named": [list(each.named) for each in draws if each.alarm],
-        "command": " ".join(command),
+        "odds": study.odds,
+        "drawn_odds": list(study.solved),
+        "named": [list(each.named) for each in study.draws if each.alarm],
+        "command": study.origin.command_line,
     }
 
 
@@ -58,9 +53,9 @@ def alarms_text(record: Mapping[str, Any]) -> str:
     )
 
 
-def alarms_figure(draws: Sequence[NullDraw], odds: float) -> Figure:
+def alarms_figure(study: AlarmStudy) -> Figure:
     """Histogram of the log odds of the draws, with those of the campaign and the threshold."""
-    solved = np.array([each.odds for each in draws if each.odds is not None])
+    solved, odds = np.array(study.solved), study.odds
     with styled():
         figure = new_figure(6.4, 3.4)
         axes = figure.subplots()
@@ -79,47 +74,29 @@ def alarms_figure(draws: Sequence[NullDraw], odds: float) -> Figure:
     return figure
 
 
-BINS = 8
-
-LEAST, CALIBRATION_MOST = 0.90, 0.99
-"""Coverage of 95 % intervals, all parameters together, that counts as right."""
-
-UNEVEN = 1e-3
-"""Probability of an uneven rank histogram, times the number of parameters, below which ranks are wrong."""
-
-
-def calibration_record(
-    trials: Sequence[Trial], names: Sequence[str], command: Sequence[str]
-) -> dict[str, object]:
-    """Coverage and rank statistics by parameter, how many trials failed, and whether all is as it should be.
-
-    A trial whose mode was not found counts as one whose intervals miss.
-    """
-    solved = [trial for trial in trials if trial.solved]
-    ranked = [trial for trial in solved if trial.found]
-    parameters: dict[str, dict[str, Any]] = {
-        name: {
-            "coverage": sum(trial.inside[name] for trial in ranked) / max(len(solved), 1),
-            "uniformity": uniformity([trial.rank[name] for trial in ranked], BINS),
-            "ranks": [trial.rank[name] for trial in ranked],
-        }
-        for name in names
-    }
-    held = sum(sum(trial.inside.values()) for trial in ranked)
-    coverage = held / max(len(solved) * len(names), 1)
-    even = all(each["uniformity"] > UNEVEN / len(names) for each in parameters.values())
+def calibration_record(study: CalibrationStudy) -> dict[str, object]:
+    """Coverage and rank statistics by parameter, how many trials failed, and whether all is as it should be."""
+    found, ranked = study.coverage, [trial for trial in study.trials if trial.solved and trial.found]
+    solved = sum(trial.solved for trial in study.trials)
     return {
         "schema": 1,
-        "calibrated": bool(names) and LEAST <= coverage <= CALIBRATION_MOST and even,
-        "coverage": coverage,
+        "calibrated": found.calibrated,
+        "coverage": found.overall,
         "interval": INTERVAL,
-        "ranks_even": even,
-        "trials": len(trials),
-        "not_solved": len(trials) - len(solved),
-        "mode_not_found": len(solved) - len(ranked),
+        "ranks_even": found.even,
+        "trials": len(study.trials),
+        "not_solved": len(study.trials) - solved,
+        "mode_not_found": solved - len(ranked),
         "places": RANKED + 1,
-        "parameters": parameters,
-        "command": " ".join(command),
+        "parameters": {
+            name: {
+                "coverage": found.inside[name],
+                "uniformity": found.uniformity[name],
+                "ranks": [trial.rank[name] for trial in ranked],
+            }
+            for name in study.names
+        },
+        "command": study.origin.command_line,
     }
 
 
@@ -139,9 +116,9 @@ def calibration_text(record: Mapping[str, Any]) -> RenderableType:
     return Group(table("Calibration", headers, rows, texts=(0,)), plain(words))
 
 
-def calibration_figure(trials: Sequence[Trial], names: Sequence[str]) -> Figure:
+def calibration_figure(study: CalibrationStudy) -> Figure:
     """Rank histograms of all parameters; the band holds 95 % of the bars of an even one."""
-    ranked = [trial for trial in trials if trial.found]
+    ranked, names = [trial for trial in study.trials if trial.found], study.names
     columns = 6
     rows = max(1, -(-len(names) // columns))
     with styled():

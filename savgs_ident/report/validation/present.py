@@ -1,0 +1,90 @@
+"""The presenter of studies with known truth; what draws is loaded when something is drawn."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from rich.console import RenderableType
+
+from savgs_ident.report.presenters import AbstractPresenter, Figures
+
+if TYPE_CHECKING:
+    from savgs_ident.validation.blind import BlindStudy
+    from savgs_ident.validation.calibration import CalibrationStudy
+    from savgs_ident.validation.false_alarms import AlarmStudy
+
+
+class _BlindStudy(AbstractPresenter["BlindStudy"]):
+    stem = "blind"
+
+    def record(self, result: "BlindStudy") -> Mapping[str, Any]:
+        from savgs_ident.report.validation.blind import blind_record
+
+        return blind_record(result.scores, result.settings, result.origin.command)
+
+    def text(self, result: "BlindStudy") -> RenderableType:
+        from savgs_ident.report.validation.blind import blind_text
+
+        return blind_text(result.scores)
+
+    def doubts(self, result: "BlindStudy") -> tuple[str, ...]:
+        return () if result.trusted else ("the diagnosis is not right as often as it should be.",)
+
+    def page(self, result: "BlindStudy") -> str:
+        from savgs_ident.report.validation.blind import blind_html
+
+        return blind_html(result.scores, result.settings, result.origin.command)
+
+    def figures(self, result: "BlindStudy") -> Figures:
+        from savgs_ident.report.validation.blind import confusion_figure
+
+        return {"confusion": lambda: confusion_figure(result.scores)}
+
+
+class _AlarmStudy(AbstractPresenter["AlarmStudy"]):
+    stem = "false_alarms"
+
+    def record(self, result: "AlarmStudy") -> Mapping[str, Any]:
+        from savgs_ident.report.validation.calibration import alarms_record
+
+        return alarms_record(result)
+
+    def text(self, result: "AlarmStudy") -> RenderableType:
+        from savgs_ident.report.text import plain
+        from savgs_ident.report.validation.calibration import alarms_text
+
+        return plain(alarms_text(self.record(result)))
+
+    def doubts(self, result: "AlarmStudy") -> tuple[str, ...]:
+        return () if result.trusted else ("there are more false alarms than there may be.",)
+
+    def figures(self, result: "AlarmStudy") -> Figures:
+        from savgs_ident.report.validation.calibration import alarms_figure
+
+        return {"false_alarms": lambda: alarms_figure(result)}
+
+
+class _CalibrationStudy(AbstractPresenter["CalibrationStudy"]):
+    stem = "calibration"
+
+    def record(self, result: "CalibrationStudy") -> Mapping[str, Any]:
+        from savgs_ident.report.validation.calibration import calibration_record
+
+        return calibration_record(result)
+
+    def text(self, result: "CalibrationStudy") -> RenderableType:
+        from savgs_ident.report.validation.calibration import calibration_text
+
+        return calibration_text(self.record(result))
+
+    def doubts(self, result: "CalibrationStudy") -> tuple[str, ...]:
+        return () if result.trusted else ("coverage or ranks are not what they should be.",)
+
+    def figures(self, result: "CalibrationStudy") -> Figures:
+        from savgs_ident.report.validation.calibration import calibration_figure
+
+        return {"calibration": lambda: calibration_figure(result)}
+
+
+BLIND_STUDY = _BlindStudy()
+ALARM_STUDY = _AlarmStudy()
+CALIBRATION_STUDY = _CalibrationStudy()
