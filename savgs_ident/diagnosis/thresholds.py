@@ -5,7 +5,7 @@ turn those weights, and the change of the response that a hypothesis makes, into
 
 - prior probabilities of hypotheses;
 - thresholds on log odds, and on the share of the response or of the misfit;
-- widths of priors that a linearised law is compared under;
+- widths of the priors of an effect's parameters, and of those that a linearised law is compared under;
 - limits of the search: how many hypotheses are fitted in full.
 
 The first three kinds can change a verdict about the same fits; the last can only miss a hypothesis.
@@ -57,6 +57,22 @@ class DecisionConstants:
     Origin: by judgement; before, it had the prior of something unknown, ten times as much. It bounds the
     probability of *unknown* from below where nothing is missing. Halved or doubled: log odds of a broken tolerance
     move by 0.7 nat.
+    """
+
+    # Priors of what an effect brings
+
+    amplitude_width: float = 2.0
+    """Width of the prior of an effect's amplitude, in its typical sizes.
+
+    Origin: by choice: an effect of twice its typical size is one standard deviation away. Halved or doubled: Occam's
+    factor moves by 0.7 nat for every amplitude; verdicts are not measured.
+    """
+
+    shape_width: float = 0.7
+    """Width of the prior of the logarithm of what shapes an effect [1].
+
+    Origin: by choice, a factor of two to either side (log 2 = 0.69). Halved or doubled: Occam's factor moves by up to
+    0.7 nat for every shape that the campaign identifies; verdicts are not measured.
     """
 
     # Thresholds on log odds
@@ -221,12 +237,6 @@ class DecisionConstants:
     parents: int = 2
     """Best single effects, or pairs, that get partners. Origin: computing time."""
 
-    typical_coordinate: float = 0.5
-    """Amplitude at which effects that are missing together are started, in widths of their prior.
-
-    Origin: priors of amplitudes are two typical sizes wide.
-    """
-
     refined_fits: int = 3
     """Best hypotheses that are fitted again on a mesh adapted to their own motion. Origin: computing time."""
 
@@ -249,6 +259,14 @@ class DecisionConstants:
 
     held_out_steps: int = 3
     """Most steps of a fit without a part, from the fit to all tests. Origin: computing time; not measured."""
+
+    @property
+    def typical_coordinate(self) -> float:
+        """The typical size of an effect in widths of its amplitude's prior [1].
+
+        Effects that are missing together are started there, and what an effect with states does is found there.
+        """
+        return 1.0 / self.amplitude_width
 
 
 DEFAULTS = DecisionConstants()
