@@ -81,7 +81,9 @@ def not_judgeable_of(findings: Findings, constants: DecisionConstants = DEFAULTS
     for score in findings.scores:
         amplitude = score.term.amplitudes[0]
         room = max(abs(amplitude.upper - amplitude.centre), abs(amplitude.lower - amplitude.centre))
-        if score.smallest > min(room, constants.judgeable_sizes * amplitude.scale / 2.0):
+        if score.smallest > min(
+            room, constants.judgeable_sizes * amplitude.scale / constants.amplitude_width
+        ):
             found.append(NotJudgeable(score.term.name, amplitude.name, float(score.smallest), amplitude.unit))
     return tuple(found)
 

@@ -88,6 +88,7 @@ def baseline_problem(
         settings.orders,
         settings.periodic,
         models,
+        settings.constants,
     )
 
 

@@ -29,6 +29,7 @@ from savgs_ident.diagnosis.loops import force_loops
 from savgs_ident.diagnosis.next_test import next_tests
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import CyclePosition, ForceLoop, MapCell, NextTest, Responses
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.find_map import LaplaceFit, Search
@@ -219,13 +220,14 @@ class DwellProblem(AbstractProblem):
             term.name: slopes[:, [names.index(each.name) for each in term.amplitudes]] for term in without
         }
         with_states = [term for term in candidates if self.catalogue[term.name].states]
+        size = self.constants.typical_coordinate
         typical = [
-            {each.name: each.centre + 0.5 * each.scale for each in term.amplitudes} for term in with_states
+            {each.name: each.centre + size * each.scale for each in term.amplitudes} for term in with_states
         ]
         effects = [self.catalogue[term.name] for term in with_states]
         moved = columns_with_states(model, self.likelihood, self.orders, p, warm_start, effects, typical)
         for term, rows in zip(with_states, moved, strict=True):
-            found[term.name] = rows[:, None] / (0.5 * term.amplitudes[0].scale)
+            found[term.name] = rows[:, None] / (size * term.amplitudes[0].scale)
         return found
 
     def slopes(
@@ -304,6 +306,7 @@ def dwell_problem(
     orders: int = 9,
     settings: PeriodicSettings | None = None,
     models: Iterable[tuple[str, ...]] = (),
+    constants: DecisionConstants = DEFAULTS,
 ) -> tuple[DwellProblem, Data]:
     """The problem of a measured response, and the response as data.
 
@@ -323,6 +326,7 @@ def dwell_problem(
         shape=(tests, channels, kept),
         settings=settings or PeriodicSettings(),
         models=tuple(models),
+        constants=constants,
     )
     test = np.repeat(np.arange(tests), 2 * channels * kept)[likelihood.place]
     data = Data(

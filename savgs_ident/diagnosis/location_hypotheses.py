@@ -1,6 +1,6 @@
 """Hypotheses of an unknown signal at each location of a plant: laws of what a port sees, and free harmonics.
 
-A location is where ports of one name sit. What may be unknown there follows from the kinds of its ports:
+A location is where the ports of one name are. What may be unknown there follows from the kinds of its ports:
 
     port     a law may be any sum of functions of
     force    displacement, velocity and load of the port, or of what a contact there carries before it slides

@@ -9,8 +9,8 @@ compiled program serves the baseline and all of them; only an effect with states
 Parameters that are not given are those of the plant, effects at their null.
 
 Parameters of the plant have the coordinates and priors that they have in a fit
-(:mod:`savgs_ident.inference.prior`). The amplitude of an effect begins at its null, two typical sizes wide; what
-shapes an effect is log-normal about its typical value, to a factor of two.
+(:mod:`savgs_ident.inference.prior`). The amplitude of an effect begins at its null, what shapes an effect is
+log-normal about its typical value; :class:`~savgs_ident.diagnosis.thresholds.DecisionConstants` has both widths.
 """
 
 from abc import ABC, abstractmethod
@@ -34,6 +34,7 @@ from savgs_ident.diagnosis.result import (
     NextTest,
     Responses,
 )
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import AbstractFrictionLimitLaw, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.find_map import LaplaceFit, Search
@@ -42,27 +43,24 @@ from savgs_ident.inference.prior import Coordinates, Linear, Logarithmic, sheet_
 from savgs_ident.inference.problem import used_parameters
 from savgs_ident.plants.base import AbstractPlant
 
-TYPICAL = 2.0
-"""Width of an amplitude's prior in typical sizes."""
 
-SHAPE = 0.7
-"""Width of the logarithm of what shapes an effect."""
-
-
-def term_of(effect: Effect) -> Term:
+def term_of(effect: Effect, constants: DecisionConstants = DEFAULTS) -> Term:
     """An effect as a candidate; what it shares with the plant's sheet (a tolerance) is not its own."""
+    amplitude_width, shape_width = constants.amplitude_width, constants.shape_width
     own = [each for each in effect.parameters if each.tolerance == 0.0]
-    amplitudes = tuple(_amplitude(each, effect.null[each.name]) for each in own if each.name in effect.null)
-    shapes = tuple(_shape(each) for each in own if each.name not in effect.null)
+    amplitudes = tuple(
+        _amplitude(each, effect.null[each.name], amplitude_width) for each in own if each.name in effect.null
+    )
+    shapes = tuple(_shape(each, shape_width) for each in own if each.name not in effect.null)
     return Term(effect.name, effect.port.location, amplitudes, shapes, effect.tried)
 
 
-def _amplitude(each: Parameter, null: float) -> Linear:
-    return Linear(each.name, each.unit, null, TYPICAL * abs(each.value - null), each.lower, each.upper)
+def _amplitude(each: Parameter, null: float, width: float) -> Linear:
+    return Linear(each.name, each.unit, null, width * abs(each.value - null), each.lower, each.upper)
 
 
-def _shape(each: Parameter) -> Logarithmic:
-    return Logarithmic(each.name, each.unit, each.value, SHAPE, each.lower, each.upper)
+def _shape(each: Parameter, width: float) -> Logarithmic:
+    return Logarithmic(each.name, each.unit, each.value, width, each.lower, each.upper)
 
 
 @dataclass(frozen=True)
@@ -76,6 +74,7 @@ class AbstractProblem(ABC):
         baseline: names of those that the baseline has.
         free: names of the parameters that the baseline identifies.
         models: sets of effects that such plants are known to have together.
+        constants: how wide the priors of effects are.
     """
 
     plant: AbstractPlant
@@ -84,6 +83,7 @@ class AbstractProblem(ABC):
     baseline: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
     models: tuple[tuple[str, ...], ...] = field(default=(), kw_only=True)
+    constants: DecisionConstants = field(default=DEFAULTS, kw_only=True)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -116,7 +116,11 @@ class AbstractProblem(ABC):
     @cached_property
     def candidates(self) -> tuple[Term, ...]:
         """All effects that the baseline does not have."""
-        terms = [term_of(effect) for name, effect in self.catalogue.items() if name not in self.baseline]
+        terms = [
+            term_of(effect, self.constants)
+            for name, effect in self.catalogue.items()
+            if name not in self.baseline
+        ]
         return tuple(term for term in terms if term.amplitudes)
 
     @property

@@ -5,7 +5,7 @@ turn those weights, and the change of the response that a hypothesis makes, into
 
 - prior probabilities of hypotheses;
 - thresholds on log odds, and on the share of the response or of the misfit;
-- widths of priors that a linearised law is compared under;
+- widths of the priors of an effect's parameters, and of those that a linearised law is compared under;
 - limits of the search: how many hypotheses are fitted in full.
 
 The first three kinds can change a verdict about the same fits; the last can only miss a hypothesis.
@@ -14,7 +14,7 @@ The first three kinds can change a verdict about the same fits; the last can onl
 "Response" is the measured response of a channel, all harmonics and tests together.
 
 Each docstring says where a value comes from, and what is known of the verdict when it is halved or doubled. Values
-"by judgement" were chosen by the authors and kept because the labelled recordings and blind trials came out right;
+"by choice" were chosen by the authors and kept because the labelled recordings and blind trials came out right;
 blind trials had been looked at when some were chosen, so that these trials are no evidence for them.
 """
 
@@ -30,33 +30,49 @@ class DecisionConstants:
     prior_none: float = 0.4
     """Prior probability that nothing is missing.
 
-    Origin: by judgement, as probable as one effect. Halved or doubled: log odds of all else move by 0.7 nat.
+    Origin: by choice, as probable as one effect. Halved or doubled: log odds of all else move by 0.7 nat.
     """
 
     prior_single: float = 0.4
     """Prior probability that one effect is missing, shared equally by all effects of the catalogue.
 
-    Origin: by judgement. Halved or doubled: log odds of every single effect move by 0.7 nat.
+    Origin: by choice. Halved or doubled: log odds of every single effect move by 0.7 nat.
     """
 
     prior_pair: float = 0.1
     """Prior probability that two effects are missing, shared equally by all pairs.
 
-    Origin: by judgement, a quarter of one effect's. Halved or doubled: log odds of every pair move by 0.7 nat.
+    Origin: by choice, a quarter of one effect's. Halved or doubled: log odds of every pair move by 0.7 nat.
     """
 
     prior_unknown: float = 0.1
     """Prior probability that something is missing which the catalogue does not have.
 
-    Origin: by judgement, the rest to one. Halved or doubled: log odds of *unknown* move by 0.7 nat.
+    Origin: by choice, the rest to one. Halved or doubled: log odds of *unknown* move by 0.7 nat.
     """
 
     prior_broken_tolerance: float = 0.01
     """Prior probability that, beside what a hypothesis says, one tolerance of the sheet does not hold.
 
-    Origin: by judgement; before, it had the prior of something unknown, ten times as much. It bounds the
+    Origin: by choice; before, it had the prior of something unknown, ten times as much. It bounds the
     probability of *unknown* from below where nothing is missing. Halved or doubled: log odds of a broken tolerance
     move by 0.7 nat.
+    """
+
+    # Priors of what an effect brings
+
+    amplitude_width: float = 2.0
+    """Width of the prior of an effect's amplitude, in its typical sizes.
+
+    Origin: by choice: an effect of twice its typical size is one standard deviation away. Halved or doubled: Occam's
+    factor moves by 0.7 nat for every amplitude; verdicts are not measured.
+    """
+
+    shape_width: float = 0.7
+    """Width of the prior of the logarithm of what shapes an effect [1].
+
+    Origin: by choice, a factor of two to either side (log 2 = 0.69). Halved or doubled: Occam's factor moves by up to
+    0.7 nat for every shape that the campaign identifies; verdicts are not measured.
     """
 
     # Thresholds on log odds
@@ -73,7 +89,7 @@ class DecisionConstants:
     indistinguishable_log_odds: float = 5.0
     """Log odds within which two hypotheses, or two ports, are reported as not distinguishable by the campaign.
 
-    Origin: by judgement; exp(5) is about 150 to 1. Halved or doubled: not measured.
+    Origin: by choice; exp(5) is about 150 to 1. Halved or doubled: not measured.
     """
 
     # Thresholds on the change of the response
@@ -81,13 +97,13 @@ class DecisionConstants:
     material_share: float = 0.003
     """Change of the response by an effect, as a share of it, from which on the effect matters.
 
-    Origin: by judgement, for campaigns whose noise is 0.14 % of the response. Halved or doubled: not measured.
+    Origin: by choice, for campaigns whose noise is 0.14 % of the response. Halved or doubled: not measured.
     """
 
     material_share_of_test: float = 0.02
     """The same within the one test where the effect changes most.
 
-    Origin: by judgement; a friction that shows in the slow tests alone reaches it. Halved or doubled: not measured.
+    Origin: by choice; a friction that shows in the slow tests alone reaches it. Halved or doubled: not measured.
     """
 
     trace_share: float = 0.0004
@@ -103,7 +119,7 @@ class DecisionConstants:
     negligible_misfit: float = 0.3
     """Misfit that counts as none [1].
 
-    Origin: by judgement, for noise known from few periods and the plant's own discretisation. Halved or doubled: not
+    Origin: by choice, for noise known from few periods and the plant's own discretisation. Halved or doubled: not
     measured.
     """
 
@@ -111,25 +127,25 @@ class DecisionConstants:
     """Share of the baseline's misfit that a hypothesis may leave and still count as explaining all.
 
     It decides whether further effects and pairs are fitted, and whether a law is looked for beside one effect.
-    Origin: by judgement. Halved or doubled: not measured.
+    Origin: by choice. Halved or doubled: not measured.
     """
 
     reported_share: float = 0.005
     """Share of the baseline's misfit left by named effects from which on a warning says so.
 
-    Origin: by judgement. It changes no verdict.
+    Origin: by choice. It changes no verdict.
     """
 
     unexplained_share: float = 0.05
     """Share of the baseline's misfit left by the best effects beyond which the verdict is *unknown*.
 
-    Origin: by judgement. Halved or doubled: not measured.
+    Origin: by choice. Halved or doubled: not measured.
     """
 
     unexplained_share_other_law: float = 0.1
     """The same for one effect by another law than the catalogue's: what it leaves is explained at its own port.
 
-    Origin: by judgement, from a tyre that stiffens with the cube of its compression where the catalogue has the
+    Origin: by choice, from a tyre that stiffens with the cube of its compression where the catalogue has the
     square, and friction that falls otherwise with velocity. Halved or doubled: not measured.
     """
 
@@ -138,32 +154,32 @@ class DecisionConstants:
     location_folds: int = 4
     """Parts into which tests are split where a law learned at a port predicts tests left out.
 
-    Origin: by judgement. Halved or doubled: not measured.
+    Origin: by choice. Halved or doubled: not measured.
     """
 
     law_widths: tuple[float, ...] = (0.3, 3.0, 30.0)
     """Prior widths of a law's coefficients, in rms of the residuals in their sd, over which evidence is averaged.
 
-    Origin: by judgement, a factor of ten apart. Halved or doubled: not measured.
+    Origin: by choice, a factor of ten apart. Halved or doubled: not measured.
     """
 
     free_input_width: float = 100.0
     """The same of an input that is free in every test: wide, so that the share that it explains is an upper bound.
 
-    Origin: by judgement. It changes no verdict.
+    Origin: by choice. It changes no verdict.
     """
 
     simple_law_prior: float = 0.1
     """Prior probability of a family's simple laws together, relative to the sum of all its functions.
 
-    Origin: by judgement: most of what is so simple is in the catalogue. Halved or doubled: log odds between a
+    Origin: by choice: most of what is so simple is in the catalogue. Halved or doubled: log odds between a
     simple law and a general one move by 0.7 nat.
     """
 
     stand_in_share: float = 0.5
     """Share of the best port's gain in log evidence from which on an effect elsewhere may imitate a law at a port.
 
-    Origin: by judgement, from blind trials in which an effect did nearly the same as something unknown at another
+    Origin: by choice, from blind trials in which an effect did nearly the same as something unknown at another
     port. Halved or doubled: not measured.
     """
 
@@ -172,26 +188,26 @@ class DecisionConstants:
     visible_sigma: float = 5.0
     """Standard deviations by which an effect must change the response to be visible.
 
-    Origin: by judgement, the convention of five sigma. It changes no verdict: it says what cannot be judged.
+    Origin: by choice, the convention of five sigma. It changes no verdict: it says what cannot be assessed.
     """
 
     judgeable_sizes: float = 10.0
-    """An effect that is visible only beyond so many typical sizes cannot be judged in this campaign.
+    """An effect that is visible only beyond so many typical sizes cannot be assessed in this campaign.
 
-    Origin: by judgement. It changes no verdict.
+    Origin: by choice. It changes no verdict.
     """
 
     broken_tolerance_width: float = 10.0
     """Width of the prior of a parameter whose tolerance does not hold, in tolerances.
 
-    Origin: by judgement. Halved or doubled: Occam's factor moves by 0.7 nat; the fit of a parameter that is several
+    Origin: by choice. Halved or doubled: Occam's factor moves by 0.7 nat; the fit of a parameter that is several
     widths off its sheet moves the other way.
     """
 
     lookalike_cosine: float = 0.9
     """Cosine between what two effects do to the campaign from which on they look alike.
 
-    Where one explains all, its lookalikes are fitted too. Origin: by judgement. Halved or doubled: not measured.
+    Where one explains all, its lookalikes are fitted too. Origin: by choice. Halved or doubled: not measured.
     """
 
     # Limits of the search
@@ -205,14 +221,14 @@ class DecisionConstants:
     promising_log_evidence: float = 2.0
     """Rise of the log evidence, by the score, from which on an effect is fitted in full.
 
-    The same rise by a broken tolerance makes the search look for pairs. Origin: by judgement, well below the
+    The same rise by a broken tolerance makes the search look for pairs. Origin: by choice, well below the
     threshold of an alarm. Halved or doubled: not measured.
     """
 
     pair_log_evidence: float = 10.0
     """Rise of the log evidence by the best single effect from which on pairs are looked for.
 
-    Origin: by judgement. Halved or doubled: not measured.
+    Origin: by choice. Halved or doubled: not measured.
     """
 
     partners: int = 3
@@ -221,25 +237,19 @@ class DecisionConstants:
     parents: int = 2
     """Best single effects, or pairs, that get partners. Origin: computing time."""
 
-    typical_coordinate: float = 0.5
-    """Amplitude at which effects that are missing together are started, in widths of their prior.
-
-    Origin: priors of amplitudes are two typical sizes wide.
-    """
-
     refined_fits: int = 3
     """Best hypotheses that are fitted again on a mesh adapted to their own motion. Origin: computing time."""
 
     refined_log_evidence: float = 300.0
     """Log evidence below the best from which on a hypothesis is not refined.
 
-    Origin: by judgement, more than an unadapted mesh costs. Halved or doubled: not measured.
+    Origin: by choice, more than an unadapted mesh costs. Halved or doubled: not measured.
     """
 
     nearest_ports: int = 2
     """Ports at which a law explains most of what a hypothesis leaves, whose effects are tried beside its members.
 
-    Origin: at the first may sit a stand-in of the hypothesis. Halved or doubled: not measured.
+    Origin: a stand-in of the hypothesis may act at the first. Halved or doubled: not measured.
     """
 
     # Held-out tests
@@ -249,6 +259,14 @@ class DecisionConstants:
 
     held_out_steps: int = 3
     """Most steps of a fit without a part, from the fit to all tests. Origin: computing time; not measured."""
+
+    @property
+    def typical_coordinate(self) -> float:
+        """The typical size of an effect in widths of its amplitude's prior [1].
+
+        Effects that are missing together are started there, and what an effect with states does is found there.
+        """
+        return 1.0 / self.amplitude_width
 
 
 DEFAULTS = DecisionConstants()

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Progress, Result, no_progress
-from savgs_ident.core.status import Status
 from savgs_ident.fit.residuals import comparable
 from savgs_ident.fit.result import Fit
 from savgs_ident.plants.model import Model
@@ -95,13 +94,10 @@ def comparison_of(fit: Fit) -> Comparison:
     """The identified model of a fit held against what it was fitted to; nothing is solved anew."""
     model: Model = fit.model
     excitation = measured_excitation(model.plant, fit.measured, model.table)
-    status = tuple(
-        Status.CONVERGED if np.isfinite(each).all() else Status.STALLED for each in fit.frictionless
-    )
     return Comparison(
         fit.measured,
         SimulatedResponse(model, excitation, fit.predicted, fit.dwell_status),
-        SimulatedResponse(disable_effects(model), excitation, fit.frictionless, status),
+        SimulatedResponse(disable_effects(model), excitation, fit.frictionless, fit.frictionless_status),
         fit.used,
         origin=replace(fit.origin, effects=fit.effects),
     )

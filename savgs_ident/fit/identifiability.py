@@ -183,7 +183,7 @@ def lower_bound(minimiser: Minimiser, best: Minimum, name: str, progress: Progre
     inside, at = float(best.u[place]), best
     for _ in range(8):
         trial, gain = rise(at, inside - np.log(1.5))
-        if not np.isfinite(gain) or gain > CHI2_95:
+        if not trial.evaluation.ok or gain > CHI2_95:
             break
         inside, at = inside - np.log(1.5), trial
     else:
@@ -192,7 +192,7 @@ def lower_bound(minimiser: Minimiser, best: Minimum, name: str, progress: Progre
     while inside - outside > 0.03:
         middle = 0.5 * (inside + outside)
         trial, gain = rise(at, middle)
-        if np.isfinite(gain) and gain <= CHI2_95:
+        if trial.evaluation.ok and gain <= CHI2_95:
             inside, at = middle, trial
         else:
             outside = middle
@@ -291,7 +291,7 @@ def assess(task: Task, minimiser: Minimiser, best: Minimum, progress: Progress) 
     names = problem.free.identified
     values = {name: float(value) for name, value in problem.parameters(best.u).items()}
     units = {name: table[name].unit for name in names}
-    if not np.isfinite(best.jacobian).all():
+    if not best.evaluation.ok:
         return Verdict(False, ("The fit broke down: nothing can be said about the parameters.",))
     covariance = _log_covariance(problem, best, values)
     bounds: dict[str, float] = {}

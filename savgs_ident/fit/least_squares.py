@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Array
 
 from savgs_ident.core.presentation import Progress
+from savgs_ident.core.status import Status
 from savgs_ident.core.values import as_values
 from savgs_ident.fit.identifiability import EXPLAINED, assess
 from savgs_ident.fit.minimise import Minimiser, Minimum, spread_of
@@ -75,6 +76,7 @@ def assemble_fit(task: Task, outcome: Outcome) -> Fit:
     rows = best.residual.size - len(problem.free.names)
     p = problem.parameters(best.u)
     values = {each.name: each.value for each in estimates}
+    frictionless, frictionless_status = _frictionless(task, best)
     return Fit(
         estimated=task.model.with_values(values),
         estimates=estimates,
@@ -89,7 +91,8 @@ def assemble_fit(task: Task, outcome: Outcome) -> Fit:
         orders=problem.orders,
         used=np.array(problem.target.used),
         predicted=np.array(harmonics(problem.model, p, best.solution, problem.orders)),
-        frictionless=_frictionless(task, best),
+        frictionless=frictionless,
+        frictionless_status=frictionless_status,
         as_given=np.array(outcome.as_given),
         starts=tuple((each.cost, each.status) for each in outcome.tried),
         quantity=task.settings.quantity,
@@ -115,15 +118,16 @@ def _estimates(task: Task, best: Minimum) -> tuple[tuple[Estimate, ...], np.ndar
     return tuple(estimates), covariance
 
 
-def _frictionless(task: Task, best: Minimum) -> np.ndarray:
+def _frictionless(task: Task, best: Minimum) -> tuple[np.ndarray, tuple[Status, ...]]:
     """The same estimates with every effect at its null: the compiled model serves for the plant alone too."""
     problem = task.problem
     nulls = {name: value for effect in problem.model.effects for name, value in effect.null.items()}
     p = dict(problem.parameters(best.u)) | as_values(nulls)
     solution = simulate_periodic(problem.model, p, task.excitation, task.settings.periodic)
-    ok = np.array([status.ok for status in solution.status()])
+    statuses = solution.status()
+    ok = np.array([status.ok for status in statuses])
     response = np.asarray(harmonics(problem.model, p, solution, problem.orders))
-    return np.where(ok[:, None, None], response, np.nan)
+    return np.where(ok[:, None, None], response, np.nan), statuses
 
 
 ROUGHLY = 0.05
@@ -170,7 +174,7 @@ def fit_least_squares(
             break
         report("trying another start")
         tried.append(_from_start(task, minimiser, u, min(EXPLORING, settings.steps), report))
-    best = min(tried, key=lambda each: each.cost if np.isfinite(each.cost) else np.inf)
+    best = min(tried, key=lambda each: each.cost if each.evaluation.ok else np.inf)
     report("refining on nodes adapted to the result")
     best = _refined(task, minimiser, best, settings.steps, report)
     verdict = assess(task, minimiser, best, report)
@@ -199,7 +203,7 @@ def _from_start(task: Task, minimiser: Minimiser, u: Array, steps: int, report: 
 
 
 def _refined(task: Task, minimiser: Minimiser, best: Minimum, steps: int, report: Progress) -> Minimum:
-    if not np.isfinite(best.cost):
+    if not best.evaluation.ok:
         return best
     p, layout = task.problem.parameters(best.u), best.solution.mesh.layout
     limit = task.settings.periodic.iterations

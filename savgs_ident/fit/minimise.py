@@ -42,6 +42,7 @@ class Minimum(NamedTuple):
 
     ``residual`` (m,) and ``jacobian`` (m, n) of data and priors are those at ``u`` (n,); ``solution`` is
     the model's there. All of these have no dimension [1]: coordinates are scaled, residuals whitened.
+    ``status`` says how the minimisation ended, ``evaluation`` whether residuals and Jacobian are numbers.
     """
 
     u: Float[Array, " n"]
@@ -49,6 +50,7 @@ class Minimum(NamedTuple):
     jacobian: np.ndarray
     solution: PeriodicSolution
     status: Status
+    evaluation: Status
 
     @property
     def cost(self) -> float:
@@ -78,8 +80,6 @@ def _blank(solver: Any, rows: int, count: int) -> Any:
 def _left_to_gain(at: Linearised) -> float:
     """By how much a Gauss-Newton step would lower the sum of squares."""
     residual, matrix = np.asarray(at.residual), np.asarray(at.jacobian)
-    if not np.isfinite(matrix).all():
-        return np.inf
     along = matrix @ np.linalg.lstsq(matrix, residual)[0]
     return float(along @ along)
 
@@ -123,8 +123,9 @@ class Minimiser(eqx.Module):
             u, state, done, fine = _step(self.solver, u, trial.at, state)
             best = trial if bool(jnp.all(u == trial.at.u)) else best
             cost = float(jnp.sum(best.at.residual**2))
-            if not (fine and np.isfinite(cost)):
-                status = Status.NOT_FINITE
+            evaluation = best.status
+            if not (fine and evaluation.ok):
+                status = Status.NOT_FINITE if evaluation.ok else evaluation
                 break
             progress(f"step {count}: chi2 = {cost:.6g}")
             small = enough * cost + NOTHING
@@ -139,14 +140,15 @@ class Minimiser(eqx.Module):
     def evaluate(self, u: Float[Array, " n"], near: PeriodicSolution) -> Minimum:
         """Residuals and Jacobian at free coordinates ``u`` [1], without moving."""
         found = evaluate(self.problem, u, self.problem.unpinned, near)
-        fine = bool(jnp.isfinite(found.at.residual).all())
-        return _minimum(found, Status.CONVERGED if fine else Status.NOT_FINITE)
+        return _minimum(found, found.status)
 
 
 def _minimum(found: Evaluation, status: Status) -> Minimum:
     u, residual, jacobian = found.at
     rows = residual.size - u.size
-    return Minimum(u, np.asarray(residual)[:rows], np.asarray(jacobian)[:rows], found.solution, status)
+    return Minimum(
+        u, np.asarray(residual)[:rows], np.asarray(jacobian)[:rows], found.solution, status, found.status
+    )
 
 
 LARGEST_SPREAD = 1e3

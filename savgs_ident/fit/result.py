@@ -71,6 +71,7 @@ class Fit(Result):
         used: which entries of ``predicted`` were fitted, (D, C, orders + 1).
         predicted: identified model, complex [unit of the reading], (D, C, orders + 1), in the plant's channels.
         frictionless: the plant without effects at the same estimates [unit of the reading], (D, C, orders + 1).
+        frictionless_status: whether the periodic solution of that converged, per dwell; it is NaN where not.
         as_given: the model before fitting [unit of the reading], (D, C, orders + 1).
         starts: (chi2 reached, status) of each start of the optimisation.
         quantity: "harmonics" or "peak_to_peak", what was fitted.
@@ -95,6 +96,7 @@ class Fit(Result):
     used: NDArray[np.bool_]
     predicted: NDArray[np.complex128]
     frictionless: NDArray[np.complex128]
+    frictionless_status: tuple[Status, ...]
     as_given: NDArray[np.complex128]
     starts: tuple[tuple[float, Status], ...]
     quantity: str

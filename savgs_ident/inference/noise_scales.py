@@ -47,7 +47,7 @@ def noise_scales(data: Data, residual: NDArray[np.float64], start: float = 1e-2)
     There may be two maxima, of which one has little discrepancy: where the residuals have room for more than was
     found, it is looked for from there too.
     """
-    found = _ascended(data, residual, start)
+    found = _maximum_from(data, residual, start)
     excess, discrepancy_scale = (
         float(np.sum(residual**2 - data.variance)),
         float(np.sum(data.discrepancy_scale**2)),
@@ -55,13 +55,13 @@ def noise_scales(data: Data, residual: NDArray[np.float64], start: float = 1e-2)
     if excess > 2.0 * max(found.discrepancy, 1e-4) ** 2 * discrepancy_scale > 0.0:
         return max(
             found,
-            _ascended(data, residual, float(np.sqrt(excess / discrepancy_scale))),
+            _maximum_from(data, residual, float(np.sqrt(excess / discrepancy_scale))),
             key=lambda each: each.value,
         )
     return found
 
 
-def _ascended(data: Data, residual: NDArray[np.float64], start: float) -> NoiseScales:
+def _maximum_from(data: Data, residual: NDArray[np.float64], start: float) -> NoiseScales:
     """The maximum that is reached from a discrepancy.
 
     Steps in the logarithm of the noise scale and the square of the discrepancy: the better of Newton's, which is

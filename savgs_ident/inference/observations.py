@@ -39,7 +39,7 @@ class Term:
 
     Attributes:
         name: its name.
-        place: where in the plant it sits.
+        place: where in the plant it acts.
         amplitudes: coordinates at whose centres it vanishes.
         shapes: coordinates that say nothing while it vanishes.
         tries: values of shapes [SI] by name at which it is looked for; typical ones where left out.

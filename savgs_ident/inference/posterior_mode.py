@@ -99,10 +99,11 @@ class LinearisationPoint(NamedTuple):
 
 
 class PosteriorMode(NamedTuple):
-    """The mode: what is known there, and how the search ended."""
+    """The mode: what is known there, how the search ended, and whether the model was solved there."""
 
     linearisation_point: LinearisationPoint
     status: Status
+    solved: bool
 
 
 class Case(NamedTuple):
@@ -172,7 +173,7 @@ def find_mode(
     if found.status.ok:
         finer = search.plant.refined((), found.values, found.prediction.warm_start)
         found = find_map(search, (), found.values, finer, level=LEVEL, progress=report)
-    return PosteriorMode(_linearisation_point(case, found), found.status)
+    return PosteriorMode(_linearisation_point(case, found), found.status, found.solved)
 
 
 def _linearisation_point(case: Case, found: LaplaceFit) -> LinearisationPoint:
@@ -240,20 +241,24 @@ def _second_derivatives(
     An axis whose sides were not solved counts as straight: the exact model decides in the end.
     """
 
-    def slopes_at(shift: np.ndarray) -> np.ndarray:
+    def slopes_at(shift: np.ndarray) -> np.ndarray | None:
         u = jnp.asarray(at.point[:-2] + shift)
         _, slopes, solution = rows_and_slopes(
             case.problem, case.likelihood, u, at.solution, anchor.predicted(u)
         )
-        solved = all(status.ok for status in solution.status())
-        return np.asarray((slopes @ axes).T if solved else np.full((axes.shape[1], at.rows.size), np.nan))
+        return np.asarray((slopes @ axes).T) if joint_status(solution.status()).ok else None
 
     here = (at.slopes @ axes).T
-    second = np.stack(in_parallel(slopes_at, axes.T)) - here
-    own = np.arange(len(second))
-    bent = np.flatnonzero(~(np.linalg.norm(second[own, own] * weight, axis=1) < BENT))
-    for axis, behind in zip(bent, in_parallel(slopes_at, -axes.T[bent]), strict=True):
-        one_sided = here - behind
-        both = 0.5 * (second[axis] + one_sided)
-        second[axis] = np.where(np.isfinite(both), both, one_sided)
+    ahead = in_parallel(slopes_at, axes.T)
+    second = np.stack([np.zeros_like(here) if each is None else each - here for each in ahead])
+    bent = [
+        axis
+        for axis, each in enumerate(ahead)
+        if each is None or not np.linalg.norm(second[axis, axis] * weight) < BENT
+    ]
+    for axis, behind in zip(bent, in_parallel(slopes_at, [-axes.T[axis] for axis in bent]), strict=True):
+        if behind is None:
+            second[axis] = 0.0
+        else:
+            second[axis] = here - behind if ahead[axis] is None else 0.5 * (second[axis] + here - behind)
     return np.nan_to_num(second)

@@ -203,13 +203,21 @@ NUISANCE = ("noise_scale", "discrepancy")
 class Scales(NamedTuple):
     """Priors of the likelihood's scales: noise scale s = exp(noise_trust a), discrepancy d = discrepancy |b|.
 
-    ``noise_trust`` is the standard deviation of the logarithm of the noise scale [1]: the noise covariance was
-    estimated, from what does not repeat. ``discrepancy`` is the scale of the half-normal prior of the model
-    discrepancy [1]: a model that misses more than a tenth of the response is the wrong model.
+    They are the same in a posterior and in a diagnosis.
     """
 
     noise_trust: float = 0.1
+    """Standard deviation of the logarithm of the noise scale [1].
+
+    The noise covariance was estimated from what does not repeat from period to period. Origin: by choice. A standard
+    deviation estimated from n numbers is known to 1 / sqrt(2 n): to 0.1 from 50 of them.
+    """
+
     discrepancy: float = 0.05
+    """Scale of the half-normal prior of the model's discrepancy, relative to the response [1].
+
+    Origin: by choice: a model that misses a tenth of the response, two of these, is the wrong model.
+    """
 
     def noise_scale(self, points: Float[Array, "*w n+2"]) -> Float[Array, "*w"]:
         """Factor on the measured noise's standard deviation [1]."""

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
+from savgs_ident.core.status import Status, joint_status
 from savgs_ident.core.transforms import FreeVector, known_to_tolerance
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import InputSignal
@@ -228,6 +229,14 @@ class Evaluation(NamedTuple):
 
     at: Linearised
     solution: PeriodicSolution
+
+    @property
+    def status(self) -> Status:
+        """Whether residuals and Jacobian are numbers; if not, how the search for the motions ended."""
+        if bool(jnp.isfinite(self.at.residual).all() & jnp.isfinite(self.at.jacobian).all()):
+            return Status.CONVERGED
+        motions = joint_status(self.solution.status())
+        return Status.NOT_FINITE if motions.ok else motions
 
 
 def evaluate(problem: Problem, u: Float[Array, " n"], pins: Pins, warm_start: PeriodicSolution) -> Evaluation:

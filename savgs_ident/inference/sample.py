@@ -189,7 +189,7 @@ def locate(case: Case, task: Task, question: Question, report: Progress) -> Post
         case.problem.model, case.problem.parameters(u), task.excitation, task.settings.periodic
     )
     mode = find_mode(case, u, near, report)
-    if not np.isfinite(mode.linearisation_point.value):
+    if not mode.solved:
         raise InputError(
             "the model has no periodic motion at these parameters",
             remedy="identify it first: savgs-ident fit",

@@ -6,7 +6,7 @@ jump loses samples; a harmonic estimate tolerates this up to a tenth of the reco
 eight periods).
 
 The bounds on values are those of a rig of this size with a wide margin. They detect a wrong unit (27.5 mm read
-as 27.5 m) and do not judge a measurement.
+as 27.5 m) and do not assess a measurement.
 
 A clipped sensor repeats one extreme value, in run after run, far more often than the value next to it. A
 quantised sinusoid also dwells at its turning points, but the outermost of its levels holds at most

@@ -236,7 +236,7 @@ def drawing_of(bench: Bench, rig: Mapping[str, float]) -> Drawing | None:
 OFF = 0.1
 """Relative standard deviation of parameters that are to be identified and have no tolerance."""
 
-TWINS = (frozenset({"accel_gain", "accel_tilt"}),)
+INDISTINGUISHABLE = (frozenset({"accel_gain", "accel_tilt"}),)
 """Effects that do exactly the same: if one is removed from the catalogue, so are the others."""
 
 ATTEMPTS = 60
@@ -316,8 +316,8 @@ def _draw(kind: Drawn, drawing: Drawing, number: int, random: np.random.Generato
     sigmas = _sigmas(drawing, present)
     if any(sigma < STANDS_OUT for sigma in sigmas):
         return None
-    twins = {twin for pair in TWINS for twin in pair if kind == "unknown" and chosen[0] in pair}
-    without = tuple(sorted({*chosen, *twins})) if kind == "unknown" else ()
+    alike = {each for pair in INDISTINGUISHABLE for each in pair if kind == "unknown" and chosen[0] in pair}
+    without = tuple(sorted({*chosen, *alike})) if kind == "unknown" else ()
     # What is unknown must stand out of the catalogue as an effect must of what calibration does.
     limit = STANDS_OUT if kind == "unknown" else TOLD_APART
     imitators = {each.name: drawing.imitators(each, limit) for each in present}

@@ -36,6 +36,7 @@ from savgs_ident.core.transforms import known_to_tolerance
 from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.effect_sensitivities import columns_with_states
 from savgs_ident.diagnosis.problem import term_of
+from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.inference.observations import Term
@@ -255,11 +256,11 @@ def _marched(
 ) -> dict[str, Real]:
     """Change of the rows by every effect with states per unit of its amplitude, found at its typical size, (m, 1)."""
     special = [term for term in terms if CATALOGUE[term.name].states]
-    effects = [CATALOGUE[term.name] for term in special]
-    typical = [{each.name: each.centre + 0.5 * each.scale for each in term.amplitudes} for term in special]
+    effects, size = [CATALOGUE[term.name] for term in special], DEFAULTS.typical_coordinate
+    typical = [{each.name: each.centre + size * each.scale for each in term.amplitudes} for term in special]
     rows = columns_with_states(model, _all_rows(bench), ORDERS, p, solution, effects, typical)
     return {
-        term.name: each[:, None] / (0.5 * term.amplitudes[0].scale)
+        term.name: each[:, None] / (size * term.amplitudes[0].scale)
         for term, each in zip(special, rows, strict=True)
     }
 

@@ -95,6 +95,7 @@ def fit(measured: HarmonicResponse, rig: Rig) -> Fit:
         used=used,
         predicted=resonance(FREQUENCY, 0.3),
         frictionless=resonance(FREQUENCY, 0.1),
+        frictionless_status=(Status.CONVERGED,) * FREQUENCY.size,
         as_given=resonance(FREQUENCY, 0.33),
         starts=((163.0, Status.CONVERGED), (163.1, Status.CONVERGED)),
         quantity="harmonics",
