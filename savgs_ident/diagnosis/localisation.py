@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.find_map import LaplaceFit, Search
-from savgs_ident.inference.noise_scales import linearised_optimum, log_determinant
+from savgs_ident.inference.laplace import log_evidence
+from savgs_ident.inference.noise_scales import linearised_optimum
 from savgs_ident.inference.prior import bounds_of
 
 Matrix = NDArray[np.float64]
@@ -141,12 +142,11 @@ def _best_width(
     wide = np.full(law.shape[1], np.inf)
     bounds = np.concatenate([lower, -wide]), np.concatenate([upper, wide])
     start = np.concatenate([mode.x, np.zeros(law.shape[1])])
-    halved = log(2.0) * sum(each.halved for each in mode.coordinates)
     found = []
     for width in constants.law_widths:
         slopes = np.concatenate([mode.slopes, width * law], axis=1)
         top = linearised_optimum(search.data, residual, slopes, start, bounds)
-        found.append(top.value - 0.5 * log_determinant(top.precision) + halved)
+        found.append(log_evidence(top.value, top.precision, mode.coordinates))
     return constants.law_widths[int(np.argmax(found))], _log_mean_exp(found)
 
 

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.find_map import LaplaceFit, Search
-from savgs_ident.inference.noise_scales import linearised_optimum, log_determinant
+from savgs_ident.inference.laplace import log_evidence, precision_of
+from savgs_ident.inference.noise_scales import linearised_optimum
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import Coordinates, Sheet, bounds_of
 
@@ -94,8 +95,7 @@ def _score(
         slopes = np.concatenate([mode.slopes, moved], axis=1)
         x = np.concatenate([mode.x, np.zeros(count)])
         top = linearised_optimum(search.data, residual, slopes, x, (bounds[0], bounds[1]), search.mask)
-        halved = log(2.0) * sum(each.halved for each in mode.coordinates + term.amplitudes)
-        evidence = top.value - 0.5 * log_determinant(top.precision) + halved
+        evidence = log_evidence(top.value, top.precision, mode.coordinates + term.amplitudes)
         if best is None or evidence > best.evidence:
             found = dict(zip((c.name for c in term.amplitudes), top.x[-count:], strict=True))
             start = {each.name: each.value(float(found[each.name])) for each in term.amplitudes} | shapes
@@ -130,7 +130,7 @@ def _per_sigma(search: Search, mode: LaplaceFit, moved: NDArray[np.float64]) -> 
     """How many units of a column stand out of the noise by one standard deviation; infinite if none do."""
     kept, noise = search.mask, search.data.variance[search.mask]
     inside, column = mode.slopes[kept], moved[kept]
-    precision = np.eye(mode.x.size) + (inside.T / noise) @ inside
+    precision = precision_of(inside, noise)
     cross = inside.T @ (column / noise)
     visible = float(column @ (column / noise) - cross @ np.linalg.solve(precision, cross))
     whole = float(column @ (column / noise))

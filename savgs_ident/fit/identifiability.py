@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
-from savgs_ident.fit.minimise import Minimiser, Minimum, spread_of
+from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import Verdict
+from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import Pins, Problem, Task
 from savgs_ident.plants.base import Excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic

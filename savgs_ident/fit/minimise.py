@@ -1,11 +1,7 @@
-"""Levenberg-Marquardt steps of optimistix, taken one by one, and the covariance of where they lead.
+"""Levenberg-Marquardt steps of optimistix, taken one by one: the least-squares fit.
 
 Taking the steps from Python costs nothing beside the model and lets each one be reported and interrupted. The problem
 is evaluated, residuals and Jacobian, before the optimiser is asked for its step.
-
-A direction of the coordinates along which the residuals do not change has no covariance. It is given a large one
-instead of a wrong one: the inverse information is capped at :data:`LARGEST_SPREAD`, to keep correlations
-meaningful.
 """
 
 from typing import Any, NamedTuple
@@ -16,7 +12,6 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
-from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
@@ -149,27 +144,3 @@ def _minimum(found: Evaluation, status: Status) -> Minimum:
     return Minimum(
         u, np.asarray(residual)[:rows], np.asarray(jacobian)[:rows], found.solution, status, found.status
     )
-
-
-LARGEST_SPREAD = 1e3
-"""Standard deviation given to an unidentifiable direction [1]: a thousand e-folds of an identified parameter."""
-
-
-class Spread(NamedTuple):
-    """Covariance (n, n) of the unconstrained coordinates [1]."""
-
-    covariance: NDArray[np.float64]
-
-    @property
-    def sd(self) -> NDArray[np.float64]:
-        """Standard deviations, (n,)."""
-        return np.sqrt(np.diag(self.covariance))
-
-
-def spread_of(jacobian: NDArray[np.float64]) -> Spread:
-    """The spread for residuals of unit variance with ``jacobian`` (m, n), priors among the rows."""
-    # Fewer residuals than coordinates leave directions without information; the thin decomposition would drop them.
-    missing = max(0, jacobian.shape[1] - jacobian.shape[0])
-    _, singular, axes = np.linalg.svd(np.pad(jacobian, ((0, missing), (0, 0))), full_matrices=False)
-    sd = 1.0 / np.maximum(singular, 1.0 / LARGEST_SPREAD)
-    return Spread((axes.T * sd**2) @ axes)

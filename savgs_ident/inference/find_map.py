@@ -9,7 +9,6 @@ rows' variance.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import log
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,8 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
-from savgs_ident.inference.noise_scales import NoiseScales, linearised_optimum, log_determinant, noise_scales
+from savgs_ident.inference.laplace import log_evidence, precision_of
+from savgs_ident.inference.noise_scales import NoiseScales, linearised_optimum, noise_scales
 from savgs_ident.inference.observations import Data, Plant, Prediction, Term
 from savgs_ident.inference.prior import Coordinates, bounds_of, slopes_at, values_at
 
@@ -184,10 +184,7 @@ def _mode(
 ) -> LaplaceFit:
     slopes = here.slopes * slopes_at(coordinates, x)
     misfit = noise_scales(search.part(), search.residual(here)[search.mask])
-    across = slopes[search.mask]
-    precision = np.eye(x.size) + (across.T / misfit.spread) @ across
-    evidence = -np.inf
-    if here.solved:
-        evidence = value - 0.5 * log_determinant(precision) + log(2.0) * sum(c.halved for c in coordinates)
+    precision = precision_of(slopes[search.mask], misfit.spread)
+    evidence = log_evidence(value, precision, coordinates) if here.solved else -np.inf
     status = status if here.solved else here.status
     return LaplaceFit(names, coordinates, x, here, slopes, misfit, value, precision, evidence, status)

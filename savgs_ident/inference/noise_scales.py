@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.inference.laplace import precision_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import Scales
 
@@ -200,8 +201,7 @@ def linearised_optimum(
         if abs(value - before) < level:
             converged = misfit.converged and inside
             break
-    precision = np.eye(x.size) + (across.T / misfit.spread) @ across
-    return LinearisedOptimum(point, misfit, value, precision, converged)
+    return LinearisedOptimum(point, misfit, value, precision_of(across, misfit.spread), converged)
 
 
 def _within(
@@ -231,8 +231,3 @@ def _within(
             return point, True
         free[np.argmax(np.where(inwards, np.abs(rise), -np.inf))] = True
     return np.clip(point, lower, upper), False
-
-
-def log_determinant(precision: Vector) -> float:
-    """log det [1] of a precision matrix (n, n). Raises :class:`numpy.linalg.LinAlgError` if it is none."""
-    return float(2.0 * np.sum(np.log(np.diag(np.linalg.cholesky(precision)))))

@@ -20,6 +20,7 @@ from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status, joint_status
 from savgs_ident.inference.exact import Anchor, ExactModel, anchor_at, in_parallel, rows_and_slopes
 from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.inference.laplace import principal_axes
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.inference.observations import Prediction, Term
 from savgs_ident.inference.prior import Coordinates, Prior, sheet_coordinate
@@ -46,8 +47,7 @@ def parameter_scale(
     weight = 1.0 / np.sqrt(np.asarray(likelihood.spread(point)))
     curvature = -np.diag(np.asarray(jax.hessian(prior)(point)))[:count]
     stacked = np.concatenate([slopes * weight[:, None], np.diag(np.sqrt(np.maximum(curvature, 0.0)))])
-    _, sizes, axes = np.linalg.svd(stacked, full_matrices=False)
-    return np.asarray(axes.T / np.maximum(sizes, 1.0 / LONGEST))
+    return principal_axes(stacked, LONGEST)
 
 
 def nuisance_scale(
