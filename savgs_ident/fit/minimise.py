@@ -2,6 +2,18 @@
 
 Taking the steps from Python costs nothing beside the model and lets each one be reported and interrupted. The problem
 is evaluated, residuals and Jacobian, before the optimiser is asked for its step.
+
+This is not the search of :func:`savgs_ident.inference.find_map.find_map`, which has the same evaluation of the model,
+the same coordinates and the same priors, because it minimises something else and starts elsewhere:
+
+- Its residuals have a known variance, so that chi2 is a sum of squares and a test of the model. The density that the
+  other maximises has a noise scale and a discrepancy of the model, which would take up what chi2 should show.
+- It serves peak-to-peak values too, for which there is no likelihood with a discrepancy.
+- Its starts may be far from the minimum and have no scale of their own, which asks for damping; the other starts
+  where a calibrated baseline or a fit already is, and takes whole steps to the optimum of the linearisation, within
+  the bounds that an amplitude may reach. Coordinates of a fit have no bounds to reach.
+
+The pins hold one coordinate for a profile by a weight, so that one compiled program serves all coordinates.
 """
 
 from typing import Any, NamedTuple
