@@ -30,8 +30,8 @@ from savgs_ident.validation.blind import plan_of
 from savgs_ident.validation.blind_record import FILE, Answer, Envelope, sealed
 from savgs_ident.validation.blind_score import Interval, Score, score_from
 from savgs_ident.validation.blind_trial import Drawn, Plan, run_trial
-from savgs_ident.validation.calibration import Trial, trial_reader
-from savgs_ident.validation.false_alarms import NullDraw, read_draw
+from savgs_ident.validation.calibration import CalibrationStudy, Trial, trial_reader
+from savgs_ident.validation.false_alarms import AlarmStudy, NullDraw, read_draw
 from savgs_ident.validation.trials import known_trials
 from savgs_ident.validation.virtual_rig import Bench
 
@@ -137,14 +137,14 @@ def read_blind(path: Path) -> object:
 def read_draws(path: Path) -> object:
     """The draws of an earlier run, and the record of them."""
     found = known_trials(path, MARKS, read_draw)
-    return found, to_json(alarms_record(found, 3.0, ()))
+    return found, to_json(alarms_record(AlarmStudy(tuple(found), 3.0)))
 
 
 def read_trials(path: Path) -> object:
     """The trials of an earlier run, and the record of them."""
     found = known_trials(path, MARKS, trial_reader())
     names = sorted(next((each.rank for each in found if each.rank), {}))
-    return found, to_json(calibration_record(found, names, ()))
+    return found, to_json(calibration_record(CalibrationStudy(tuple(found), tuple(names))))
 
 
 def read_blind_seal(path: Path) -> object:
