@@ -14,6 +14,11 @@ model without it can do:
 with x the parameters that are identified or known to a tolerance, in units of what is known of them beforehand.
 The search takes damped Gauss-Newton steps within bounds.
 
+It is not the search of :mod:`savgs_ident.inference.find_map`. The noise is known exactly, so that no noise scale and
+no discrepancy may take up what stands out; the amplitudes of an effect beside have no prior; and what is known
+beforehand is centred on the drawn rig, within one e-fold for an identified parameter where a fit has three. Other
+widths could change what is drawn for a seed.
+
 How large a drawn effect is made: by what it changes, not by its parameter's number.
 
 Newtons of friction and seconds of lag have no common size; what they do to the response has. The amplitude is
