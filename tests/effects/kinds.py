@@ -10,6 +10,9 @@ A law is compared at the instants of a cycle: what it sees there (n, k) depends 
     sensor          frequency
 """
 
+from collections.abc import Callable
+from functools import cache
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -98,13 +101,23 @@ def seen_along(effect: Effect, cycle: Cycle) -> NDArray[np.float64]:
     return np.hstack(columns if isinstance(effect.law, AbstractForceLaw) else [*columns, cycle.rate])
 
 
+@cache
+def _compiled(name: str) -> Callable[[Values, Array], Array]:
+    effect = CATALOGUE[name]
+    return jax.jit(jax.vmap(lambda p, one: outcome(effect, p, one), in_axes=(None, 0)))
+
+
+@cache
+def _compiled_slopes(name: str) -> Callable[[Values, Values, Array], Array]:
+    law = _compiled(name)
+    return jax.jit(lambda p, direction, seen: jax.jvp(lambda q: law(q, seen), (p,), (direction,))[1])
+
+
 def outcomes(effect: Effect, p: Values, seen: NDArray[np.float64]) -> NDArray[np.float64]:
     """The law at many instants, (n, m)."""
-    return np.asarray(jax.vmap(lambda one: outcome(effect, p, one))(jnp.asarray(seen)))
+    return np.asarray(_compiled(effect.name)(dict(p), jnp.asarray(seen)))
 
 
 def slopes(effect: Effect, p: Values, direction: Values, seen: NDArray[np.float64]) -> NDArray[np.float64]:
     """Its derivatives in the parameters, along a direction of them."""
-    at = jnp.asarray(seen)
-    law = jax.vmap(lambda q, one: outcome(effect, q, one), in_axes=(None, 0))
-    return np.asarray(jax.jvp(lambda q: law(q, at), (dict(p),), (dict(direction),))[1])
+    return np.asarray(_compiled_slopes(effect.name)(dict(p), dict(direction), jnp.asarray(seen)))

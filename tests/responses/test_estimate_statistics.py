@@ -32,7 +32,7 @@ def draw_response(
     return estimate_response(synthetic.campaign(*dwells), orders=ORDERS)
 
 
-@pytest.fixture(scope="module", params=["white", "coloured"])
+@pytest.fixture(scope="module", params=[pytest.param("white", marks=pytest.mark.slow), "coloured"])
 def drawn(request: pytest.FixtureRequest, synthetic: Any) -> tuple[HarmonicResponse, Any]:
     noise = synthetic.white(0.05) if request.param == "white" else synthetic.coloured(0.05, 0.93)
     harmonics = synthetic.stepped(2.0, 40)
@@ -45,7 +45,6 @@ def errors_of(response: HarmonicResponse, harmonics: Any) -> Any:
     return np.stack([error.real, error.imag], axis=-1)
 
 
-@pytest.mark.slow
 def test_mean_error_lies_within_its_standard_error(drawn: tuple[HarmonicResponse, Any]) -> None:
     response, harmonics = drawn
     error = errors_of(response, harmonics)
@@ -138,6 +137,7 @@ def test_orders_cut_off_neither_bias_nor_count_as_noise(synthetic: Any) -> None:
     assert ratio == pytest.approx(1.0, abs=4.0 * np.sqrt(1.0 / error.size))
 
 
+@pytest.mark.slow
 def test_drift_does_not_bias(synthetic: Any) -> None:
     """A drift of 100 noise deviations over the record leaves the harmonics alone."""
     rng = np.random.default_rng(6)
