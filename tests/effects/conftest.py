@@ -4,7 +4,7 @@ import pytest
 
 from savgs_ident.plants.quarter_car.rig import Rig
 
-from ..plants.instants import all_parameters
+from ..plants.quarter_car.instants import all_parameters
 
 
 @pytest.fixture(scope="session")

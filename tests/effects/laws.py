@@ -20,7 +20,7 @@ from savgs_ident.plants.quarter_car.catalogue import build_model
 from savgs_ident.plants.quarter_car.plant import Loads
 from savgs_ident.plants.quarter_car.rig import Rig
 
-from ..plants.instants import NOMINAL, as_values, inputs_of, motion_of
+from ..plants.quarter_car.instants import NOMINAL, as_values, inputs_of, motion_of
 
 
 def typical(effect: Effect, **others: float) -> Values:

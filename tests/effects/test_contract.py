@@ -22,7 +22,7 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_toml import KNOWN_UNITS
 
 from ..in_one_test import over
-from ..plants.instants import as_values
+from ..plants.quarter_car.instants import as_values
 from .kinds import KINDS, effects_of
 
 NO_LAWS = {"__init__"}

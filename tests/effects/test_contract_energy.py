@@ -10,7 +10,7 @@ import pytest
 from savgs_ident.effects.effect import Effect
 
 from ..in_one_test import over
-from ..plants.instants import as_values
+from ..plants.quarter_car.instants import as_values
 from .cycles import along_a_cycle
 from .kinds import MECHANISMS, effects_of
 

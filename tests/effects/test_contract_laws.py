@@ -23,8 +23,8 @@ from savgs_ident.effects.base import (
 from savgs_ident.effects.effect import Effect
 
 from ..in_one_test import over
-from ..plants.instants import as_values
 from ..plants.primitives import MAPPABLE, primitives_of
+from ..plants.quarter_car.instants import as_values
 from .kinds import MECHANISMS, effects_of, outcome, outcomes, seen_by, slopes
 
 

@@ -18,7 +18,7 @@ from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS, QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 
 from ..in_one_test import over
-from ..plants.instants import as_values, draw_instants, inputs_of, motion_of
+from ..plants.quarter_car.instants import as_values, draw_instants, inputs_of, motion_of
 from .kinds import effects_of
 
 COUNT = 40

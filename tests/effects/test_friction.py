@@ -17,7 +17,7 @@ from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.kinematics import strut_length
 from savgs_ident.plants.quarter_car.rig import Rig
 
-from ..plants.instants import as_values
+from ..plants.quarter_car.instants import as_values
 from .laws import follow, in_the_rig, instant, signals, typical
 
 # rail_coulomb: eqs. (1)-(2): what the rail holds is in proportion to what it carries.

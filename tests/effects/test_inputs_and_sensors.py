@@ -10,7 +10,7 @@ from savgs_ident.effects.base import Fundamental, InputSignal
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, build_model
 from savgs_ident.plants.quarter_car.rig import Rig
 
-from ..plants.instants import as_values
+from ..plants.quarter_car.instants import as_values
 from .laws import typical
 
 # cam_harmonic: a cam with a second and a third order, and no other.

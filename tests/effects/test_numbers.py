@@ -9,7 +9,7 @@ from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.kinematics import linkage
 from savgs_ident.plants.quarter_car.rig import Rig
 
-from ..plants.instants import as_values, draw_instants
+from ..plants.quarter_car.instants import as_values, draw_instants
 from .laws import in_the_rig, instant
 
 # spring_rate: a stiffer spring about the same free length.

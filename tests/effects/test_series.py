@@ -13,7 +13,7 @@ from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.kinematics import strut_length
 from savgs_ident.plants.quarter_car.rig import Rig
 
-from ..plants.instants import as_values
+from ..plants.quarter_car.instants import as_values
 from .laws import balance_of, fundamental, give_way, in_the_rig, instant, typical
 
 # mount_compliance: a spring with a damper beside it: it creeps to its deflection with their time constant.

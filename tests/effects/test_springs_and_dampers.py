@@ -13,7 +13,7 @@ from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.kinematics import strut_length, suspension_travel
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig
 
-from ..plants.instants import as_values
+from ..plants.quarter_car.instants import as_values
 from .laws import force_of, in_the_rig, instant, typical
 
 # rail_viscous: grease: a force against the velocity, in proportion to it.

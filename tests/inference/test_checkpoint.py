@@ -23,9 +23,6 @@ from .toy_surrogate import Stand
 STRETCHES = 5
 """How often chains grow in the tests."""
 
-SLOW = {"nuts": pytest.mark.slow}
-"""Samplers that take long for a stretch; what is continued is one code for all."""
-
 
 class _InterruptError(Exception):
     """The run is stopped."""
@@ -77,7 +74,7 @@ def _assert_same(chains: Chains, other: Chains) -> None:
 @pytest.mark.parametrize(
     "calls", [*(pytest.param((n,), marks=pytest.mark.slow) for n in (1, 4, 7)), (2, 1, 3)], ids=str
 )
-@pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW.get(name, ())) for name in SAMPLERS])
+@pytest.mark.parametrize("name", SAMPLERS)
 def test_a_chain_that_was_stopped_is_the_same(
     name: str, calls: tuple[int, ...], partly: Toy, rough: Stand, tmp_path: Path
 ) -> None:

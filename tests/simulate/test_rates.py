@@ -16,7 +16,7 @@ from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.transient import Rates, solve_rates
 
-from ..plants.instants import draw_instants, inputs_of, motion_of
+from ..plants.quarter_car.instants import draw_instants, inputs_of, motion_of
 
 pytestmark = pytest.mark.slow
 

@@ -17,7 +17,7 @@ from savgs_ident.symbolic.translate import to_casadi
 
 from ..effects.kinds import MECHANISMS, effects_of, outcome, outcomes, seen_by
 from ..in_one_test import over
-from ..plants.instants import all_parameters, as_values
+from ..plants.quarter_car.instants import all_parameters, as_values
 
 COUNT = 400
 

@@ -16,7 +16,7 @@ from savgs_ident.plants.quarter_car.plant import read_sensors
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.symbolic.translate import to_casadi
 
-from ..plants.instants import draw_instants, inputs_of, motion_of, shifted
+from ..plants.quarter_car.instants import draw_instants, inputs_of, motion_of, shifted
 
 COUNT = 200
 

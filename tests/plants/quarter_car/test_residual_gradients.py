@@ -15,8 +15,8 @@ from savgs_ident.plants.quarter_car.dynamics import TRAVEL, Section, section, se
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 
+from ..primitives import MAPPABLE, TABLE_LOOK_UP, primitives_of
 from .instants import as_values, draw_instants, inputs_of, motion_of, shifted
-from .primitives import MAPPABLE, TABLE_LOOK_UP, primitives_of
 
 COUNT = 40
 FORCE = 5e3

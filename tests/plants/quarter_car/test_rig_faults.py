@@ -11,7 +11,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig
 from savgs_ident.plants.quarter_car.rig_toml import SECTION_OF
 
-from ..in_one_test import over
+from ...in_one_test import over
 
 SHIPPED = default_rig_path().read_text(encoding="utf-8")
 
