@@ -90,9 +90,9 @@ def test_the_record_is_whole(nominal: Fit, rig: Rig) -> None:
     assert nominal.dof == 28 * 2 * 9 * 2 - 4
     assert 0.0 < nominal.prior_chi2 < 20.0
     for estimate in nominal.estimates:
-        assert nominal.rig.parameters[estimate.name].value == estimate.value
+        assert nominal.model.rig.parameters[estimate.name].value == estimate.value
     untouched = set(rig.parameters) - {estimate.name for estimate in nominal.estimates}
-    assert all(nominal.rig.parameters[name].value == rig.parameters[name].value for name in untouched)
+    assert all(nominal.model.rig.parameters[name].value == rig.parameters[name].value for name in untouched)
     assert np.sqrt(np.diag(nominal.covariance)) == pytest.approx([e.stderr for e in nominal.estimates])
     assert np.diag(nominal.correlation) == pytest.approx(1.0)
     assert np.all(np.linalg.eigvalsh(nominal.correlation) > 0.0)
