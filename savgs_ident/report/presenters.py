@@ -6,6 +6,7 @@ same one. Each room has its presenters in ``present.py``, which is loaded when s
     presenters.FIT.text(fit)
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
@@ -26,23 +27,23 @@ Shown = TypeVar("Shown", bound=Result)
 Figures = Mapping[str, "Callable[[], Figure]"]
 
 
-class AbstractPresenter(Generic[Shown]):
+class AbstractPresenter(ABC, Generic[Shown]):
     """What presenters have in common: the numbers are written first, then tables, pictures and the report."""
 
     stem: str
     """The name of the files without their endings."""
 
+    @abstractmethod
     def record(self, result: Shown) -> Mapping[str, Any]:
         """The JSON object of the result."""
-        raise NotImplementedError
 
+    @abstractmethod
     def text(self, result: Shown) -> RenderableType:
         """Tables and sentences for a terminal."""
-        raise NotImplementedError
 
+    @abstractmethod
     def doubts(self, result: Shown) -> tuple[str, ...]:
         """Why the result is not to be trusted, a sentence each; empty if it is."""
-        raise NotImplementedError
 
     def page(self, result: Shown) -> str | None:
         """The report as HTML; None where there is none."""

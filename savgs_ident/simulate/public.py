@@ -15,7 +15,7 @@ from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.actuation import RigSource, held_link
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.road import cam_excitation, sweep_road
+from savgs_ident.plants.quarter_car.road import cam_excitation, nominal_test, sweep_road
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse, unbiased_peak_to_peak
@@ -71,7 +71,7 @@ def simulate_sweep(model: RigModel, progress: Progress = no_progress) -> Simulat
     use_persistent_cache()
     progress("integrating a sweep of 60 s")
     table = model.table
-    cam, angle = table.values_of(("cam_peak_to_peak", "psi_nominal"))
+    cam, angle = nominal_test(table.as_dict())
     time = np.linspace(0.0, DURATION_S, round(DURATION_S * RATE_HZ) + 1)
     source = RigSource(sweep_road(cam, LOWEST_HZ, HIGHEST_HZ, DURATION_S), held_link(angle))
     solution = simulate_transient(model.build(), as_values(table.as_dict()), source, time)
@@ -184,5 +184,4 @@ def _excitation(
     parameters = model.rig.parameters
     if campaign is not None:
         return measured_excitation(QuarterCar, estimate_response(campaign, orders), parameters)
-    values = parameters.values_of(("cam_peak_to_peak", "psi_nominal"))
-    return cam_excitation(np.unique(_checked(frequency) or DWELLS), *values)
+    return cam_excitation(np.unique(_checked(frequency) or DWELLS), *nominal_test(parameters.as_dict()))

@@ -38,6 +38,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import record_of, write_bytes
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.road import nominal_test
 from savgs_ident.recordings.recording import CANONICAL_UNITS, RecordedChannel, Recording, TestKind
 from savgs_ident.validation.virtual_rig import Bench, Sensors, Steady, steady_dwells, sweep_readings
 
@@ -88,7 +89,7 @@ def record_campaign(bench: Bench, answer: Answer, random: np.random.Generator) -
     Raises :class:`InputError` for a rig that does not come to a steady motion.
     """
     model, p = bench.model(answer.effects), bench.values({**answer.rig, **answer.parameters})
-    lift, angle = (float(p[name]) for name in ("cam_peak_to_peak", "psi_nominal"))
+    lift, angle = nominal_test(p)
     tests = []
     for dwell in steady_dwells(model, p, bench.programme.dwells):
         if not dwell.settled:

@@ -36,7 +36,14 @@ from savgs_ident.plants.quarter_car.actuation import ImposedLink, RigSource, hel
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, build_model
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.road import RoadMotion, cam_excitation, cam_road, flat_road, sweep_road
+from savgs_ident.plants.quarter_car.road import (
+    RoadMotion,
+    cam_excitation,
+    cam_road,
+    flat_road,
+    nominal_test,
+    sweep_road,
+)
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, resolve, simulate_periodic
 from savgs_ident.simulate.program_cache import placed
@@ -135,7 +142,7 @@ class Bench:
     @cached_property
     def excitation(self) -> Excitation:
         """The cam in all dwells, and a rigid link."""
-        lift, angle = self.table.values_of(("cam_peak_to_peak", "psi_nominal"))
+        lift, angle = nominal_test(self.table.as_dict())
         return cam_excitation(self.programme.dwells, lift, angle)
 
     def model(self, effects: Sequence[str]) -> QuarterCar:
@@ -227,7 +234,8 @@ def without_sensor_faults(model: QuarterCar) -> QuarterCar:
 def steady_dwells(model: QuarterCar, p: Values, frequencies: tuple[float, ...]) -> Iterator[Steady]:
     """The steady motions of the rig in one dwell after the other [Hz], with a link held at its nominal angle."""
     mechanics = without_sensor_faults(model)
-    state, rise = _at_rest(mechanics, p, placed(held_link(float(p["psi_nominal"])))), STRETCH
+    _, angle = nominal_test(p)
+    state, rise = _at_rest(mechanics, p, placed(held_link(angle))), STRETCH
     for frequency in frequencies:
         apart = np.inf
         for _ in range(ceil(PATIENCE / STRETCH)):
@@ -255,7 +263,7 @@ def _stretch(
 
     The cam's lift grows to its height during the first ``rise`` [s].
     """
-    lift, angle = float(p["cam_peak_to_peak"]), float(p["psi_nominal"])
+    lift, angle = nominal_test(p)
     times = np.linspace(0.0, periods / frequency, SAMPLES + 1)
     drive = (cam_road(lift, frequency, rise), held_link(angle), jnp.asarray(times))
     end, readings = _integrated(model, p, start, *placed(drive))
@@ -296,8 +304,8 @@ def sweep_readings(
     Raises :class:`InputError` if the integration does not end well.
     """
     times = np.arange(round(duration * rate) + 1) / rate
-    road = sweep_road(float(p["cam_peak_to_peak"]), 0.0, end, duration)
-    link = held_link(float(p["psi_nominal"]))
+    lift, angle = nominal_test(p)
+    road, link = sweep_road(lift, 0.0, end, duration), held_link(angle)
     shown, ended = _swept(model, p, *placed((road, link, jnp.asarray(times))))
     if not np.isfinite(shown).all() or not bool(ended):
         raise InputError("the sweep cannot be simulated", source="sweep", remedy="draw another rig")

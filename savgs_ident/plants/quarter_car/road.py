@@ -5,7 +5,9 @@ road.height(t), road.velocity(t)
 """
 
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
+from typing import SupportsFloat
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -45,6 +47,11 @@ class RoadMotion(eqx.Module):
     def cam_at(self, t: Float[Array, ""]) -> Fundamental | None:
         """Angle and speed of the cam at time ``t`` [s]; None if nothing turns."""
         return None if self.turning is None else Fundamental(self.turning.value(t), self.turning.rate(t))
+
+
+def nominal_test(p: Mapping[str, SupportsFloat]) -> tuple[float, float]:
+    """Lift of the cam [m], peak to peak, and the angle [rad] at which the link is held, from the parameters."""
+    return float(p["cam_peak_to_peak"]), float(p["psi_nominal"])
 
 
 def cam_excitation(frequency: ArrayLike, peak_to_peak: float, link_angle: float) -> Excitation:

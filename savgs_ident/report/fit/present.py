@@ -1,5 +1,6 @@
 """The presenter of a fit, and of a model against a measurement; what draws is loaded when something is drawn."""
 
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -21,8 +22,9 @@ if TYPE_CHECKING:
 class _Identified(AbstractPresenter[Shown]):
     """A model drawn against a measurement: smooth curves, for which it is solved between the dwells too."""
 
+    @abstractmethod
     def comparison(self, result: Shown) -> "Comparison":
-        raise NotImplementedError
+        """The model against the measurement."""
 
     def figures(self, result: Shown) -> Figures:
         return {"bode": lambda: comparison_figure(self.comparison(result))}
