@@ -270,13 +270,13 @@ def use_persistent_cache() -> bool:
     return True
 
 
-def make_room_for_programs() -> None:
-    """Let compiled programs go where they are many: each takes some twenty regions of the process's memory.
+def make_room_for_programs(most: int = MANY_REGIONS) -> None:
+    """Let compiled programs go where they take more than ``most`` regions of the process's memory, some twenty each.
 
     For processes that do one task after another. Beyond the bound of the system the next program, compiled or read
     from the cache, would end the process.
     """
-    if mapped_regions() > MANY_REGIONS:
+    if mapped_regions() > most:
         jax.clear_caches()
         gc.collect()
 

@@ -19,27 +19,24 @@ QUICK = ("--free", "c_sd", "--max-frequency", "2", "--fixed-tolerances")
 FAST = ("inspect", "export")
 
 
-def _slow_but(name: str, room: int = 30_000) -> tuple[pytest.MarkDecorator, ...]:
-    return () if name in FAST and room == 30_000 else (pytest.mark.slow,)
+def _slow_but(name: str) -> tuple[pytest.MarkDecorator, ...]:
+    return () if name in FAST else (pytest.mark.slow,)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "more", "room", "refused", "kept"),
     [
-        pytest.param(*row, marks=_slow_but(row[0], row[2]))
-        for row in (
-            ("inspect", (), 2_000, "inspect.json", []),
-            ("inspect", (), 30_000, "inspect.png", ["inspect.json"]),
-            ("export", (), 2_000, "model.json", []),
-            ("simulate", ("--frequency", "2"), 500, "simulate.json", []),
-            ("simulate", ("--frequency", "2"), 20_000, "simulate.png", ["simulate.csv", "simulate.json"]),
-            ("fit", QUICK, 3_000, "fit.json", []),
-            ("fit", QUICK, 30_000, "bode.png", ["fit.json", "model.toml"]),
-            ("linearise", (), 3_000, "linearise.json", []),
-            ("design", ("--rigs", "1"), 6_000, "design.json", ["controller.json"]),
-            ("campaign", (*QUICK, "--workers", "1"), 1_000, "o/short", []),
-        )
+        ("inspect", (), 2_000, "inspect.json", []),
+        ("inspect", (), 30_000, "inspect.png", ["inspect.json"]),
+        ("export", (), 2_000, "model.json", []),
+        ("simulate", ("--frequency", "2"), 500, "simulate.json", []),
+        ("simulate", ("--frequency", "2"), 20_000, "simulate.png", ["simulate.csv", "simulate.json"]),
+        ("fit", QUICK, 3_000, "fit.json", []),
+        ("fit", QUICK, 30_000, "bode.png", ["fit.json", "model.toml"]),
+        ("linearise", (), 3_000, "linearise.json", []),
+        ("design", ("--rigs", "1"), 6_000, "design.json", ["controller.json"]),
+        ("campaign", (*QUICK, "--workers", "1"), 1_000, "o/short", []),
     ],
 )
 def test_a_full_disk_is_told_with_the_file_and_leaves_whole_files_only(

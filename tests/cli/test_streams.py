@@ -10,16 +10,17 @@ from .installed import Installed, files_in
 WRITTEN = ["inspect.json", "inspect.pdf", "inspect.png"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "line",
     [
-        pytest.param('"$@" | head -1; exit ${PIPESTATUS[0]}', marks=pytest.mark.slow),
+        '"$@" | head -1; exit ${PIPESTATUS[0]}',
         '"$@" | true; exit ${PIPESTATUS[0]}',
-        pytest.param('"$@" 2>&1 | true; exit ${PIPESTATUS[0]}', marks=pytest.mark.slow),
-        pytest.param('"$@" >&-', marks=pytest.mark.slow),
-        pytest.param('"$@" 2>&-', marks=pytest.mark.slow),
-        pytest.param('"$@" >&- 2>&-', marks=pytest.mark.slow),
-        pytest.param('"$@" 2>/dev/full', marks=pytest.mark.slow),
+        '"$@" 2>&1 | true; exit ${PIPESTATUS[0]}',
+        '"$@" >&-',
+        '"$@" 2>&-',
+        '"$@" >&- 2>&-',
+        '"$@" 2>/dev/full',
     ],
 )
 def test_nobody_who_listens_is_no_reason_to_stop(

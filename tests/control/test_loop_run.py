@@ -67,6 +67,7 @@ def sliding(friction: QuarterCar, smooth: Values, loop: Loop) -> ClosedLoopRun:
     return ran(friction, smooth, AT_TWO, loop)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rigid", "within"), [(False, 1e-3), (True, 0.01)])
 def test_the_passive_run_ends_in_the_periodic_motion(
     friction: QuarterCar, numbers: Values, held: ClosedLoopRun, rigid: bool, within: float
@@ -122,6 +123,7 @@ def test_the_active_run_is_that_of_an_error_controlled_integration(
         assert left < within, name
 
 
+@pytest.mark.slow
 def test_the_plate_carries_the_weight_at_rest_and_on_average(sliding: ClosedLoopRun, smooth: Values) -> None:
     """Over whole periods, where no friction holds the rig: nothing else holds it up."""
     weight = float((smooth["m_s"] + smooth["m_u"]) * smooth["g"])

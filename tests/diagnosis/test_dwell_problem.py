@@ -141,6 +141,7 @@ def test_a_force_that_is_imposed_acts_like_the_effect_that_makes_it(
     assert _relative(imposed, columns[0][:, 0], data) < 1e-6
 
 
+@pytest.mark.slow
 def test_every_port_is_a_place_and_explains_what_acts_there(
     plant_and_data: Case, start: PeriodicSolution
 ) -> None:

@@ -83,6 +83,7 @@ def test_frequency_responses_are_those_of_the_state_spaces_in_the_file(found: di
         assert responses[name] == pytest.approx(wanted, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_motion_on_the_cam_is_that_of_the_nonlinear_rig(
     found: dict[str, Any], model: ExportedModel
 ) -> None:

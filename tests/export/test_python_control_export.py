@@ -24,6 +24,8 @@ from savgs_ident.simulate.transient import simulate_transient
 LIFT, FREQUENCY, DURATION = 0.0275, 2.35, 0.6
 """Of a cam that begins smoothly: [m], [Hz], [s]."""
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def path(model: ExportedModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -62,7 +64,6 @@ def test_linear_systems_come_back_to_the_last_digit(systems: dict[str, Any], mod
         )
 
 
-@pytest.mark.slow
 def test_the_nonlinear_right_side_is_the_equations(systems: dict[str, Any], model: ExportedModel) -> None:
     rig, equations = systems["nonlinear"], model.equations
     assert isinstance(rig, control.NonlinearIOSystem)
@@ -77,7 +78,6 @@ def test_the_nonlinear_right_side_is_the_equations(systems: dict[str, Any], mode
         assert rig.output(0.0, x, u) == pytest.approx(outputs, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.slow
 def test_every_parameter_can_be_changed(systems: dict[str, Any], model: ExportedModel) -> None:
     rig, equations = systems["nonlinear"], model.equations
     changed = model.table.with_values({"k_t": 2e5, "mount_compliance": 3e-6})
@@ -96,7 +96,6 @@ def test_it_rests_where_it_says(systems: dict[str, Any], path: Path) -> None:
     assert systems["nonlinear"].dynamics(0.0, x, u) == pytest.approx(np.zeros(x.size), abs=1e-6)
 
 
-@pytest.mark.slow
 def test_it_moves_as_the_simulator_says(systems: dict[str, Any], model: ExportedModel, path: Path) -> None:
     """On a cam, with friction and the mount: python-control's integration against ours."""
     # Between these instants python-control takes the inputs as straight lines: of a cam, that is off by 3e-8 m.
@@ -176,7 +175,6 @@ def test_a_rest_that_does_not_fit_is_refused(path: Path, tmp_path: Path) -> None
         resting_point(broken)
 
 
-@pytest.mark.slow
 def test_a_rig_without_friction_has_the_same_systems(rig: Rig, tmp_path: Path) -> None:
     (path,) = write_python_control(ExportedModel(rig, MODELS["simqc"]), tmp_path)
     found = load_python_control(path)

@@ -23,6 +23,9 @@ from .toy_surrogate import Stand
 STRETCHES = 5
 """How often chains grow in the tests."""
 
+EACH = [pytest.param(name, marks=pytest.mark.slow if name == "nuts" else ()) for name in SAMPLERS]
+"""The samplers; NUTS takes long to compile, and what is on disk is one code for all."""
+
 
 class _InterruptError(Exception):
     """The run is stopped."""
@@ -74,7 +77,7 @@ def _assert_same(chains: Chains, other: Chains) -> None:
 @pytest.mark.parametrize(
     "calls", [*(pytest.param((n,), marks=pytest.mark.slow) for n in (1, 4, 7)), (2, 1, 3)], ids=str
 )
-@pytest.mark.parametrize("name", SAMPLERS)
+@pytest.mark.parametrize("name", EACH)
 def test_a_chain_that_was_stopped_is_the_same(
     name: str, calls: tuple[int, ...], partly: Toy, rough: Stand, tmp_path: Path
 ) -> None:
@@ -96,7 +99,7 @@ def test_a_chain_that_was_stopped_is_the_same(
         _assert_same(resumed, straight)
 
 
-@pytest.mark.parametrize("name", SAMPLERS)
+@pytest.mark.parametrize("name", EACH)
 def test_nothing_is_lost_between_two_runs(name: str, partly: Toy, rough: Stand, tmp_path: Path) -> None:
     path = tmp_path / "chain.h5"
     first = _grown(name, partly, rough, new_checkpoint(path, "case"), 3)

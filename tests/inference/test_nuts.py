@@ -116,11 +116,12 @@ def _off_in_standard_errors(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.max(found))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "step_size"),
     [
-        *(pytest.param(name, 0.7, marks=() if "skewed" in name else pytest.mark.slow) for name in CASES),
-        pytest.param("1-d, 30 % too wide, off", SHORT, marks=pytest.mark.slow),
+        *((name, 0.7) for name in CASES),
+        ("1-d, 30 % too wide, off", SHORT),
         ("2-d, skewed", SHORT),
     ],
 )

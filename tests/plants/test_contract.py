@@ -100,6 +100,13 @@ BENCHES = {
 }
 
 
+MOVED = [
+    pytest.param(bench, id=name, marks=() if bench.plant.effects else pytest.mark.slow)
+    for name, bench in BENCHES.items()
+]
+"""Where motions are solved, plants without effects are left to the slow tests: the others have all their terms."""
+
+
 @pytest.fixture(scope="module", params=BENCHES.values(), ids=BENCHES)
 def bench(request: pytest.FixtureRequest) -> Bench:
     found: Bench = request.param
@@ -174,6 +181,7 @@ def test_the_residual_has_the_slopes_of_differences(bench: Bench) -> None:
         assert np.max(np.abs(differences - slopes[:, place])) < 1e-5 * size, names[place]
 
 
+@pytest.mark.parametrize("bench", MOVED, indirect=True)
 def test_harmonics_have_the_slopes_of_differences(bench: Bench) -> None:
     """On the same nodes: where these are moved, friction shows it."""
     plant, p = bench.plant, bench.p
@@ -192,6 +200,7 @@ def test_harmonics_have_the_slopes_of_differences(bench: Bench) -> None:
         assert np.max(np.abs(differences - slopes[place]) / size) < 1e-3, name
 
 
+@pytest.mark.parametrize("bench", MOVED, indirect=True)
 def test_periodic_and_transient_motions_agree(bench: Bench) -> None:
     """After the transient has died away, over the last period of the faster dwell."""
     plant, p, frequency = bench.plant, bench.p, bench.frequency[-1]

@@ -98,6 +98,7 @@ def test_equal_steps_warp_the_frequency_exactly_as_the_trapezoidal_rule_does(
     assert np.max(np.abs(found / _transfer(linearised, omega, 1j * omega) - 1.0)) > 1e-4
 
 
+@pytest.mark.slow
 def test_simqc_peaks_at_two_hertz(frictionless: QuarterCar, numbers: Values) -> None:
     solution = simulate_periodic(frictionless, numbers, cam(PROGRAMME))
     assert all(status.ok for status in solution.status())

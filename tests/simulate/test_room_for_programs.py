@@ -23,8 +23,7 @@ before = compilation.mapped_regions()
 for number in range({programs}):
     jax.jit(lambda x, n=number: jnp.cumsum(jnp.sin(n * x)))(jnp.ones(number + 2)).block_until_ready()
 full = compilation.mapped_regions()
-compilation.MANY_REGIONS = full + {room}
-compilation.make_room_for_programs()
+compilation.make_room_for_programs(full + {room})
 print(before, full, compilation.mapped_regions())
 """
 

@@ -99,6 +99,7 @@ def test_the_order_of_the_dwells_does_not_matter(few: PeriodicSolution) -> None:
     assert np.max(distance(_orders(P, turned)[::-1], _orders(P, few))) < 1e-10
 
 
+@pytest.mark.slow
 def test_the_stated_truncation_error_is_the_real_one(few: PeriodicSolution) -> None:
     """Second order says four thirds of it."""
     fine = finer(PLANT, P, few, 8)
@@ -142,6 +143,7 @@ def test_the_error_follows_the_tolerance() -> None:
     assert fine < rough / 300.0
 
 
+@pytest.mark.slow
 def test_what_road_brings_is_lost_or_stored() -> None:
     """Over a second with stick and slip."""
     times = np.linspace(0.0, 1.0, 20_001)
@@ -196,6 +198,7 @@ def test_what_gives_way_in_series_has_rates_and_slopes_of_its_own() -> None:
     assert np.max(np.abs(found.sd)) > 0.0
 
 
+@pytest.mark.slow
 def test_a_motion_that_is_none_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     ill = dict(P) | {"k_t": jnp.asarray(jnp.nan)}
     begin = _moved().state_at(0)
