@@ -92,7 +92,7 @@ def room_for_programs() -> Iterator[None]:
     yield
     from savgs_ident.simulate.program_cache import make_room_for_programs
 
-    make_room_for_programs(most=40_000)
+    make_room_for_programs(most=30_000)
 
 
 @pytest.fixture(scope="session")
