@@ -10,6 +10,7 @@ from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.core.status import Status
 from savgs_ident.fit.collocation.crosscheck import CollocationFit, CollocationSettings, fit_by_collocation
 from savgs_ident.fit.result import Fit
+from savgs_ident.inference.prior import sheet_coordinate
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
@@ -63,11 +64,13 @@ def test_it_finds_what_the_recordings_were_made_with(found: CollocationFit) -> N
         assert estimate.stderr < 0.03 * value
 
 
-def test_what_is_left_is_the_noise(found: CollocationFit, response: HarmonicResponse) -> None:
+def test_what_is_left_is_the_noise(found: CollocationFit, response: HarmonicResponse, rig: Rig) -> None:
     samples = found.dof + len(FREE) + 2 * len(DWELLS)
     assert found.tests == response.tests
     assert found.chi2 / found.dof == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / samples) + 0.005)
-    assert found.prior_chi2 == 0.0
+    table = RigModel(rig, MODELS["simtr"]).table
+    priors = [sheet_coordinate(table[name]).at(found.by_name[name].value) for name in FREE]
+    assert found.prior_chi2 == pytest.approx(np.sum(np.square(priors)), rel=1e-6)
     for name, sd in NOISE.items():
         assert response.noise_sd[:, response.channel(name)] == pytest.approx(sd, rel=0.05)
 
