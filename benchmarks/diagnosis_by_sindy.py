@@ -21,7 +21,7 @@ from savgs_ident.diagnosis.model_selection import recalibrate
 from savgs_ident.diagnosis.quarter_car import SIMTR, quarter_car_problem
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.simulate.excitation import recorded_names
 from savgs_ident.validation.trials import side_by_side
@@ -149,7 +149,7 @@ def read_trial(folder: Path, rig: Rig) -> Trial:
     """A trial from its folder."""
     answer = json.loads((folder / "answer.json").read_text())["answer"]
     verdict = json.loads((folder / "diagnosis.json").read_text())["verdict"]
-    campaign = read_campaign(folder / "campaign")
+    campaign = load_campaign(folder / "campaign")
     measured = estimate_response(campaign.only(recorded_names(QuarterCar)), SIMTR.orders)
     names, library, residual = regression_of(measured, rig)
     return Trial(

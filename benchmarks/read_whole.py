@@ -3,13 +3,13 @@
 import sys
 import time
 
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 
 
 def main() -> None:
     """Command line."""
     began = time.perf_counter()
-    read_campaign(sys.argv[1])
+    load_campaign(sys.argv[1])
     seconds = time.perf_counter() - began
     print(seconds)
 

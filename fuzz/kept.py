@@ -21,7 +21,7 @@ from savgs_ident.core.output import to_json
 from savgs_ident.inference.samplers import nuts as nuts_sampler
 from savgs_ident.inference.samplers.chains import new_checkpoint, open_checkpoint
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, rig_content
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.report.campaigns.record import campaigns_columns, campaigns_record
 from savgs_ident.report.validation.blind import blind_record
 from savgs_ident.report.validation.calibration import alarms_record, calibration_record
@@ -236,7 +236,7 @@ def _blind_files() -> dict[str, bytes]:
         path = Path(folder) / FILE
         path.write_bytes(gzip.compress(campaign, mtime=0))
         envelope = Envelope(answer, "ab" * 16)
-        seal = sealed(envelope, read_campaign(folder).sha256)
+        seal = sealed(envelope, load_campaign(folder).sha256)
         told = {"trial": _NUMBER, "settings": _PLAN.marks()} | asdict(envelope)
         return {
             f"trial_0001/campaign/{FILE}": path.read_bytes(),

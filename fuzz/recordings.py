@@ -13,10 +13,10 @@ from scipy.io import savemat
 from fuzz.cdr import IMU, JOINTS, imu_message, joint_message, number_message, text_message
 from fuzz.loader import Original
 from fuzz.mcap_files import Message, Topic, mcap_bytes
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.plants.quarter_car.road import read_road
 from savgs_ident.recordings.axis_recording import read_axis
 from savgs_ident.recordings.channels import read_channel_map
-from savgs_ident.recordings.read import read_campaign
 
 START_NS = 1_763_715_600_000_000_000
 RATE_HZ, SAMPLES, FREQUENCY_HZ = 50.0, 120, 2.0
@@ -139,13 +139,13 @@ def axis() -> Original:
 
 def read_table(path: Path) -> object:
     """The campaign in a file."""
-    return read_campaign(path)
+    return load_campaign(path)
 
 
 def read_map(path: Path) -> object:
     """The map, and the campaign beside it as it says."""
-    found = read_channel_map(path)
-    return found, read_campaign(path.parent / "campaign.csv", found)
+    found = read_channel_map(path, RIG_LAYOUT)
+    return found, load_campaign(path.parent / "campaign.csv", found)
 
 
 def read_road_file(path: Path) -> object:

@@ -11,7 +11,8 @@ import control
 import numpy as np
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, Recording
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
+from savgs_ident.recordings.recording import Campaign, Recording
 
 _BOUNDS = ("lower", "upper")
 
@@ -61,7 +62,7 @@ def _recording_faults(recording: Recording) -> Iterator[str]:
     if frequency is not None and not 0.0 < frequency < np.inf:
         yield f"the frequency of '{recording.name}' is {frequency}"
     for name, channel in recording.channels.items():
-        if channel.unit != CANONICAL_UNITS[name]:
+        if channel.unit != RIG_LAYOUT.si_unit(name):
             yield f"'{name}' is in {channel.unit}"
         if channel.time.shape != channel.values.shape:
             yield f"'{name}' has {channel.values.size} values at {channel.time.size} times"

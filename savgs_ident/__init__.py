@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from savgs_ident.plants.quarter_car.model import RigModel as QuarterCar
     from savgs_ident.plants.quarter_car.model import load_model, load_rig
     from savgs_ident.plants.quarter_car.rig import Rig, default_campaign_path
+    from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
     from savgs_ident.plants.two_mass import TwoMass
-    from savgs_ident.recordings.read import read_campaign as load_campaign
     from savgs_ident.recordings.recording import Campaign
     from savgs_ident.report.public import plot_bode
     from savgs_ident.responses.driven_motion import DrivenMotion, load_motion
@@ -65,7 +65,7 @@ _PLACES = {
     # What there is to work on.
     "load_rig": "plants.quarter_car.model",
     "load_model": "plants.quarter_car.model",
-    "load_campaign": "recordings.read:read_campaign",
+    "load_campaign": "plants.quarter_car.rig_recordings",
     "load_motion": "responses.driven_motion",
     "default_campaign_path": "plants.quarter_car.rig",
     "QuarterCar": "plants.quarter_car.model:RigModel",

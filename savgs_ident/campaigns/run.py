@@ -38,8 +38,9 @@ from savgs_ident.fit.public import fit_with
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig, rig_content, rig_text
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.recordings.channels import read_channel_map
-from savgs_ident.recordings.read import map_digest, read_campaign
+from savgs_ident.recordings.read import map_digest
 from savgs_ident.simulate.program_cache import (
     compute_on_one_core,
     make_room_for_programs,
@@ -147,7 +148,7 @@ def run_campaigns(
     """Identify many campaigns side by side, and say whether the parameters agree and whether they change.
 
     Args:
-        folders: campaigns as :func:`savgs_ident.recordings.read.read_campaign` takes them, and folders of several:
+        folders: campaigns as :func:`savgs_ident.load_campaign` takes them, and folders of several:
             one in each file or subfolder.
         out: folder in which each campaign's result is kept; a run that was stopped goes on from there.
         rig: rig file to start from; the shipped one if left out.
@@ -240,7 +241,7 @@ def _identified(task: Task) -> Kept:
             remedy="install the same version for every worker",
         )
     job = task.job
-    campaign = read_campaign(job.campaign, job.channels)
+    campaign = load_campaign(job.campaign, job.channels)
     if campaign.sha256 != task.data_sha256:
         raise InputError(
             "is not what it was when the run began",
@@ -269,7 +270,7 @@ class _Pending:
 def _settings(one: Job, content: bytes) -> dict[str, Any]:
     """What a result depends on besides data and rig, this program's version among it; checks them, too."""
     if one.channels is not None:
-        read_channel_map(one.channels)
+        read_channel_map(one.channels, RIG_LAYOUT)
     model = one.model_of(content)
     return {
         "model": one.model,

@@ -26,7 +26,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
-from savgs_ident.control.linearisation import OperatingPoint, resting
+from savgs_ident.control.linearisation import OperatingPoint, nominal_rest
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import Motion
@@ -126,7 +126,7 @@ def _bare_slopes(model: QuarterCar, p: Values, at: OperatingPoint) -> _Bare:
 
 
 def _bare(model: QuarterCar, p: Values) -> _Bare:
-    at = resting(QuarterCar(model.damper), model.effective(p), p["psi_nominal"])
+    at = nominal_rest(QuarterCar(model.damper), model.effective(p))
     return jax.tree.map(np.asarray, _bare_slopes(model, p, at))
 
 

@@ -43,7 +43,7 @@ from jaxtyping import Array, Float
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from savgs_ident.control.linearisation import resting, slopes
+from savgs_ident.control.linearisation import nominal_rest, slopes
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.equilibrium import static_equilibrium
 from savgs_ident.plants.quarter_car.kinematics import installation_ratio, strut_length, suspension_travel
@@ -157,7 +157,7 @@ def with_damper_at_rest(model: QuarterCar, p: Values, masses: TwoMasses) -> TwoM
 def with_distributed_masses(model: QuarterCar, p: Values, masses: TwoMasses) -> TwoMasses:
     """The same with wishbones and upright as rigid bodies: the mass matrix couples the two velocities."""
     bare, rig = QuarterCar(model.damper), model.effective(p)
-    at = resting(bare, rig, p["psi_nominal"])
+    at = nominal_rest(bare, rig)
     inertia = -np.asarray(slopes(bare, rig, at).residual_y)
     travel = float(jax.grad(suspension_travel, argnums=1)(rig, at.q.theta_LW))
     turn: NDArray[np.float64] = np.array([[1.0, 0.0], [-1.0 / travel, 1.0 / travel]])

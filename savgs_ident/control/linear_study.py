@@ -33,7 +33,7 @@ from savgs_ident.control.linear_equivalent import (
     with_damper_at_rest,
     with_distributed_masses,
 )
-from savgs_ident.control.linearisation import linearise, resting
+from savgs_ident.control.linearisation import linearise, nominal_rest
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Result
 from savgs_ident.core.values import Values
@@ -236,7 +236,7 @@ def study_small_motions(model: QuarterCar, p: Values) -> SmallMotions:
     for name, numbers in masses.items():
         response = quarter_car_space(numbers)(iw)
         models[name] = np.stack([response[0, 0], response[1, 0]], axis=-1) * iw[:, None]
-    exact = linearise(bare, rig, resting(bare, rig, p["psi_nominal"]))
+    exact = linearise(bare, rig, nominal_rest(bare, rig))
     found = exact(iw)
     seen = np.array([float(rig["accel_gain"]), float(rig["deflection_gain"])])
     models["exact linearisation"] = np.stack([found[0, 0], found[1, 0]], axis=-1) * iw[:, None]

@@ -59,6 +59,11 @@ def resting(model: QuarterCar, p: Values, link_angle: Float[Array, ""] | float) 
     return _resting(model, p, jnp.asarray(link_angle, jnp.float64))
 
 
+def nominal_rest(model: QuarterCar, p: Values) -> OperatingPoint:
+    """The rig at rest with the link at its nominal angle."""
+    return resting(model, p, p["psi_nominal"])
+
+
 @eqx.filter_jit
 def _resting(model: QuarterCar, p: Values, angle: Float[Array, ""]) -> OperatingPoint:
     zero = jnp.zeros_like(angle)

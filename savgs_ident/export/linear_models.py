@@ -115,7 +115,7 @@ def exact(model: ExportedModel) -> LinearModel:
     Raises :class:`InputError` where the rig has none, or no static equilibrium.
     """
     p, bare = values_without_friction(model), without_friction(model.plant)
-    at = linearisation.resting(bare, p, p["psi_nominal"])
+    at = linearisation.nominal_rest(bare, p)
     check_rest(map(float, at.q), model)
     space = linearisation.linearise(bare, p, at)
     internal = {f"{place}_{state.name}": state.unit for place, state in enumerate(bare.states)}

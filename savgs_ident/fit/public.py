@@ -9,7 +9,7 @@ from savgs_ident.fit.result import Fit
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.model import load_model
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.simulate.measured import Measurements, campaign_of, measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
@@ -69,4 +69,4 @@ def fit_with(
 
 def demo(progress: Progress = no_progress) -> Fit:
     """Identify the rig that comes with the package from the campaign that comes with it."""
-    return fit(load_model(), read_campaign(default_campaign_path()), progress=progress)
+    return fit(load_model(), load_campaign(default_campaign_path()), progress=progress)

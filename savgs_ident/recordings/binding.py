@@ -1,4 +1,4 @@
-"""What a reader of a file format works with: its interface, and the step from signals to canonical channels.
+"""What a reader of a file format works with: its interface, and the step from signals to channels.
 
 A reader lists the signals that a file offers (columns, fields of topics) as :class:`SignalCandidate` records.
 :func:`bind` assigns them to channels: the channel map first, then the usual names. The reader returns a
@@ -10,15 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.channels import (
-    ChannelMap,
-    ChannelRule,
-    canonical_name,
-    is_exact,
-    split_header,
-    unit_factor,
-)
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Recording
+from savgs_ident.recordings.channels import ChannelMap, ChannelRule
+from savgs_ident.recordings.layout import RecordingLayout
+from savgs_ident.recordings.recording import Recording
 
 Progress = Callable[[float], None]
 """Called with the share of the source that has been read, 0 to 1."""
@@ -75,30 +69,33 @@ class Binding:
 def bind(
     candidates: Sequence[SignalCandidate],
     rules: Sequence[tuple[ChannelRule, str]],
-    mapped: frozenset[str],
+    channel_map: ChannelMap,
     source: str,
 ) -> tuple[tuple[Binding, ...], tuple[DataWarning, ...]]:
     """Bind signals to channels; ``rules`` pairs each rule of the map with the key of its signal.
 
-    ``mapped`` names the channels that the map assigns, here or elsewhere: usual names are ignored for them.
+    Usual names are ignored for the channels that ``channel_map`` assigns, here or elsewhere.
     Raises :class:`InputError` for an unknown unit or two signals that look alike.
     """
+    layout = channel_map.layout
+    mapped = {rule.channel for rule in channel_map.rules}
     by_key = {candidate.key: candidate for candidate in candidates}
     bindings: dict[str, Binding] = {}
     warnings: list[DataWarning] = []
     for rule, key in rules:
-        bindings[rule.channel] = _by_rule(rule, by_key[key], source, warnings)
+        bindings[rule.channel] = _by_rule(rule, layout, by_key[key], source, warnings)
     for candidate in candidates:
-        name = canonical_name(split_header(candidate.text).label)
-        if name is None or name not in CANONICAL_UNITS or name in mapped:
+        label = layout.split_header(candidate.text).label
+        name = layout.canonical_name(label)
+        if name is None or name == "time" or name in mapped:
             continue
         rival = bindings.get(name)
-        exact = is_exact(split_header(candidate.text).label)
+        exact = layout.is_exact(label)
         if rival is not None and rival.exact and not exact:
             continue
         if rival is not None and rival.exact == exact:
             raise ambiguous(name, rival.label, candidate.label, source)
-        bindings[name] = _by_name(name, candidate, exact, source, warnings)
+        bindings[name] = _by_name(name, layout, candidate, exact, source, warnings)
     return tuple(bindings.values()), tuple(warnings)
 
 
@@ -112,18 +109,18 @@ def ambiguous(channel: str, one: str, other: str, source: str) -> InputError:
     )
 
 
-def mapped_channels(channel_map: ChannelMap) -> frozenset[str]:
-    """The channels that the map assigns."""
-    return frozenset(rule.channel for rule in channel_map.rules)
-
-
 def unit_factor_or_si(
-    unit: str | None, channel: str, label: str, source: str, warnings: list[DataWarning]
+    unit: str | None,
+    channel: str,
+    layout: RecordingLayout,
+    label: str,
+    source: str,
+    warnings: list[DataWarning],
 ) -> float:
     """The factor of a unit [SI per unit], or 1 with a warning where none is written."""
     if unit:
-        return unit_factor(unit, channel, source=source)
-    si = CANONICAL_UNITS.get(channel, "s")
+        return layout.unit_factor(unit, channel, source=source)
+    si = layout.si_unit(channel)
     warnings.append(
         DataWarning(
             "unit_assumed",
@@ -137,18 +134,27 @@ def unit_factor_or_si(
 
 
 def _by_rule(
-    rule: ChannelRule, candidate: SignalCandidate, source: str, warnings: list[DataWarning]
+    rule: ChannelRule,
+    layout: RecordingLayout,
+    candidate: SignalCandidate,
+    source: str,
+    warnings: list[DataWarning],
 ) -> Binding:
-    unit = rule.unit or split_header(candidate.text).unit or candidate.unit
-    factor = unit_factor_or_si(unit, rule.channel, candidate.label, source, warnings) * rule.sign
+    unit = rule.unit or layout.split_header(candidate.text).unit or candidate.unit
+    factor = unit_factor_or_si(unit, rule.channel, layout, candidate.label, source, warnings) * rule.sign
     return Binding(
         rule.channel, candidate.key, factor * rule.scale, factor * rule.offset, candidate.label, exact=True
     )
 
 
 def _by_name(
-    name: str, candidate: SignalCandidate, exact: bool, source: str, warnings: list[DataWarning]
+    name: str,
+    layout: RecordingLayout,
+    candidate: SignalCandidate,
+    exact: bool,
+    source: str,
+    warnings: list[DataWarning],
 ) -> Binding:
-    unit = split_header(candidate.text).unit or candidate.unit
-    factor = unit_factor_or_si(unit, name, candidate.label, source, warnings)
+    unit = layout.split_header(candidate.text).unit or candidate.unit
+    factor = unit_factor_or_si(unit, name, layout, candidate.label, source, warnings)
     return Binding(name, candidate.key, factor, 0.0, candidate.label, exact)

@@ -27,9 +27,8 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning
 from savgs_ident.recordings.binding import SignalCandidate
-from savgs_ident.recordings.channels import canonical_name
+from savgs_ident.recordings.layout import RecordingLayout
 from savgs_ident.recordings.mcap_records import DecodeError, MessageBlock, gather
-from savgs_ident.recordings.recording import CANONICAL_UNITS
 
 PRIMITIVES: Mapping[str, str] = MappingProxyType(
     {
@@ -233,7 +232,7 @@ _INDEXED = re.compile(r"^(?P<array>.+)\[(?P<index>[^\]]+)\]$")
 class CdrDecoder:
     """Decoder of one topic. ROS numbers are SI by convention (REP 103), so no unit is needed."""
 
-    def __init__(self, topic: str, type_name: str, definition: str) -> None:
+    def __init__(self, topic: str, type_name: str, definition: str, layout: RecordingLayout) -> None:
         self.topic = topic
         self.type_name = type_name.replace("/msg/", "/")
         self.notes: tuple[DataWarning, ...] = ()
@@ -242,17 +241,18 @@ class CdrDecoder:
         except SchemaError as error:
             raise DecodeError(f"its schema is not understood: {error}") from error
         self._layouts: list[MessageLayout] = []
+        self._channels = layout
 
     def candidates(self, first: bytes) -> tuple[SignalCandidate, ...]:
         """The numbers in the first message as signals; usual message types are recognised."""
         layout = self._layout(first)
         other_meaning = self.type_name.startswith(_OTHER_MEANING)
-        names = {path: "" if other_meaning else _field_name(path, self.topic) for path in layout.numbers}
+        names = {path: "" if other_meaning else self._field_name(path) for path in layout.numbers}
         if self.type_name == "sensor_msgs/Imu":
             names["linear_acceleration.z"] = "accel_z"
         elif self.type_name == "sensor_msgs/JointState":
             names |= self._joint(layout)
-        units = {path: CANONICAL_UNITS.get(canonical_name(name) or "") for path, name in names.items()}
+        units = {path: self._unit(name) for path, name in names.items()}
         return tuple(
             SignalCandidate(path, name, units[path], f"{self.topic} {path}") for path, name in names.items()
         )
@@ -320,37 +320,43 @@ class CdrDecoder:
         return fits
 
     def _joint(self, layout: MessageLayout) -> dict[str, str]:
-        """The joint that is the single link: the only one, or the only one with 'link' in its name."""
+        """The joint that is meant: the only one, or the only one with the word of the layout in its name."""
+        joint = self._channels.joint
+        if joint is None:
+            return {}
         joints = {path[5:-1]: text for path, text in layout.texts.items() if path.startswith("name[")}
-        links = [index for index, text in joints.items() if "link" in text.lower()]
-        if len(links) != 1 and len(joints) > 1:
+        meant = [index for index, text in joints.items() if joint.word in text.lower()]
+        if len(meant) != 1 and len(joints) > 1:
             self.notes = (
                 DataWarning(
                     "ambiguous_joint",
-                    "which joint is the single link is not clear: " + ", ".join(joints.values()),
+                    f"which joint is the {joint.word} is not clear: " + ", ".join(joints.values()),
                     channel=self.topic,
                     remedy='name it in channels.toml: field = "position[joint name]"',
                 ),
             )
             return {}
-        index = links[0] if links else next(iter(joints), "0")
+        index = meant[0] if meant else next(iter(joints), "0")
         if f"effort[{index}]" in layout.numbers:
             self.notes = (
                 DataWarning(
                     "effort_ignored",
-                    "effort of a joint is a torque [N m], not the motor current, and is not used",
+                    "effort of a joint is a torque [N m], and is not used",
                     channel=self.topic,
-                    remedy="log the motor current as its own topic",
+                    remedy="log a motor's current as its own topic",
                 ),
             )
-        wanted = {f"position[{index}]": "link_angle", f"velocity[{index}]": "link_velocity"}
+        wanted = {f"position[{index}]": joint.position, f"velocity[{index}]": joint.velocity}
         return {path: name for path, name in wanted.items() if path in layout.numbers}
 
+    def _unit(self, name: str) -> str | None:
+        channel = self._channels.canonical_name(name)
+        return None if channel is None else self._channels.si_unit(channel)
 
-def _field_name(path: str, topic: str) -> str:
-    """The name by which a field is recognised: its own, or for ``data`` that of its topic."""
-    if path != "data":
-        return path
-    parts = [part for part in topic.split("/") if part]
-    joined = "_".join(parts)
-    return joined if canonical_name(joined) else (parts[-1] if parts else topic)
+    def _field_name(self, path: str) -> str:
+        """The name by which a field is recognised: its own, or for ``data`` that of its topic."""
+        if path != "data":
+            return path
+        parts = [part for part in self.topic.split("/") if part]
+        joined = "_".join(parts)
+        return joined if self._channels.canonical_name(joined) else (parts[-1] if parts else self.topic)

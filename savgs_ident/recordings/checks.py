@@ -1,8 +1,8 @@
 """All checks of a campaign: clean every test, and leave out the tests that cannot be used.
 
 :func:`screen` checks the channels (:mod:`checks_signal`), then every test as a whole (the channels that a
-response needs, for long enough, the road moving at the frequency in the test's name), then the campaign
-(:mod:`checks_physics`). A test that cannot be used is left out with a warning that gives the reason; if no
+response needs, for long enough, the driven channel moving at the frequency in the test's name), then the campaign by
+what the layout knows of its plant. A test that cannot be used is left out with a warning that gives the reason; if no
 test remains, the first reason is raised as the error.
 """
 
@@ -13,7 +13,6 @@ from math import inf
 import numpy as np
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.checks_physics import check_physics, remove_gravity
 from savgs_ident.recordings.checks_signal import (
     LONGEST_GAP,
     DataLocation,
@@ -24,22 +23,19 @@ from savgs_ident.recordings.checks_signal import (
     check_time,
     find_longest_constant,
 )
+from savgs_ident.recordings.layout import RecordingLayout
 from savgs_ident.recordings.recording import RecordedChannel, Recording
 
-RESPONSES = ("sprung_accel", "susp_deflection")
-"""Channels of which a test with a moving road needs at least one."""
 _FEWEST_PERIODS, _FEW_PERIODS = 3.0, 6.0
 """Periods below which the noise (what does not repeat) cannot be estimated, or is estimated poorly."""
 _FREQUENCY_OFF = 0.05
 _LEAST_RATE = 4.0
 """Samples a period below which even the first harmonic is doubtful."""
-_STILL = 1e-3
-"""Peak-to-peak road [m] that a standstill may have."""
 _STUCK_SHARE = 0.20
 
 
 def screen(
-    recordings: Sequence[Recording], source: str
+    recordings: Sequence[Recording], layout: RecordingLayout, source: str
 ) -> tuple[tuple[Recording, ...], tuple[DataWarning, ...]]:
     """The usable recordings, cleaned, and all warnings.
 
@@ -50,7 +46,7 @@ def screen(
     errors: list[InputError] = []
     for recording in recordings:
         try:
-            cleaned, found = screen_test(recording, source)
+            cleaned, found = screen_test(recording, layout, source)
         except InputError as error:
             errors.append(error)
             continue
@@ -58,22 +54,27 @@ def screen(
         warnings.extend(found)
     if not kept:
         raise errors[0] if errors else InputError("holds no test", source=source, remedy="record again")
-    level, gravity = remove_gravity(kept, source)
-    return level, (
+    corrected = tuple(kept)
+    for correct in layout.corrections:
+        corrected, found = correct(corrected, source)
+        warnings.extend(found)
+    return corrected, (
         *(_left_out(error) for error in errors),
         *warnings,
-        *gravity,
-        *check_clipping(level, source),
-        *check_physics(level, source),
+        *check_clipping(corrected, source),
+        *(warning for check in layout.checks for warning in check(corrected, source)),
     )
 
 
-def screen_test(recording: Recording, source: str) -> tuple[Recording, tuple[DataWarning, ...]]:
-    """One test with cleaned channels; raises :class:`InputError` where it cannot be used."""
+def screen_test(
+    recording: Recording, layout: RecordingLayout, source: str
+) -> tuple[Recording, tuple[DataWarning, ...]]:
+    """One test with cleaned channels in the layout's order; raises :class:`InputError` where it cannot be used."""
     channels: dict[str, RecordedChannel] = {}
     warnings: list[DataWarning] = []
     longest_gap = inf if recording.kind == "other" else LONGEST_GAP
-    for name, channel in recording.channels.items():
+    for name in (name for name in layout.names if name in recording.channels):
+        channel = recording.channels[name]
         place = DataLocation(source, recording.name, name)
         check_stamps(channel, DataLocation(source, recording.name, "time"))
         whole, found = check_missing(channel, place, longest_gap)
@@ -82,33 +83,35 @@ def screen_test(recording: Recording, source: str) -> tuple[Recording, tuple[Dat
             continue
         ordered, found = check_time(whole, place, longest_gap)
         warnings.extend(found)
-        check_possible(ordered, place)
+        check_possible(ordered, layout.specs[name], place)
         channels[name] = ordered
     place = DataLocation(source, recording.name)
     cleaned = replace(recording, channels=channels)
-    stuck = find_stuck_channels(cleaned, place)
+    stuck = find_stuck_channels(cleaned, layout, place)
     cleaned = replace(cleaned, channels={k: v for k, v in channels.items() if k not in stuck})
-    check_complete(cleaned, place)
+    check_complete(cleaned, layout, place)
     if not cleaned.channels:
         raise place.error("has no channel with data", "record the test again")
     return cleaned, (
         *_once(warnings),
         *stuck.values(),
-        *check_test(cleaned, place),
+        *check_test(cleaned, layout, place),
         *_unknown(cleaned, place),
     )
 
 
-def find_stuck_channels(recording: Recording, place: DataLocation) -> dict[str, DataWarning]:
+def find_stuck_channels(
+    recording: Recording, layout: RecordingLayout, place: DataLocation
+) -> dict[str, DataWarning]:
     """Channels that keep one value while the test goes on, with a warning each.
 
     In a steady oscillation nothing is constant for a whole period; in a sweep the bound is a fifth of the record,
-    because it begins at rest. The link may be held, so its channels are not checked.
+    because it begins at rest. Other channels than the driven one and the responses may be held, and are not checked.
     """
     if recording.kind not in ("dwell", "sweep"):
         return {}
     found = {}
-    for name in ("road_height", *RESPONSES):
+    for name in (layout.driven, *layout.responses):
         channel = recording.channels.get(name)
         if channel is None:
             continue
@@ -126,29 +129,29 @@ def find_stuck_channels(recording: Recording, place: DataLocation) -> dict[str, 
     return found
 
 
-def check_complete(recording: Recording, place: DataLocation) -> None:
-    """Raises :class:`InputError` where a test with a moving road lacks the road or all responses."""
+def check_complete(recording: Recording, layout: RecordingLayout, place: DataLocation) -> None:
+    """Raises :class:`InputError` where a dwell or a sweep lacks the driven channel or all responses."""
     if recording.kind not in ("dwell", "sweep"):
         return
     here = ", ".join(recording.channels) or "none"
-    if "road_height" not in recording.channels:
-        raise DataLocation(place.source, place.test, "road_height").error(
+    if layout.driven not in recording.channels:
+        raise DataLocation(place.source, place.test, layout.driven).error(
             f"the channel is missing or unusable (there is: {here})", "record it, or map it in channels.toml"
         )
-    if not any(name in recording.channels for name in RESPONSES):
-        raise DataLocation(place.source, place.test, RESPONSES[0]).error(
-            f"neither {' nor '.join(RESPONSES)} is there and usable (there is: {here})",
+    if not any(name in recording.channels for name in layout.responses):
+        raise DataLocation(place.source, place.test, layout.responses[0]).error(
+            f"neither {' nor '.join(layout.responses)} is there and usable (there is: {here})",
             "record one of them, or map it in channels.toml",
         )
 
 
-def check_test(recording: Recording, place: DataLocation) -> tuple[DataWarning, ...]:
+def check_test(recording: Recording, layout: RecordingLayout, place: DataLocation) -> tuple[DataWarning, ...]:
     """Warnings about a dwell or a standstill; raises :class:`InputError` for a dwell that is too short."""
     if recording.kind == "standstill":
-        return _check_still(recording, place)
+        return _check_still(recording, layout, place)
     if recording.kind != "dwell":
         return ()
-    measured = measure_frequency(recording.channels["road_height"])
+    measured = measure_frequency(recording.channels[layout.driven])
     nominal = recording.frequency_hz
     frequency = nominal or measured
     periods = recording.duration_s * frequency
@@ -159,13 +162,13 @@ def check_test(recording: Recording, place: DataLocation) -> tuple[DataWarning, 
         )
     return (
         *_few_periods(periods, place),
-        *_frequency_off(nominal, measured, place),
-        *_undersampled(recording, frequency, place),
+        *_frequency_off(nominal, measured, DataLocation(place.source, place.test, layout.driven)),
+        *_undersampled(recording, frequency, layout, place),
     )
 
 
 def measure_frequency(road: RecordedChannel) -> float:
-    """Frequency [Hz] of the road from its upward crossings of mid height (hysteresis a fifth of its travel).
+    """Frequency [Hz] of the driven channel from its upward crossings of mid height (hysteresis 1/5 of its travel).
 
     0 where it does not cross twice.
     """
@@ -195,15 +198,17 @@ def _frequency_off(nominal: float | None, measured: float, place: DataLocation) 
     if nominal is None or abs(measured / nominal - 1.0) <= _FREQUENCY_OFF:
         return ()
     return (
-        DataLocation(place.source, place.test, "road_height").warning(
+        place.warning(
             "frequency_mismatch",
-            f"the road moves at {measured:.4g} Hz, the test is said to be at {nominal:.4g} Hz",
+            f"moves at {measured:.4g} Hz, the test is said to be at {nominal:.4g} Hz",
             "check the name of the test and the unit of the time",
         ),
     )
 
 
-def _undersampled(recording: Recording, frequency: float, place: DataLocation) -> tuple[DataWarning, ...]:
+def _undersampled(
+    recording: Recording, frequency: float, layout: RecordingLayout, place: DataLocation
+) -> tuple[DataWarning, ...]:
     return tuple(
         DataLocation(place.source, place.test, name).warning(
             "undersampled",
@@ -211,18 +216,20 @@ def _undersampled(recording: Recording, frequency: float, place: DataLocation) -
             f"sample at least {_LEAST_RATE:.0f} times a period",
         )
         for name, channel in recording.channels.items()
-        if name in ("road_height", *RESPONSES) and channel.rate_hz < _LEAST_RATE * frequency
+        if name in (layout.driven, *layout.responses) and channel.rate_hz < _LEAST_RATE * frequency
     )
 
 
-def _check_still(recording: Recording, place: DataLocation) -> tuple[DataWarning, ...]:
-    road = recording.channels.get("road_height")
-    if road is None or np.ptp(road.values) <= _STILL:
+def _check_still(
+    recording: Recording, layout: RecordingLayout, place: DataLocation
+) -> tuple[DataWarning, ...]:
+    driven = recording.channels.get(layout.driven)
+    if driven is None or np.ptp(driven.values) <= layout.still:
         return ()
     return (
-        DataLocation(place.source, place.test, "road_height").warning(
+        DataLocation(place.source, place.test, layout.driven).warning(
             "standstill_moves",
-            f"the road moves by {1e3 * float(np.ptp(road.values)):.3g} mm in a standstill",
+            f"moves by {float(np.ptp(driven.values)):.3g} {driven.unit} in a standstill",
             "check the name of the test",
         ),
     )

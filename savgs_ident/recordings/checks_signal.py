@@ -5,7 +5,7 @@ pasted together; the right samples are then unknown, which is an error. A few re
 jump loses samples; a harmonic estimate tolerates this up to a tenth of the record (about one of at least
 eight periods).
 
-The bounds on values are those of a rig of this size with a wide margin. They detect a wrong unit (27.5 mm read
+The bounds on values are those of the layout, with a wide margin. They detect a wrong unit (27.5 mm read
 as 27.5 m) and do not assess a measurement.
 
 A clipped sensor repeats one extreme value, in run after run, far more often than the value next to it. A
@@ -15,15 +15,15 @@ amplitude, small). The end of a range is the same in every test: a value that an
 A signal with noise added after the clipping is not recognised.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.recording import CANONICAL_UNITS, RecordedChannel, Recording
+from savgs_ident.recordings.layout import ChannelSpec
+from savgs_ident.recordings.recording import RecordedChannel, Recording
 
 
 @dataclass(frozen=True)
@@ -134,18 +134,6 @@ def _jumps(
     )
 
 
-LARGEST: Mapping[str, tuple[float, str]] = MappingProxyType(
-    {
-        "road_height": (0.5, "mm or cm"),
-        "sprung_accel": (300.0, "mm/s^2, or a sensor in another unit than its header says"),
-        "susp_deflection": (0.5, "mm or cm"),
-        "link_angle": (20.0, "deg"),
-        "link_velocity": (60.0, "rpm or deg/s"),
-        "motor_current": (500.0, "mA"),
-    }
-)
-"""Largest magnitude of each channel [SI] and what it is likely to be in instead."""
-
 _MOST_MISSING = 0.20
 _REGULAR = 1.5
 
@@ -203,14 +191,13 @@ def _is_slower_sensor(kept: NDArray[np.float64], grid: NDArray[np.float64]) -> b
     return bool(inner and kept[0] - grid[0] <= _REGULAR * step and grid[-1] - kept[-1] <= _REGULAR * step)
 
 
-def check_possible(channel: RecordedChannel, place: DataLocation) -> None:
+def check_possible(channel: RecordedChannel, spec: ChannelSpec, place: DataLocation) -> None:
     """Raises :class:`InputError` where a value is larger than any rig of this kind gives."""
-    bound, suspect = LARGEST[channel.name]
     worst = int(np.argmax(np.abs(channel.values)))
     value = float(channel.values[worst])
-    if abs(value) > bound:
+    if abs(value) > spec.largest:
         raise place.error(
-            f"{value:.4g} {CANONICAL_UNITS[channel.name]} is not possible, the data may be in {suspect}",
+            f"{value:.4g} {spec.unit} is not possible, the data may be in {spec.suspect}",
             "put the right unit into the header or channels.toml",
             time=float(channel.time[worst]),
         )

@@ -1,13 +1,13 @@
 """CSV campaigns: one table with a ``test`` column, or one test a file; plain or gzipped.
 
-    test,time [s],road_height [m],sprung_accel [m/s^2],susp_deflection [mm]
-    dwell_0.50Hz,0.00001,-0.005737,0.0156,-5.737
+    test,time [s],road_height [m],susp_deflection [mm]
+    dwell_0.50Hz,0.00001,-0.005737,-5.737
 
 The unit stands in the header (``name [unit]``, ``name (unit)``, ``name_unit``) or in a row of units below it.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,26 +21,20 @@ from savgs_ident.recordings.binding import (
     Reading,
     SignalCandidate,
     bind,
-    mapped_channels,
     unit_factor_or_si,
 )
-from savgs_ident.recordings.channels import (
-    TEST_COLUMNS,
-    ChannelMap,
-    ChannelRule,
-    canonical_name,
-    normalise,
-    split_header,
-)
+from savgs_ident.recordings.channels import ChannelMap, ChannelRule
 from savgs_ident.recordings.csv_table import GZIP_MAGIC, CsvHead, CsvTable, TextBlocks, read_head
+from savgs_ident.recordings.layout import RecordingLayout, normalise
 from savgs_ident.recordings.recording import (
-    CANONICAL_UNITS,
     RecordedChannel,
     Recording,
     classify_test,
     unix_time,
 )
 
+TEST_COLUMNS = ("test", "test_name", "run", "condition")
+"""Usual names of the column with the test's name."""
 _MOST_REPEATS = 20
 """A test that comes back more often than this is not a repeated test but a table out of order."""
 
@@ -53,15 +47,16 @@ def read_csv(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading
     first = next(blocks, b"")
     if not first:
         raise _nothing_whole(text, source)
-    head = read_head(first, source)
+    layout = channel_map.layout
+    head = read_head(first, layout, source)
     warnings: list[DataWarning] = []
     candidates = head.candidates()
     time_position, time_factor = _time_column(head, channel_map, source, warnings)
     rules = _rules(candidates, channel_map, source)
-    bindings, notes = bind(candidates, rules, mapped_channels(channel_map), source)
+    bindings, notes = bind(candidates, rules, channel_map, source)
     warnings.extend(notes)
     if not bindings:
-        raise _no_channel(head, source)
+        raise _no_channel(head, layout, source)
     positions = {int(binding.key) for binding in bindings} | {time_position}
     table = CsvTable(head, tuple(sorted(positions)), _test_column(head, channel_map, source), source)
     for block in _chain(head.body, blocks):
@@ -76,7 +71,7 @@ def read_csv(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading
     with np.errstate(over="ignore", invalid="ignore"):
         time = columns[time_position] * time_factor
         channels = {binding.channel: _channel_values(columns, binding) for binding in bindings}
-        recordings = _split_tests(runs, time, channels, {b.channel: b.label for b in bindings})
+        recordings = _split_tests(runs, time, channels, bindings, layout)
     warnings.extend(_end_warnings(text, source, time))
     warnings.extend(_repeat_warnings(recordings, runs, source))
     return Reading(recordings, tuple(warnings))
@@ -109,18 +104,18 @@ def _nothing_whole(text: TextBlocks, source: str) -> InputError:
     return InputError("is empty", source=source, remedy="record again, or give another file")
 
 
-def _no_channel(head: CsvHead, source: str) -> InputError:
+def _no_channel(head: CsvHead, layout: RecordingLayout, source: str) -> InputError:
     return InputError(
         "no column is known: found " + ", ".join(f"'{name}'" for name in head.columns[:20]),
         source=source,
-        remedy="name the columns as " + ", ".join(CANONICAL_UNITS) + ", or map them in channels.toml",
+        remedy="name the columns as " + ", ".join(layout.names) + ", or map them in channels.toml",
     )
 
 
-def _position(head: CsvHead, wanted: str, channel: str, source: str) -> int:
+def _position(head: CsvHead, wanted: str, channel: str, layout: RecordingLayout, source: str) -> int:
     """Where the column stands that the map calls ``wanted``."""
     for position, text in enumerate(head.columns):
-        if wanted == text or normalise(wanted) == normalise(split_header(text).label):
+        if wanted == text or normalise(wanted) == normalise(layout.split_header(text).label):
             return position
     raise InputError(
         f"channels.toml names column '{wanted}', the file does not have it",
@@ -133,12 +128,13 @@ def _position(head: CsvHead, wanted: str, channel: str, source: str) -> int:
 def _rules(
     candidates: tuple[SignalCandidate, ...], channel_map: ChannelMap, source: str
 ) -> list[tuple[ChannelRule, str]]:
-    found = []
+    layout, found = channel_map.layout, []
     for rule in channel_map.rules:
         if rule.column is None:
             continue
         exact = [c.key for c in candidates if c.text == rule.column]
-        loose = [c.key for c in candidates if normalise(split_header(c.text).label) == normalise(rule.column)]
+        wanted = normalise(rule.column)
+        loose = [c.key for c in candidates if normalise(layout.split_header(c.text).label) == wanted]
         if not exact and not loose:
             raise InputError(
                 f"channels.toml names column '{rule.column}', the file does not have it",
@@ -153,12 +149,12 @@ def _rules(
 def _time_column(
     head: CsvHead, channel_map: ChannelMap, source: str, warnings: list[DataWarning]
 ) -> tuple[int, float]:
+    layout = channel_map.layout
     if channel_map.time_column is not None:
-        position = _position(head, channel_map.time_column, "time", source)
+        position = _position(head, channel_map.time_column, "time", layout, source)
     else:
-        found = [
-            i for i, text in enumerate(head.columns) if canonical_name(split_header(text).label) == "time"
-        ]
+        labels = [layout.split_header(text).label for text in head.columns]
+        found = [i for i, label in enumerate(labels) if layout.canonical_name(label) == "time"]
         if not found:
             raise InputError(
                 "no column is the time: found " + ", ".join(f"'{name}'" for name in head.columns[:20]),
@@ -166,15 +162,15 @@ def _time_column(
                 channel="time",
                 remedy="call it 'time [s]', or name it under [time] in channels.toml",
             )
-        exact = [i for i in found if normalise(split_header(head.columns[i]).label) == "time"]
+        exact = [i for i in found if normalise(labels[i]) == "time"]
         position = (exact or found)[0]
-    unit = channel_map.time_unit or split_header(head.columns[position]).unit or head.units[position]
-    return position, unit_factor_or_si(unit, "time", head.columns[position], source, warnings)
+    unit = channel_map.time_unit or layout.split_header(head.columns[position]).unit or head.units[position]
+    return position, unit_factor_or_si(unit, "time", layout, head.columns[position], source, warnings)
 
 
 def _test_column(head: CsvHead, channel_map: ChannelMap, source: str) -> int | None:
     if channel_map.test_column is not None:
-        return _position(head, channel_map.test_column, "test", source)
+        return _position(head, channel_map.test_column, "test", channel_map.layout, source)
     names = [normalise(text) for text in head.columns]
     return next((names.index(name) for name in TEST_COLUMNS if name in names), None)
 
@@ -190,7 +186,8 @@ def _split_tests(
     runs: list[tuple[str, int]],
     time: NDArray[np.float64],
     channels: dict[str, NDArray[np.float64]],
-    labels: dict[str, str],
+    bindings: Sequence[Binding],
+    layout: RecordingLayout,
 ) -> tuple[Recording, ...]:
     """One recording a run of equal test names; rows without a name belong to no test."""
     stops = [start for _, start in runs[1:]] + [time.size]
@@ -208,10 +205,14 @@ def _split_tests(
                 kind=kind,
                 frequency_hz=frequency,
                 channels={
-                    channel: RecordedChannel(
-                        channel, CANONICAL_UNITS[channel], clock, values[start:stop], labels[channel]
+                    each.channel: RecordedChannel(
+                        each.channel,
+                        layout.si_unit(each.channel),
+                        clock,
+                        channels[each.channel][start:stop],
+                        each.label,
                     )
-                    for channel, values in channels.items()
+                    for each in bindings
                 },
                 start=unix_time(float(time[start])),
             )

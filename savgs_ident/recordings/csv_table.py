@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.binding import Progress, SignalCandidate
-from savgs_ident.recordings.channels import canonical_name, find_unit, split_header
+from savgs_ident.recordings.layout import RecordingLayout, find_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -128,7 +128,7 @@ class CsvHead:
         )
 
 
-def read_head(block: bytes, source: str) -> CsvHead:
+def read_head(block: bytes, layout: RecordingLayout, source: str) -> CsvHead:
     """Read the head from the first block of whole lines.
 
     Raises :class:`InputError` where there is no header, a column is named twice, or the file is not text.
@@ -143,11 +143,11 @@ def read_head(block: bytes, source: str) -> CsvHead:
     text = head.decode(encoding)
     delimiter = max(_DELIMITERS, key=text.count)
     columns = _cells(text, delimiter)
-    _check_columns(columns, source)
+    _check_columns(columns, layout, source)
     units: tuple[str | None, ...] = (None,) * len(columns)
     second, rest_after, count_after = next(lines, (b"", b"", count))
     row = _cells(second.decode(encoding), delimiter)
-    if _is_unit_row(row, columns):
+    if _is_unit_row(row, columns, layout):
         units, rest, count = tuple(cell.strip("[]() ") or None for cell in row), rest_after, count_after
         row = _cells(next(lines, (b"", b"", count))[0].decode(encoding), delimiter)
     decimal = "," if delimiter != "," and any("," in cell for cell in row) else "."
@@ -176,28 +176,29 @@ def _cells(line: str, delimiter: str) -> tuple[str, ...]:
     return tuple(cell.strip() for cell in row)
 
 
-def _check_columns(columns: tuple[str, ...], source: str) -> None:
+def _check_columns(columns: tuple[str, ...], layout: RecordingLayout, source: str) -> None:
     twice = sorted({name for name in columns if name and columns.count(name) > 1})
     if twice:
         raise InputError(
             f"column '{twice[0]}' is there twice", source=source, remedy="rename or delete one of the two"
         )
     if all(_is_number(name) for name in columns):
+        example = ",".join(["time [s]", *(f"{each.name} [{each.unit}]" for each in layout.channels[:2])])
         raise InputError(
             "has no header line",
             source=source,
-            remedy="write one such as 'time [s],road_height [m],sprung_accel [m/s^2]'",
+            remedy=f"write one such as '{example}'",
         )
 
 
-def _is_unit_row(row: tuple[str, ...], columns: tuple[str, ...]) -> bool:
+def _is_unit_row(row: tuple[str, ...], columns: tuple[str, ...], layout: RecordingLayout) -> bool:
     """A second line such as ``s;mm;g``: what stands below a known column is a unit or empty."""
     if len(row) != len(columns) or any(_is_number(cell) for cell in row):
         return False
     known = [
         cell.strip("[]() ")
         for cell, name in zip(row, columns, strict=True)
-        if canonical_name(split_header(name).label)
+        if layout.canonical_name(layout.split_header(name).label)
     ]
     return bool(known) and all(not cell or find_unit(cell) for cell in known) and any(known)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning
 from savgs_ident.recordings.binding import SignalCandidate
-from savgs_ident.recordings.channels import find_unit
+from savgs_ident.recordings.layout import find_unit
 from savgs_ident.recordings.mcap_records import DecodeError, MessageBlock
 
 _DEEPEST = 4

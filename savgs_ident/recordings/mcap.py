@@ -28,11 +28,11 @@ from savgs_ident.recordings.binding import (
     SignalCandidate,
     ambiguous,
     bind,
-    mapped_channels,
 )
 from savgs_ident.recordings.cdr import CdrDecoder
 from savgs_ident.recordings.channels import ChannelMap
 from savgs_ident.recordings.json_messages import JsonDecoder
+from savgs_ident.recordings.layout import RecordingLayout
 from savgs_ident.recordings.mcap_records import (
     MAGIC,
     DecodeError,
@@ -50,7 +50,6 @@ from savgs_ident.recordings.mcap_timing import (
     parse_event,
 )
 from savgs_ident.recordings.recording import (
-    CANONICAL_UNITS,
     RecordedChannel,
     Recording,
     classify_test,
@@ -92,7 +91,7 @@ class Decoder(Protocol):
         """Values (n,) by key [unit of the field], and the stamps of the headers [ns], (n,), if there are any."""
 
 
-def choose_decoder(channel: McapChannel, schema: Schema | None) -> Decoder:
+def choose_decoder(channel: McapChannel, schema: Schema | None, layout: RecordingLayout) -> Decoder:
     """The decoder of a topic; raises :class:`DecodeError` with the reason where there is none."""
     if channel.message_encoding == "json":
         return JsonDecoder(channel.topic, schema.data if schema else b"{}")
@@ -102,7 +101,8 @@ def choose_decoder(channel: McapChannel, schema: Schema | None) -> Decoder:
         raise DecodeError("its schema is missing from the file")
     if schema.encoding != "ros2msg":
         raise DecodeError(f"its schema encoding '{schema.encoding}' is not read (ros2msg is)")
-    return CdrDecoder(channel.topic, schema.name, schema.data.decode("utf-8", errors="replace"))
+    definition = schema.data.decode("utf-8", errors="replace")
+    return CdrDecoder(channel.topic, schema.name, definition, layout)
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ class TopicColumns:
                     remedy="the fields are " + ", ".join(c.key for c in candidates[:20]),
                 )
             rules.append((rule, key))
-        bindings, notes = bind(candidates, rules, mapped_channels(self._map), self._source)
+        bindings, notes = bind(candidates, rules, self._map, self._source)
         self.warnings = notes + self._decoder.notes
         return bindings
 
@@ -261,7 +261,7 @@ class _TopicCollector:
         columns = self._columns.get(channel.topic)
         if columns is None:
             try:
-                decoder = choose_decoder(channel, self._schemas.get(channel.schema_id))
+                decoder = choose_decoder(channel, self._schemas.get(channel.schema_id), self._map.layout)
             except DecodeError as error:
                 self._refuse(channel.topic, str(error))
                 return
@@ -339,7 +339,7 @@ class _TopicCollector:
             source=self._source,
             remedy="copy the file again"
             if cut
-            else "map topics to " + ", ".join(CANONICAL_UNITS) + " in channels.toml",
+            else "map topics to " + ", ".join(self._map.layout.names) + " in channels.toml",
         )
 
 
@@ -363,7 +363,7 @@ def _split_tests(
     for span in spans:
         channels: dict[str, RecordedChannel] = {}
         for data, time in zip(topics, times, strict=True):
-            channels |= _channels_within(span, data, time)
+            channels |= _channels_within(span, data, time, channel_map.layout)
         kind, named = classify_test(span.name)
         frequency = span.frequency_hz if span.frequency_hz is not None else named
         kind = "dwell" if kind == "other" and frequency is not None else kind
@@ -372,7 +372,9 @@ def _split_tests(
     return tuple(recordings), tuple(warnings)
 
 
-def _channels_within(span: Span, data: TopicData, time: NDArray[np.int64]) -> dict[str, RecordedChannel]:
+def _channels_within(
+    span: Span, data: TopicData, time: NDArray[np.int64], layout: RecordingLayout
+) -> dict[str, RecordedChannel]:
     inside = time >= span.start
     if span.stop is not None:
         inside &= time <= span.stop
@@ -385,7 +387,7 @@ def _channels_within(span: Span, data: TopicData, time: NDArray[np.int64]) -> di
     return {
         binding.channel: RecordedChannel(
             binding.channel,
-            CANONICAL_UNITS[binding.channel],
+            layout.si_unit(binding.channel),
             clock,
             data.values[binding.channel][whole if contiguous else picked],
             binding.label,

@@ -1,9 +1,9 @@
 """Read a campaign: a file, or a folder with the files of one visit to the rig.
 
-    campaign = read_campaign("campaign.csv.gz")
+    campaign = read_campaign("campaign.csv.gz", layout)
     for dwell in campaign.of_kind("dwell"):
-        accel = dwell.channels["sprung_accel"]
-        print(dwell.frequency_hz, accel.time, accel.values)
+        deflection = dwell.channels["susp_deflection"]
+        print(dwell.frequency_hz, deflection.time, deflection.values)
     for warning in campaign.warnings:
         print(warning)
 
@@ -21,6 +21,7 @@ from savgs_ident.recordings.binding import Progress, Reader, Reading
 from savgs_ident.recordings.channels import FILE_NAME, ChannelMap, read_channel_map
 from savgs_ident.recordings.checks import screen
 from savgs_ident.recordings.csv import CSV
+from savgs_ident.recordings.layout import RecordingLayout
 from savgs_ident.recordings.mcap import MCAP
 from savgs_ident.recordings.recording import Campaign, Recording
 
@@ -31,11 +32,16 @@ READERS: tuple[Reader, ...] = (
 
 
 def read_campaign(
-    path: Path | str, channel_map: ChannelMap | Path | str | None = None, *, progress: Progress | None = None
+    path: Path | str,
+    layout: RecordingLayout,
+    channel_map: ChannelMap | Path | str | None = None,
+    *,
+    progress: Progress | None = None,
 ) -> Campaign:
     """Read and check everything at ``path``.
 
     ``path`` is a CSV (plain or gzipped) or MCAP file, or a folder of such files, each with a test or several.
+    ``layout`` says which channels the tests of the plant have.
     ``channel_map`` is a map, or the path of one; without it, a ``channels.toml`` beside the file (or in the
     folder) is used if there is one. ``progress`` is called with the fraction read, 0 to 1.
 
@@ -45,7 +51,7 @@ def read_campaign(
     path = Path(path)
     try:
         files = campaign_files(path)
-        the_map = _map_for(path, channel_map)
+        the_map = _map_for(path, layout, channel_map)
         readings = _read_files(files, the_map, progress or (lambda fraction: None))
         digest = digest_files(files)
     except OSError as error:
@@ -55,18 +61,18 @@ def read_campaign(
             remedy="check the path and its permissions",
         ) from error
     _check_unique(files, readings)
-    recordings, found = _screen_all(files, readings)
+    recordings, found = _screen_all(files, layout, readings)
     reported = tuple(warning for reading in readings for warning in reading.warnings)
-    return Campaign(str(path), recordings, (*reported, *found), digest)
+    return Campaign(str(path), recordings, (*reported, *found), digest, layout)
 
 
-def _map_for(path: Path, channel_map: ChannelMap | Path | str | None) -> ChannelMap:
+def _map_for(path: Path, layout: RecordingLayout, channel_map: ChannelMap | Path | str | None) -> ChannelMap:
     if isinstance(channel_map, ChannelMap):
         return channel_map
     if channel_map is not None:
-        return read_channel_map(channel_map)
+        return read_channel_map(channel_map, layout)
     beside = map_beside(path)
-    return ChannelMap() if beside is None else read_channel_map(beside)
+    return ChannelMap(layout) if beside is None else read_channel_map(beside, layout)
 
 
 def map_beside(path: Path) -> Path | None:
@@ -147,11 +153,11 @@ def _check_unique(files: Sequence[Path], readings: Sequence[Reading]) -> None:
 
 
 def _screen_all(
-    files: Sequence[Path], readings: Sequence[Reading]
+    files: Sequence[Path], layout: RecordingLayout, readings: Sequence[Reading]
 ) -> tuple[tuple[Recording, ...], tuple[DataWarning, ...]]:
     """Screen together, so that a standstill in one file serves the dwells in the others."""
     source = str(files[0] if len(files) == 1 else files[0].parent)
-    return screen([recording for reading in readings for recording in reading.recordings], source)
+    return screen([each for reading in readings for each in reading.recordings], layout, source)
 
 
 def digest_files(files: Sequence[Path]) -> str:

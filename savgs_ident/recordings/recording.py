@@ -26,18 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning
-
-CANONICAL_UNITS: Mapping[str, str] = MappingProxyType(
-    {
-        "road_height": "m",
-        "sprung_accel": "m/s^2",
-        "susp_deflection": "m",
-        "link_angle": "rad",
-        "link_velocity": "rad/s",
-        "motor_current": "A",
-    }
-)
-"""The canonical channels and the SI unit of each."""
+from savgs_ident.recordings.layout import UNKNOWN_LAYOUT, RecordingLayout
 
 TestKind = Literal["dwell", "sweep", "standstill", "other"]
 
@@ -95,13 +84,15 @@ class Recording:
 class Campaign:
     """All tests of one source, in the order in which they were recorded.
 
-    ``sha256`` is the digest of the bytes read, for provenance; ``warnings`` are those of the reader and the checks.
+    ``sha256`` is the digest of the bytes read, for provenance; ``warnings`` are those of the reader and the checks;
+    ``layout`` says which channels there may be, and is empty where that is not known.
     """
 
     source: str
     recordings: tuple[Recording, ...]
     warnings: tuple[DataWarning, ...]
     sha256: str
+    layout: RecordingLayout = UNKNOWN_LAYOUT
 
     @property
     def start(self) -> float | None:

@@ -23,6 +23,7 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from savgs_ident.plants.model import Model
+    from savgs_ident.recordings.layout import RecordingLayout
 
 MINUS = "\u2212"
 """A minus as long as a plus."""
@@ -167,31 +168,31 @@ class ChannelLabel:
         return f"{self.title[:1].upper()}{self.title[1:]}"
 
 
-READINGS: Mapping[str, ChannelLabel] = MappingProxyType(
-    {
-        "sprung_accel": ChannelLabel("sprung-mass acceleration", "m/s²", 1.0, "m/s² per m"),
-        "susp_deflection": ChannelLabel("suspension deflection", "mm", 1e3, "m per m"),
-    }
-)
-"""The channels of a quarter car that recordings are looked through for, where no model says more (and JAX is not
-loaded)."""
-
 _UNIT_WORDS: Mapping[str, str] = MappingProxyType({"m": "metre", "rad": "radian", "N": "newton"})
 _SHOWN_UNITS: Mapping[str, tuple[str, float]] = MappingProxyType({"m": ("mm", 1e3)})
+
+
+def response_labels(layout: "RecordingLayout") -> dict[str, ChannelLabel]:
+    """How the responses in the recordings of a plant are shown, by name in their order."""
+    driven = layout.specs[layout.driven]
+    named = [layout.specs[name] for name in layout.responses]
+    return {each.name: _label(each.about, each.unit, driven.about, driven.unit) for each in named}
+
+
+def shown_unit(unit: str) -> tuple[str, float]:
+    """The unit in which values of an SI unit are printed, and the factor to it."""
+    return _SHOWN_UNITS.get(unit, (unit_text(unit), 1.0))
+
+
+def _label(about: str, unit: str, driven: str, driven_unit: str) -> ChannelLabel:
+    shown, scale = shown_unit(unit)
+    return ChannelLabel(about, shown, scale, f"{unit_text(unit)} per {unit_text(driven_unit)}", driven)
 
 
 def channel_labels(model: "Model") -> dict[str, ChannelLabel]:
     """How the channels of a model's plant are shown, by name in their order, as responses to its first input."""
     driven = model.plant.inputs[0]
-    return {
-        each.name: ChannelLabel(
-            each.about,
-            *_SHOWN_UNITS.get(each.unit, (unit_text(each.unit), 1.0)),
-            f"{unit_text(each.unit)} per {unit_text(driven.unit)}",
-            driven.about,
-        )
-        for each in model.channels
-    }
+    return {each.name: _label(each.about, each.unit, driven.about, driven.unit) for each in model.channels}
 
 
 def per_input_words(model: "Model") -> str:
@@ -206,13 +207,6 @@ def per_input_key(model: "Model") -> str:
     return f"per_{_UNIT_WORDS.get(driven.unit, 'unit')}_of_{driven.about}".replace(" ", "_")
 
 
-def channel_label(name: str, model: "Model | None" = None) -> ChannelLabel:
-    """How the channel ``name`` is shown: as a model's plant declares it or as listed, others by name and in SI."""
-    # Only here: the command line prints errors without numpy, which recordings load.
-    from savgs_ident.recordings.recording import CANONICAL_UNITS
-
-    known = READINGS if model is None else channel_labels(model)
-    if name in known:
-        return known[name]
-    unit = unit_text(CANONICAL_UNITS.get(name, "1"))
-    return ChannelLabel(name, unit, 1.0, f"{unit} per m")
+def channel_label(name: str, model: "Model") -> ChannelLabel:
+    """How the channel ``name`` is shown: as the model's plant declares it; what is no channel, by its name."""
+    return channel_labels(model).get(name) or ChannelLabel(name, DASH, 1.0, DASH)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, Recording
+from savgs_ident.recordings.recording import Campaign, Recording
 from savgs_ident.responses.dwell_fit import ChannelFit, DwellFit, fit_dwell
 from savgs_ident.responses.fundamental import (
     ClockGroup,
@@ -31,13 +31,12 @@ _STEADY_SHARE = 0.01
 _STEADY_SIGMAS = 5.0
 _NOISE_FACTOR = 1.5
 _CLOCK_SIGMAS = 5.0
-ROAD = "road_height"
 
 
-def estimate_response(campaign: Campaign, orders: int = 15, driven: str = ROAD) -> HarmonicResponse:
+def estimate_response(campaign: Campaign, orders: int = 15, driven: str = "") -> HarmonicResponse:
     """Complex harmonics, covariance and peak-to-peak of all dwells of ``campaign``, sorted by frequency.
 
-    ``driven`` is the input that moves in them, the road or that of another plant, called the road below.
+    ``driven`` is the input that moves in them, that of the campaign's layout if empty; it is called the road below.
 
     ``orders`` is the highest order kept; a channel sampled at r Hz is valid up to 0.4 r / f. The covariance
     holds the noise of the channel and the phase noise of the road, which sets the time origin (a part common
@@ -53,6 +52,7 @@ def estimate_response(campaign: Campaign, orders: int = 15, driven: str = ROAD) 
     """
     if orders < 1:
         raise InputError(f"orders is {orders}", source="orders", remedy="ask for at least order 1")
+    driven = driven or campaign.layout.driven
     fits, groups, warnings = _fit_all(campaign, orders, {}, driven)
     if not fits:
         raise _no_dwell(campaign, warnings)
@@ -61,7 +61,8 @@ def estimate_response(campaign: Campaign, orders: int = 15, driven: str = ROAD) 
         fits, groups, warnings = _fit_all(campaign, orders, stretch, driven)
     for test, fit in fits.items():
         warnings += check_steady(campaign.source, test, groups[test], fit)
-    return _assemble(fits, orders, warnings + clock_warnings + _check_all(campaign, fits), driven)
+    warnings += clock_warnings + check_noise(campaign, fits) + check_folding(campaign.source, fits)
+    return _assemble(campaign, fits, orders, warnings, driven)
 
 
 def _fit_all(
@@ -89,10 +90,6 @@ def _fit_all(
         fits[recording.name], kept[recording.name] = fit, groups
         warnings += check_frequency(campaign.source, recording, fit.frequency, driven)
     return fits, kept, warnings
-
-
-def _check_all(campaign: Campaign, fits: Mapping[str, DwellFit]) -> tuple[DataWarning, ...]:
-    return check_noise(campaign, fits) + check_folding(campaign.source, fits)
 
 
 def _middle(recording: Recording, driven: str) -> float:
@@ -150,13 +147,17 @@ def _no_dwell(campaign: Campaign, warnings: tuple[DataWarning, ...]) -> InputErr
 
 
 def _assemble(
-    fits: Mapping[str, DwellFit], orders: int, warnings: tuple[DataWarning, ...], driven: str
+    campaign: Campaign,
+    fits: Mapping[str, DwellFit],
+    orders: int,
+    warnings: tuple[DataWarning, ...],
+    driven: str,
 ) -> HarmonicResponse:
-    """The record: dwells sorted by frequency, channels in canonical order, time origins moved."""
+    """The record: dwells sorted by frequency, channels as recorded, time origins moved."""
     tests = tuple(sorted(fits, key=lambda test: fits[test].frequency))
     present = {name for fit in fits.values() for name in fit.channels}
-    channels = tuple(name for name in CANONICAL_UNITS if name in present)
-    channels += tuple(sorted(present - set(channels)))
+    recorded = dict.fromkeys(name for recording in campaign.recordings for name in recording.channels)
+    channels = tuple(name for name in recorded if name in present)
     shape = (len(tests), len(channels), orders + 1)
     harmonics = np.zeros(shape, dtype=np.complex128)
     covariance = np.zeros((*shape, 2, 2))
@@ -218,7 +219,7 @@ def _phase_variance(road: ChannelFit) -> float:
 
 
 def check_frequency(
-    source: str, recording: Recording, measured: float, driven: str = ROAD
+    source: str, recording: Recording, measured: float, driven: str
 ) -> tuple[DataWarning, ...]:
     """A warning where the road moves at another frequency [Hz] than the test's name or label gives."""
     nominal = recording.frequency_hz

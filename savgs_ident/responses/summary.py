@@ -11,7 +11,7 @@ from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.recordings.recording import Campaign, Recording
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
-from savgs_ident.responses.sweeps import ROAD, estimate_sweep_response
+from savgs_ident.responses.sweeps import estimate_sweep_response
 
 LEAST_RATIO = 3.0
 """Least signal-to-noise ratio [1] of an order that counts as seen."""
@@ -37,20 +37,16 @@ class CampaignSummary(Result):
     warnings: tuple[DataWarning, ...]
 
 
-SENSORS = ("sprung_accel", "susp_deflection")
-"""The channels whose response along a sweep is estimated."""
-
-
 def inspect(
     campaign: Campaign,
-    channels: Sequence[str] = SENSORS,
+    channels: Sequence[str] = (),
     orders: int = 15,
     progress: Progress = no_progress,
 ) -> CampaignSummary:
     """What is in a campaign: tests, channels, amplitudes, signal-to-noise, noise, warnings.
 
-    What can be estimated is, harmonics up to ``orders``, of sweeps the response of ``channels``; what cannot be
-    becomes a warning.
+    What can be estimated is, harmonics up to ``orders``, of sweeps the response of ``channels``, of those of
+    the campaign's layout where none is given; what cannot be becomes a warning.
     """
     progress("estimating responses")
     warnings = list(campaign.warnings)
@@ -64,10 +60,12 @@ def inspect(
     else:
         what = "there is no harmonic dwell, which a fit needs"
         warnings.append(DataWarning("no_dwell", what, campaign.source, remedy="name the tests dwell_<f>Hz"))
+    driven = campaign.layout.driven
+    wanted = (driven, *(channels or campaign.layout.responses))
     sweeps = []
     for recording in campaign.of_kind("sweep"):
         try:
-            sweeps.append(estimate_sweep_response(_only(recording, channels), source=campaign.source))
+            sweeps.append(estimate_sweep_response(_only(recording, wanted), driven, source=campaign.source))
         except InputError as error:
             warnings.append(_as_warning("sweep_not_used", error))
     warnings += [warning for sweep in sweeps for warning in sweep.warnings]
@@ -77,7 +75,7 @@ def inspect(
 
 
 def _only(recording: Recording, channels: Sequence[str]) -> Recording:
-    found = {name: channel for name, channel in recording.channels.items() if name in (ROAD, *channels)}
+    found = {name: channel for name, channel in recording.channels.items() if name in channels}
     return Recording(recording.name, recording.kind, recording.frequency_hz, found)
 
 

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.recordings.recording import CANONICAL_UNITS, RecordedChannel, Recording
+from savgs_ident.recordings.recording import RecordedChannel, Recording
 from savgs_ident.responses.harmonic_response import SweepResponse
 
-ROAD = "road_height"
 _ORDERS = 7
 _TRUSTED_SHARE = 0.40
 _HALF_ORDERS = (0.5, 1.5, 2.5)
@@ -48,9 +47,9 @@ class LocalPhase:
 
 
 def estimate_sweep_response(
-    recording: Recording, cycles: float = 4.0, overlap: float = 0.5, source: str = ""
+    recording: Recording, driven: str, cycles: float = 4.0, overlap: float = 0.5, source: str = ""
 ) -> SweepResponse:
-    """First harmonic of each channel per metre of road along one sweep.
+    """First harmonic of each channel per unit of the input ``driven``, called the road below, along one sweep.
 
     ``cycles`` is the length of a window in cycles of the road, ``overlap`` the share that neighbours have in
     common (their errors are correlated accordingly). The road's amplitude is taken as constant within a
@@ -66,18 +65,17 @@ def estimate_sweep_response(
 
     Raises :class:`InputError` when the road is missing or moves fewer than ``cycles`` + 1 cycles.
     """
-    road = _usable(recording.channels.get(ROAD))
+    road = _usable(recording.channels.get(driven))
     if road is None or np.ptp(road.values) == 0.0:
         raise InputError(
             "the sweep has no road motion to refer to",
             source=source,
             test=recording.name,
-            channel=ROAD,
+            channel=driven,
             remedy="map the road channel, or leave this test out",
         )
     phases, windows = _road_windows(recording.name, road, cycles, overlap, source)
-    names = [name for name in CANONICAL_UNITS if name in recording.channels and name != ROAD]
-    names += sorted(set(recording.channels) - set(names) - {ROAD})
+    names = [name for name in recording.channels if name != driven]
     columns = [_channel_response(_usable(recording.channels[name]), phases, windows) for name in names]
     return SweepResponse(
         test=recording.name,
@@ -116,7 +114,7 @@ def _road_windows(
             f"the road moves {max(times.size - 1, 0) / 2:g} cycles, {cycles + 1:g} are needed",
             source=source,
             test=test,
-            channel=ROAD,
+            channel=road.name,
             remedy="use shorter windows or a longer sweep",
         )
     phase_over_time = phase_at_crossings(times)

@@ -88,7 +88,7 @@ def first_sweep(campaign: Campaign, plant: AbstractPlant | type[AbstractPlant]) 
     """The response along the first sweep of a campaign; None if there is none that can be used."""
     for recording in campaign.only(recorded_names(plant)).of_kind("sweep"):
         try:
-            return estimate_sweep_response(recording, source=campaign.source)
+            return estimate_sweep_response(recording, plant.inputs[0].name, source=campaign.source)
         except InputError:
             continue
     return None

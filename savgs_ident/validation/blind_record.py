@@ -38,8 +38,9 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import record_of, write_bytes
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.plants.quarter_car.road import nominal_test
-from savgs_ident.recordings.recording import CANONICAL_UNITS, RecordedChannel, Recording, TestKind
+from savgs_ident.recordings.recording import RecordedChannel, Recording, TestKind
 from savgs_ident.validation.virtual_rig import Bench, Sensors, Steady, steady_dwells, sweep_readings
 
 Drawn = Literal["none", "effect", "two", "unknown"]
@@ -159,7 +160,7 @@ def _test(
     names = ("road_height", "sprung_accel", "susp_deflection", "link_angle")
     values = (*shown, link)
     channels = {
-        name: RecordedChannel(name, CANONICAL_UNITS[name], stamps, each)
+        name: RecordedChannel(name, RIG_LAYOUT.si_unit(name), stamps, each)
         for name, each in zip(names, values, strict=True)
     }
     return Recording(name, kind, frequency, channels)

@@ -26,7 +26,7 @@ from savgs_ident.diagnosis.quarter_car import SIMTR, diagnose_response
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, parse_rig
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Recording
 from savgs_ident.simulate.measured import first_sweep, measured_response
 from savgs_ident.simulate.public import DWELLS
@@ -150,14 +150,14 @@ def run_trial(plan: Plan, draw: Draw, diagnose: Diagnose, out: Path, number: int
     seal = _handed_over(folder).seal
     envelope = _read(folder / "answer.json", envelope_of)
     with blamed_on(campaign / "seal.json"):
-        answer = opened(seal, envelope, read_campaign(campaign).sha256)
+        answer = opened(seal, envelope, load_campaign(campaign).sha256)
     return score_of(answer, found)
 
 
 def diagnose_folder(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
     """The diagnosis of a recorded campaign as its ``diagnosis.json`` has it."""
     settings = replace(SIMTR, without=without)
-    campaign = read_campaign(folder)
+    campaign = load_campaign(folder)
     measured = measured_response(campaign, QuarterCar, settings.orders)
     diagnosis = diagnose_response(measured, rig, settings, sweep=first_sweep(campaign, QuarterCar))
     origin = RigModel(rig, settings.baseline).origin(campaign, measured.warnings)
@@ -204,7 +204,7 @@ def _record(folder: Path, plan: Plan, drawn: Drawn, number: int) -> None:
     envelope = Envelope(drawn.answer, drawn.salt)
     settings = {"trial": number, "settings": plan.marks()}
     write_json(folder / "answer.json", settings | asdict(envelope))
-    seal = sealed(envelope, read_campaign(campaign).sha256)
+    seal = sealed(envelope, load_campaign(campaign).sha256)
     # What the catalogue of this trial lacks is part of the question.
     write_json(campaign / "seal.json", {"without": drawn.answer.without, "seal": asdict(seal)})
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from savgs_ident.core.output import prepare_folder
 from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.recordings.recording import Campaign, Recording
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.simulate.public import DWELLS
@@ -59,7 +60,7 @@ def simulate_campaign(
     recordings = record_campaign(bench, answer, np.random.default_rng(seed))
     if start is not None:
         recordings = tuple(_begun(each, start.timestamp()) for each in recordings)
-    return Campaign("simulated", recordings, (), "")
+    return Campaign("simulated", recordings, (), "", RIG_LAYOUT)
 
 
 def write_campaign(campaign: Campaign, folder: str | Path) -> Path:

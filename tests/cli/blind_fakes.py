@@ -17,8 +17,8 @@ import numpy as np
 
 from savgs_ident.cli.console import Reporter
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.recordings.read import read_campaign
-from savgs_ident.recordings.recording import CANONICAL_UNITS, RecordedChannel, Recording
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
+from savgs_ident.recordings.recording import RecordedChannel, Recording
 from savgs_ident.validation.blind import Job, run_blind
 from savgs_ident.validation.blind_trial import Drawn, Plan
 from savgs_ident.validation.virtual_rig import Bench
@@ -68,7 +68,7 @@ def _test(
     wave = np.cos(2.0 * np.pi * frequency * time_) if frequency else np.zeros(count)
     channels = {
         each: RecordedChannel(
-            each, CANONICAL_UNITS[each], time_, size * wave + 1e-4 * random.standard_normal(count)
+            each, RIG_LAYOUT.si_unit(each), time_, size * wave + 1e-4 * random.standard_normal(count)
         )
         for each, size in {"road_height": 0.01, "sprung_accel": 2.0, "susp_deflection": 0.01}.items()
     }
@@ -76,7 +76,7 @@ def _test(
 
 
 def number_of(folder: Path) -> int:
-    (still,) = read_campaign(folder).of_kind("standstill")
+    (still,) = load_campaign(folder).of_kind("standstill")
     return still.channels["road_height"].time.size - 100
 
 

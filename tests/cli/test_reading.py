@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.simulate.measured import first_sweep
 
 
 def test_the_first_sweep_that_can_be_used_is_taken(nominal_campaign: Path) -> None:
-    campaign = read_campaign(nominal_campaign)
+    campaign = load_campaign(nominal_campaign)
     sweep = first_sweep(campaign, QuarterCar)
     assert sweep is not None
     assert sweep.test == campaign.of_kind("sweep")[0].name

@@ -14,7 +14,7 @@ from savgs_ident.plants.quarter_car.damper import damper_curve
 from savgs_ident.plants.quarter_car.model import FREE
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import recorded_names
@@ -42,7 +42,7 @@ def measure(shared_rig: Path) -> Measure:
         file = shared_rig / name / "campaign.csv.gz"
         if not file.exists():
             pytest.skip(f"{file} is not here")
-        return estimate_response(read_campaign(file).only(recorded_names(QuarterCar)), 9)
+        return estimate_response(load_campaign(file).only(recorded_names(QuarterCar)), 9)
 
     return measured
 

@@ -9,7 +9,7 @@ import pytest
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
 from savgs_ident.plants.quarter_car.model import FREE
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.validation.blind_draw import (
@@ -185,7 +185,7 @@ def truth(drawing: Drawing) -> Answer:
 def campaign(bench: Bench, truth: Answer, tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     folder = tmp_path_factory.mktemp("campaign")
     write_campaign(record_campaign(bench, truth, np.random.default_rng(4)), folder)
-    return read_campaign(folder)
+    return load_campaign(folder)
 
 
 @pytest.mark.slow

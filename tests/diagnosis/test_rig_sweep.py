@@ -11,8 +11,8 @@ from savgs_ident.diagnosis import sweep as module
 from savgs_ident.diagnosis.sweep import along, first_harmonic, frequencies_of, sweep_shrink
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.recordings.read import read_campaign
-from savgs_ident.recordings.recording import CANONICAL_UNITS, RecordedChannel, Recording
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
+from savgs_ident.recordings.recording import RecordedChannel, Recording
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import SweepResponse
 from savgs_ident.responses.sweeps import estimate_sweep_response
@@ -122,19 +122,19 @@ def test_the_gap_is_relative_to_the_response_and_leaves_out_what_no_dwell_reache
 @pytest.mark.slow
 def test_the_rig_swept_in_time_answers_as_predicted(rig: Rig, nominal_campaign) -> None:
     """Within a hundredth of the response, where a dwell as slow would be off by more near the peak."""
-    campaign = read_campaign(nominal_campaign)
+    campaign = load_campaign(nominal_campaign)
     measured = estimate_response(campaign, 9)
     plant, _ = rig_problem(measured, rig, dict(CATALOGUE))
     model = build_model(rig, MODELS["simtr"])
     times, readings = sweep_readings(model, plant.values({}), 60.0, 3.0, 500.0)
     road = 0.01375 * np.sin(np.pi * RATE * times**2)
     channels = {
-        name: RecordedChannel(name, CANONICAL_UNITS[name], times, values)
+        name: RecordedChannel(name, RIG_LAYOUT.si_unit(name), times, values)
         for name, values in zip(
             ("road_height", "sprung_accel", "susp_deflection"), (road, *readings), strict=True
         )
     }
-    sweep = estimate_sweep_response(Recording("sweep", "sweep", None, channels))
+    sweep = estimate_sweep_response(Recording("sweep", "sweep", None, channels), "road_height")
     frequencies = frequencies_of(np.asarray(plant.excitation.frequency), sweep)
     assert frequencies is not None
     told = first_harmonic(plant, sweep, frequencies, (), {})

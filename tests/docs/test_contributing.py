@@ -22,6 +22,7 @@ from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.plants.base import Excitation, find_rest, nominal_inputs, standing
 from savgs_ident.plants.quarter_car.catalogue import build_model
 from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.plants.two_mass import TwoMass
 from savgs_ident.recordings import read
 from savgs_ident.simulate.harmonics import harmonics
@@ -147,7 +148,7 @@ def test_the_reader_reads_what_is_saved_and_refuses_what_is_damaged(
     noise = 1e-4 * np.random.default_rng(1).standard_normal(time.size)
     path = tmp_path / "dwell_1.0Hz.npz"
     np.savez(path, time=time, road_height=height, susp_deflection_mm=1e3 * (0.5 * height + noise))
-    (dwell,) = read.read_campaign(path).of_kind("dwell")
+    (dwell,) = load_campaign(path).of_kind("dwell")
     assert dwell.frequency_hz == 1.0
     np.testing.assert_allclose(dwell.channels["road_height"].values, height)
     np.testing.assert_allclose(dwell.channels["susp_deflection"].values, 0.5 * height + noise, atol=1e-12)
@@ -156,10 +157,10 @@ def test_the_reader_reads_what_is_saved_and_refuses_what_is_damaged(
     with pytest.raises(
         InputError, match=r"dwell_1.0Hz.npz: is no NumPy archive: .* Remedy: copy the file again"
     ):
-        read.read_campaign(path)
+        load_campaign(path)
     np.savez(path, road_height=height)
     with pytest.raises(InputError, match="has no array 'time'"):
-        read.read_campaign(path)
+        load_campaign(path)
 
 
 def test_the_export_can_be_read_back(rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ import pytest
 import savgs_ident as si
 from benchmarks.figures import FIGURES
 from savgs_ident.cli.app import app
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.recordings.channels import read_channel_map
 
 from ..in_one_test import over
@@ -73,4 +74,4 @@ def test_the_channel_map_of_a_page_is_one(page: str, tmp_path: Path) -> None:
     (block,) = (each for each in re.findall(r"```toml\n(.*?)```", text, re.S) if "[channels." in each)
     path = tmp_path / "channels.toml"
     path.write_text(block)
-    assert read_channel_map(path).rules[0].unit == "g"
+    assert read_channel_map(path, RIG_LAYOUT).rules[0].unit == "g"

@@ -15,7 +15,7 @@ from savgs_ident.fit.result import Fit
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
@@ -32,7 +32,7 @@ def _as_users_have_it() -> Iterator[None]:
 @pytest.fixture(scope="package")
 def measured(nominal_campaign: Path) -> HarmonicResponse:
     """The response of the shipped campaign, orders 0..9."""
-    return estimate_response(read_campaign(nominal_campaign), 9)
+    return estimate_response(load_campaign(nominal_campaign), 9)
 
 
 @pytest.fixture(scope="package")

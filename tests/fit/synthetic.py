@@ -12,8 +12,9 @@ from savgs_ident.core.values import as_values
 from savgs_ident.plants.quarter_car.catalogue import build_model, model_parameters
 from savgs_ident.plants.quarter_car.plant import read_sensors
 from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.plants.quarter_car.road import cam_excitation
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, RecordedChannel, Recording
+from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 
 STROKE = 0.0275
@@ -57,11 +58,11 @@ def synthetic_campaign(
             for name, signal in clean.items()
         }
         recordings.append(Recording(f"dwell_{frequency}Hz", "dwell", frequency, channels))
-    return Campaign("synthetic", tuple(recordings), (), "")
+    return Campaign("synthetic", tuple(recordings), (), "", RIG_LAYOUT)
 
 
 def _channel(name: str, time: NDArray[np.float64], values: NDArray[np.float64]) -> RecordedChannel:
-    return RecordedChannel(name, CANONICAL_UNITS[name], time, values)
+    return RecordedChannel(name, RIG_LAYOUT.si_unit(name), time, values)
 
 
 def _sampled(

@@ -14,7 +14,7 @@ from savgs_ident.inference.prior import sheet_coordinate
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
@@ -127,7 +127,7 @@ def test_a_parameter_that_does_nothing_is_refused(
 @pytest.fixture(scope="module")
 def crosschecked(measured: HarmonicResponse, nominal_campaign: Path, rig: Rig) -> CollocationFit:
     """All dwells of the shipped campaign, tolerances estimated along."""
-    campaign = read_campaign(nominal_campaign)
+    campaign = load_campaign(nominal_campaign)
     return fit_by_collocation(campaign, measured, RigModel(rig, MODELS["simtr"]), free=FREE)
 
 
@@ -153,7 +153,7 @@ def test_on_the_shipped_campaign_it_finds_the_truth(crosschecked: CollocationFit
 
 def test_the_frictionless_rig_too(measured: HarmonicResponse, nominal_campaign: Path, rig: Rig) -> None:
     """It has no internal states; it does not explain the recordings, which shows in chi2."""
-    campaign = read_campaign(nominal_campaign)
+    campaign = load_campaign(nominal_campaign)
     one = only(measured, np.isin(np.round(measured.frequency, 2), (6.0,)))
     found = fit_by_collocation(campaign, one, RigModel(rig, ()), free=("c_sd",), settings=EXACT)
     assert found.status.ok

@@ -10,7 +10,7 @@ from savgs_ident.fit.result import Fit
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
@@ -21,7 +21,7 @@ from .bench import TRUTH
 def test_the_same_samples_in_json_give_the_same_fit(
     nominal: Fit, measured: HarmonicResponse, shared_rig: Path, rig: Rig
 ) -> None:
-    campaign = read_campaign(shared_rig / "nominal" / "campaign_json.mcap")
+    campaign = load_campaign(shared_rig / "nominal" / "campaign_json.mcap")
     response = estimate_response(campaign, 9)
     sd = np.sqrt(np.trace(measured.covariance, axis1=-2, axis2=-1))
     assert np.max(np.abs(response.harmonics - measured.harmonics)[measured.valid] / sd[measured.valid]) < 1e-4
@@ -37,7 +37,7 @@ def test_the_same_samples_in_json_give_the_same_fit(
 def test_other_clocks_rates_and_noise_give_the_same_parameters_within_their_errors(
     nominal: Fit, shared_rig: Path, rig: Rig
 ) -> None:
-    response = estimate_response(read_campaign(shared_rig / "nominal" / "campaign_ros2.mcap"), 9)
+    response = estimate_response(load_campaign(shared_rig / "nominal" / "campaign_ros2.mcap"), 9)
     fit = fit_least_squares(response, RigModel(rig, MODELS["simtr"]), free=FREE)
     assert fit.trusted
     assert fit.chi2 / fit.dof < 1.6

@@ -13,7 +13,7 @@ from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import resolve
@@ -27,7 +27,7 @@ DWELLS = (1.4, 2.35, 4.5, 6.0)
 
 @pytest.fixture(scope="module")
 def question(nominal_campaign: Path, rig: Rig) -> Question:
-    measured = estimate_response(read_campaign(nominal_campaign), 9)
+    measured = estimate_response(load_campaign(nominal_campaign), 9)
     kept = only(measured, np.isin(np.round(measured.frequency, 2), DWELLS))
     return Question(kept, RigModel(true_rig(rig), MODELS["simtr"]), {}, FREE)
 

@@ -15,9 +15,9 @@ import pytest
 import zstandard
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.recordings.channels import read_channel_map
 from savgs_ident.recordings.mcap_records import LARGEST_CHUNK, MAGIC
-from savgs_ident.recordings.read import read_campaign
 
 GIGABYTE = 1 << 30
 MEGABYTE = bytes(1 << 20)
@@ -73,7 +73,7 @@ def test_a_chunk_that_unfolds_to_a_gigabyte(
     )
     assert path.stat().st_size < 2 << 20
     with _bounded(8 << 20), pytest.raises(InputError, match=r"declares .* bytes|a chunk is damaged"):
-        read_campaign(path)
+        load_campaign(path)
 
 
 @pytest.mark.parametrize(("compression", "pack"), [("zstd", _zstd), ("lz4", _lz4)])
@@ -83,7 +83,7 @@ def test_a_chunk_of_zeros_that_is_as_large_as_it_says(
     path = tmp_path / "a.mcap"
     path.write_bytes(_chunk(compression, pack(LARGEST_CHUNK), LARGEST_CHUNK))
     with _bounded(3 * LARGEST_CHUNK), pytest.raises(InputError, match="its records do not fill it"):
-        read_campaign(path)
+        load_campaign(path)
 
 
 def _gzipped(*pieces: tuple[bytes, int]) -> bytes:
@@ -96,14 +96,14 @@ def test_a_line_of_a_gigabyte(tmp_path: Path) -> None:
     path.write_bytes(_gzipped((HEADER, 1), (b"1" * len(MEGABYTE), 1 << 8)) * 4)
     assert path.stat().st_size < 2 << 20
     with _bounded(64 << 20), pytest.raises(InputError, match="has a line longer than"):
-        read_campaign(path)
+        load_campaign(path)
 
 
 def test_millions_of_empty_lines(tmp_path: Path) -> None:
     path = tmp_path / "a.csv.gz"
     path.write_bytes(_gzipped((HEADER, 1), (b"\n" * len(MEGABYTE), 1 << 3)))
     with _bounded(256 << 20), pytest.raises(InputError, match="has a header but no data"):
-        read_campaign(path)
+        load_campaign(path)
 
 
 def test_millions_of_rows_in_some_kilobytes(tmp_path: Path) -> None:
@@ -111,7 +111,7 @@ def test_millions_of_rows_in_some_kilobytes(tmp_path: Path) -> None:
     path.write_bytes(gzip.compress(HEADER + b"0,0,0\n" * (1 << 22), 9))
     assert path.stat().st_size < 100_000
     with _bounded(GIGABYTE, 20.0), pytest.raises(InputError, match=r"a\.csv\.gz"):
-        read_campaign(path)
+        load_campaign(path)
 
 
 @pytest.mark.parametrize("nested", ["[" * 2000 + "]" * 2000, "{a=" * 2000 + "1" + "}" * 2000, "9" * 5000])
@@ -119,5 +119,5 @@ def test_a_map_without_end(nested: str, tmp_path: Path) -> None:
     path = tmp_path / "channels.toml"
     path.write_text(f"channels = {nested}\n")
     with pytest.raises(InputError, match="is not TOML") as caught:
-        read_channel_map(path)
+        read_channel_map(path, RIG_LAYOUT)
     assert caught.value.source == str(path)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from benchmarks.write_long_mcap import write_long_mcap
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.mcap_records import McapRecords
-from savgs_ident.recordings.read import read_campaign
 
 BYTES_A_SAMPLE = 6 * 8 + 3 * 8
 """Six values, their time, and the two clocks that are held until the time is chosen [bytes]."""
@@ -34,7 +34,7 @@ def _peak(work: Callable[[], object]) -> int:
 def test_peak_is_the_result_and_a_few_buffers(long_mcap: tuple[Path, int]) -> None:
     path, samples = long_mcap
     buffers = 24 << 20
-    assert _peak(lambda: read_campaign(path)) < samples * BYTES_A_SAMPLE + buffers
+    assert _peak(lambda: load_campaign(path)) < samples * BYTES_A_SAMPLE + buffers
 
 
 def test_the_container_is_walked_in_the_memory_of_a_chunk(long_mcap: tuple[Path, int]) -> None:
@@ -49,7 +49,7 @@ def test_the_container_is_walked_in_the_memory_of_a_chunk(long_mcap: tuple[Path,
 
 def test_the_long_campaign_is_whole_and_sound(long_mcap: tuple[Path, int]) -> None:
     path, samples = long_mcap
-    campaign = read_campaign(path)
+    campaign = load_campaign(path)
     assert campaign.warnings == ()
     assert [r.frequency_hz for r in campaign.recordings] == [0.5, 1.0, 1.5]
     assert sum(r.channels["sprung_accel"].values.size for r in campaign.recordings) == samples

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.checks import measure_frequency
 from savgs_ident.recordings.checks_signal import check_clipping
-from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 
 Signals = dict[str, NDArray[np.float64]]
@@ -31,7 +31,7 @@ def read(
     ) -> Campaign:
         path = tmp_path / name
         path.write_bytes(text(csv_bytes(change(signals()))))
-        return read_campaign(path)
+        return load_campaign(path)
 
     return build
 
@@ -164,7 +164,7 @@ def test_gravity_and_bias_are_taken_off_by_the_standstill(
         if both:
             text = csv_bytes(still | {"sprung_accel": np.full(1000, 9.9)})
             (tmp_path / folder / "standstill.csv").write_bytes(text)
-    known, unknown = read_campaign(tmp_path / "with"), read_campaign(tmp_path / "without")
+    known, unknown = load_campaign(tmp_path / "with"), load_campaign(tmp_path / "without")
     assert [w.code for w in (*known.warnings, *unknown.warnings)] == ["gravity_removed"] * 2
     values = signals()["sprung_accel"]
     np.testing.assert_allclose(known.recordings[0].channels["sprung_accel"].values, values, atol=1e-9)
@@ -178,7 +178,7 @@ def test_one_bad_test_costs_that_test(
 ) -> None:
     good, bad = csv_bytes(signals(), test="dwell_1Hz"), csv_bytes(signals(2.0, 1.0), test="dwell_2Hz")
     (tmp_path / "a.csv").write_bytes(good + bad.split(b"\n", 1)[1])
-    campaign = read_campaign(tmp_path / "a.csv")
+    campaign = load_campaign(tmp_path / "a.csv")
     assert [r.name for r in campaign.recordings] == ["dwell_1Hz"]
     assert [(w.code, w.test) for w in campaign.warnings] == [("test_left_out", "dwell_2Hz")]
     assert "2.0 periods" in campaign.warnings[0].what
@@ -192,7 +192,7 @@ def test_repeated_tests_are_kept_apart(
         csv_bytes(signals(2.0), test="dwell_2Hz").split(b"\n", 1)[1],
     )
     (tmp_path / "a.csv").write_bytes(one + two + one.split(b"\n", 1)[1])
-    campaign = read_campaign(tmp_path / "a.csv")
+    campaign = load_campaign(tmp_path / "a.csv")
     assert [r.name for r in campaign.recordings] == ["dwell_1Hz", "dwell_2Hz", "dwell_1Hz#2"]
     assert [w.code for w in campaign.warnings] == ["repeated_test"]
 
@@ -208,7 +208,7 @@ def test_a_cut_gzip_gives_its_whole_lines(
     path = tmp_path / "dwell_1Hz.csv.gz"
     packed = gzip.compress(csv_bytes(signals(seconds=60.0)))
     path.write_bytes(packed[: len(packed) // 2])
-    campaign = read_campaign(path)
+    campaign = load_campaign(path)
     channel = campaign.recordings[0].channels["sprung_accel"]
     assert [w.code for w in campaign.warnings] == ["truncated_file"]
     assert campaign.warnings[0].time == channel.time[-1]
@@ -274,7 +274,7 @@ def test_the_frequency_of_the_road_is_measured(frequency: float, phase: float) -
 
 @pytest.mark.parametrize("condition", ["nominal", "stribeck_rail", "mount_compliance", "accel_lag"])
 def test_nothing_is_wrong_with_a_sound_campaign(condition: str, shared_rig: Path) -> None:
-    campaign = read_campaign(shared_rig / condition / "campaign.csv.gz")
+    campaign = load_campaign(shared_rig / condition / "campaign.csv.gz")
     assert campaign.warnings == ()
     assert len(campaign.of_kind("dwell")) == 28
     assert len(campaign.of_kind("sweep")) == len(campaign.of_kind("standstill")) == 1

@@ -8,20 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from savgs_ident.recordings.channels import (
-    ALIASES,
-    DIMENSIONS,
-    UNITS,
-    ChannelMap,
-    ChannelRule,
-    Header,
-    canonical_name,
-    find_unit,
-    split_header,
-    unit_factor,
-)
-from savgs_ident.recordings.read import read_campaign
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, classify_test
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
+from savgs_ident.recordings.channels import ChannelMap, ChannelRule
+from savgs_ident.recordings.layout import UNITS, Header, find_unit
+from savgs_ident.recordings.recording import Campaign, classify_test
 
 from ..in_one_test import over
 
@@ -80,7 +70,7 @@ DIALECTS: dict[str, Callable[[Signals, Csv], bytes]] = {
 
 
 def _si() -> dict[str, str]:
-    return {"time": "s"} | dict(CANONICAL_UNITS)
+    return {name: RIG_LAYOUT.si_unit(name) for name in ("time", *RIG_LAYOUT.names)}
 
 
 def _si_headers() -> dict[str, str]:
@@ -97,7 +87,7 @@ def test_every_dialect_gives_the_same_recording(
 ) -> None:
     path = tmp_path / "dwell_1.00Hz.csv"
     path.write_bytes(DIALECTS[dialect](signals(), csv_bytes))
-    campaign = read_campaign(path)
+    campaign = load_campaign(path)
     assert campaign.warnings == ()
     _same(campaign, signals())
 
@@ -107,7 +97,7 @@ def _same(campaign: Campaign, signals: Signals) -> None:
     assert (recording.name, recording.kind, recording.frequency_hz) == ("dwell_1.00Hz", "dwell", 1.0)
     assert set(recording.channels) == set(signals) - {"time"}
     for name, channel in recording.channels.items():
-        assert channel.unit == CANONICAL_UNITS[name]
+        assert channel.unit == RIG_LAYOUT.si_unit(name)
         np.testing.assert_allclose(channel.values, signals[name], rtol=1e-12, atol=1e-14)
         np.testing.assert_allclose(channel.time, signals["time"], rtol=0, atol=1e-9)
 
@@ -115,7 +105,7 @@ def _same(campaign: Campaign, signals: Signals) -> None:
 def test_channels_are_read_only(tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Csv) -> None:
     path = tmp_path / "dwell_1.00Hz.csv"
     path.write_bytes(csv_bytes(signals()))
-    channel = read_campaign(path).recordings[0].channels["road_height"]
+    channel = load_campaign(path).recordings[0].channels["road_height"]
     with pytest.raises(ValueError, match="read-only"):
         channel.values[0] = 1.0
 
@@ -125,7 +115,7 @@ def test_a_header_without_unit_is_taken_as_si_and_told(
 ) -> None:
     path = tmp_path / "dwell_1.00Hz.csv"
     path.write_bytes(csv_bytes(signals(), headers={}))
-    campaign = read_campaign(path)
+    campaign = load_campaign(path)
     assert [w.code for w in campaign.warnings] == ["unit_assumed"] * 5
     assert "'road_height' has no unit, taken as m" in str(campaign.warnings[1])
     _same(campaign, signals())
@@ -146,7 +136,7 @@ def test_a_channel_map_settles_names_units_signs_and_offsets(
         '[channels.susp_deflection]\ncolumn = "AI3"\nunit = "mm"\nscale = 2\noffset = -12.5\nsign = -1\n'
         '[channels.link_angle]\ncolumn = "AI4"\nunit = "rad"\n'
     )
-    for campaign in (read_campaign(tmp_path), read_campaign(tmp_path / "dwell_1.00Hz.csv")):
+    for campaign in (load_campaign(tmp_path), load_campaign(tmp_path / "dwell_1.00Hz.csv")):
         assert campaign.warnings == ()
         _same(campaign, signals())
 
@@ -157,7 +147,7 @@ def test_a_map_wins_over_the_usual_name(
     path = tmp_path / "dwell_1.00Hz.csv"
     path.write_bytes(csv_bytes(signals() | {"road_2": 2 * signals()["road_height"]}))
     rule = ChannelRule("road_height", column="road_2", unit="m")
-    road = read_campaign(path, ChannelMap((rule,))).recordings[0].channels["road_height"]
+    road = load_campaign(path, ChannelMap(RIG_LAYOUT, (rule,))).recordings[0].channels["road_height"]
     np.testing.assert_allclose(road.values, 2 * signals()["road_height"])
     assert road.source == "road_2"
 
@@ -169,12 +159,12 @@ def test_a_folder_with_one_test_a_file(
     for frequency in (1.0, 2.0, 3.0):
         (tmp_path / f"dwell_{frequency}Hz.csv").write_bytes(csv_bytes(signals(frequency)))
     (tmp_path / "notes.md").write_text("not a recording")
-    campaign = read_campaign(tmp_path, progress=told.append)
+    campaign = load_campaign(tmp_path, progress=told.append)
     assert [r.frequency_hz for r in campaign.recordings] == [1.0, 2.0, 3.0]
     assert told == sorted(told)
     assert told[-1] == 1.0
     (tmp_path / "dwell_3.0Hz.csv").write_bytes(csv_bytes(signals(3.0, 12.0)))
-    assert read_campaign(tmp_path).sha256 != campaign.sha256
+    assert load_campaign(tmp_path).sha256 != campaign.sha256
 
 
 def test_a_file_much_larger_than_a_block(
@@ -183,7 +173,7 @@ def test_a_file_much_larger_than_a_block(
     long = signals(1.0, 1600.0)
     (tmp_path / "dwell_1.00Hz.csv").write_bytes(csv_bytes(long, test="dwell_1.00Hz"))
     assert (tmp_path / "dwell_1.00Hz.csv").stat().st_size > 2 * (1 << 22)
-    _same(read_campaign(tmp_path), long)
+    _same(load_campaign(tmp_path), long)
 
 
 @over(
@@ -209,7 +199,7 @@ def test_names_tell_kind_and_frequency(name: str, kind: str, frequency: float | 
     ],
 )  # fmt: skip
 def test_headers_split_into_label_and_unit(text: str, header: Header) -> None:
-    assert split_header(text) == header
+    assert RIG_LAYOUT.split_header(text) == header
 
 
 @over(
@@ -223,14 +213,16 @@ def test_headers_split_into_label_and_unit(text: str, header: Header) -> None:
     ],
 )  # fmt: skip
 def test_units(text: str, channel: str, factor: float) -> None:
-    assert unit_factor(text, channel) == pytest.approx(factor, rel=1e-15)
+    assert RIG_LAYOUT.unit_factor(text, channel) == pytest.approx(factor, rel=1e-15)
 
 
 def test_tables_are_consistent() -> None:
-    assert set(ALIASES) == set(DIMENSIONS) == {"time", *CANONICAL_UNITS}
-    assert {unit.dimension for unit in UNITS.values()} == set(DIMENSIONS.values())
-    for channel, unit in CANONICAL_UNITS.items():
-        assert unit_factor(unit, channel) == 1.0
-        assert all(canonical_name(alias) == channel for alias in ALIASES[channel])
-        assert ALIASES[channel][0] == channel
+    dimensions = {UNITS[RIG_LAYOUT.si_unit(name)].dimension for name in ("time", *RIG_LAYOUT.names)}
+    assert {unit.dimension for unit in UNITS.values()} == dimensions
+    for channel in RIG_LAYOUT.channels:
+        assert RIG_LAYOUT.unit_factor(channel.unit, channel.name) == 1.0
+        assert RIG_LAYOUT.is_exact(channel.name)
+        assert all(RIG_LAYOUT.canonical_name(alias) == channel.name for alias in channel.aliases)
+    aliases = [alias for channel in RIG_LAYOUT.channels for alias in (channel.name, *channel.aliases)]
+    assert len(set(aliases)) == len(aliases)
     assert find_unit("furlong") is None

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.recordings.cdr import SchemaError, find_layout, parse_definition
 from savgs_ident.recordings.mcap_records import MAGIC
-from savgs_ident.recordings.read import read_campaign
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign
+from savgs_ident.recordings.recording import Campaign
 
 SHARED_FOLDER = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 START = 1_763_715_600_000_000_000
@@ -25,7 +25,7 @@ FLIPS = st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(1, 255
 def _survives(path: Path, content: bytes) -> None:
     path.write_bytes(content)
     try:
-        campaign = read_campaign(path)
+        campaign = load_campaign(path)
     except InputError as error:
         refusal = str(error)
     else:
@@ -38,7 +38,7 @@ def _check_sound(campaign: Campaign) -> None:
     assert campaign.recordings
     for recording in campaign.recordings:
         for name, channel in recording.channels.items():
-            assert channel.unit == CANONICAL_UNITS[name]
+            assert channel.unit == RIG_LAYOUT.si_unit(name)
             assert np.isfinite(channel.values).all()
             assert (np.diff(channel.time) > 0).all()
 

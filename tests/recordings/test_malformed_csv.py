@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 
 from ..in_one_test import over
 from .refusal import check_refusal
@@ -184,7 +184,7 @@ def test_broken_table_is_refused_with_reason_place_and_remedy(
     path = tmp_path / name
     path.write_bytes(build(signals(), csv_bytes))
     with pytest.raises(InputError, match=message) as caught:
-        read_campaign(path)
+        load_campaign(path)
     assert str(path) in str(caught.value)
     assert "Remedy: " in str(caught.value)
     check_refusal(path, caught.value)
@@ -195,16 +195,16 @@ def test_the_table_behind_the_broken_ones_is_good(
 ) -> None:
     path = tmp_path / NAME
     path.write_bytes(csv_bytes(signals()))
-    campaign = read_campaign(path)
+    campaign = load_campaign(path)
     assert campaign.warnings == ()
     assert campaign.recordings[0].frequency_hz == 1.0
 
 
 def test_paths_that_are_no_campaign(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not exist"):
-        read_campaign(tmp_path / "none.csv")
+        load_campaign(tmp_path / "none.csv")
     with pytest.raises(InputError, match="the folder holds no campaign"):
-        read_campaign(tmp_path)
+        load_campaign(tmp_path)
 
 
 def test_a_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -216,7 +216,7 @@ def test_a_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(InputError, match=r"Permission denied.*permissions"):
-        read_campaign(path)
+        load_campaign(path)
 
 
 def test_the_same_test_in_two_files(
@@ -225,13 +225,13 @@ def test_the_same_test_in_two_files(
     for name in ("a.csv", "b.csv"):
         (tmp_path / name).write_bytes(csv_bytes(signals(), test="dwell_1Hz"))
     with pytest.raises(InputError, match=r"test .dwell_1Hz.: the test is in a\.csv and in b\.csv"):
-        read_campaign(tmp_path)
+        load_campaign(tmp_path)
 
 
 MAPS = {
     "not TOML": ("[channels", "is not TOML"),
     "unknown table": ("[chanels.road_height]\n", "unknown table 'chanels'"),
-    "unknown channel": ('[channels.wheel]\ncolumn = "x"', "'wheel' is not a canonical channel"),
+    "unknown channel": ('[channels.wheel]\ncolumn = "x"', "'wheel' is not a known channel"),
     "unknown key": ('[channels.road_height]\ncolumn = "x"\ngain = 2', "unknown key.*'gain'"),
     "neither column nor topic": ("[channels.road_height]\nscale = 2", "either a column or a topic"),
     "both column and topic": (
@@ -267,5 +267,5 @@ def test_broken_channel_map(
     (tmp_path / "channels.toml").write_text(text)
     (tmp_path / NAME).write_bytes(csv_bytes(signals()))
     with pytest.raises(InputError, match=message) as caught:
-        read_campaign(tmp_path / NAME)
+        load_campaign(tmp_path / NAME)
     check_refusal(tmp_path / NAME, caught.value)

@@ -10,8 +10,8 @@ import zstandard
 from mcap.writer import CompressionType
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.mcap_records import LARGEST_CHUNK, MAGIC
-from savgs_ident.recordings.read import read_campaign
 
 from ..in_one_test import over
 from .refusal import check_refusal
@@ -66,7 +66,7 @@ def test_broken_container_is_refused(case: str, tmp_path: Path) -> None:
     path = tmp_path / "broken.mcap"
     path.write_bytes(content)
     with pytest.raises(InputError, match=message) as caught:
-        read_campaign(path)
+        load_campaign(path)
     assert str(path) in str(caught.value)
     assert "Remedy: " in str(caught.value)
     check_refusal(path, caught.value)
@@ -76,7 +76,7 @@ def test_the_checksum_that_is_tested_can_be_right(tmp_path: Path) -> None:
     path = tmp_path / "whole.mcap"
     path.write_bytes(_file(_chunk("", LOST_MESSAGE, 33, crc=zlib.crc32(LOST_MESSAGE))))
     with pytest.raises(InputError, match="messages of channel 9"):
-        read_campaign(path)
+        load_campaign(path)
 
 
 CDR = b"\x00\x01\x00\x00"
@@ -131,7 +131,7 @@ def test_unreadable_topic_is_refused_with_its_reason(
     topic, payload, message = TOPICS[case]
     path = write_mcap(tmp_path / "a.mcap", {"/road_height": topic}, [("/road_height", START, payload)])
     with pytest.raises(InputError, match=message) as caught:
-        read_campaign(path)
+        load_campaign(path)
     check_refusal(path, caught.value)
 
 
@@ -146,7 +146,7 @@ def test_a_text_where_a_number_belongs_is_named_with_its_time(
     with pytest.raises(
         InputError, match=r"'/road', at 1763715600\.030 s: 'road_height' is 'high', not a number"
     ):
-        read_campaign(path)
+        load_campaign(path)
 
 
 def test_the_same_channel_on_two_topics(tmp_path: Path, write_mcap: Callable[..., Path]) -> None:
@@ -158,7 +158,7 @@ def test_the_same_channel_on_two_topics(tmp_path: Path, write_mcap: Callable[...
         [("/front/road_height", START, payload), ("/rear/road_height", START, payload)],
     )
     with pytest.raises(InputError, match="'/front/road_height data' and '/rear/road_height data' could both"):
-        read_campaign(path)
+        load_campaign(path)
 
 
 MAPS = {
@@ -183,7 +183,7 @@ def test_channel_map_that_does_not_fit(
     write_mcap(tmp_path / "a.mcap", json_topics, json_messages(signals(), "dwell_1Hz", 1.0))
     (tmp_path / "channels.toml").write_text(text)
     with pytest.raises(InputError, match=message):
-        read_campaign(tmp_path / "a.mcap")
+        load_campaign(tmp_path / "a.mcap")
 
 
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE])
@@ -197,9 +197,9 @@ def test_a_cut_file_gives_its_whole_chunks(
 ) -> None:
     messages = json_messages(signals(seconds=20.0), "dwell_1Hz", 1.0)
     path = write_mcap(tmp_path / "a.mcap", json_topics, messages, compression=compression, chunk_size=8192)
-    whole = read_campaign(path)
+    whole = load_campaign(path)
     path.write_bytes(path.read_bytes()[: int(0.6 * path.stat().st_size)])
-    cut = read_campaign(path)
+    cut = load_campaign(path)
     codes = [warning.code for warning in cut.warnings]
     assert codes == ["truncated_file", "unpaired_event"]
     stops = cut.recordings[0].channels["sprung_accel"].time[-1]
@@ -223,6 +223,6 @@ def test_a_damaged_chunk_costs_its_samples_only(
     inside = content.index(ZSTD_MAGIC, len(content) // 3) + 200
     content[inside] ^= 0x10
     path.write_bytes(bytes(content))
-    campaign = read_campaign(path)
+    campaign = load_campaign(path)
     assert [warning.code for warning in campaign.warnings] == ["damaged_chunk", "time_jump"]
     assert 2000 < campaign.recordings[0].channels["sprung_accel"].values.size < 3000

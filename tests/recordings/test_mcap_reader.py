@@ -14,9 +14,9 @@ from mcap.writer import CompressionType
 from mcap_ros2.decoder import DecoderFactory
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.cdr import find_layout, parse_definition
 from savgs_ident.recordings.mcap_timing import choose_clock, irregularity
-from savgs_ident.recordings.read import read_campaign
 
 START = 1_763_715_600_000_000_000
 IMU = (
@@ -102,7 +102,7 @@ def test_every_dress_of_a_file_gives_the_same_numbers(
     path = write_mcap(
         tmp_path / "a.mcap", json_topics, messages, compression=compression, chunked=chunked, index=index
     )
-    campaign = read_campaign(path)
+    campaign = load_campaign(path)
     assert campaign.warnings == ()
     (recording,) = campaign.recordings
     assert (recording.name, recording.kind, recording.frequency_hz) == ("any name", "dwell", 2.0)
@@ -121,7 +121,7 @@ def test_samples_outside_every_test_are_dropped(
     first, second = json_messages(signals(1.0), "a", 1.0), json_messages(signals(2.0), "b", 2.0, 60.0)
     stray = ("/rig/daq", START + 30 * 10**9, json.dumps({"road_height": 99.0}).encode())
     path = write_mcap(tmp_path / "a.mcap", json_topics, [*first, stray, *second])
-    campaign = read_campaign(path)
+    campaign = load_campaign(path)
     assert [r.name for r in campaign.recordings] == ["a", "b"]
     assert all(r.channels["road_height"].time[0] == 0.0 for r in campaign.recordings)
     assert max(np.abs(r.channels["road_height"].values).max() for r in campaign.recordings) < 0.02
@@ -136,7 +136,7 @@ def test_tests_without_their_events_are_told(
 ) -> None:
     first, second = json_messages(signals(1.0), "a", 1.0), json_messages(signals(1.0), "b", 1.0, 10.5)
     path = write_mcap(tmp_path / "a.mcap", json_topics, [*first[:-1], *second[1:]])
-    campaign = read_campaign(path)
+    campaign = load_campaign(path)
     told = [(w.code, w.test) for w in campaign.warnings]
     assert told == [("unpaired_event", "b"), ("unpaired_event", "a"), ("time_jump", "a")]
     assert campaign.recordings[0].duration_s == pytest.approx(20.49)
@@ -152,7 +152,7 @@ def test_header_clock_is_taken_where_messages_come_in_bursts(
         for i, (at, log) in enumerate(zip(sampled, logged, strict=True))
     ]
     topic = ("cdr", "sensor_msgs/msg/Imu", "ros2msg", IMU)
-    campaign = read_campaign(write_mcap(tmp_path / "idle.mcap", {"/imu": topic}, messages))
+    campaign = load_campaign(write_mcap(tmp_path / "idle.mcap", {"/imu": topic}, messages))
     assert [w.code for w in campaign.warnings] == ["clock_choice", "gravity_removed"]
     assert "the header clock" in campaign.warnings[0].what
     channel = campaign.recordings[0].channels["sprung_accel"]
@@ -164,9 +164,9 @@ def test_the_map_can_force_a_clock(tmp_path: Path, write_mcap: Callable[..., Pat
     messages = [("/imu", START + i * 10_000_000, _imu(START + i * 5_000_000, 9.8)) for i in range(100)]
     topic = ("cdr", "sensor_msgs/msg/Imu", "ros2msg", IMU)
     path = write_mcap(tmp_path / "idle.mcap", {"/imu": topic}, messages)
-    assert read_campaign(path).recordings[0].channels["sprung_accel"].rate_hz == pytest.approx(200.0)
+    assert load_campaign(path).recordings[0].channels["sprung_accel"].rate_hz == pytest.approx(200.0)
     (tmp_path / "channels.toml").write_text('[time]\nclock = "log"\n')
-    assert read_campaign(path).recordings[0].channels["sprung_accel"].rate_hz == pytest.approx(100.0)
+    assert load_campaign(path).recordings[0].channels["sprung_accel"].rate_hz == pytest.approx(100.0)
 
 
 def test_clock_of_another_epoch_is_moved_onto_the_log_time() -> None:
@@ -196,18 +196,18 @@ def test_the_joint_that_is_the_link(tmp_path: Path, write_mcap: Callable[..., Pa
     ]
     path = write_mcap(tmp_path / "idle.mcap", {"/joint_states": topic}, messages)
     with pytest.raises(InputError, match="no topic carries a known channel"):
-        read_campaign(path)
+        load_campaign(path)
     (tmp_path / "channels.toml").write_text(
         '[channels.link_angle]\ntopic = "/joint_states"\n'
         'field = "position[knee]"\nunit = "deg"\noffset = 90\n'
     )
-    angle = read_campaign(path).recordings[0].channels["link_angle"]
+    angle = load_campaign(path).recordings[0].channels["link_angle"]
     np.testing.assert_allclose(angle.values, np.deg2rad(90 + 0.1 * np.arange(50)))
 
 
 def test_json_and_table_campaigns_are_the_same_recording(shared_rig: Path) -> None:
-    table = read_campaign(shared_rig / "nominal" / "campaign.csv.gz")
-    stream = read_campaign(shared_rig / "nominal" / "campaign_json.mcap")
+    table = load_campaign(shared_rig / "nominal" / "campaign.csv.gz")
+    stream = load_campaign(shared_rig / "nominal" / "campaign_json.mcap")
     assert table.warnings == stream.warnings == ()
     assert len(table.recordings) == len(stream.recordings) == 30
     for one, other in zip(table.recordings, stream.recordings, strict=True):
@@ -219,7 +219,7 @@ def test_json_and_table_campaigns_are_the_same_recording(shared_rig: Path) -> No
 
 
 def test_ros2_campaign_has_its_own_clocks(shared_rig: Path) -> None:
-    campaign = read_campaign(shared_rig / "nominal" / "campaign_ros2.mcap")
+    campaign = load_campaign(shared_rig / "nominal" / "campaign_ros2.mcap")
     assert [w.code for w in campaign.warnings] == ["effort_ignored", "gravity_removed"]
     rates = {
         "sprung_accel": 200, "susp_deflection": 100, "road_height": 50, "link_angle": 50, "link_velocity": 50,
@@ -242,7 +242,7 @@ def test_ros2_campaign_has_its_own_clocks(shared_rig: Path) -> None:
     ["none", "zstd", "imu_lz4_chunks32k", "imu_unchunked", "imu_noindex_nosummary", "imu_lz4_truncated60pct"],
 )
 def test_real_imu_in_every_dress(name: str, shared_mcap: Path) -> None:
-    campaign = read_campaign(shared_mcap / f"tilt_{name}.mcap")
+    campaign = load_campaign(shared_mcap / f"tilt_{name}.mcap")
     codes = [w.code for w in campaign.warnings]
     truncated = "truncated" in name
     expected = ["clock_choice", "test_kind_unknown", "gravity_removed"]
@@ -257,11 +257,11 @@ def test_real_imu_in_every_dress(name: str, shared_mcap: Path) -> None:
 @pytest.mark.parametrize("name", ["rosbag2_talker", "lichtblick_example"])
 def test_files_without_a_known_channel_are_refused(name: str, shared_mcap: Path) -> None:
     with pytest.raises(InputError, match="no topic carries a known channel; topics: "):
-        read_campaign(shared_mcap / f"{name}.mcap")
+        load_campaign(shared_mcap / f"{name}.mcap")
 
 
 def test_a_bag_of_every_message_type_is_read(shared_mcap: Path) -> None:
-    campaign = read_campaign(shared_mcap / "rosbags-rs_test_bag.mcap")
+    campaign = load_campaign(shared_mcap / "rosbags-rs_test_bag.mcap")
     assert (
         campaign.recordings[0].channels["sprung_accel"].source
         == "/test/sensor_msgs/imu linear_acceleration.z"

@@ -33,7 +33,7 @@ from savgs_ident.diagnosis.result import (
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
-from savgs_ident.report.text import READINGS
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 KINDS: tuple[Kind, ...] = ("none", "effect", "several", "unknown")
@@ -187,7 +187,7 @@ def _parameters(effects: tuple[str, ...]) -> tuple[Estimate, ...]:
 
 def _responses(measured: HarmonicResponse, gap: float) -> Responses:
     rng = np.random.default_rng(20170912)
-    rows = [measured.channel(name) for name in READINGS]
+    rows = [measured.channel(name) for name in RIG_LAYOUT.responses]
     seen = measured.harmonics[:, rows]
     noise = np.sqrt(np.trace(measured.covariance[:, rows], axis1=-2, axis2=-1) / 2.0)
     after = seen + noise * (rng.standard_normal(seen.shape) + 1j * rng.standard_normal(seen.shape))
@@ -199,7 +199,7 @@ def _responses(measured: HarmonicResponse, gap: float) -> Responses:
 
 def _map(measured: HarmonicResponse, predicted: NDArray[np.complex128]) -> tuple[MapCell, ...]:
     cells = []
-    for c, name in enumerate(READINGS):
+    for c, name in enumerate(RIG_LAYOUT.responses):
         channel = measured.channel(name)
         for d, frequency in enumerate(measured.frequency):
             response = np.sqrt(np.sum(np.abs(measured.harmonics[d, channel, 1:]) ** 2))

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from savgs_ident.inference.result import Convergence, Marginal, Posterior, Predictive, ProfileLine, Role
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig
-from savgs_ident.recordings.read import read_campaign
-from savgs_ident.report.text import READINGS
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
@@ -42,8 +41,8 @@ SENTENCES = (
 @cache
 def nominal_response(campaign: Path) -> HarmonicResponse:
     """The harmonics of the shipped campaign, orders 0 to 9."""
-    channels = ("road_height", *READINGS)
-    return estimate_response(read_campaign(campaign).only(channels), 9)
+    channels = ("road_height", *RIG_LAYOUT.responses)
+    return estimate_response(load_campaign(campaign).only(channels), 9)
 
 
 def synthetic_posterior(
@@ -182,7 +181,7 @@ def _marginal(
 
 
 def _predictive(rng: np.random.Generator, measured: HarmonicResponse, samples: int = 200) -> Predictive:
-    rows = [measured.channel(name) for name in READINGS]
+    rows = [measured.channel(name) for name in RIG_LAYOUT.responses]
     seen, covariance = measured.harmonics[:, rows], measured.covariance[:, rows]
     used = measured.valid[:, rows].copy()
     used[..., 0] = False

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from savgs_ident.fit.residuals import measured_points
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.report.panels import phase_deg
-from savgs_ident.report.text import READINGS
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.frequency_response import model_curve
 
@@ -17,7 +17,7 @@ Response = Callable[[NDArray[np.float64], float], NDArray[np.complex128]]
 
 
 def test_points_are_per_metre_of_the_measured_road(measured: HarmonicResponse) -> None:
-    points = measured_points(measured, tuple(READINGS), "road_height")
+    points = measured_points(measured, RIG_LAYOUT.responses, "road_height")
     road = measured.harmonics[:, 0, 1]
     assert_allclose(points.transfer[:, 0] * road, measured.harmonics[:, 1, 1])
     assert_allclose(points.peak_to_peak[:, 1], measured.peak_to_peak[:, 2])
@@ -25,7 +25,7 @@ def test_points_are_per_metre_of_the_measured_road(measured: HarmonicResponse) -
 
 def test_error_bars_agree_with_scatter(measured: HarmonicResponse) -> None:
     rng = np.random.default_rng(3)
-    points = measured_points(measured, tuple(READINGS), "road_height")
+    points = measured_points(measured, RIG_LAYOUT.responses, "road_height")
     factor = np.linalg.cholesky(measured.covariance[4, 1, 1])
     moved = factor @ rng.standard_normal((2, 20000))
     drawn = (measured.harmonics[4, 1, 1] + moved[0] + 1j * moved[1]) / measured.harmonics[4, 0, 1].real
@@ -35,7 +35,7 @@ def test_error_bars_agree_with_scatter(measured: HarmonicResponse) -> None:
 
 def test_a_channel_that_was_not_recorded_is_left_open(measured: HarmonicResponse) -> None:
     other = replace(measured, channels=("road_height", "sprung_accel", "something_else"))
-    points = measured_points(other, tuple(READINGS), "road_height")
+    points = measured_points(other, RIG_LAYOUT.responses, "road_height")
     assert np.isnan(points.transfer[:, 1]).all()
     assert np.isfinite(points.transfer[:, 0]).all()
 

@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 
 from savgs_ident.fit.residuals import measured_points, whitened
 from savgs_ident.fit.result import Fit
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.report.campaigns.inspect import campaign_figure
 from savgs_ident.report.fit.bode import bode_figure, response_figure
-from savgs_ident.report.text import READINGS
+from savgs_ident.report.text import response_labels
 from savgs_ident.report.theme import DPI, printable, write_figure
 from savgs_ident.responses.summary import CampaignSummary, inspect
 from savgs_ident.simulate.frequency_response import ModelCurve, model_curve
+
+LABELS = tuple(response_labels(RIG_LAYOUT).values())
 
 HOSTILE = "a [bold red]b[/] $\\frac{1}{0}$ \x1b[31m\x07 漢 \ud800"
 
@@ -42,13 +44,13 @@ def bode(fit: Fit, curves: list[ModelCurve]) -> Figure:
         measured_points(fit.measured, fit.channels, "road_height"),
         curves,
         residuals,
-        tuple(READINGS.values()),
+        LABELS,
     )
 
 
 @pytest.fixture(scope="module")
 def summary(nominal_campaign: Path) -> CampaignSummary:
-    return inspect(read_campaign(nominal_campaign))
+    return inspect(load_campaign(nominal_campaign))
 
 
 def _panel(figure: Figure, row: int, column: int) -> Axes:
@@ -97,7 +99,7 @@ def test_nothing_solved_and_one_channel_only_is_drawn(fit: Fit, tmp_path: Path) 
         measured_points(other, fit.channels, "road_height"),
         [open_curve],
         residuals,
-        tuple(READINGS.values()),
+        LABELS,
     )
     png, _ = write_figure(tmp_path, "bode", figure)
     assert png.stat().st_size > 10_000
@@ -117,7 +119,11 @@ def test_pictures_are_valid_files_of_the_size_asked_for(bode: Figure, tmp_path: 
 def test_the_same_figure_gives_the_same_bytes(curves: list[ModelCurve], tmp_path: Path) -> None:
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        write_figure(tmp_path / name, "r", response_figure("title", curves, tuple(READINGS.values())))
+        write_figure(
+            tmp_path / name,
+            "r",
+            response_figure("title", curves, LABELS),
+        )
     for suffix in ("png", "pdf"):
         one, two = (tmp_path / name / f"r.{suffix}" for name in ("one", "two"))
         assert one.read_bytes() == two.read_bytes()
@@ -127,7 +133,7 @@ def test_names_in_a_figure_are_neither_formulas_nor_missing_glyphs(
     curves: list[ModelCurve], tmp_path: Path
 ) -> None:
     named = [replace(curve, label=HOSTILE) for curve in curves]
-    figure = response_figure(HOSTILE, named, tuple(READINGS.values()))
+    figure = response_figure(HOSTILE, named, LABELS)
     write_figure(tmp_path, "r", figure)
     shown = figure.legends[0].get_texts()[0].get_text()
     assert "[bold red]" in shown
@@ -158,5 +164,5 @@ def test_a_response_at_a_single_frequency_is_seen(
     frequency = np.array([2.0])
     road, ok = np.full(1, 0.01375 + 0.0j), np.ones(1, dtype=np.bool_)
     curve = model_curve("one", frequency, mass_on_spring(frequency, 0.3), road, ok)
-    figure = response_figure("one point", [curve], tuple(READINGS.values()))
+    figure = response_figure("one point", [curve], LABELS)
     assert all(axes.get_lines()[0].get_marker() == "o" for axes in figure.axes)

@@ -18,12 +18,12 @@ from savgs_ident.fit.residuals import (
 )
 from savgs_ident.fit.result import Fit
 from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS
-from savgs_ident.report.text import READINGS
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 
 def test_reports_know_the_channels_of_the_model() -> None:
-    assert tuple(READINGS) == RESPONSE_CHANNELS
+    assert RIG_LAYOUT.responses == RESPONSE_CHANNELS
 
 
 def test_whitened_residuals_of_the_truth_are_unit_normals(fit: Fit) -> None:
@@ -56,7 +56,7 @@ def test_entries_that_are_not_used_are_left_open(fit: Fit) -> None:
 def test_a_gain_error_of_one_per_cent_is_a_gap_of_one_per_cent(fit: Fit) -> None:
     off = fit.measured.harmonics[:, 1:] * 0.99
     found = gaps(fit.measured, fit.channels, off, fit.used)
-    for name in (*READINGS, "together"):
+    for name in (*RIG_LAYOUT.responses, "together"):
         assert_allclose(found[name].relative, 0.01, rtol=1e-9)
     assert found["together"].sigma > 1.0
 
@@ -80,7 +80,7 @@ def test_what_can_be_compared_has_known_noise(measured: HarmonicResponse) -> Non
     covariance[1, 1, 2] = 0.0
     valid = measured.valid.copy()
     valid[4, 2, 3:] = False
-    used = comparable(replace(measured, covariance=covariance, valid=valid), tuple(READINGS), 3)
+    used = comparable(replace(measured, covariance=covariance, valid=valid), RIG_LAYOUT.responses, 3)
     assert used.shape == (8, 2, 4)
     assert not used[:, :, 0].any()
     assert not used[1, 0, 2]

@@ -11,7 +11,7 @@ from savgs_ident.core.output import to_json, write_table
 from savgs_ident.core.status import Status
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.report.model import sweep_columns, sweep_figure, sweep_record
 from savgs_ident.report.theme import write_figure
 from savgs_ident.simulate.frequency_response import DURATION_S, HIGHEST_HZ, SimulatedSweep
@@ -39,7 +39,7 @@ def test_the_peak_is_found_at_the_frequency_of_the_cam(sweep: SimulatedSweep) ->
 
 def test_the_series_is_read_back_as_a_recording(sweep: SimulatedSweep, tmp_path: Path) -> None:
     write_table(tmp_path / "sweep.csv", sweep_columns(sweep))
-    (recording,) = read_campaign(tmp_path / "sweep.csv").recordings
+    (recording,) = load_campaign(tmp_path / "sweep.csv").recordings
     assert_allclose(recording.channels["sprung_accel"].values, sweep.readings[0], atol=1e-8)
     assert_allclose(recording.channels["road_height"].values, sweep.driven, atol=1e-10)
 

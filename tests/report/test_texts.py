@@ -22,7 +22,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.fit.residuals import chi2_by_dwell
 from savgs_ident.fit.result import Fit, Verdict
 from savgs_ident.plants.quarter_car.rig import read_rig, write_rig
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.report.campaigns.inspect import campaign_text, summary_record
 from savgs_ident.report.fit.record import fit_record
 from savgs_ident.report.fit.text import fit_text, value_with_error
@@ -150,12 +150,12 @@ def test_hostile_test_names_in_a_campaign_are_shown_as_they_are(tmp_path: Path) 
     ]
     head = "time [s],road_height [m],sprung_accel [m/s^2],test"
     (tmp_path / "run.csv").write_text("\n".join([head, *rows]) + "\n")
-    record = as_json(summary_record(inspect(read_campaign(tmp_path / "run.csv"))))
-    assert name in rendered(campaign_text(record), width=160)
+    record = as_json(summary_record(inspect(load_campaign(tmp_path / "run.csv"))))
+    assert name in rendered(campaign_text(record, RIG_LAYOUT), width=160)
 
 
 def test_the_record_of_the_shipped_campaign_is_what_was_recorded(nominal_campaign: Path) -> None:
-    campaign = read_campaign(nominal_campaign)
+    campaign = load_campaign(nominal_campaign)
     record = as_json(summary_record(inspect(campaign)))
     assert record["tests"] == 30
     assert len(record["dwells"]) == 28
@@ -177,7 +177,7 @@ def test_the_record_of_the_shipped_campaign_is_what_was_recorded(nominal_campaig
 
 
 def test_tables_of_a_campaign_fit_a_terminal_of_80_columns(nominal_campaign: Path) -> None:
-    record = as_json(summary_record(inspect(read_campaign(nominal_campaign))))
-    text = rendered(campaign_text(record), width=80)
+    record = as_json(summary_record(inspect(load_campaign(nominal_campaign))))
+    text = rendered(campaign_text(record, RIG_LAYOUT), width=80)
     rows = [line for line in text.splitlines() if line.startswith("dwell_")]
     assert len(rows) == 28

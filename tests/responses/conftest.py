@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, RecordedChannel, Recording
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
+from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 
 Noise = Callable[[np.random.Generator, int], NDArray[np.float64]]
 
@@ -65,14 +66,14 @@ def dwell(
         clean = (turns @ signal.harmonics).real + signal.drift * (time - start)
         stamps = start + (time - start) / signal.clock
         channels[label] = RecordedChannel(
-            label, CANONICAL_UNITS[label], stamps, clean + signal.noise(rng, count), "synthetic"
+            label, RIG_LAYOUT.si_unit(label), stamps, clean + signal.noise(rng, count), "synthetic"
         )
     return Recording(name, "dwell", frequency, channels)
 
 
 def campaign(*recordings: Recording) -> Campaign:
     """The recordings as one campaign."""
-    return Campaign("synthetic", recordings, (), "")
+    return Campaign("synthetic", recordings, (), "", RIG_LAYOUT)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse, signal_to_noise
@@ -263,7 +264,7 @@ def test_no_usable_dwell_is_an_input_error(synthetic: Any, bus: Any, which: str)
     short = synthetic.dwell(np.random.default_rng(24), bus, 0.5, 4.0, name="short")
     dwells = {"none": (), "short": (short,)}[which]
     with pytest.raises(InputError, match=r"Remedy: .+") as caught:
-        estimate_response(Campaign("here.csv", dwells, (), ""))
+        estimate_response(Campaign("here.csv", dwells, (), "", RIG_LAYOUT))
     assert caught.value.source == "here.csv"
 
 

@@ -54,7 +54,7 @@ def expected(frequency: Any, window: Any) -> Any:
 
 
 def test_frequency_and_rate_follow_the_road() -> None:
-    response = estimate_sweep_response(sweep(1, 1e-4))
+    response = estimate_sweep_response(sweep(1, 1e-4), "road_height")
     pull = (response.frequency - RATE * response.time) / response.frequency_sd
     assert np.abs(pull).max() < 5.0
     assert response.sweep_rate == pytest.approx(RATE, rel=0.01)
@@ -63,7 +63,7 @@ def test_frequency_and_rate_follow_the_road() -> None:
 
 def test_response_is_the_linear_one_with_its_known_bias() -> None:
     """Averaged over draws: right to 0.3 per cent once the two terms that the docstring states are added."""
-    runs = [estimate_sweep_response(sweep(seed, 1e-4)) for seed in range(6)]
+    runs = [estimate_sweep_response(sweep(seed, 1e-4), "road_height") for seed in range(6)]
     frequency = runs[0].frequency
     steady, bias = expected(frequency, runs[0].window_s)
     c = runs[0].channel("susp_deflection")
@@ -77,7 +77,7 @@ def test_response_is_the_linear_one_with_its_known_bias() -> None:
 
 @pytest.mark.slow
 def test_deviation_is_the_scatter_of_repeated_sweeps() -> None:
-    runs = [estimate_sweep_response(sweep(seed, 3e-4)) for seed in range(12)]
+    runs = [estimate_sweep_response(sweep(seed, 3e-4), "road_height") for seed in range(12)]
     c = runs[0].channel("susp_deflection")
     every = np.stack([run.response[:, c] for run in runs])
     scatter = np.sqrt(0.5 * (np.var(every.real, axis=0, ddof=1) + np.var(every.imag, axis=0, ddof=1)))
@@ -87,7 +87,7 @@ def test_deviation_is_the_scatter_of_repeated_sweeps() -> None:
 
 
 def test_a_channel_on_another_clock_needs_no_resampling() -> None:
-    response = estimate_sweep_response(sweep(3, 1e-4))
+    response = estimate_sweep_response(sweep(3, 1e-4), "road_height")
     c = response.channel("link_angle")
     assert np.abs(response.response[:, c] - 2.0).max() < 0.01
 
@@ -95,7 +95,7 @@ def test_a_channel_on_another_clock_needs_no_resampling() -> None:
 def test_a_sweep_without_road_or_too_short_is_refused() -> None:
     whole = sweep(4, 1e-4, duration=12.0)
     with pytest.raises(InputError, match=r"cycles, 5 are needed.*Remedy"):
-        estimate_sweep_response(whole)
+        estimate_sweep_response(whole, "road_height")
     blind = Recording("sweep", "sweep", None, {"susp_deflection": whole.channels["susp_deflection"]})
     with pytest.raises(InputError, match=r"no road motion.*Remedy"):
-        estimate_sweep_response(blind, source="run.csv")
+        estimate_sweep_response(blind, "road_height", source="run.csv")

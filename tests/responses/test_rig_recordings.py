@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from savgs_ident.recordings.read import read_campaign
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.sweeps import estimate_sweep_response
@@ -14,12 +14,12 @@ from savgs_ident.responses.sweeps import estimate_sweep_response
 
 @pytest.fixture(scope="module")
 def from_csv(shared_rig: Path) -> HarmonicResponse:
-    return estimate_response(read_campaign(shared_rig / "nominal" / "campaign.csv.gz"))
+    return estimate_response(load_campaign(shared_rig / "nominal" / "campaign.csv.gz"))
 
 
 @pytest.fixture(scope="module")
 def from_ros2(shared_rig: Path) -> HarmonicResponse:
-    return estimate_response(read_campaign(shared_rig / "nominal" / "campaign_ros2.mcap"))
+    return estimate_response(load_campaign(shared_rig / "nominal" / "campaign_ros2.mcap"))
 
 
 def test_all_dwells_with_their_frequencies(from_csv: HarmonicResponse) -> None:
@@ -67,9 +67,9 @@ def test_other_clocks_rates_and_noise_give_the_same_response(
 
 def test_sweep_is_near_the_dwells(shared_rig: Path, from_csv: HarmonicResponse) -> None:
     """A sweep of 0.05 Hz/s through a rig with friction stays within 3 % of the dwells from 1 to 2.9 Hz."""
-    campaign = read_campaign(shared_rig / "nominal" / "campaign.csv.gz")
+    campaign = load_campaign(shared_rig / "nominal" / "campaign.csv.gz")
     (recording,) = campaign.of_kind("sweep")
-    swept = estimate_sweep_response(recording)
+    swept = estimate_sweep_response(recording, "road_height")
     inside = (from_csv.frequency > 1.0) & (from_csv.frequency < 2.9)
     for channel in ("sprung_accel", "susp_deflection"):
         road = from_csv.harmonics[:, from_csv.channel("road_height"), 1]

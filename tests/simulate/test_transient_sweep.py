@@ -11,8 +11,8 @@ from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_
 from savgs_ident.plants.quarter_car.kinematics import Values
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.plants.quarter_car.road import cam_excitation, recorded_road, sweep_road
-from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.periodic import simulate_periodic
@@ -37,7 +37,7 @@ def truth(rig: Rig) -> Values:
 
 @pytest.fixture(scope="module")
 def campaign(shared_rig: Path) -> Campaign:
-    return read_campaign(shared_rig / "nominal" / "campaign.csv.gz")
+    return load_campaign(shared_rig / "nominal" / "campaign.csv.gz")
 
 
 def test_the_recorded_sweep_is_met_within_its_noise(

@@ -15,8 +15,17 @@ from matplotlib.ticker import MultipleLocator
 from rich.console import Group, RenderableType
 
 from savgs_ident.core.output import warning_record
-from savgs_ident.recordings.recording import CANONICAL_UNITS, Campaign, RecordedChannel
-from savgs_ident.report.text import READINGS, channel_label, fixed, plain, significant, table
+from savgs_ident.recordings.layout import RecordingLayout
+from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
+from savgs_ident.report.text import (
+    ChannelLabel,
+    fixed,
+    plain,
+    response_labels,
+    shown_unit,
+    significant,
+    table,
+)
 from savgs_ident.report.theme import (
     BLUE,
     GREY,
@@ -41,7 +50,7 @@ def summary_record(summary: CampaignSummary) -> dict[str, object]:
         "sha256": campaign.sha256,
         "tests": len(campaign.recordings),
         "channels": _channels(campaign, summary.standstill_noise),
-        "missing_channels": [name for name in CANONICAL_UNITS if name not in _present(campaign)],
+        "missing_channels": [name for name in campaign.layout.names if name not in _present(campaign)],
         "dwells": _dwells(summary),
         "sweeps": [
             {
@@ -64,8 +73,8 @@ def summary_record(summary: CampaignSummary) -> dict[str, object]:
 
 
 def _present(campaign: Campaign) -> dict[str, list[RecordedChannel]]:
-    """The records of each channel by name, canonical order first."""
-    found: dict[str, list[RecordedChannel]] = {name: [] for name in CANONICAL_UNITS}
+    """The records of each channel by name, those of the layout first."""
+    found: dict[str, list[RecordedChannel]] = {name: [] for name in campaign.layout.names}
     for recording in campaign.recordings:
         for name, channel in recording.channels.items():
             found.setdefault(name, []).append(channel)
@@ -98,12 +107,14 @@ def _dwells(summary: CampaignSummary) -> list[dict[str, object]]:
             "duration_s": recording.duration_s,
             "usable": recording.name in used,
         }
-        | _dwell_response(summary.response, used.get(recording.name))
+        | _dwell_response(summary.response, recording, used.get(recording.name))
         for recording in ordered
     ]
 
 
-def _dwell_response(response: HarmonicResponse | None, d: int | None) -> dict[str, object]:
+def _dwell_response(
+    response: HarmonicResponse | None, recording: Recording, d: int | None
+) -> dict[str, object]:
     if response is None or d is None:
         return {"frequency_hz": None, "frequency_sd_hz": None, "periods": None, "channels": {}}
     ratio = signal_to_noise(response)[d]
@@ -115,7 +126,7 @@ def _dwell_response(response: HarmonicResponse | None, d: int | None) -> dict[st
             "noise_sd": response.noise_sd[d, c],
             "signal_to_noise": ratio[c, 1],
             "orders_seen": [k for k in range(1, response.orders + 1) if ratio[c, k] >= LEAST_RATIO],
-            "unit": CANONICAL_UNITS.get(name),
+            "unit": recording.channels[name].unit,
         }
         for c, name in enumerate(response.channels)
         if response.valid[d, c, 1]
@@ -138,14 +149,14 @@ def _sweep_range(summary: CampaignSummary, test: str) -> list[float] | None:
 _SHOWN_WARNINGS = 20
 
 
-def campaign_text(record: dict[str, Any]) -> RenderableType:
+def campaign_text(record: dict[str, Any], layout: RecordingLayout) -> RenderableType:
     """Tables of channels and dwells, the other tests, and the warnings of an ``inspect`` record."""
     parts: list[RenderableType] = [plain(f"{record['source']}: {_count(record['tests'], 'test')}", "bold")]
     parts.append(_channel_table(record))
     if record["missing_channels"]:
         parts.append(plain("Not recorded: " + ", ".join(record["missing_channels"]) + "\n"))
     if record["dwells"]:
-        parts.append(_dwell_table(record["dwells"]))
+        parts.append(_dwell_table(record["dwells"], layout))
     parts += [plain(line) for line in _other_tests(record)]
     parts += _warnings(record["source"], record["warnings"])
     return Group(*parts)
@@ -172,28 +183,33 @@ def _channel_table(record: dict[str, Any]) -> RenderableType:
     return table("Channels", headers, rows, texts=(0, 1, 6))
 
 
-def _dwell_table(dwells: list[dict[str, Any]]) -> RenderableType:
+def _dwell_table(dwells: list[dict[str, Any]], layout: RecordingLayout) -> RenderableType:
+    driven = layout.specs[layout.driven]
+    shown, scale = shown_unit(driven.unit)
+    labels = response_labels(layout)
     rows = [
         (
             dwell["test"],
             fixed(dwell["frequency_hz"], 3),
             dwell["periods"] or "-",
-            _reading(dwell, "road_height", "peak_to_peak", 1e3, 2),
-            _reading(dwell, "sprung_accel", "peak_to_peak", 1.0, 3),
-            _reading(dwell, "sprung_accel", "signal_to_noise", 1.0, 0),
-            _highest(dwell, "sprung_accel"),
-            _reading(dwell, "susp_deflection", "peak_to_peak", 1e3, 2),
-            _reading(dwell, "susp_deflection", "signal_to_noise", 1.0, 0),
-            _highest(dwell, "susp_deflection"),
+            _reading(dwell, driven.name, "peak_to_peak", scale, 2),
+            *(cell for name, label in labels.items() for cell in _response_cells(dwell, name, label)),
         )
         for dwell in dwells
     ]
-    headers = (
-        "dwell", "f\n[Hz]", "periods", "road\n[mm]", "accel\n[m/s²]", "S/N\n[1]", "order",
-        "defl.\n[mm]", "S/N\n[1]", "order",
-    )  # fmt: skip
+    headers = ["dwell", "f\n[Hz]", "periods", f"{driven.short}\n[{shown}]"]
+    for name, label in labels.items():
+        headers += [f"{layout.specs[name].short}\n[{label.unit}]", "S/N\n[1]", "order"]
     title = "Dwells, peak to peak (S/N: signal-to-noise of the first harmonic; order: highest one seen)"
     return table(title, headers, rows)
+
+
+def _response_cells(dwell: dict[str, Any], name: str, label: ChannelLabel) -> tuple[str, ...]:
+    return (
+        _reading(dwell, name, "peak_to_peak", label.scale, 3 if label.scale == 1.0 else 2),
+        _reading(dwell, name, "signal_to_noise", 1.0, 0),
+        _highest(dwell, name),
+    )
 
 
 def _reading(dwell: dict[str, Any], channel: str, key: str, scale: float, places: int) -> str:
@@ -235,17 +251,18 @@ _STEPS = (LEAST_RATIO, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)
 
 
 def campaign_figure(summary: CampaignSummary) -> Figure:
-    """Response per metre of road, signal-to-noise by order, and noise; a column for each reading."""
+    """Response per metre of road, signal-to-noise by order, and noise; a column for each response."""
     with styled():
         figure = new_figure(10.5, 9.5)
         figure.suptitle(printable(f"What is in {summary.campaign.source}"), fontsize=11)
-        axes = figure.subplots(3, len(READINGS), squeeze=False, height_ratios=(1.25, 1.0, 0.8))
+        labels = response_labels(summary.campaign.layout)
+        axes = figure.subplots(3, len(labels), squeeze=False, height_ratios=(1.25, 1.0, 0.8))
         span = _span(summary)
-        for column, name in zip(axes.T, READINGS, strict=True):
-            column[0].set_title(channel_label(name).title)
-            _draw_response(column[0], summary, name)
-            shades = _draw_ratio(column[1], summary.response, name)
-            _draw_noise(column[2], summary, name)
+        for column, (name, label) in zip(axes.T, labels.items(), strict=True):
+            column[0].set_title(label.title)
+            _draw_response(column[0], summary, name, label)
+            shades = _draw_ratio(column[1], summary, name)
+            _draw_noise(column[2], summary, name, label)
             for row, axis in enumerate(column):
                 frequency_axis(axis, *span, labelled=row == 2)
         if shades is not None:
@@ -264,20 +281,24 @@ def _span(summary: CampaignSummary) -> tuple[float, float]:
     return float(together.min()), float(together.max())
 
 
-def _usable(response: HarmonicResponse | None, name: str) -> bool:
-    return response is not None and name in response.channels and "road_height" in response.channels
+def _usable(summary: CampaignSummary, name: str) -> HarmonicResponse | None:
+    """The response of the dwells if the channel and the driven one are in it."""
+    response = summary.response
+    if response is None or not {name, summary.campaign.layout.driven} <= set(response.channels):
+        return None
+    return response
 
 
-def _draw_response(axes: Axes, summary: CampaignSummary, name: str) -> None:
+def _draw_response(axes: Axes, summary: CampaignSummary, name: str, label: ChannelLabel) -> None:
     magnitude_axis(axes)
-    axes.set_ylabel(f"first harmonic [{channel_label(name).per_input} of road]")
+    axes.set_ylabel(f"first harmonic [{label.per_input} of {label.input}]")
     for sweep in summary.sweeps:
         _draw_sweep(axes, sweep, name)
-    response = summary.response
-    if response is not None and _usable(response, name):
+    response = _usable(summary, name)
+    if response is not None:
         d = response.valid[:, response.channel(name), 1]
         first = response.harmonics[d, response.channel(name), 1]
-        road = np.abs(response.harmonics[d, response.channel("road_height"), 1])
+        road = np.abs(response.harmonics[d, response.channel(summary.campaign.layout.driven), 1])
         error = np.sqrt(0.5 * np.trace(response.covariance[d, response.channel(name), 1], axis1=1, axis2=2))
         axes.errorbar(
             response.frequency[d], np.abs(first) / road, 2.0 * error / road,
@@ -300,10 +321,11 @@ def _draw_sweep(axes: Axes, sweep: SweepResponse, name: str) -> None:
     )  # fmt: skip
 
 
-def _draw_ratio(axes: Axes, response: HarmonicResponse | None, name: str) -> ScalarMappable | None:
+def _draw_ratio(axes: Axes, summary: CampaignSummary, name: str) -> ScalarMappable | None:
     axes.set_ylabel("harmonic order [1]")
     axes.grid(visible=False)
-    if response is None or not _usable(response, name):
+    response = _usable(summary, name)
+    if response is None:
         return None
     ratio = signal_to_noise(response)[:, response.channel(name), 1:]
     frequency, order = np.broadcast_arrays(response.frequency[:, None], np.arange(1, ratio.shape[1] + 1))
@@ -318,11 +340,11 @@ def _draw_ratio(axes: Axes, response: HarmonicResponse | None, name: str) -> Sca
     )  # fmt: skip
 
 
-def _draw_noise(axes: Axes, summary: CampaignSummary, name: str) -> None:
-    unit, scale = channel_label(name).unit, channel_label(name).scale
+def _draw_noise(axes: Axes, summary: CampaignSummary, name: str, label: ChannelLabel) -> None:
+    unit, scale = label.unit, label.scale
     axes.set_ylabel(f"noise of a sample [{unit}]")
-    response = summary.response
-    if response is not None and _usable(response, name):
+    response = _usable(summary, name)
+    if response is not None:
         noise = scale * response.noise_sd[:, response.channel(name)]
         axes.plot(response.frequency, noise, "D", color=BLUE, markersize=4, label="in the dwell, 1 sd")
     at_rest = summary.standstill_noise.get(name)

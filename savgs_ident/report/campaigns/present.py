@@ -24,7 +24,7 @@ class _CampaignSummary(AbstractPresenter["CampaignSummary"]):
     def text(self, result: "CampaignSummary") -> RenderableType:
         from savgs_ident.report.campaigns.inspect import campaign_text
 
-        return campaign_text(dict(self.record(result)))
+        return campaign_text(dict(self.record(result)), result.campaign.layout)
 
     def doubts(self, result: "CampaignSummary") -> tuple[str, ...]:
         del result

@@ -14,8 +14,9 @@ from savgs_ident.control.design import FACTORS, REGULARISATION, Design
 from savgs_ident.control.linear_equivalent import quarter_car_space
 from savgs_ident.control.margins import Robustness, open_loop, sensitivity
 from savgs_ident.control.synthesis import singular_values
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.report.control.design_text import WEIGHT_WORDS, is_reduced
-from savgs_ident.report.text import READINGS
+from savgs_ident.report.text import response_labels
 from savgs_ident.report.theme import (
     BLUE,
     GREY,
@@ -26,6 +27,9 @@ from savgs_ident.report.theme import (
     new_figure,
     styled,
 )
+
+_READINGS = response_labels(RIG_LAYOUT)
+"""The responses that are compared."""
 
 WIDE = np.logspace(-2.0, 2.0, 801)
 """Frequencies of the closed loop [Hz]."""
@@ -123,8 +127,8 @@ def ride_figure(design: Design) -> Figure:
     passive, active = ride_responses(design, RIDE)
     with styled():
         figure = new_figure(10.5, 4.4)
-        panels = figure.subplots(1, len(READINGS))
-        for c, (axes, shown) in enumerate(zip(panels, READINGS.values(), strict=True)):
+        panels = figure.subplots(1, len(_READINGS))
+        for c, (axes, shown) in enumerate(zip(panels, _READINGS.values(), strict=True)):
             axes.set_title(shown.title)
             axes.set_ylabel(f"magnitude [{shown.per_input} of road]")
             axes.plot(RIDE, np.abs(passive[:, c]), label="passive, link held", **_BOUND)

@@ -16,8 +16,9 @@ from savgs_ident.control.linear_study import (
     LinearStudy,
     SmallMotions,
 )
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.report.control.linear_text import ELEMENT_WORDS, sign_of_alpha
-from savgs_ident.report.text import READINGS
+from savgs_ident.report.text import response_labels
 from savgs_ident.report.theme import (
     BLUE,
     GREY,
@@ -30,6 +31,9 @@ from savgs_ident.report.theme import (
     printable,
     styled,
 )
+
+_READINGS = response_labels(RIG_LAYOUT)
+"""The responses that are compared."""
 
 _CURVE: Mapping[str, Any] = MappingProxyType({"color": BLUE, "linewidth": 1.8})
 _CONSTANT: Mapping[str, Any] = MappingProxyType({"color": GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.6})
@@ -107,8 +111,8 @@ def responses_figure(small: SmallMotions) -> Figure:
     """Magnitudes of the linear models and the nonlinear rig at small motions, and how far they are apart."""
     with styled():
         figure = new_figure(10.5, 7.4)
-        grid = figure.subplots(2, len(READINGS), squeeze=False, height_ratios=(1.2, 1.0))
-        for c, (column, shown) in enumerate(zip(grid.T, READINGS.values(), strict=True)):
+        grid = figure.subplots(2, len(_READINGS), squeeze=False, height_ratios=(1.2, 1.0))
+        for c, (column, shown) in enumerate(zip(grid.T, _READINGS.values(), strict=True)):
             column[0].set_title(shown.title)
             column[0].set_ylabel(f"magnitude [{shown.per_input} of road]")
             column[1].set_ylabel("difference to the nonlinear rig [%]")
@@ -132,8 +136,8 @@ def described_figure(test: CamMotions) -> Figure:
     ends = float(described.frequency[0]), float(described.frequency[-1])
     with styled():
         figure = new_figure(10.5, 7.4)
-        upper, lower = figure.subplots(2, len(READINGS), squeeze=False)
-        for c, (axes, shown) in enumerate(zip(upper, READINGS.values(), strict=True)):
+        upper, lower = figure.subplots(2, len(_READINGS), squeeze=False)
+        for c, (axes, shown) in enumerate(zip(upper, _READINGS.values(), strict=True)):
             axes.set_title(shown.title)
             axes.set_ylabel(f"magnitude [{shown.per_input} of road]")
             axes.plot(

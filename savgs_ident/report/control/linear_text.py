@@ -21,7 +21,7 @@ from savgs_ident.control.linear_study import (
     SmallMotions,
 )
 from savgs_ident.core.presentation import Origin
-from savgs_ident.recordings.recording import CANONICAL_UNITS
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.report.text import decimal, fixed, numeral, percentage, plain, signed, significant, table
 
 ELEMENT_WORDS: Mapping[str, str] = MappingProxyType(
@@ -257,7 +257,7 @@ def _test_motions(test: CamMotions, words: str) -> dict[str, Any]:
 def _response(response: NDArray[np.complex128]) -> dict[str, Any]:
     return {
         name: {
-            "unit": CANONICAL_UNITS[name],
+            "unit": RIG_LAYOUT.si_unit(name),
             "per_metre_of_road": np.abs(response[:, c]),
             "phase_deg": np.degrees(np.angle(response[:, c])),
         }

@@ -82,7 +82,7 @@ class _Comparison(_Identified["Comparison"]):
     def text(self, result: "Comparison") -> RenderableType:
         from savgs_ident.report.fit.text import bode_text
 
-        return bode_text(dict(self.record(result)))
+        return bode_text(dict(self.record(result)), result.given)
 
     def doubts(self, result: "Comparison") -> tuple[str, ...]:
         return () if result.trusted else ("the model's periodic motion was not found in every dwell.",)

@@ -66,7 +66,7 @@ def fit_record(fit: Fit) -> dict[str, object]:
     }
 
 
-def gap_record(fit: Fit) -> dict[str, object]:
+def gap_record(fit: Fit) -> dict[str, dict[str, float]]:
     """The gap before and after the fit, by channel and together."""
     before, after = (
         gaps(fit.measured, fit.channels, predicted, fit.used) for predicted in (fit.as_given, fit.predicted)

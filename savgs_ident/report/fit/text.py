@@ -7,6 +7,7 @@ from rich.console import Group, RenderableType
 
 from savgs_ident.fit.residuals import chi2_by_dwell, entries_by_dwell
 from savgs_ident.fit.result import Estimate, Fit
+from savgs_ident.plants.model import Model
 from savgs_ident.report.fit.record import gap_record
 from savgs_ident.report.text import channel_label, fixed, plain, table
 
@@ -21,7 +22,7 @@ def fit_text(fit: Fit) -> RenderableType:
         _quality(fit),
         *_correlation(fit),
         plain(""),
-        _gap_table(gap_record(fit)),
+        _gap_table(fit),
         *_tolerances(fit),
         *_dwells(fit),
         plain("Verdict", "bold"),
@@ -88,17 +89,17 @@ def _correlation(fit: Fit) -> list[RenderableType]:
     ]
 
 
-def _gap_table(gap: dict[str, Any]) -> RenderableType:
+def _gap_table(fit: Fit) -> RenderableType:
     rows = [
         (
-            channel_label(name).title,
+            channel_label(name, fit.model).title,
             fixed(100.0 * entry["before"], 2),
             fixed(100.0 * entry["after"], 3),
             fixed(100.0 * entry["floor"], 3),
             fixed(entry["before_sigma"], 1),
             fixed(entry["after_sigma"], 2),
         )
-        for name, entry in gap.items()
+        for name, entry in gap_record(fit).items()
     ]
     headers = ("residual (rms)", "before\n[%]", "after\n[%]", "noise\n[%]", "before\n[sd]", "after\n[sd]")
     return table("Gap between measurement and model", headers, rows)
@@ -167,11 +168,11 @@ def _verdict(fit: Fit) -> list[str]:
     return sentences + list(fit.verdict.sentences)
 
 
-def bode_text(record: dict[str, Any]) -> RenderableType:
+def bode_text(record: dict[str, Any], model: Model) -> RenderableType:
     """The gap by channel, and the dwells that were not solved."""
     rows = [
         (
-            channel_label(name).title,
+            channel_label(name, model).title,
             fixed(100.0 * gap["relative"], 3),
             fixed(100.0 * gap["floor"], 3),
             fixed(gap["sigma"], 2),

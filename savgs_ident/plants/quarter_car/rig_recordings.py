@@ -1,4 +1,6 @@
-"""Checks that hold for any quarter car, whatever its parameters: they find wrong units and signs.
+"""What recordings of the rig hold: its channels, and what is true of any quarter car, whatever its parameters.
+
+The checks find wrong units and signs:
 
 * Far below resonance the body follows the road: sprung acceleration = -(2 pi f)^2 road height. A ratio far from
   one indicates a unit (g for m/s^2 is a factor 9.8), the opposite sign indicates a sign.
@@ -7,18 +9,27 @@
   canonical channel does not contain gravity. Where the mean of the channel shows that it does, the mean of the
   standstill is subtracted, which removes the sensor's bias too; without a standstill, standard gravity is
   subtracted and the bias remains.
+
+    campaign = load_campaign("campaign.csv.gz")
+    for dwell in campaign.of_kind("dwell"):
+        accel = dwell.channels["sprung_accel"]
+        print(dwell.frequency_hz, accel.time, accel.values)
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 from math import pi
+from pathlib import Path
 
 import numpy as np
 
 from savgs_ident.core.errors import DataWarning
-from savgs_ident.recordings.channels import STANDARD_GRAVITY
+from savgs_ident.recordings.binding import Progress
+from savgs_ident.recordings.channels import ChannelMap
 from savgs_ident.recordings.checks_signal import DataLocation
-from savgs_ident.recordings.recording import RecordedChannel, Recording
+from savgs_ident.recordings.layout import STANDARD_GRAVITY, ChannelSpec, JointChannels, RecordingLayout
+from savgs_ident.recordings.read import read_campaign
+from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 
 _LOW_HZ = 1.25
 """Half of the lowest resonance that a rig of this kind has, about."""
@@ -148,3 +159,66 @@ def _subtract(recording: Recording, offset: float) -> Recording:
         return recording
     lowered = replace(channel, values=channel.values - offset)
     return replace(recording, channels={**recording.channels, _CHANNEL: lowered})
+
+
+RIG_LAYOUT = RecordingLayout(
+    channels=(
+        ChannelSpec(
+            "road_height", "m", "road",
+            ("road", "road_z", "road_displacement", "road_profile", "cam_height", "plate_height", "z_r", "zr"),
+            largest=0.5, suspect="mm or cm", short="road",
+        ),
+        ChannelSpec(
+            "sprung_accel", "m/s^2", "sprung-mass acceleration",
+            (
+                "sprung_acceleration", "sprung_mass_accel", "sprung_mass_acceleration", "body_accel",
+                "body_acceleration", "accel_z", "acc_z", "acceleration_z", "az", "z_s_ddot",
+            ),
+            largest=300.0, suspect="mm/s^2, or a sensor in another unit than its header says", short="accel",
+        ),
+        ChannelSpec(
+            "susp_deflection", "m", "suspension deflection",
+            ("suspension_deflection", "susp_defl", "deflection", "l_s"),
+            largest=0.5, suspect="mm or cm", short="defl.",
+        ),
+        ChannelSpec(
+            "link_angle", "rad", "link angle", ("single_link_angle", "sl_angle", "theta_sl", "dtheta_sl"),
+            largest=20.0, suspect="deg",
+        ),
+        ChannelSpec(
+            "link_velocity", "rad/s", "link velocity", ("link_speed", "single_link_velocity", "sl_velocity"),
+            largest=60.0, suspect="rpm or deg/s",
+        ),
+        ChannelSpec(
+            "motor_current", "A", "motor current", ("current", "i_q", "iq", "motor_current_q"),
+            largest=500.0, suspect="mA",
+        ),
+    ),
+    driven="road_height",
+    responses=("sprung_accel", "susp_deflection"),
+    still=1e-3,
+    joint=JointChannels("link", "link_angle", "link_velocity"),
+    corrections=(remove_gravity,),
+    checks=(check_physics,),
+)  # fmt: skip
+"""The channels of the rig, up and bump positive: one that differs is mapped with ``sign = -1``."""
+
+
+def load_campaign(
+    path: Path | str,
+    channel_map: ChannelMap | Path | str | None = None,
+    *,
+    layout: RecordingLayout = RIG_LAYOUT,
+    progress: Progress | None = None,
+) -> Campaign:
+    """Read and check everything at ``path``.
+
+    ``path`` is a CSV (plain or gzipped) or MCAP file, or a folder of such files, each with a test or several.
+    ``channel_map`` is a map, or the path of one; without it, a ``channels.toml`` beside the file (or in the
+    folder) is used if there is one. ``layout`` says which channels there are, by default those of the rig.
+    ``progress`` is called with the fraction read, 0 to 1.
+
+    Channels are in SI, time in [s] from the start of each test. Raises :class:`InputError`, which names file, test,
+    channel and time, and what to do.
+    """
+    return read_campaign(path, layout, channel_map, progress=progress)
