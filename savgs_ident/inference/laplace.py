@@ -67,8 +67,11 @@ def principal_axes(jacobian: Array, longest: float) -> Array:
     """Columns along the principal axes of the covariance for rows of unit variance, one sd long each, or shorter.
 
     ``jacobian`` (m, n) has the priors among its rows; no column is longer than ``longest`` [1]. The shortest comes
-    first. The covariance is ``axes @ axes.T``.
+    first. The covariance is ``axes @ axes.T``. A Jacobian that is not finite, of a model that could not be evaluated,
+    says nothing: all columns are the longest.
     """
+    if not np.all(np.isfinite(jacobian)):
+        return longest * np.eye(jacobian.shape[1])
     # Fewer rows than coordinates leave directions without any; the thin decomposition would drop them.
     missing = max(0, jacobian.shape[1] - jacobian.shape[0])
     _, sizes, axes = np.linalg.svd(np.pad(jacobian, ((0, missing), (0, 0))), full_matrices=False)

@@ -124,3 +124,9 @@ def test_a_direction_without_information_has_a_large_spread_and_leaves_the_other
     assert spread.sd[:2] == pytest.approx([LARGEST_SPREAD / np.sqrt(2.0)] * 2, rel=1e-6)
     difference = np.array([1.0, -1.0, 0.0])
     assert difference @ spread.covariance @ difference == pytest.approx(0.01, rel=1e-3)
+
+
+def test_a_jacobian_that_is_not_finite_says_nothing_of_any_parameter() -> None:
+    jacobian = np.eye(3)
+    jacobian[1, 2] = np.nan
+    np.testing.assert_allclose(spread_of(jacobian).sd, LARGEST_SPREAD)
