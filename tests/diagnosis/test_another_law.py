@@ -31,7 +31,7 @@ from savgs_ident.effects.base import (
 )
 from savgs_ident.effects.effect import Effect, effect_at
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
-from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS
+from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS, QuarterCar
 from savgs_ident.plants.quarter_car.ports import ACCEL, RAIL, ROAD
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
@@ -96,7 +96,7 @@ def _recorded(response: HarmonicResponse, rig: Rig, effect: Effect) -> HarmonicR
     baseline = MODELS["simtr"]
     model = build_model(rig, baseline) + effect
     p = as_values(model_parameters(rig, baseline).as_dict())
-    solution = simulate_periodic(model, p, measured_excitation(response, float(p["psi_nominal"])))
+    solution = simulate_periodic(model, p, measured_excitation(QuarterCar, response, rig.parameters))
     assert all(status.ok for status in solution.status())
     clean = np.asarray(harmonics(model, p, solution, response.orders))
     shown = response.harmonics.copy()
