@@ -125,7 +125,7 @@ def test_an_effect_by_another_law_is_named(
     assert diagnosis.verdict.effects == (name,)
     assert diagnosis.verdict.ports == (port,)
     assert diagnosis.verdict.another_law
-    assert "another law than that of the catalogue" in diagnosis.verdict.sentence
+    assert "Its law differs from that of the catalogue" in diagnosis.verdict.sentence
     assert diagnosis.candidates[0].effects == (name,)
     assert diagnosis.shrink.share_closed > 0.9
 
