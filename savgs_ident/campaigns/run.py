@@ -148,8 +148,8 @@ def run_campaigns(
     """Identify many campaigns side by side, and say whether the parameters agree and whether they change.
 
     Args:
-        folders: campaigns as :func:`savgs_ident.load_campaign` takes them, and folders of several:
-            one in each file or subfolder.
+        folders: campaigns as :func:`~savgs_ident.plants.quarter_car.rig_recordings.load_campaign` takes them, and
+            folders of several: one in each file or subfolder.
         out: folder in which each campaign's result is kept; a run that was stopped goes on from there.
         rig: rig file to start from; the shipped one if left out.
         model: "simtr", with rail and tyre friction, or "simqc", without.

@@ -10,6 +10,8 @@ The checks find wrong units and signs:
   standstill is subtracted, which removes the sensor's bias too; without a standstill, standard gravity is
   subtracted and the bias remains.
 
+A campaign is read and looked into so::
+
     campaign = load_campaign("campaign.csv.gz")
     for dwell in campaign.of_kind("dwell"):
         accel = dwell.channels["sprung_accel"]
