@@ -218,6 +218,8 @@ def _why_not(record: Mapping[str, Any]) -> str:
         return str(record["advice"])
     if not record["converged"]:
         return "the model's periodic motion was not found in every dwell"
+    if not record.get("verdict", {}).get("explained", True):
+        return "the model does not explain the data"
     return "the data do not identify every free parameter"
 
 

@@ -12,7 +12,8 @@ def demo(out: OutOption = Path("out/demo"), json: JsonOption = False, quiet: Qui
 
     Writes fit.json, model.toml, bode.png and bode.pdf.
 
-    Exit code 1 if the fit did not converge or the data do not identify every parameter.
+    Exit code 1 if the fit did not converge, the model does not explain the data, or they do not identify every
+    parameter.
 
     Example: savgs-ident demo
     """

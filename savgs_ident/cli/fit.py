@@ -46,7 +46,8 @@ def fit(
 
     Writes fit.json, model.toml (the identified rig), bode.png and bode.pdf.
 
-    Exit code 1 if the fit did not converge or the data do not identify every parameter.
+    Exit code 1 if the fit did not converge, the model does not explain the data, or they do not identify every
+    parameter.
 
     Example: savgs-ident fit campaign.csv.gz --free mu_r c_sd --max-frequency 4
     """

@@ -34,6 +34,7 @@ from savgs_ident.diagnosis.model_selection import (
     recalibrate,
     refit_named,
     select_model,
+    without_support,
 )
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
 from savgs_ident.diagnosis.problem import AbstractProblem
@@ -48,9 +49,11 @@ from savgs_ident.diagnosis.result import (
     Learned,
     NextTest,
     PortShare,
+    Shrink,
 )
 from savgs_ident.diagnosis.search import hypothesis_of
 from savgs_ident.diagnosis.sweep import ModelPoint, sweep_shrink
+from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.diagnosis.verdict import indistinguishable, most_probable
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned import coefficients_at
@@ -187,10 +190,17 @@ def _diagnose(
         lambda: _predict_further(refitted, evidence, law, values, further),
     )
     linear = held_out_by_law(refitted.search, evidence.localisation.held_out)
-    held = {**held, **last, UNKNOWN: linear if law is None else law.held}
+    held = {**held, **last}
+    unknown = max(linear, held[NONE], key=lambda each: each.mean) if law is None else law.held
+    held = {**held, UNKNOWN: unknown}
 
     base, model = problem.base, _corrected_model(refitted, evidence, law)
     together, by_channel = shrinks(data, _left_out_rows(problem, held, model))
+    if _unsupported(evidence, together, problem.constants):
+        evidence, law = without_support(evidence), None
+        model = _corrected_model(refitted, evidence, law)
+        together, by_channel = shrinks(data, _left_out_rows(problem, held, model))
+        apart = _predict_further(refitted, evidence, law, values, further)
     # Before what is named was refitted: the alternatives were not.
     alternatives = indistinguishable(selected.weighed, selected.chosen, problem.constants)
     verdict = write_verdict(refitted, evidence, alternatives, together)
@@ -221,6 +231,18 @@ def _diagnose(
         learned=None if law is None else _offered(law),
         wall_s=time.perf_counter() - began,
     )
+
+
+def _unsupported(evidence: DiagnosisEvidence, gap: Shrink, constants: DecisionConstants) -> bool:
+    """Whether what is spoken for predicts held-out tests no better than a baseline that misses little.
+
+    Where the baseline misses by more than is small, something is missing, predicted or not; and a tolerance that does
+    not hold is in the recalibrated baseline already.
+    """
+    tolerance = evidence.kind == "unknown" and evidence.unknown.reason == "tolerance"
+    if evidence.kind == "none" or tolerance or gap.after < gap.recalibrated:
+        return False
+    return gap.recalibrated**2 - gap.floor**2 <= constants.material_share**2
 
 
 def _port_shares(evidence: DiagnosisEvidence) -> tuple[PortShare, ...]:

@@ -21,7 +21,8 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import joint_status
 from savgs_ident.core.values import Values
-from savgs_ident.diagnosis.effect_sensitivities import columns_with_states, node_loads, rehearse
+from savgs_ident.diagnosis.background import pieces_of_curve, with_background
+from savgs_ident.diagnosis.effect_sensitivities import columns_with_states, impose, node_loads, rehearse
 from savgs_ident.diagnosis.gap import cycle_positions, gap_map
 from savgs_ident.diagnosis.localisation import InputLocation, Localisation
 from savgs_ident.diagnosis.location_hypotheses import input_locations
@@ -83,8 +84,8 @@ def _directional_rows(
 WIDTH = 52
 """Directions that are solved for at a time: a program for each number would have to be compiled."""
 
-ITERATIONS = 25
-"""Most Newton steps from one point of a search to the next."""
+ITERATIONS = 100
+"""Most Newton steps from one point of a search to the next: a bristle that is new to a slow dwell needs dozens."""
 
 
 @dataclass(frozen=True)
@@ -250,6 +251,38 @@ class DwellProblem(AbstractProblem):
     ) -> list[InputLocation]:
         """What an unknown signal at each location could do to the harmonics, about a motion with ``terms``."""
         return input_locations(self, terms, self.values(values), warm_start)
+
+    def with_background(self, data: Data, values: Mapping[str, float], warm_start: PeriodicSolution) -> Data:
+        """The data with errors at every location and input, of the dampers' curves, and drifts of what is free."""
+        read = harmonics(self.complete(()), self.values(values), warm_start, self.orders)
+        order = jnp.arange(self.orders + 1)
+        inputs = [np.asarray(self.likelihood.rows(each)) for each in (read, 1j * order * read)]
+        locations = self.locations((), values, warm_start)
+        model, p = self.model(()), placed(self.values(values))
+        drifts = self.slopes(model, p, warm_start, self.free) * [float(p[name]) for name in self.free]
+        return with_background(
+            data,
+            self.channel,
+            locations,
+            inputs=np.stack(inputs, axis=1),
+            curves=self._curves(values, warm_start),
+            drifts=drifts,
+            constants=self.constants,
+        )
+
+    def _curves(self, values: Mapping[str, float], warm_start: PeriodicSolution) -> NDArray[np.float64]:
+        """What relative errors of one at points of the dampers' curves do to the rows, (m, points)."""
+        model, p = self.complete(()), self.values(values)
+        seen = self.port_signals(values, warm_start)
+        fields = [
+            (port.name, piece)
+            for port in self.plant.ports
+            if port.damped
+            for piece in pieces_of_curve(
+                np.asarray(seen[port.name].velocity), np.asarray(seen[port.name].load)
+            )
+        ]
+        return impose(model, self.likelihood, self.orders, p, warm_start, fields).T
 
     def port_signals(
         self, values: Mapping[str, float], warm_start: PeriodicSolution

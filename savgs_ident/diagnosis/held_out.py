@@ -1,6 +1,6 @@
 """Predictions of tests that a hypothesis has not seen: each is left out once, the others set the parameters."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,10 @@ class HeldOut:
 
 def held_out_by_law(search: Search, rows: NDArray[np.float64]) -> HeldOut:
     """Left-out predictions (m,) [unit of each row] of a learned law, with the noise scales that they show."""
-    miss = search.data.measured - rows
-    spread = noise_scales(search.data, miss).spread
-    return HeldOut(rows, -0.5 * (miss**2 / spread + np.log(spread / search.data.variance)))
+    data = replace(search.data, shared=None)
+    miss = data.measured - rows
+    spread = noise_scales(data, miss).spread
+    return HeldOut(rows, -0.5 * (miss**2 / spread + np.log(spread / data.variance)))
 
 
 def hold_out(
@@ -41,13 +42,20 @@ def hold_out(
         out = data.test % folds == fold
         part = Search(search.plant, data, ~out)
         found = find_map(part, terms, mode.values, mode.prediction.warm_start, constants.held_out_steps)
-        rows[out] = found.prediction.rows[out]
+        rows[out] = found.prediction.rows[out] + _by_tolerated(part, found, out)
         slopes = found.slopes[out]
-        spread = (
-            found.noise_scales.noise**2 * data.variance
-            + (found.noise_scales.discrepancy * data.discrepancy_scale) ** 2
-        )
+        spread = data.marginal(found.noise_scales.noise, found.noise_scales.discrepancy)
         variance = spread[out] + np.einsum("ij,jk,ik->i", slopes, found.covariance(), slopes)
         miss = data.measured[out] - rows[out]
         density[out] = -0.5 * (miss**2 / variance + np.log(variance / data.variance[out]))
     return HeldOut(rows, density)
+
+
+def _by_tolerated(part: Search, found: LaplaceFit, out: NDArray[np.bool_]) -> NDArray[np.float64] | float:
+    """What errors within tolerances, as the other tests have set them, change in the rows that are left ``out``."""
+    tolerated = part.data.tolerated
+    if tolerated is None:
+        return 0.0
+    scales = found.noise_scales
+    weights = part.part.weights(part.missed(found.prediction) / scales.spread)
+    return np.asarray(scales.noise**2 * tolerated[out] @ (tolerated[part.mask].T @ weights))

@@ -32,10 +32,12 @@ class Law(NamedTuple):
     Attributes:
         columns: change of the rows per function of the law, the same in all tests [unit of the row], (m, q).
         prior: its prior probability relative to the other laws of the location.
+        whole: whether it may be any sum of a set of functions; a few of them otherwise.
     """
 
     columns: Matrix
     prior: float = 1.0
+    whole: bool = True
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,11 @@ class InputLocation:
     name: str
     laws: tuple[Law, ...]
     free: Matrix
+
+    @property
+    def functions(self) -> Matrix:
+        """What all functions do of which its laws consist [unit of the row], (m, q)."""
+        return np.concatenate([law.columns for law in self.laws if law.whole], axis=1)
 
 
 @dataclass(frozen=True)
@@ -81,7 +88,8 @@ def localise(
     constants: DecisionConstants = DEFAULTS,
 ) -> list[Localisation]:
     """What an input at every location explains beyond a fit, the largest share first."""
-    found = [_localisation(search, mode, each, constants) for each in locations]
+    folds = _folds_of(search, mode, constants.location_folds)
+    found = [_localisation(search, mode, each, folds, constants) for each in locations]
     return sorted(found, key=lambda each: -each.share)
 
 
@@ -97,10 +105,9 @@ def widths_of(
 
     ``columns`` (m, q) are the change of the rows per unit of each.
     """
-    weight = 1.0 / np.sqrt(mode.noise_scales.spread)
-    width, _ = _best_width(search, mode, _unit_columns(columns, weight), constants)
-    rms = np.sqrt(np.mean((columns * weight[:, None]) ** 2, axis=0))
-    return np.asarray(width / np.where(rms > 0.0, rms, 1.0))
+    rms = _rms(search, mode, columns)
+    width, _ = _best_width(search, mode, columns / rms, constants)
+    return np.asarray(width / rms)
 
 
 def _log_mean_exp(evidences: Sequence[float]) -> float:
@@ -108,64 +115,96 @@ def _log_mean_exp(evidences: Sequence[float]) -> float:
     return best + log(sum(exp(each - best) for each in evidences) / len(evidences))
 
 
+class _Fold(NamedTuple):
+    """A fit without some of the tests, linearised.
+
+    Attributes:
+        out: rows of the tests that are left out, (m,).
+        search: what counts without them.
+        weight: of its independent rows, one over their sd.
+        slopes: of these in the coordinates, weighed.
+        missed: how far the fit misses them, weighed.
+    """
+
+    out: NDArray[np.bool_]
+    search: Search
+    weight: NDArray[np.float64]
+    slopes: Matrix
+    missed: NDArray[np.float64]
+
+
+def _folds_of(search: Search, mode: LaplaceFit, count: int) -> list[_Fold]:
+    """The fit without every so many-th test; none where that leaves no test, or leaves out none."""
+    found, scales = [], mode.noise_scales
+    for fold in range(count):
+        out = search.data.test % count == fold
+        if not out.any() or out.all():
+            continue
+        part = Search(search.plant, search.data, ~out)
+        weight = 1.0 / np.sqrt(part.rows.marginal(scales.noise, scales.discrepancy))
+        slopes, missed = part.turned(mode.slopes), part.missed(mode.prediction)
+        found.append(_Fold(out, part, weight, slopes * weight[:, None], missed * weight))
+    return found
+
+
 def _localisation(
-    search: Search, mode: LaplaceFit, location: InputLocation, constants: DecisionConstants
+    search: Search,
+    mode: LaplaceFit,
+    location: InputLocation,
+    folds: Sequence[_Fold],
+    constants: DecisionConstants,
 ) -> Localisation:
-    weight = 1.0 / np.sqrt(mode.noise_scales.spread)
-    laws = [_unit_columns(each.columns, weight) for each in location.laws]
+    weight = 1.0 / np.sqrt(search.data.marginal(mode.noise_scales.noise, mode.noise_scales.discrepancy))
+    laws = [each.columns / _rms(search, mode, each.columns) for each in location.laws]
     widths, evidences = zip(*(_best_width(search, mode, each, constants) for each in laws), strict=True)
     priors = np.array([each.prior for each in location.laws])
     weights = np.array(evidences) + np.log(priors / priors.sum())
     law, width = laws[int(np.argmax(weights))], widths[int(np.argmax(weights))]
     evidence = float(np.logaddexp.reduce(weights))
     free_share, free_input = _free_input(search, mode, location.free, weight, constants.free_input_width)
-    folds = constants.location_folds
-    without, missed = (_left_out(search, mode, each, weight, folds) for each in (law * 0.0, law * width))
+    without, missed = (_left_out(search, mode, each, folds) for each in (law * 0.0, law * width))
     whole = float(np.sum((without * weight) ** 2))
     share = max(0.0, 1.0 - float(np.sum((missed * weight) ** 2)) / whole) if whole > 0.0 else 0.0
     held_out = search.data.measured - missed
     return Localisation(location.name, share, free_share, evidence, held_out, free_input)
 
 
-def _unit_columns(columns: Matrix, weight: NDArray[np.float64]) -> Matrix:
-    """Columns of unit rms in units of the rows' sd; what does nothing stays nothing."""
-    size = np.sqrt(np.mean((columns * weight[:, None]) ** 2, axis=0))
-    return columns / np.where(size > 0.0, size, 1.0)
+def _rms(search: Search, mode: LaplaceFit, columns: Matrix) -> NDArray[np.float64]:
+    """Root mean squares (q,) of columns (m, q) as independent rows, in their sd; 1 for what does nothing."""
+    squares = search.turned(columns) ** 2 / mode.noise_scales.spread[:, None]
+    size = np.sqrt(np.mean(squares, axis=0))
+    return np.where(size > 0.0, size, 1.0)
 
 
 def _best_width(
     search: Search, mode: LaplaceFit, law: Matrix, constants: DecisionConstants
 ) -> tuple[float, float]:
     """The width of the prior with the greatest log evidence, and the log evidence averaged over all widths."""
-    residual = search.residual(mode.prediction)
+    missed, inside, across = search.missed(mode.prediction), search.turned(mode.slopes), search.turned(law)
     lower, upper = bounds_of(mode.coordinates)
     wide = np.full(law.shape[1], np.inf)
     bounds = np.concatenate([lower, -wide]), np.concatenate([upper, wide])
     start = np.concatenate([mode.x, np.zeros(law.shape[1])])
     found = []
     for width in constants.law_widths:
-        slopes = np.concatenate([mode.slopes, width * law], axis=1)
-        top = linearised_optimum(search.data, residual, slopes, start, bounds)
+        slopes = np.concatenate([inside, width * across], axis=1)
+        top = linearised_optimum(search.rows, missed, slopes, start, bounds)
         found.append(log_evidence(top.value, top.precision, mode.coordinates))
     return constants.law_widths[int(np.argmax(found))], _log_mean_exp(found)
 
 
-def _left_out(
-    search: Search, mode: LaplaceFit, law: Matrix, weight: NDArray[np.float64], folds: int
-) -> NDArray[np.float64]:
+def _left_out(search: Search, mode: LaplaceFit, law: Matrix, folds: Sequence[_Fold]) -> NDArray[np.float64]:
     """Residuals (m,) of every test when the others have set the parameters and the law's coefficients."""
     residual = search.residual(mode.prediction)
     slopes = np.concatenate([mode.slopes, law], axis=1)
     x = np.concatenate([mode.x, np.zeros(law.shape[1])])
     missed = residual.copy()
-    for fold in range(folds):
-        out = search.data.test % folds == fold
-        inside = slopes[~out] * weight[~out, None]
-        if not out.any() or out.all():
-            continue
+    for fold in folds:
+        across = fold.search.turned(law) * fold.weight[:, None]
+        inside = np.concatenate([fold.slopes, across], axis=1)
         precision = np.eye(x.size) + inside.T @ inside
-        step = np.linalg.solve(precision, inside.T @ (residual * weight)[~out] - x)
-        missed[out] = residual[out] - slopes[out] @ step
+        step = np.linalg.solve(precision, inside.T @ fold.missed - x)
+        missed[fold.out] = residual[fold.out] - slopes[fold.out] @ step
     return missed
 
 

@@ -109,7 +109,7 @@ def laws_of_functions(columns: NDArray[np.float64], plain: tuple[int, ...] = ())
     if plain:
         shares = [*(share / 2.0 for share in shares), DEFAULTS.simple_law_prior / 2.0]
         alone.append(columns[:, list(plain)])
-    return (Law(columns), *(Law(few, share) for few, share in zip(alone, shares, strict=True)))
+    return (Law(columns), *(Law(few, share, whole=False) for few, share in zip(alone, shares, strict=True)))
 
 
 def force_functions(port: Port, seen: PortSignals, solution: PeriodicSolution) -> Functions:

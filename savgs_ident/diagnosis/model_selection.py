@@ -29,7 +29,7 @@ from savgs_ident.core.parallel import side_by_side
 from savgs_ident.core.presentation import Progress
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.problem import AbstractProblem
-from savgs_ident.diagnosis.result import Hypothesis, Kind
+from savgs_ident.diagnosis.result import NONE, Hypothesis, Kind
 from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.search import (
     Findings,
@@ -37,6 +37,7 @@ from savgs_ident.diagnosis.search import (
     hypothesis_of,
     left_over,
     pairs_with,
+    singles_among,
 )
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
@@ -125,6 +126,7 @@ class DiagnosisEvidence:
         left: share of the baseline's misfit that the most probable hypothesis leaves.
         another_law: whether the named effect acts by another law than the catalogue's.
         refit_failed: whether what is named could not be found again on a finer mesh.
+        unsupported: whether what would be named predicts tests that were held out no better than the baseline.
     """
 
     findings: Findings
@@ -138,6 +140,7 @@ class DiagnosisEvidence:
     left: float
     another_law: bool = False
     refit_failed: bool = False
+    unsupported: bool = False
 
     @property
     def localisation(self) -> Localisation:
@@ -179,7 +182,14 @@ def recalibrate(
     base = find_map(search, (), values, warm_start)
     if not base.solved:
         raise InputError("the baseline cannot be recalibrated", remedy="mend the rig file")
-    return DiagnosisProblem(plant, data, search, given.rows, refine(search, base, ()), constants)
+    fine = refine(search, base, ())
+    data = plant.with_background(data, fine.values, fine.prediction.warm_start)
+    if data is search.data:
+        return DiagnosisProblem(plant, data, search, given.rows, fine, constants)
+    progress("recalibrating with a background of small errors")
+    search = search_of(plant, data)
+    base = replace(find_map(search, (), fine.values, fine.prediction.warm_start), precise=True)
+    return DiagnosisProblem(plant, data, search, given.rows, base, constants)
 
 
 def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvidence:
@@ -190,6 +200,7 @@ def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvid
         lambda: forward_selection(search, base, plant.candidates, progress, plant.known, constants),
         lambda: _localised(problem, base),
     )
+    findings = _with_nearest(problem, findings, localisations, progress)
     findings, beside = _law_beside_best(problem, _material(problem, findings), progress)
     best = most_probable(findings, constants)
     left = left_over(search, base, best, constants)
@@ -200,8 +211,8 @@ def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvid
         constants,
     )
     first = max(localisations, key=lambda each: each.evidence)
-    is_trace = _change(problem, first.held_out - base.prediction.rows).is_trace(constants)
-    alone = -np.inf if is_trace else anywhere(localisations)
+    change = _change(problem, first.held_out - base.prediction.rows)
+    alone = anywhere(localisations) if change.matters(constants) else -np.inf
     unknown = unknown_evidence(findings, alone, beside, broken.weight, constants)
     weighed = weigh(findings, unknown, constants)
     kind, chosen = decide(weighed, change_without(problem, best, best.terms), left, constants)
@@ -219,6 +230,12 @@ def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvid
     if kind != "unknown" or unknown.reason == "tolerance":
         return found
     return _beside_nearest_effect(problem, found, progress)
+
+
+def without_support(evidence: DiagnosisEvidence) -> DiagnosisEvidence:
+    """The evidence where held-out tests do not bear out what it speaks for: then nothing may be named."""
+    none = next(each for each in evidence.weighed if each.hypothesis == NONE)
+    return replace(evidence, kind="none", chosen=none, another_law=False, unsupported=True)
 
 
 def refit_named(
@@ -279,6 +296,25 @@ def _beside_nearest_effect(
     weighed = reweighed(evidence.weighed, best, own + unknown, elsewhere + unknown)
     chosen = next(each for each in weighed if each.mode is best)
     return replace(closer, weighed=weighed, kind="effect", chosen=chosen, left=left, another_law=True)
+
+
+def _with_nearest(
+    problem: DiagnosisProblem, findings: Findings, localisations: Sequence[Localisation], progress: Progress
+) -> Findings:
+    """The findings, and where they leave much, the single effects at the locations that explain most."""
+    constants = problem.constants
+    left = left_over(problem.search, problem.base, most_probable(findings, constants), constants)
+    if left <= constants.unexplained_share:
+        return findings
+    ranked = sorted(localisations, key=lambda each: -each.evidence)
+    nearest = [
+        each.name for each in ranked[: constants.nearest_ports] if each.evidence > problem.base.evidence
+    ]
+    candidates = problem.plant.candidates
+    wanted = [term for term in candidates if problem.location(term.name) in nearest]
+    if not wanted:
+        return findings
+    return singles_among(problem.search, findings, wanted, candidates, progress, constants)
 
 
 def _law_beside_best(

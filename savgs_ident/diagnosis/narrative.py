@@ -35,6 +35,13 @@ def write_verdict(
 
 
 def _nothing_missing(problem: DiagnosisProblem, evidence: DiagnosisEvidence, gap: Shrink) -> str:
+    if evidence.unsupported:
+        return (
+            f"Nothing can be named: the recalibrated model differs from these data by {_percent(gap.recalibrated)} "
+            f"of the response, where the noise accounts for {_percent(gap.floor)}, but what would explain some tests "
+            "predicts those that were held out no better than the model without it. Look for what changed between "
+            "the tests."
+        )
     return (
         f"These data show nothing missing in the model: the recalibrated model differs from them by "
         f"{_percent(gap.recalibrated)} of the response; the noise accounts for {_percent(gap.floor)}."
@@ -62,12 +69,19 @@ def _something_unknown(
     problem: DiagnosisProblem, evidence: DiagnosisEvidence, ports: Sequence[str], gap: Shrink
 ) -> str:
     found = evidence.localisation
-    sentence = (
-        f"The model lacks something that no effect of the catalogue explains: a law learned at the port "
-        f"'{found.name}' accounts for {100.0 * found.share:.0f} % of the squared gap in held-out tests, which "
-        f"shrinks from {_percent(gap.recalibrated)} recalibrated to {_percent(gap.after)} of the response; "
-        f"the noise is {_percent(gap.floor)}."
-    )
+    sentence = "The model lacks something that no effect of the catalogue explains: "
+    if gap.after < gap.recalibrated:
+        sentence += (
+            f"a law learned at the port '{found.name}' accounts for {100.0 * found.share:.0f} % of the squared gap "
+            f"in held-out tests, which shrinks from {_percent(gap.recalibrated)} recalibrated to "
+            f"{_percent(gap.after)} of the response; the noise is {_percent(gap.floor)}."
+        )
+    else:
+        sentence += (
+            f"recalibrated it misses by {_percent(gap.recalibrated)} of the response, the noise is "
+            f"{_percent(gap.floor)}, and no law learned at a port predicts held-out tests better; the nearest acts "
+            f"at the port '{found.name}'."
+        )
     sentence += _nearest(problem, evidence)
     if ports:
         sentence += f" This campaign cannot distinguish the port {evidence.port} from {' or '.join(ports)}."
@@ -136,7 +150,11 @@ def write_warnings(
     ):
         if not mode.status.ok:
             found.append(f"The search for {name} did not converge: {mode.status.advice}.")
-    if evidence.kind == "none" and gap.recalibrated**2 - gap.floor**2 > constants.material_share**2:
+    if (
+        evidence.kind == "none"
+        and not evidence.unsupported
+        and gap.recalibrated**2 - gap.floor**2 > constants.material_share**2
+    ):
         found.append(
             f"The recalibrated model differs by {_percent(gap.recalibrated)} of the response where the noise is "
             f"{_percent(gap.floor)}, by errors that follow no law at any port: look at the tests with the "

@@ -220,6 +220,10 @@ class AbstractProblem(ABC):
     ) -> list[InputLocation]:
         """What an unknown signal at each location could do to the rows, about a solution with ``terms``."""
 
+    def with_background(self, data: Data, values: Mapping[str, float], warm_start: Any) -> Data:
+        """The data with small errors that every model has, about a solution of the baseline; as they are if none."""
+        return data
+
     @abstractmethod
     def port_signals(self, values: Mapping[str, float], warm_start: Any) -> Mapping[str, PortSignals]:
         """What laws see at the force ports along the baseline's motion [the ports' units], (P,) each."""

@@ -39,8 +39,8 @@ class Score:
         start: parameters at its best point, SI, by name.
         smallest: the first amplitude that would stand out of the noise by ``visible_sigma`` sd, nuisances projected
             out [its unit]; infinite if none would.
-        direction: what it does to the rows there, nuisances projected out, in units of their sd, (m,): of unit
-            length, or nothing.
+        direction: what it does to the independent rows there, nuisances projected out, in units of their sd, (m,):
+            of unit length, or nothing.
         status: whether what it does to the rows could be evaluated.
     """
 
@@ -80,7 +80,7 @@ def scores_of(
 def _score(
     search: Search, mode: LaplaceFit, term: Term, columns: NDArray[np.float64], visible: float
 ) -> Score:
-    residual = search.residual(mode.prediction)
+    residual, inside = search.missed(mode.prediction), search.turned(mode.slopes)
     count = len(term.amplitudes)
     bounds = tuple(
         np.concatenate(pair)
@@ -91,17 +91,17 @@ def _score(
     for shapes, column in zip(term.tried, columns, strict=True):
         if not np.isfinite(column).all():
             continue
-        moved = column * scales
-        slopes = np.concatenate([mode.slopes, moved], axis=1)
+        moved = search.turned(column * scales)
+        slopes = np.concatenate([inside, moved], axis=1)
         x = np.concatenate([mode.x, np.zeros(count)])
-        top = linearised_optimum(search.data, residual, slopes, x, (bounds[0], bounds[1]), search.mask)
+        top = linearised_optimum(search.rows, residual, slopes, x, (bounds[0], bounds[1]))
         evidence = log_evidence(top.value, top.precision, mode.coordinates + term.amplitudes)
         if best is None or evidence > best.evidence:
             found = dict(zip((c.name for c in term.amplitudes), top.x[-count:], strict=True))
             start = {each.name: each.value(float(found[each.name])) for each in term.amplitudes} | shapes
-            direction = _direction(search, mode, moved @ _some(top.x[-count:]))
-            sigma = _significance(search, mode, moved)
-            smallest = scales[0] * visible * _per_sigma(search, mode, moved[:, 0])
+            direction = _direction(mode, inside, moved @ _some(top.x[-count:]))
+            sigma = _significance(mode, residual, inside, moved)
+            smallest = scales[0] * visible * _per_sigma(search.rows.variance, inside, moved[:, 0])
             best = Score(term, sigma, evidence, start, smallest, direction)
     return best or Score(term, 0.0, -np.inf, {}, np.inf, np.zeros(residual.size), Status.NOT_FINITE)
 
@@ -116,37 +116,38 @@ def _some(amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
     return amplitudes if np.any(amplitudes) else np.ones_like(amplitudes)
 
 
-def _direction(search: Search, mode: LaplaceFit, moved: NDArray[np.float64]) -> NDArray[np.float64]:
-    weight = np.zeros(moved.size)
-    weight[search.mask] = 1.0 / np.sqrt(mode.noise_scales.spread)
-    inside = mode.slopes * weight[:, None]
-    left = moved * weight
-    left = left - inside @ np.linalg.solve(mode.precision, inside.T @ left)
+def _direction(
+    mode: LaplaceFit, inside: NDArray[np.float64], moved: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    weight = 1.0 / np.sqrt(mode.noise_scales.spread)
+    weighed, left = inside * weight[:, None], moved * weight
+    left = left - weighed @ np.linalg.solve(mode.precision, weighed.T @ left)
     length = float(np.linalg.norm(left))
     return left / length if length > 0.0 else left
 
 
-def _per_sigma(search: Search, mode: LaplaceFit, moved: NDArray[np.float64]) -> float:
+def _per_sigma(noise: NDArray[np.float64], inside: NDArray[np.float64], column: NDArray[np.float64]) -> float:
     """How many units of a column stand out of the noise by one standard deviation; infinite if none do."""
-    kept, noise = search.mask, search.data.variance[search.mask]
-    inside, column = mode.slopes[kept], moved[kept]
     precision = precision_of(inside, noise)
     cross = inside.T @ (column / noise)
-    visible = float(column @ (column / noise) - cross @ np.linalg.solve(precision, cross))
     whole = float(column @ (column / noise))
+    visible = whole - float(cross @ np.linalg.solve(precision, cross))
     return 1.0 / sqrt(visible) if visible > 1e-9 * whole > 0.0 else np.inf
 
 
-def _significance(search: Search, mode: LaplaceFit, moved: NDArray[np.float64]) -> float:
+def _significance(
+    mode: LaplaceFit,
+    residual: NDArray[np.float64],
+    inside: NDArray[np.float64],
+    moved: NDArray[np.float64],
+) -> float:
     """Square root of the drop of chi2 that the candidate brings, at the weights of the mode."""
-    kept, spread = search.mask, mode.noise_scales.spread
-    residual = search.residual(mode.prediction)[kept]
-    weighted = moved[kept] / spread[:, None]
-    inside = mode.slopes[kept]
+    spread = mode.noise_scales.spread
+    weighted = moved / spread[:, None]
     cross = inside.T @ weighted
     held = np.linalg.solve(mode.precision, cross)
     score = weighted.T @ residual - held.T @ (inside.T @ (residual / spread) - mode.x)
-    information = weighted.T @ moved[kept] - cross.T @ held
+    information = weighted.T @ moved - cross.T @ held
     size = np.trace(information) / len(information)
     if size <= 0.0:
         return 0.0

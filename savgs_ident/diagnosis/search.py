@@ -63,10 +63,14 @@ def hypothesis_of(mode: LaplaceFit) -> Hypothesis:
 
 
 def excess(search: Search, mode: LaplaceFit) -> float:
-    """The misfit [1]: mean square of the residuals in noise variances, less one, and not below zero."""
-    mask = search.mask
-    residual = search.residual(mode.prediction)[mask]
-    return max(float(np.mean(residual**2 / search.data.variance[mask])) - 1.0, 0.0)
+    """The misfit [1]: mean square of the residuals in their variances, less one, and not below zero.
+
+    The variance is that of the noise, and of errors that rows share at the size that these are expected at.
+    """
+    rows = search.rows
+    expected = rows.scales.discrepancy if search.data.shared is not None else 0.0
+    variance = rows.marginal(1.0, expected)
+    return max(float(np.mean(search.missed(mode.prediction) ** 2 / variance)) - 1.0, 0.0)
 
 
 def left_over(
@@ -109,6 +113,26 @@ def forward_selection(
         by_name = dict(zip((term.name for term in terms), sensitivities, strict=True))
         pairs = _pairs(fits, singles, scores, by_name)
     return _findings(base, scores, [*together, *singles, *pairs])
+
+
+def singles_among(
+    search: Search,
+    findings: Findings,
+    wanted: Sequence[Term],
+    terms: Sequence[Term],
+    progress: Progress,
+    constants: DecisionConstants = DEFAULTS,
+) -> Findings:
+    """The findings, and each of the ``wanted`` among the ``terms`` alone that has not been fitted yet.
+
+    An effect that acts far from in proportion to its size scores little at its null.
+    """
+    tried = {mode.terms for mode in findings.modes}
+    fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
+    others = [term for term in wanted if (term.name,) not in tried]
+    singles = fits.extended(findings.base, score_terms(search, findings.base, others))
+    more = _findings(findings.base, findings.scores, fits.refined([*findings.modes, *singles]))
+    return replace(more, lost=(*findings.lost, *more.lost))
 
 
 def pairs_with(

@@ -106,12 +106,37 @@ class DecisionConstants:
     Origin: by choice; a friction that shows in the slow tests alone reaches it. Halved or doubled: not measured.
     """
 
-    trace_share: float = 0.0004
-    """Change of the response by a learned law below which the law is no evidence for something unknown.
+    # The background of small errors
 
-    It is evidence all the same where it reaches ``material_share_of_test``. Origin: two formulations of the same
-    rig differ by up to 0.03 %. Halved: those differences count. Doubled and more (0.1 %): the value of an earlier
-    version; verdicts between the two are not measured.
+    material_error: float = 0.002
+    """Width of the prior of the errors that a model has at each port, as a share of the response.
+
+    Origin: by choice, two thirds of what an effect must change to matter. Halved or doubled: not measured.
+    """
+
+    input_error: float = 0.0005
+    """The same of the amplitude and the phase [rad] of a test's input.
+
+    Origin: by choice: a recorded road is known to half a per mille. Halved or doubled: not measured.
+    """
+
+    curve_tolerance: float = 0.02
+    """Tolerance of a damper's curve, point by point, as a share of its force.
+
+    Origin: by choice, what a dynamometer's table is good for. Halved or doubled: not measured.
+    """
+
+    drift_tolerance: float = 0.05
+    """Change of an identified parameter from the middle of a campaign to its ends, as a share of it.
+
+    Origin: by choice: friction and damping of parts that become warm. Halved or doubled: not measured.
+    """
+
+    independent_error: float = 0.3
+    """Errors that each harmonic has by itself, in those that it shares with others.
+
+    Origin: by choice, so that they stay below the noise of a campaign at the material size. Halved or doubled: not
+    measured.
     """
 
     # Thresholds on the misfit

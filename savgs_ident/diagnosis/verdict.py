@@ -47,11 +47,6 @@ class Change(NamedTuple):
         local = self.in_one_test >= constants.material_share_of_test
         return self.overall >= constants.material_share or local
 
-    def is_trace(self, constants: DecisionConstants = DEFAULTS) -> bool:
-        """Whether a law that changes no more is too small to be evidence for something unknown."""
-        local = self.in_one_test >= constants.material_share_of_test
-        return self.overall < constants.trace_share and not local
-
 
 Reason = Literal["law", "law beside effects", "tolerance"]
 """What speaks for something unknown: a law at a port, one beside the best effects, a tolerance that does not hold."""
@@ -125,8 +120,8 @@ def broken_tolerance(
 ) -> BrokenTolerance:
     """The most probable tolerance that does not hold.
 
-    Beside the most probable hypothesis; where this is a pair also beside none, because one broken tolerance is
-    simpler than two effects. ``conflict`` is that of a fit, ``port`` the location at which a parameter acts.
+    Beside the most probable hypothesis, and beside none: an effect may only stand in for the number that is off.
+    ``conflict`` is that of a fit, ``port`` the location at which a parameter acts.
     """
     count = len(findings.scores)
 
@@ -136,7 +131,7 @@ def broken_tolerance(
         return BrokenTolerance(mode.evidence + found.gain + prior, found, beside, port(found.parameter))
 
     best = most_probable(findings, constants)
-    modes = (best, findings.base) if len(best.terms) > 1 else (best,)
+    modes = (best, findings.base) if best.terms else (best,)
     return max(map(broken, modes), key=lambda each: each.weight)
 
 

@@ -19,7 +19,7 @@ from jaxtyping import Array
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import as_values
-from savgs_ident.fit.identifiability import EXPLAINED, assess
+from savgs_ident.fit.identifiability import EXPLAINED, assess, weighed_by_misfit
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import Estimate, Fit, Verdict
 from savgs_ident.inference.laplace import spread_of
@@ -105,7 +105,7 @@ def _estimates(task: Task, best: Minimum) -> tuple[tuple[Estimate, ...], np.ndar
     problem = task.problem
     values = problem.parameters(best.u)
     slope = np.asarray(problem.slopes(best.u))
-    spread = spread_of(best.jacobian)
+    spread = spread_of(weighed_by_misfit(problem, best))
     covariance = spread.covariance * np.outer(slope, slope)
     widths, estimates = problem.free.widths, []
     for place, name in enumerate(problem.free.names):

@@ -21,8 +21,9 @@ PACKAGES = ("jax", "optimistix", "numpy", "scipy")
 class Estimate:
     """One estimated parameter in SI.
 
-    ``stderr`` is its standard error; ``free`` distinguishes an identified parameter from one that was known to a
-    tolerance and estimated along. For the latter ``prior`` and ``prior_sd`` say what was known before.
+    ``stderr`` is its standard error, which contains what the model leaves unexplained; ``free`` distinguishes an
+    identified parameter from one that was known to a tolerance and estimated along. For the latter ``prior`` and
+    ``prior_sd`` say what was known before.
     """
 
     name: str
@@ -42,11 +43,13 @@ class Verdict:
         identifiable: whether every free parameter is identified.
         sentences: the verdict, one statement each.
         confounded: groups of free parameters that trade off against each other.
+        explained: whether the model explains the data, but for small errors that every model has.
     """
 
     identifiable: bool
     sentences: tuple[str, ...]
     confounded: tuple[tuple[str, ...], ...] = ()
+    explained: bool = True
 
     def __str__(self) -> str:
         return "\n".join(self.sentences)
@@ -128,8 +131,9 @@ class Fit(Result):
 
     @property
     def trusted(self) -> bool:
-        """Whether the fit converged everywhere and every free parameter is identified by the data."""
-        return self.status.ok and all(each.ok for each in self.dwell_status) and self.verdict.identifiable
+        """Whether the fit converged everywhere, the model explains the data, and they identify what is free."""
+        converged = self.status.ok and all(each.ok for each in self.dwell_status)
+        return converged and self.verdict.explained and self.verdict.identifiable
 
     @property
     def by_name(self) -> Mapping[str, Estimate]:

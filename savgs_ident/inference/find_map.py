@@ -9,6 +9,7 @@ rows' variance.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -91,9 +92,23 @@ class Search:
         """Measured less predicted [unit of the row], (m,)."""
         return self.data.measured - prediction.rows
 
+    @cached_property
     def part(self) -> Data:
         """The data that count."""
         return self.data.part(self.mask)
+
+    @property
+    def rows(self) -> Data:
+        """The same as independent rows."""
+        return self.part.independent
+
+    def turned(self, change: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A change of all rows [their units], (m,) or (m, n), as one of :attr:`rows`."""
+        return self.part.turned(change[self.mask])
+
+    def missed(self, prediction: Prediction) -> NDArray[np.float64]:
+        """Measured less predicted, as independent rows."""
+        return self.turned(self.residual(prediction))
 
 
 def search_of(plant: Plant, data: Data, mask: NDArray[np.bool_] | None = None) -> Search:
@@ -130,18 +145,16 @@ def find_map(
             return found._replace(status=Status.NOT_FINITE)
         return found
 
-    part = search.part()
     here, status = at(x, warm_start), Status.MAX_ITERATIONS
-    value = _value(part, search, here, x)
+    value = _value(search, here, x)
     for count in range(1, steps + 1):
         if not here.solved:
             break
         if progress:
             progress(f"looking for the mode, step {count}: log density {value:.2f}")
-        slopes = here.slopes * slopes_at(coordinates, x)
-        residual = search.residual(here)
+        slopes = search.turned(here.slopes * slopes_at(coordinates, x))
         top = linearised_optimum(
-            search.data, residual, slopes, x, (lower, upper), search.mask, min(1e-3, 0.1 * level)
+            search.rows, search.missed(here), slopes, x, (lower, upper), min(1e-3, 0.1 * level)
         )
         if top.value - value < level:
             status = Status.CONVERGED if top.converged else Status.STALLED
@@ -149,7 +162,7 @@ def find_map(
         for halving in range(HALVINGS):
             there = x + 0.5**halving * (top.x - x)
             tried = at(there, here.warm_start)
-            found = _value(part, search, tried, there)
+            found = _value(search, tried, there)
             if found > value:
                 break
         else:
@@ -166,11 +179,11 @@ def refine(search: Search, mode: LaplaceFit, terms: tuple[Term, ...]) -> Laplace
     return replace(find_map(search, terms, mode.values, warm_start), precise=True)
 
 
-def _value(part: Data, search: Search, prediction: Prediction, x: NDArray[np.float64]) -> float:
+def _value(search: Search, prediction: Prediction, x: NDArray[np.float64]) -> float:
     """Log density of rows and prior; minus infinity where the plant was not solved."""
     if not prediction.solved:
         return -np.inf
-    return noise_scales(part, search.residual(prediction)[search.mask]).value - 0.5 * float(x @ x)
+    return noise_scales(search.rows, search.missed(prediction)).value - 0.5 * float(x @ x)
 
 
 def _mode(
@@ -183,8 +196,8 @@ def _mode(
     status: Status,
 ) -> LaplaceFit:
     slopes = here.slopes * slopes_at(coordinates, x)
-    misfit = noise_scales(search.part(), search.residual(here)[search.mask])
-    precision = precision_of(slopes[search.mask], misfit.spread)
+    misfit = noise_scales(search.rows, search.missed(here))
+    precision = precision_of(search.turned(slopes), misfit.spread)
     evidence = log_evidence(value, precision, coordinates) if here.solved else -np.inf
     status = status if here.solved else here.status
     return LaplaceFit(names, coordinates, x, here, slopes, misfit, value, precision, evidence, status)

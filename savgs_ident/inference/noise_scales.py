@@ -43,7 +43,9 @@ class NoiseScales(NamedTuple):
 
 
 def noise_scales(data: Data, residual: NDArray[np.float64], start: float = 1e-2) -> NoiseScales:
-    """The best noise scale and discrepancy for residuals (m,), the discrepancy looked for from ``start`` on.
+    """The best noise scale and discrepancy for residuals (m,) of independent rows.
+
+    The discrepancy is looked for from ``start`` on.
 
     There may be two maxima, of which one has little discrepancy: where the residuals have room for more than was
     found, it is looked for from there too.
@@ -180,28 +182,24 @@ def linearised_optimum(
     slopes: Vector,
     x: Vector,
     bounds: tuple[Vector, Vector],
-    mask: NDArray[np.bool_] | None = None,
     level: float = 1e-3,
 ) -> LinearisedOptimum:
     """The best point for residuals (measured - predicted, m) with slopes (m, n) of the prediction at ``x`` (n,).
 
-    Only the rows ``mask`` (m,) count, all by default. Rows are in their units, coordinates in standard
-    deviations. The point for given weights and the scales for a given point in turn, until the density rises by less
-    than ``level``: it rises at every turn.
+    ``data`` are independent rows, in their units; coordinates are in standard deviations. The point for given
+    weights and the scales for a given point in turn, until the density rises by less than ``level``: it rises at
+    every turn.
     """
-    rows = np.ones(residual.size, bool) if mask is None else mask
-    part = data.part(rows)
-    here, across = residual[rows], slopes[rows]
-    misfit = noise_scales(part, here)
+    misfit = noise_scales(data, residual)
     value, point, converged = -np.inf, x, False
     for _ in range(_LINEAR_ROUNDS):
-        point, inside = _within(here, across, x, misfit.spread, bounds)
-        misfit = noise_scales(part, here - across @ (point - x), misfit.discrepancy)
+        point, inside = _within(residual, slopes, x, misfit.spread, bounds)
+        misfit = noise_scales(data, residual - slopes @ (point - x), misfit.discrepancy)
         before, value = value, misfit.value - 0.5 * float(point @ point)
         if abs(value - before) < level:
             converged = misfit.converged and inside
             break
-    return LinearisedOptimum(point, misfit, value, precision_of(across, misfit.spread), converged)
+    return LinearisedOptimum(point, misfit, value, precision_of(slopes, misfit.spread), converged)
 
 
 def _within(

@@ -101,14 +101,21 @@ class Plant(Protocol):
 
 @dataclass(frozen=True)
 class Data:
-    """m independent numbers, each in a unit of its own.
+    """m numbers with independent noise, each in a unit of its own, and errors of the model that they may share.
+
+    A discrepancy d of the model is normal with covariance d^2 (diag(a^2) + B B'): errors of each number by itself,
+    and errors that many of them share. Turned into the principal axes of that covariance in units of the noise, the
+    numbers are independent again (:attr:`independent`), and all that holds for independent numbers holds for them.
 
     Attributes:
         measured: the numbers, (m,).
         variance: variance of their noise, (m,).
-        reach: by how much a relative discrepancy of one of the model moves them, (m,).
+        discrepancy_scale: a, by how much a relative discrepancy of one moves each by itself, (m,).
         test: which test each belongs to, counted from 0, (m,).
         scales: what is known beforehand of noise scale and discrepancy.
+        shared: B, by how much it moves them together, (m, k); None where they share nothing.
+        tolerated: errors of known size that they share, (m, t): what is known of the model to a tolerance, but is no
+            number of its own. Their scale is that of the noise. None where there are none.
     """
 
     measured: NDArray[np.float64]
@@ -116,16 +123,81 @@ class Data:
     discrepancy_scale: NDArray[np.float64]
     test: NDArray[np.intp]
     scales: Scales = field(default_factory=Scales)
+    shared: NDArray[np.float64] | None = None
+    tolerated: NDArray[np.float64] | None = None
 
     def part(self, mask: NDArray[np.bool_]) -> "Data":
         """The numbers that ``mask`` (m,) picks."""
+        if mask.all():
+            return self
         return Data(
             self.measured[mask],
             self.variance[mask],
             self.discrepancy_scale[mask],
             self.test[mask],
             self.scales,
+            None if self.shared is None else self.shared[mask],
+            None if self.tolerated is None else self.tolerated[mask],
         )
+
+    @cached_property
+    def independent(self) -> "Data":
+        """The numbers turned into axes in which neither noise nor discrepancy is shared."""
+        if not self._share:
+            return self
+        sizes, _ = self._axes
+        return Data(
+            self.turned(self.measured), np.ones(sizes.size), sizes, np.zeros(sizes.size, np.intp), self.scales
+        )
+
+    def turned(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What changes the numbers, (m,) or (m, n), in the axes in which they are independent."""
+        if not self._share:
+            return rows
+        _, axes = self._axes
+        return np.asarray(axes @ rows)
+
+    def weights(self, turned: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Weights (m,) of the numbers that stand for weights of the independent ones: the transpose of turning."""
+        if not self._share:
+            return turned
+        _, axes = self._axes
+        return np.asarray(axes.T @ turned)
+
+    def marginal(self, noise: float, discrepancy: float) -> NDArray[np.float64]:
+        """Variance (m,) [their units squared] of each number by itself, at a noise scale and a discrepancy [1]."""
+        known, together = (
+            0.0 if each is None else np.sum(each**2, axis=1) for each in (self.tolerated, self.shared)
+        )
+        return np.asarray(
+            noise**2 * (self.variance + known) + discrepancy**2 * (self.discrepancy_scale**2 + together)
+        )
+
+    def draw_errors(
+        self, noise: float, discrepancy: float, random: np.random.Generator
+    ) -> NDArray[np.float64]:
+        """Errors of the numbers (m,) [their units], at a noise scale and a discrepancy [1]."""
+        sd = np.sqrt(noise**2 * self.variance + (discrepancy * self.discrepancy_scale) ** 2)
+        drawn = sd * random.standard_normal(sd.size)
+        for columns, size in ((self.tolerated, noise), (self.shared, discrepancy)):
+            if columns is not None:
+                drawn += size * columns @ random.standard_normal(columns.shape[1])
+        return drawn
+
+    @property
+    def _share(self) -> bool:
+        return self.shared is not None or self.tolerated is not None
+
+    @cached_property
+    def _axes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Discrepancy scales (m,) along the principal axes, in noise sd, and what turns the numbers there, (m, m)."""
+        noise, alone = np.diag(self.variance), np.diag(self.discrepancy_scale)
+        if self.tolerated is not None:
+            noise += self.tolerated @ self.tolerated.T
+        whiten = np.linalg.inv(np.linalg.cholesky(noise))
+        errors = whiten @ (alone if self.shared is None else np.concatenate([alone, self.shared], axis=1))
+        squares, axes = np.linalg.eigh(errors @ errors.T)
+        return np.sqrt(np.maximum(squares, 0.0)), axes.T @ whiten
 
     @property
     def tests(self) -> int:

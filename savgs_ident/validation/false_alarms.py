@@ -100,8 +100,8 @@ class AlarmBench:
             return None
         # On nodes of its own: what finitely many of them cost is then not the same in truth and model.
         there = plant.predict((), truth, asked, plant.refined((), truth, found.warm_start))
-        noise = base.noise_scales.noise * np.sqrt(self.problem.data.variance)
-        rows = there.rows + noise * random.standard_normal(there.rows.size)
+        scales, data = base.noise_scales, self.problem.data
+        rows = there.rows + data.draw_errors(scales.noise, scales.discrepancy, random)
         return self._recalibrated(rows, self._estimated_variance(random)) if there.solved else None
 
     def _estimated_variance(self, random: np.random.Generator) -> NDArray[np.float64]:

@@ -138,16 +138,6 @@ def test_a_bound_is_kept_and_the_others_make_the_best_of_it() -> None:
             assert value < top.value
 
 
-def test_rows_that_are_left_out_do_not_count() -> None:
-    data, residual, slopes = _problem(4)
-    kept = data.test % 2 == 0
-    wide = np.full(3, np.inf)
-    top = linearised_optimum(data, residual, slopes, np.zeros(3), (-wide, wide), kept)
-    spoilt = np.where(kept, residual, 1e3)
-    again = linearised_optimum(data, spoilt, slopes, np.zeros(3), (-wide, wide), kept)
-    np.testing.assert_array_equal(top.x, again.x)
-
-
 @given(st.floats(-5.0, 5.0), st.floats(0.1, 3.0), st.floats(-2.0, 2.0))
 def test_coordinates_and_values_are_each_others_inverse(x: float, scale: float, centre: float) -> None:
     for coordinate in (Linear("k", "N/m", centre, scale), Logarithmic("v", "m/s", np.exp(centre), scale)):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from savgs_ident.diagnosis.gap import Rows, shrinks
+from savgs_ident.diagnosis.result import Shrink
 from savgs_ident.inference.observations import Data
 
 TESTS, ROWS = 30, 40
@@ -69,3 +70,13 @@ def test_a_channel_that_is_missing_in_a_test_does_not_count_there() -> None:
     off = truth * np.where(channel == 0, 1.03, 1.04)
     together, _ = shrinks(part, Rows(truth[kept], off[kept], truth[kept], channel[kept], CHANNELS))
     assert together.recalibrated == pytest.approx(np.sqrt((0.03**2 + 0.04**2) / 2.0), rel=1e-3)
+
+
+def test_what_calibration_and_the_effect_close_make_up_the_whole() -> None:
+    """Of squares beyond the noise: what is left after both is the product of what each leaves."""
+    gap = Shrink(0.3, 0.05, 0.004, 0.002, share_closed=0.0, interval=(0.0, 1.0))
+    left = (1.0 - gap.closed_by_calibration) * (1.0 - gap.closed_by_effect)
+    assert left == pytest.approx((0.004**2 - 0.002**2) / (0.3**2 - 0.002**2))
+    assert gap.closed_by_effect == pytest.approx(1.0 - (0.004**2 - 0.002**2) / (0.05**2 - 0.002**2))
+    nothing = Shrink(0.001, 0.001, 0.001, 0.002, share_closed=0.0, interval=(0.0, 1.0))
+    assert np.isnan(nothing.closed_by_effect)

@@ -264,12 +264,6 @@ def test_an_effect_whose_fit_was_lost_is_not_judged_by_its_score() -> None:
     assert alarm_odds(weighed) == pytest.approx(300.0 - np.log(3.0))
 
 
-def test_a_law_is_a_trace_only_if_it_does_next_to_nothing_in_every_test() -> None:
-    assert Change(0.00035, 0.019).is_trace()
-    assert not Change(0.00045, 0.0).is_trace()
-    assert not Change(0.0, 0.021).is_trace()
-
-
 def test_a_hypothesis_that_is_weighed_anew_takes_its_place_and_leaves_the_others() -> None:
     first = _weighed({"none": 0.0, "unknown": 600.0, "rail_viscous": 500.0, "spring_rate": 300.0})
     mine: Any = SimpleNamespace(noise_scales=SimpleNamespace(value=-np.inf))

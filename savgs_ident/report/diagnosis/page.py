@@ -309,8 +309,7 @@ def _facts(diagnosis: Diagnosis) -> tuple[dict[str, object], ...]:
     named = next(
         (each for each in diagnosis.candidates if (each.effects or (str(each.hypothesis),)) == said), None
     )
-    low, high = (percentage(end) for end in shrink.interval)
-    known = np.isfinite(shrink.share_closed)
+    calibrated = np.isfinite(shrink.closed_by_calibration)
     return (
         {
             "name": "Missing",
@@ -331,9 +330,11 @@ def _facts(diagnosis: Diagnosis) -> tuple[dict[str, object], ...]:
             "bad": False,
         },
         {
-            "name": "Share closed",
-            "value": percentage(shrink.share_closed),
-            "then": f"95 %: {low} to {high}" if known else "nothing to close",
+            "name": "Closed by what was found",
+            "value": percentage(shrink.closed_by_effect),
+            "then": f"calibration closed {percentage(shrink.closed_by_calibration)}"
+            if calibrated
+            else "nothing to close",
             "bad": False,
         },
     )

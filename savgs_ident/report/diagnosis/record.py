@@ -141,6 +141,8 @@ def _shrink(each: Shrink) -> dict[str, object]:
         "recalibrated": each.recalibrated,
         "after": each.after,
         "floor": each.floor,
+        "closed_by_calibration": each.closed_by_calibration,
+        "closed_by_effect": each.closed_by_effect,
         "share_closed": each.share_closed,
         "interval": each.interval,
     }

@@ -51,6 +51,8 @@ class _Fit(_Identified["Fit"]):
     def doubts(self, result: "Fit") -> tuple[str, ...]:
         if result.trusted:
             return ()
+        if not result.verdict.explained:
+            return ("the model does not explain the data: look for what is missing with `diagnose`.",)
         if not result.status.ok:
             return (f"{result.status.advice}.",)
         if not all(status.ok for status in result.dwell_status):

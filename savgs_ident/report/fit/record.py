@@ -52,6 +52,7 @@ def fit_record(fit: Fit) -> dict[str, object]:
         "status": fit.status.name.lower(),
         "advice": fit.status.advice,
         "verdict": {
+            "explained": fit.verdict.explained,
             "identifiable": fit.verdict.identifiable,
             "sentences": fit.verdict.sentences,
             "confounded": fit.verdict.confounded,

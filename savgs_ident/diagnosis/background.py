@@ -1,0 +1,97 @@
+"""The background: small errors that every model has, in every hypothesis, so that they are no gap.
+
+No table of a damper is exact, no recorded road arrives without a phase error, no friction is the same at the end of a
+campaign. Such errors are small, and many rows of the data share them; rows taken for independent would turn each into
+tens of nats of evidence for something missing. So all hypotheses, *nothing is missing* among them, carry the same
+random errors, each normal about zero:
+
+    at a port     any sum of the functions that a law there may consist of
+    at an input   amplitude and phase, in each test their own
+
+Their sizes relative to each other are fixed here; their common size is the model's discrepancy d, estimated with each
+hypothesis under a prior whose width is the material size (:class:`~savgs_ident.inference.observations.Data`). What is
+missing is what stands out of them.
+
+Beside them stand errors of known size, which calibration may take up. What the sheet knows as a curve, as the table
+of a damper, has a tolerance at every point of it; and what is identified, a friction or a damping, may change while a
+campaign goes on and parts become warm.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.diagnosis.localisation import InputLocation
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.inference.observations import Data
+from savgs_ident.inference.prior import Scales
+
+Matrix = NDArray[np.float64]
+
+
+def with_background(
+    data: Data,
+    channel: NDArray[np.intp],
+    locations: Sequence[InputLocation],
+    inputs: Matrix,
+    curves: Matrix,
+    drifts: Matrix,
+    constants: DecisionConstants = DEFAULTS,
+) -> Data:
+    """The data with the errors that their rows share.
+
+    ``channel`` (m,) is that of each row; ``locations`` say what laws there can do; ``inputs`` (m, i) is what the
+    inputs' relative errors of one do to the rows [unit of the row], in all tests, ``curves`` (m, t) what relative
+    errors of one do to them at points of curves of the sheet, ``drifts`` (m, n) what relative changes of one of what
+    is identified do.
+    """
+    columns = []
+    for location in locations:
+        functions = location.functions
+        size = relative_change(data, channel, functions) * np.sqrt(functions.shape[1])
+        columns.append(functions[:, size > 0.0] / size[size > 0.0])
+    ratio = constants.input_error / constants.material_error
+    tests = (data.test == test for test in range(data.tests))
+    columns += [ratio * np.where(mine[:, None], inputs, 0.0) for mine in tests]
+    return replace(
+        data,
+        discrepancy_scale=constants.independent_error * data.discrepancy_scale,
+        scales=Scales(discrepancy=constants.material_error),
+        shared=np.concatenate(columns, axis=1),
+        tolerated=np.concatenate(
+            [
+                constants.curve_tolerance * curves,
+                constants.drift_tolerance * drifts * _time_of(data)[:, None],
+            ],
+            axis=1,
+        ),
+    )
+
+
+def relative_change(data: Data, channel: NDArray[np.intp], columns: Matrix) -> NDArray[np.float64]:
+    """How much each of the columns (m, q) changes the response [1], in the channel where it changes most; (q,)."""
+    whole = np.bincount(channel, data.measured**2)
+    squares = np.stack([np.bincount(channel, column**2, whole.size) for column in columns.T], axis=1)
+    return np.asarray(np.sqrt(np.max(squares[whole > 0.0] / whole[whole > 0.0, None], axis=0)))
+
+
+CURVE_POINTS = tuple(np.geomspace(0.01, 1.0, 16).tolist())
+"""Points of a damper's curve to either side, as shares of the largest velocity [1]: as dense as tables are."""
+
+
+def pieces_of_curve(velocity: NDArray[np.float64], force: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """What each point of a damper's curve contributes to its ``force`` (P,) along a motion; they sum up to it.
+
+    Between points the errors are straight. Velocities and forces are in the units of their port, which they keep.
+    """
+    points = np.array([*(-share for share in reversed(CURVE_POINTS)), 0.0, *CURVE_POINTS])
+    relative = velocity / max(float(np.abs(velocity).max()), np.finfo(float).tiny)
+    return [np.interp(relative, points, unit) * force for unit in np.eye(points.size)]
+
+
+def _time_of(data: Data) -> NDArray[np.float64]:
+    """When in the campaign the test of each row was [1], from -1 to 1 in the order of the tests, (m,)."""
+    last = max(data.tests - 1, 1)
+    return 2.0 * data.test / last - 1.0 if data.tests > 1 else np.zeros(data.test.size)

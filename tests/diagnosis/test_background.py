@@ -1,0 +1,82 @@
+"""The background: small errors that every model has are no gap, and what stands out of them is one."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from savgs_ident.core.presentation import no_progress
+from savgs_ident.diagnosis.background import pieces_of_curve, relative_change, with_background
+from savgs_ident.diagnosis.localisation import InputLocation, Law
+from savgs_ident.diagnosis.model_selection import DiagnosisEvidence, recalibrate, select_model
+from savgs_ident.diagnosis.public import baseline_of
+from savgs_ident.diagnosis.quarter_car import quarter_car_problem
+from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.inference.observations import Data
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
+from savgs_ident.simulate.measured import measured_response
+
+
+def _data(tests: int = 5, rows: int = 40) -> Data:
+    random = np.random.default_rng(0)
+    measured = random.standard_normal(tests * rows)
+    return Data(measured, np.full(measured.size, 1e-6), np.abs(measured), np.repeat(np.arange(tests), rows))
+
+
+def test_every_location_has_the_material_size_however_many_functions_it_has() -> None:
+    data, random = _data(), np.random.default_rng(1)
+    channel = np.arange(data.measured.size) % 2
+    for count in (1, 12):
+        columns = random.standard_normal((data.measured.size, count)) * random.uniform(0.1, 10.0, count)
+        place = InputLocation("rail", (Law(columns),), columns)
+        nothing = np.zeros((data.measured.size, 0))
+        there = with_background(data, channel, [place], nothing, nothing, nothing)
+        assert there.shared is not None
+        size = DEFAULTS.material_error * np.sqrt(np.sum(relative_change(data, channel, there.shared) ** 2))
+        assert size == pytest.approx(DEFAULTS.material_error)
+        assert there.scales.discrepancy == DEFAULTS.material_error
+
+
+def test_an_input_errs_in_each_test_by_itself_and_what_is_identified_drifts() -> None:
+    data, nothing = _data(), np.zeros((200, 0))
+    there = with_background(data, np.zeros(200, int), [], np.ones((200, 1)), nothing, np.ones((200, 1)))
+    assert there.shared is not None
+    assert there.tolerated is not None
+    size = DEFAULTS.material_error * there.shared
+    np.testing.assert_allclose(size, DEFAULTS.input_error * (data.test[:, None] == np.arange(5)))
+    np.testing.assert_allclose(there.tolerated[:, 0], DEFAULTS.drift_tolerance * (data.test / 2.0 - 1.0))
+
+
+def test_the_pieces_of_a_curve_are_the_curve() -> None:
+    velocity = np.concatenate([np.linspace(-0.4, 0.3, 101), [0.0]])
+    force = 900.0 * velocity + 300.0 * np.sign(velocity) * np.abs(velocity) ** 0.5
+    pieces = pieces_of_curve(velocity, force)
+    np.testing.assert_allclose(np.sum(pieces, axis=0), force, atol=1e-9)
+    # Each stands for a part of the curve alone.
+    assert max(np.count_nonzero(each) for each in pieces) < 40
+
+
+def _with_damper_off(rig: Rig, share: float, seed: int) -> Rig:
+    random = np.random.default_rng(seed)
+    off = tuple(force * (1.0 + share * float(random.standard_normal())) for force in rig.damper_force)
+    return replace(rig, damper_force=off)
+
+
+def _selected(rig: Rig, campaign: Path) -> DiagnosisEvidence:
+    model = RigModel(rig, ("rail_coulomb", "tyre_friction"))
+    response = measured_response(load_campaign(campaign), model.plant, 9)
+    plant, data = quarter_car_problem(response, *baseline_of(model)[:2])
+    return select_model(recalibrate(plant, data, {}, no_progress), no_progress)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("share", "seed"), [(0.005, 1), (0.005, 2), (0.02, 1), (0.02, 2)])
+def test_a_damper_table_that_is_slightly_off_is_no_gap(
+    rig: Rig, nominal_campaign: Path, share: float, seed: int
+) -> None:
+    evidence = _selected(_with_damper_off(rig, share, seed), nominal_campaign)
+    assert evidence.kind == "none"
+    assert max(each.evidence for each in evidence.localisations) < evidence.findings.base.evidence + 4.0
