@@ -86,6 +86,11 @@ class DiagnosisProblem:
         """Where the effects of a hypothesis act, each location once."""
         return tuple(dict.fromkeys(self.location(name) for name in hypothesis.effects))
 
+    def families(self, hypothesis: Hypothesis) -> tuple[str, ...]:
+        """Where the effects of a hypothesis act and of which kind they are, as location/family, each once."""
+        effects = (self.plant.catalogue[name] for name in hypothesis.effects)
+        return tuple(dict.fromkeys(f"{each.port.location}/{each.law.family.value}" for each in effects))
+
     def parameter_port(self, parameter: str) -> str | None:
         """The location at which a parameter of the plant acts; None for one that no port has (hardpoints)."""
         return self._parameter_ports.get(parameter)

@@ -30,7 +30,8 @@ def write_verdict(
         ports=problem.locations(hypothesis),
         confusable_with=tuple(alternatives),
         sentence=_effects_missing(problem, evidence, alternatives, gap),
-        another_law=evidence.another_law,
+        families=problem.families(hypothesis),
+        law_known=not evidence.another_law,
     )
 
 

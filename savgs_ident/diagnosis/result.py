@@ -79,7 +79,9 @@ class Verdict:
         confusable_with: effects that this campaign cannot distinguish from those named.
         sentence: the verdict in one sentence.
         confusable_ports: of something unknown, ports that this campaign cannot distinguish from the one named.
-        another_law: whether what is named acts by another law than the catalogue's.
+        families: the kinds of what is missing, each as port/family.
+        law_known: whether what is named acts by the law of the catalogue; otherwise that is the nearest.
+        probability: of what is said, all hypotheses summing to 1.
     """
 
     kind: Kind
@@ -88,7 +90,9 @@ class Verdict:
     confusable_with: tuple[str, ...]
     sentence: str
     confusable_ports: tuple[str, ...] = ()
-    another_law: bool = False
+    families: tuple[str, ...] = ()
+    law_known: bool = True
+    probability: float = 1.0
 
     def __str__(self) -> str:
         return self.sentence
