@@ -35,7 +35,7 @@ def candidates_of(
         closed = float("nan")
         if mode is not None and gap > constants.negligible_misfit:
             left = left_over(search, findings.base, mode, constants)
-            closed = 1.0 - left if hypothesis.effects else 0.0
+            closed = 1.0 - left if hypothesis.effects or hypothesis.flexible else 0.0
         found.append(
             Candidate(
                 hypothesis=hypothesis,
@@ -43,7 +43,7 @@ def candidates_of(
                 score_sigma=joint_sigma([scores[name] for name in hypothesis.effects if name in scores]),
                 heldout_gain=float(gain),
                 share_closed=closed,
-                parameters=() if mode is None else estimates_of(mode, scores),
+                parameters=() if mode is None or hypothesis.flexible else estimates_of(mode, scores),
                 refitted=mode is not None,
             )
         )

@@ -35,10 +35,12 @@ class Hypothesis:
     Attributes:
         effects: names of the effects; none of them if nothing is missing.
         unknown: whether it is something else. Then there are no effects.
+        flexible: port/family of a learned law; empty where there is none. Then there are no effects either.
     """
 
     effects: tuple[str, ...] = ()
     unknown: bool = False
+    flexible: str = ""
 
     def __eq__(self, other: object) -> bool:
         """Whether the other one has the same effects."""
@@ -49,16 +51,16 @@ class Hypothesis:
         return hash(self._key)
 
     def __str__(self) -> str:
-        """The effects joined by plus signs, "none" or "unknown"."""
-        return "unknown" if self.unknown else " + ".join(self.effects) or "none"
+        """The effects joined by plus signs, a port/family, "none" or "unknown"."""
+        return "unknown" if self.unknown else self.flexible or " + ".join(self.effects) or "none"
 
     def with_effect(self, name: str) -> Self:
         """The hypothesis with one more effect."""
         return type(self)((*self.effects, name))
 
     @property
-    def _key(self) -> tuple[frozenset[str], bool]:
-        return frozenset(self.effects), self.unknown
+    def _key(self) -> tuple[frozenset[str], bool, str]:
+        return frozenset(self.effects), self.unknown, self.flexible
 
 
 NONE = Hypothesis()
