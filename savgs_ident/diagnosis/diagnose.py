@@ -41,6 +41,7 @@ from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import (
     NONE,
     UNKNOWN,
+    Candidate,
     Diagnosis,
     DiagnosisSettings,
     ForceLoop,
@@ -202,6 +203,9 @@ def _diagnose(
         together, by_channel = shrinks(data, _left_out_rows(problem, held, model))
         apart = _predict_further(refitted, evidence, law, values, further)
     # Before what is named was refitted: the alternatives were not.
+    candidates = candidates_of(
+        evidence.findings, evidence.weighed, held, refitted.search, problem.families, problem.constants
+    )
     alternatives = indistinguishable(selected.weighed, selected.chosen, problem.constants)
     verdict = write_verdict(refitted, evidence, alternatives, together)
     return Diagnosis(
@@ -211,12 +215,10 @@ def _diagnose(
         parameters=base.values,
         identified=model.fit.values,
         verdict=verdict,
-        ports=_port_shares(evidence),
+        ports=_port_shares(evidence, candidates),
         map=plant.gap_map(data, base.prediction.rows),
         cycle=plant.cycle_positions(data, base.prediction.rows),
-        candidates=candidates_of(
-            evidence.findings, evidence.weighed, held, refitted.search, problem.constants
-        ),
+        candidates=candidates,
         shrink=together,
         by_channel=by_channel,
         further=apart,
@@ -261,8 +263,18 @@ def _unsupported(evidence: DiagnosisEvidence, gap: Shrink, constants: DecisionCo
     return gap.recalibrated**2 - gap.floor**2 <= constants.material_share**2
 
 
-def _port_shares(evidence: DiagnosisEvidence) -> tuple[PortShare, ...]:
-    return tuple(PortShare(each.name, each.share, each.free_input_share) for each in evidence.localisations)
+def _port_shares(evidence: DiagnosisEvidence, candidates: Sequence[Candidate]) -> tuple[PortShare, ...]:
+    """Shares of all ports, with the probability that something acts there."""
+    unknown = next((each.probability for each in candidates if each.hypothesis == UNKNOWN), 0.0)
+
+    def probability(port: str) -> float:
+        named = sum(each.probability for each in candidates if port in each.ports)
+        return named + (unknown if port == evidence.port else 0.0)
+
+    return tuple(
+        PortShare(each.name, each.share, each.free_input_share, probability(each.name))
+        for each in evidence.localisations
+    )
 
 
 def _left_out_rows(

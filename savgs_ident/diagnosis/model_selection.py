@@ -88,7 +88,9 @@ class DiagnosisProblem:
         return tuple(dict.fromkeys(self.location(name) for name in hypothesis.effects))
 
     def families(self, hypothesis: Hypothesis) -> tuple[str, ...]:
-        """Where the effects of a hypothesis act and of which kind they are, as location/family, each once."""
+        """Where a hypothesis acts and of which kind it is, as location/family, each once."""
+        if hypothesis.flexible:
+            return (hypothesis.flexible,)
         effects = (self.plant.catalogue[name] for name in hypothesis.effects)
         return tuple(dict.fromkeys(f"{each.port.location}/{each.law.family.value}" for each in effects))
 

@@ -14,6 +14,7 @@ from savgs_ident.core.parameter import Parameter
 from savgs_ident.effects.base import AbstractLaw, Port, PortKind
 from savgs_ident.effects.effect import Effect, effect_at
 from savgs_ident.effects.laws.asymmetry import Asymmetry
+from savgs_ident.effects.laws.attached_oscillator import AttachedOscillator
 from savgs_ident.effects.laws.backlash import Backlash
 from savgs_ident.effects.laws.compliance import Compliance
 from savgs_ident.effects.laws.coulomb import Coulomb
@@ -46,6 +47,7 @@ LAWS: tuple[AbstractLaw, ...] = (
     PreslidingFriction(),
     SaturatingFriction(),
     Viscous(),
+    AttachedOscillator(),
     OneSidedDamping(),
     LinearStiffness(),
     ProgressiveStiffness(),
