@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
     from savgs_ident.plants.two_mass import TwoMass
     from savgs_ident.recordings.recording import Campaign
-    from savgs_ident.report.public import plot_bode
+    from savgs_ident.report.presenters import plot_bode
     from savgs_ident.responses.driven_motion import DrivenMotion, load_motion
     from savgs_ident.responses.harmonic_response import HarmonicResponse
     from savgs_ident.responses.summary import CampaignSummary, inspect
@@ -102,7 +102,7 @@ _PLACES = {
     "close_loop": "control.public",
     "export": "export.public",
     "run_campaigns": "campaigns.run",
-    "plot_bode": "report.public",
+    "plot_bode": "report.presenters",
     # Campaigns of rigs whose truth is known.
     "DWELLS": "simulate.public",
     "draw_truth": "validation.public",
