@@ -73,12 +73,12 @@ class _Fit(_Identified["Fit"]):
     stem = "fit"
 
     def record(self, result: "Fit") -> Mapping[str, Any]:
-        from savgs_ident.report.fit.record import fit_record
+        from savgs_ident.report.fit import fit_record
 
         return fit_record(result)
 
     def text(self, result: "Fit") -> RenderableType:
-        from savgs_ident.report.fit.text import fit_text
+        from savgs_ident.report.fit import fit_text
 
         return fit_text(result)
 
@@ -111,12 +111,12 @@ class _Comparison(_Identified["Comparison"]):
     stem = "bode"
 
     def record(self, result: "Comparison") -> Mapping[str, Any]:
-        from savgs_ident.report.fit.record import bode_record
+        from savgs_ident.report.fit import bode_record
 
         return bode_record(result)
 
     def text(self, result: "Comparison") -> RenderableType:
-        from savgs_ident.report.fit.text import bode_text
+        from savgs_ident.report.fit import bode_text
 
         return bode_text(dict(self.record(result)), result.given)
 
@@ -142,7 +142,7 @@ def comparison_figure(comparison: "Comparison", progress: Progress = no_progress
     with ThreadPoolExecutor(1) as pool:
         solving = pool.submit(comparison.between)
         from savgs_ident.fit.residuals import measured_points, whitened
-        from savgs_ident.report.fit.bode import bode_figure
+        from savgs_ident.report.bode import bode_figure
         from savgs_ident.report.text import channel_labels
     model, frictionless = solving.result()
     given, measured = comparison.given, comparison.measured
@@ -241,9 +241,8 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
         return diagnosis_html(result, result.origin.with_versions(self.packages))
 
     def figures(self, result: "Diagnosis") -> Figures:
-        from savgs_ident.report.diagnosis.bode import diagnosis_bode_figure
+        from savgs_ident.report.diagnosis.compared import diagnosis_bode_figure, drive_figure
         from savgs_ident.report.diagnosis.drawing import rig_figure
-        from savgs_ident.report.diagnosis.drive import drive_figure
         from savgs_ident.report.diagnosis.figures import force_figure, gap_map_figure, shrink_figure
 
         shrink: Figures = {"shrink": lambda: shrink_figure(result)}

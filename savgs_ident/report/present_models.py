@@ -43,7 +43,7 @@ class _SimulatedResponse(AbstractPresenter["SimulatedResponse"]):
         return () if result.trusted else (_UNSOLVED,)
 
     def figures(self, result: "SimulatedResponse") -> Figures:
-        from savgs_ident.report.fit.bode import response_figure
+        from savgs_ident.report.bode import response_figure
         from savgs_ident.report.text import channel_labels
 
         effects, labels = result.origin.effects, tuple(channel_labels(result.model).values())
@@ -143,7 +143,7 @@ class _LinearStudy(AbstractPresenter["LinearStudy"]):
         return linear_html(result, control_origin(result))
 
     def figures(self, result: "LinearStudy") -> Figures:
-        from savgs_ident.report.control.linear_figures import alpha_figure, described_figure, responses_figure
+        from savgs_ident.report.control.linear_page import alpha_figure, described_figure, responses_figure
 
         figures: dict[str, Callable[[], Figure]] = {
             "alpha": lambda: alpha_figure(result.equivalents),
@@ -218,16 +218,16 @@ class _LoopStudy(AbstractPresenter["LoopStudy"]):
         return loop_html(result, _values(result), control_origin(result), result.controller)
 
     def figures(self, result: "LoopStudy") -> Figures:
-        from savgs_ident.report.control import loop_figures
+        from savgs_ident.report.control import loop_page
 
         figures: dict[str, Callable[[], Figure]] = {
-            "closed-loop": lambda: loop_figures.loop_signals_figure(result, _values(result)),
-            "failures": lambda: loop_figures.failures_figure(result),
+            "closed-loop": lambda: loop_page.loop_signals_figure(result, _values(result)),
+            "failures": lambda: loop_page.failures_figure(result),
         }
         if result.on_rigs:
-            figures["rigs"] = lambda: loop_figures.rigs_figure(result)
+            figures["rigs"] = lambda: loop_page.rigs_figure(result)
         if result.causes:
-            figures["causes"] = lambda: loop_figures.causes_figure(result)
+            figures["causes"] = lambda: loop_page.causes_figure(result)
         return figures
 
     def more(self, result: "LoopStudy", folder: Path) -> Iterator[Path]:

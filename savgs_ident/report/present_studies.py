@@ -43,7 +43,7 @@ class _CampaignStudy(AbstractPresenter["CampaignStudy"]):
         return campaigns_html(result, result.settings, result.origin.command)
 
     def figures(self, result: "CampaignStudy") -> Figures:
-        from savgs_ident.report.campaigns.figures import campaigns_figure
+        from savgs_ident.report.campaigns.page import campaigns_figure
 
         return {"campaign": lambda: campaigns_figure(result)} if result.units else {}
 

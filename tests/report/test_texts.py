@@ -24,8 +24,7 @@ from savgs_ident.fit.result import Fit, Verdict
 from savgs_ident.plants.quarter_car.rig import read_rig, write_rig
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.report.campaigns.inspect import campaign_text, summary_record
-from savgs_ident.report.fit.record import fit_record
-from savgs_ident.report.fit.text import fit_text, value_with_error
+from savgs_ident.report.fit import fit_record, fit_text, value_with_error
 from savgs_ident.report.text import plain
 from savgs_ident.responses.summary import inspect
 

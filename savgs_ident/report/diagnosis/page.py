@@ -26,9 +26,14 @@ from savgs_ident.diagnosis.result import (
     Shrink,
 )
 from savgs_ident.plants.quarter_car.model import RigModel
-from savgs_ident.report.diagnosis.bode import compared_channels, diagnosis_bode_figure, first_harmonic_gap
+from savgs_ident.report.diagnosis.compared import (
+    compared_channels,
+    diagnosis_bode_figure,
+    drive_figure,
+    drive_words,
+    first_harmonic_gap,
+)
 from savgs_ident.report.diagnosis.drawing import rig_figure
-from savgs_ident.report.diagnosis.drive import drive_figure, drive_words
 from savgs_ident.report.diagnosis.figures import (
     force_figure,
     gap_channels,
