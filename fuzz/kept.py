@@ -17,7 +17,7 @@ from fuzz.loader import Original
 from fuzz.recordings import packed_table
 from savgs_ident.campaigns.store import FILES, Kept, MadeFrom, keep_result, kept_result
 from savgs_ident.campaigns.study import row_of, study_campaigns
-from savgs_ident.core.output import to_json
+from savgs_ident.core.files import to_json
 from savgs_ident.inference.samplers import nuts as nuts_sampler
 from savgs_ident.inference.samplers.chains import new_checkpoint, open_checkpoint
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, rig_content

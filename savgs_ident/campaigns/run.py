@@ -30,8 +30,7 @@ from savgs_ident.campaigns.store import (
 from savgs_ident.campaigns.study import CampaignRow, CampaignStudy, RowStatus, row_of, study_campaigns
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import Lost, cores, run_tasks
-from savgs_ident.core.files import spelled_out
-from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.files import prepare_folder, spelled_out
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.fit.least_squares import FitSettings
 from savgs_ident.fit.public import fit_with

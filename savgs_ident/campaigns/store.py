@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from savgs_ident.core.files import cannot_write, is_begun
-from savgs_ident.core.output import to_json
+from savgs_ident.core.files import cannot_write, is_begun, to_json
 from savgs_ident.recordings.read import campaign_files, digest_files, map_digest
 from savgs_ident.recordings.recording import unix_time
 

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.parallel import side_by_side
+from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.presentation import Progress
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.problem import AbstractProblem

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Group, RenderableType
 
-from savgs_ident.core.output import warning_record
+from savgs_ident.core.files import warning_record
 from savgs_ident.fit.comparison import Comparison
 from savgs_ident.fit.residuals import (
     Gap,

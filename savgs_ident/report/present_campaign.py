@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import RenderableType
 
-from savgs_ident.core.files import write_bytes
-from savgs_ident.core.output import write_json
+from savgs_ident.core.files import write_bytes, write_json
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.report.presenters import AbstractPresenter, Figures, Shown, is_quarter_car
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import RenderableType
 
-from savgs_ident.core.output import write_json, write_table
+from savgs_ident.core.files import write_json, write_table
 from savgs_ident.core.presentation import Origin, Progress, Result
 from savgs_ident.report.presenters import AbstractPresenter, Figures
 

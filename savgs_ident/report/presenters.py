@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from rich.console import RenderableType
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.files import write_bytes
-from savgs_ident.core.output import write_json
+from savgs_ident.core.files import write_bytes, write_json
 from savgs_ident.core.presentation import Progress, Result
 
 if TYPE_CHECKING:

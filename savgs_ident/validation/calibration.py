@@ -23,8 +23,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from savgs_ident.core.files import record_of
-from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.files import prepare_folder, record_of
 from savgs_ident.core.parameter import Parameter, ParameterTable
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.sampling import question_about

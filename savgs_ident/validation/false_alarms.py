@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from scipy.stats import beta
 from threadpoolctl import threadpool_limits
 
-from savgs_ident.core.files import record_of
-from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.files import prepare_folder, record_of
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.diagnosis.model_selection import DiagnosisProblem, recalibrate, select_model
 from savgs_ident.diagnosis.public import baseline_of

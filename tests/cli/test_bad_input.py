@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from savgs_ident.core import output
+from savgs_ident.core import files
 from savgs_ident.plants.quarter_car.catalogue import EFFECTS
 from savgs_ident.plants.quarter_car.rig import default_rig_path
 
@@ -74,7 +74,7 @@ def test_a_full_disk_is_said(
     def full(path: Path, content: bytes) -> Path:
         raise OSError(errno.ENOSPC, "No space left on device", str(path))
 
-    monkeypatch.setattr(output, "write_bytes", full)
+    monkeypatch.setattr(files, "write_bytes", full)
     done = invoke("inspect", short_campaign, "--out", tmp_path / "o")
     assert done.exit_code == 2
     assert "inspect.json: No space left on device" in flat(done.stderr)

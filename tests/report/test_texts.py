@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 from rich.console import Console, RenderableType
 
 from savgs_ident.core.errors import DataWarning
-from savgs_ident.core.output import to_json
+from savgs_ident.core.files import to_json
 from savgs_ident.core.presentation import Origin
 from savgs_ident.core.status import Status
 from savgs_ident.fit.residuals import chi2_by_dwell

@@ -20,8 +20,7 @@ from scipy.stats import norm
 
 from savgs_ident.campaigns.study import CampaignStudy, RowStatus
 from savgs_ident.campaigns.trends import CONFIDENCE, Line
-from savgs_ident.core.files import write_bytes
-from savgs_ident.core.output import write_table
+from savgs_ident.core.files import write_bytes, write_table
 from savgs_ident.core.presentation import package_versions
 from savgs_ident.report.campaigns.record import (
     TREND_HEADERS,

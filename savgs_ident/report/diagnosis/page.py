@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from savgs_ident.core.files import write_bytes
-from savgs_ident.core.output import write_json
+from savgs_ident.core.files import write_bytes, write_json
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.presentation import Origin
 from savgs_ident.diagnosis.result import (
