@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 
 from benchmarks.outcome import Outcome, Progress
 from benchmarks.task import ORDERS, TOLERANCE_PERCENT, Harmonics, Task, errors_percent
-from savgs_ident.effects.base import PortSignals
-from savgs_ident.effects.bristle import Presliding, bristle
+from savgs_ident.effects.base import PortSignals, Presliding, bristle
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.dynamics import Coordinates

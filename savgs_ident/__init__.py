@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from savgs_ident.diagnosis.public import diagnose
     from savgs_ident.diagnosis.result import Diagnosis
     from savgs_ident.effects.base import Number, Port, PortKind, PortSignals
-    from savgs_ident.effects.effect import Effect
-    from savgs_ident.effects.generic import generic_effects
+    from savgs_ident.effects.effect import Effect, generic_effects
     from savgs_ident.export.public import Exported, export
     from savgs_ident.fit.comparison import Comparison, compare
     from savgs_ident.fit.public import demo, fit
@@ -84,7 +83,7 @@ _PLACES = {
     "PortKind": "effects.base",
     "PortSignals": "effects.base",
     "TwoMass": "plants.two_mass",
-    "generic_effects": "effects.generic",
+    "generic_effects": "effects.effect",
     # What is done with it, a command each.
     "demo": "fit.public",
     "inspect": "responses.summary",

@@ -360,7 +360,7 @@ def _no_answer(address: str, what: str) -> InputError:
 
 
 Item = TypeVar("Item")
-Result = TypeVar("Result")
+Other = TypeVar("Other")
 
 
 def in_parallel(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:

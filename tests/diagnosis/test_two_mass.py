@@ -13,7 +13,7 @@ from savgs_ident.diagnosis.localisation import localise
 from savgs_ident.diagnosis.location_hypotheses import input_locations
 from savgs_ident.diagnosis.search import forward_selection
 from savgs_ident.diagnosis.verdict import most_probable
-from savgs_ident.effects.generic import generic_effects
+from savgs_ident.effects.effect import generic_effects
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
 from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import PortKind
-from savgs_ident.effects.generic import generic_effects
+from savgs_ident.effects.effect import generic_effects
 from savgs_ident.plants.axis import Axis
 from savgs_ident.plants.base import (
     AbstractPlant,

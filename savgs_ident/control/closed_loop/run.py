@@ -23,8 +23,13 @@ from savgs_ident.control.closed_loop.stabilised import STABLE, stabilised_step
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values
-from savgs_ident.effects.base import SETTLING, AbstractInputLaw, AbstractSensorLaw, AbstractSeriesLaw
-from savgs_ident.effects.bristle import DRAG_TIME
+from savgs_ident.effects.base import (
+    DRAG_TIME,
+    SETTLING,
+    AbstractInputLaw,
+    AbstractSensorLaw,
+    AbstractSeriesLaw,
+)
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.profiles import Constant
 from savgs_ident.plants.quarter_car.actuation import RigSource
