@@ -19,7 +19,7 @@ from savgs_ident.core.values import Values
 from savgs_ident.effects.base import AbstractNumberLaw, Port, Role
 from savgs_ident.effects.effect import effect_at
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
-from savgs_ident.plants.quarter_car.damper import damper_curve
+from savgs_ident.plants.quarter_car.forces import damper_curve
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.ports import INERTIA
 from savgs_ident.plants.quarter_car.rig import Rig

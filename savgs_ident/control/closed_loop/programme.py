@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.plants.profiles import Faded, LinearSweep, Sine, tabulated
-from savgs_ident.plants.quarter_car.road import RoadMotion
+from savgs_ident.plants.quarter_car.inputs import RoadMotion
 
 ROUGHNESS: Mapping[str, float] = MappingProxyType({"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6})
 """Geometric mean of G_d(n_0) of the classes [m^3], ISO 8608 table C.1."""

@@ -32,14 +32,12 @@ from savgs_ident.effects.base import (
 )
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.profiles import Constant
-from savgs_ident.plants.quarter_car.actuation import RigSource
 from savgs_ident.plants.quarter_car.drive import Drive, VelocityReference, drive_state
 from savgs_ident.plants.quarter_car.dynamics import TRAVEL, Coordinates, SectionCurves
-from savgs_ident.plants.quarter_car.equilibrium import deflection_zero
+from savgs_ident.plants.quarter_car.forces import Inputs
+from savgs_ident.plants.quarter_car.inputs import RigSource, RoadMotion
 from savgs_ident.plants.quarter_car.kinematics import suspension_travel
-from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.road import RoadMotion
-from savgs_ident.plants.quarter_car.tyre import Inputs
+from savgs_ident.plants.quarter_car.plant import QuarterCar, deflection_zero
 from savgs_ident.simulate.transient import pack_state, rest_state, state_rates, unpack_state
 
 FRAME = 20
