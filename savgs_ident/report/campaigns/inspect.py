@@ -15,8 +15,7 @@ from matplotlib.ticker import MultipleLocator
 from rich.console import Group, RenderableType
 
 from savgs_ident.core.files import warning_record
-from savgs_ident.recordings.layout import RecordingLayout
-from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
+from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording, RecordingLayout
 from savgs_ident.report.text import (
     ChannelLabel,
     fixed,
