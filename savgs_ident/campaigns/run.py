@@ -17,12 +17,15 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from savgs_ident import __version__
-from savgs_ident.campaigns.search import Found, check_apart, find_campaigns, in_natural_order
 from savgs_ident.campaigns.store import (
+    Found,
     Kept,
     MadeFrom,
+    check_apart,
+    find_campaigns,
     forget_parts,
     has_result,
+    in_natural_order,
     keep_result,
     kept_result,
     made_from,

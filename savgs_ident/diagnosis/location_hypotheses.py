@@ -31,8 +31,7 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.effects.base import Load, Port, PortKind, PortSignals
 from savgs_ident.effects.learned import OF_THE_LOAD, OF_THE_MOTION, functions
 from savgs_ident.plants.base import AbstractPlant
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.periodic import PeriodicSolution, harmonics
 from savgs_ident.simulate.program_cache import placed
 
 if TYPE_CHECKING:

@@ -34,8 +34,7 @@ from savgs_ident.simulate.frequency_response import (
     SimulatedSweep,
     simulate_response,
 )
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.simulate.transient import simulate_transient
 

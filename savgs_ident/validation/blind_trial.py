@@ -27,7 +27,7 @@ from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, parse_rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Recording
-from savgs_ident.simulate.measured import first_sweep, measured_response
+from savgs_ident.simulate.excitation import first_sweep, measured_response
 from savgs_ident.simulate.public import DWELLS
 from savgs_ident.validation.blind_draw import Shares, draw_answer
 from savgs_ident.validation.blind_record import (

@@ -37,9 +37,8 @@ from savgs_ident.inference.sample import SAMPLERS, Question, plan
 from savgs_ident.inference.samplers.chains import SamplingSettings, new_checkpoint
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.measured import every_so_many, measured_response
-from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
+from savgs_ident.simulate.excitation import every_so_many, measured_response
+from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.validation.trials import Kept, marks_of, once_a_process, run_trials
 

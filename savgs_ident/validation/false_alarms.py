@@ -32,7 +32,7 @@ from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.measured import measured_response
+from savgs_ident.simulate.excitation import measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.validation.trials import Kept, marks_of, once_a_process, run_trials
 

@@ -46,8 +46,13 @@ from savgs_ident.plants.quarter_car.inputs import (
 )
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, resolve, simulate_periodic
+from savgs_ident.simulate.periodic import (
+    PeriodicSettings,
+    PeriodicSolution,
+    harmonics,
+    resolve,
+    simulate_periodic,
+)
 from savgs_ident.simulate.program_cache import placed
 from savgs_ident.simulate.public import DWELLS
 from savgs_ident.simulate.transient import pack_state, rest_state, simulate_transient, unpack_state

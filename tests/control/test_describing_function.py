@@ -22,8 +22,7 @@ from savgs_ident.plants.quarter_car.catalogue import build_model, model_paramete
 from savgs_ident.plants.quarter_car.inputs import cam_excitation
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, harmonics, simulate_periodic
 
 CAM = 0.0275
 FREQUENCY = np.array([0.7, 2.0, 4.5])

@@ -17,13 +17,14 @@ from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.profiles import ProfileSource, Sine
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
 from savgs_ident.simulate import transient
-from savgs_ident.simulate.harmonics import harmonics, truncation_error
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
+    harmonics,
     resolve,
     simulate_periodic,
     solve_on_mesh,
+    truncation_error,
 )
 from savgs_ident.simulate.transient import TransientSolution, simulate_transient, solve_rates, transient_loads
 

@@ -12,8 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from savgs_ident.control.closed_loop.laws import KINDS
-from savgs_ident.control.closed_loop.metrics import RPM
-from savgs_ident.control.closed_loop.programme import LoopKind
+from savgs_ident.control.closed_loop.programme import RPM, LoopKind
 from savgs_ident.control.closed_loop.run import Signals
 from savgs_ident.control.closed_loop.study import LoopStudy
 from savgs_ident.core.presentation import Origin
