@@ -61,12 +61,12 @@ class _BlindStudy(AbstractPresenter["BlindStudy"]):
     stem = "blind"
 
     def record(self, result: "BlindStudy") -> Mapping[str, Any]:
-        from savgs_ident.report.validation.blind import blind_record
+        from savgs_ident.report.validation import blind_record
 
         return blind_record(result.scores, result.settings, result.origin.command)
 
     def text(self, result: "BlindStudy") -> RenderableType:
-        from savgs_ident.report.validation.blind import blind_text
+        from savgs_ident.report.validation import blind_text
 
         return blind_text(result.scores)
 
@@ -74,12 +74,12 @@ class _BlindStudy(AbstractPresenter["BlindStudy"]):
         return () if result.trusted else ("the diagnosis is not right as often as it should be.",)
 
     def page(self, result: "BlindStudy") -> str:
-        from savgs_ident.report.validation.blind import blind_html
+        from savgs_ident.report.validation import blind_html
 
         return blind_html(result.scores, result.settings, result.origin.command)
 
     def figures(self, result: "BlindStudy") -> Figures:
-        from savgs_ident.report.validation.blind import confusion_figure
+        from savgs_ident.report.validation import confusion_figure
 
         return {"confusion": lambda: confusion_figure(result.scores)}
 
@@ -88,13 +88,13 @@ class _AlarmStudy(AbstractPresenter["AlarmStudy"]):
     stem = "false_alarms"
 
     def record(self, result: "AlarmStudy") -> Mapping[str, Any]:
-        from savgs_ident.report.validation.calibration import alarms_record
+        from savgs_ident.report.validation import alarms_record
 
         return alarms_record(result)
 
     def text(self, result: "AlarmStudy") -> RenderableType:
         from savgs_ident.report.text import plain
-        from savgs_ident.report.validation.calibration import alarms_text
+        from savgs_ident.report.validation import alarms_text
 
         return plain(alarms_text(self.record(result)))
 
@@ -102,7 +102,7 @@ class _AlarmStudy(AbstractPresenter["AlarmStudy"]):
         return () if result.trusted else ("there are more false alarms than there may be.",)
 
     def figures(self, result: "AlarmStudy") -> Figures:
-        from savgs_ident.report.validation.calibration import alarms_figure
+        from savgs_ident.report.validation import alarms_figure
 
         return {"false_alarms": lambda: alarms_figure(result)}
 
@@ -111,12 +111,12 @@ class _CalibrationStudy(AbstractPresenter["CalibrationStudy"]):
     stem = "calibration"
 
     def record(self, result: "CalibrationStudy") -> Mapping[str, Any]:
-        from savgs_ident.report.validation.calibration import calibration_record
+        from savgs_ident.report.validation import calibration_record
 
         return calibration_record(result)
 
     def text(self, result: "CalibrationStudy") -> RenderableType:
-        from savgs_ident.report.validation.calibration import calibration_text
+        from savgs_ident.report.validation import calibration_text
 
         return calibration_text(self.record(result))
 
@@ -124,7 +124,7 @@ class _CalibrationStudy(AbstractPresenter["CalibrationStudy"]):
         return () if result.trusted else ("coverage or ranks are not what they should be.",)
 
     def figures(self, result: "CalibrationStudy") -> Figures:
-        from savgs_ident.report.validation.calibration import calibration_figure
+        from savgs_ident.report.validation import calibration_figure
 
         return {"calibration": lambda: calibration_figure(result)}
 

@@ -32,6 +32,7 @@ from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import InputSignal
 from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.simulate.collocation import (
+    CyclicFactors,
     Linearised,
     Trajectory,
     blank_linearised,
@@ -40,7 +41,6 @@ from savgs_ident.simulate.collocation import (
     solve_linearised,
     step_defects,
 )
-from savgs_ident.simulate.cyclic import CyclicFactors
 from savgs_ident.simulate.excitation import inputs_at, signals_at
 from savgs_ident.simulate.mesh import Layout, Mesh, adapted_mesh, layout_for, turns, uniform_mesh
 from savgs_ident.simulate.program_cache import placed, stored
