@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.parallel import in_parallel, side_by_side
+from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.diagnosis.candidates import candidates_of, confusable_of, estimates_among, not_judgeable_of

@@ -41,12 +41,12 @@ from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.excitation import measured_excitation
-from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.mesh import Layout, layout_for
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
     adapt,
+    harmonics,
     resolve,
     simulate_periodic,
 )

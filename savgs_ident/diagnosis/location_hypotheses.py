@@ -40,8 +40,7 @@ from savgs_ident.effects.learned import (
     what_gives,
 )
 from savgs_ident.plants.base import AbstractPlant
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.periodic import PeriodicSolution, harmonics
 from savgs_ident.simulate.program_cache import placed
 
 if TYPE_CHECKING:

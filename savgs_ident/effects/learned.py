@@ -31,6 +31,7 @@ from savgs_ident.effects.base import (
     AbstractInputLaw,
     AbstractSensorLaw,
     AbstractSeriesLaw,
+    Bristle,
     Family,
     FrictionLimit,
     Fundamental,
@@ -40,9 +41,10 @@ from savgs_ident.effects.base import (
     Port,
     PortKind,
     PortSignals,
+    Presliding,
     Role,
+    bristle,
 )
-from savgs_ident.effects.bristle import Bristle, Presliding, bristle
 from savgs_ident.effects.effect import Effect, effect_at
 
 

@@ -36,8 +36,7 @@ from savgs_ident.plants.quarter_car.ports import ACCEL, RAIL, ROAD
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 
 from .conftest import Measure
 

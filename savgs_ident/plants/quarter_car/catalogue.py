@@ -37,7 +37,7 @@ from savgs_ident.effects.laws.stribeck import Stribeck
 from savgs_ident.effects.laws.tilt import Tilt
 from savgs_ident.effects.laws.viscous import Viscous
 from savgs_ident.effects.learned import functions_at, learned_effect
-from savgs_ident.plants.quarter_car.damper import damper_curve
+from savgs_ident.plants.quarter_car.forces import damper_curve
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.ports import (
     ACCEL,

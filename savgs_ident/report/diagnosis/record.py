@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from savgs_ident.core.output import warning_record
+from savgs_ident.core.files import warning_record
 from savgs_ident.core.presentation import Origin
 from savgs_ident.diagnosis.result import Candidate, Diagnosis, Estimate, FurtherShrink, Learned, Shrink
 
