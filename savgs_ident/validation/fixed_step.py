@@ -55,7 +55,7 @@ def _integrated(
     samples: int,
 ) -> tuple[State, Array]:
     prepared, size = model.prepare(p), len(model.coordinates)
-    zeros, h = nominal_readings(model, p, prepared), interval / inner
+    zeros, h = nominal_readings(model, p, prepared), interval / inner.astype(interval.dtype)
 
     def rate(t: Array, x: State, near: Array) -> tuple[State, Array]:
         """Rates of the packed state, and the accelerations and rates from which the next are found sooner."""
@@ -73,7 +73,8 @@ def _integrated(
         t = i * interval
         near = rate(t, *carried)[1]
         shown = _readings(model, p, source, t, unpack_state(model, carried[0]), near, prepared)
-        end = jax.lax.fori_loop(0, inner, lambda k, at: advance(t + k * h, *at), (carried[0], near))
+        steps = (carried[0], near)
+        end = jax.lax.fori_loop(0, inner, lambda k, at: advance(t + k.astype(h.dtype) * h, *at), steps)
         return end, shown - jnp.stack(zeros)
 
     guess = jnp.zeros(size + len(model.states))

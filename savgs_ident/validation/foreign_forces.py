@@ -33,6 +33,10 @@ STEEPEST = 20.0
 """Largest exponent of an exponential spring: beyond it the force is so large that it stays what it is."""
 
 
+CENTRING = 1e-3
+"""Stiffness within a play over that of its flanks [1]: a rig at rest has one state then."""
+
+
 def _amplitude(role: str, value: float, unit: str, about: str, most: float = 1e4) -> Parameter:
     """A size that is never negative, at most ``most`` times the typical ``value`` [``unit``]."""
     return Parameter(role, value, unit, lower=0.0, upper=most * value, about=about)
@@ -50,7 +54,7 @@ def _strain(signals: PortSignals, from_rest: bool) -> Scalar:
     return jnp.maximum(signals.displacement, 0.0)
 
 
-def _beyond(displacement: Scalar, gap: Scalar) -> Scalar:
+def _beyond(displacement: Array, gap: Scalar) -> Array:
     """What of a displacement lies beyond a gap to either side, both in one unit."""
     return displacement - jnp.clip(displacement, -gap, gap)
 
@@ -237,10 +241,11 @@ class Clearance(AbstractForceLaw):
 class EndPlay(AbstractSeriesLaw):
     """Play in the path of a load between two damped, elastic flanks.
 
-        tau xd + (x beyond -g/2 .. g/2) = r g (F - F_0) / F_1
+        tau xd + e x + (x beyond -g/2 .. g/2) = r g (F - F_0) / F_1
 
     with the displacement x [m], the play g [m], the load F [N], F_0 at rest, the load F_1 [N] that presses a flank in
-    by the share r [1] of the play and the time tau [s] in which the film between the flanks gives way.
+    by the share r [1] of the play and the time tau [s] in which the film between the flanks gives way. A small e [1]
+    centres what nothing presses.
 
     Source: Nordin, Galic, Gutman 1997, International Journal of Adaptive Control and Signal Processing 11(1), the
     physical model of backlash with a damped shaft.
@@ -267,7 +272,8 @@ class EndPlay(AbstractSeriesLaw):
     def balance(self, v: Values, load: Load, state: State, rate: State) -> State:
         """The displacement out of balance [m]."""
         pressed = v["share"] * v["play"] * load.beyond_rest / v["load"]
-        return (v["time"] + SETTLING) * rate + _beyond(state[0], v["play"] / 2.0) - pressed
+        there = CENTRING * state + _beyond(state, v["play"] / 2.0)
+        return (v["time"] + SETTLING) * rate + there - pressed
 
 
 def _attached_mass(port: Port) -> dict[str, Parameter | float]:

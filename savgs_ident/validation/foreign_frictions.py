@@ -1,7 +1,8 @@
 """Friction by other formulas than the catalogue's.
 
 Each law has a bristle or a reversal of its own and counts as a share beside what the port has. Internal states are
-those of unit friction, so that the laws are regular where the friction vanishes.
+those of unit friction, so that the laws are regular where the friction vanishes. Bristles creep back by a hundredth a
+second: a rig at rest has one state then.
 
 They are the truth of foreign trials (:mod:`savgs_ident.validation.foreign_laws`): no diagnosis knows them.
 """
@@ -24,6 +25,7 @@ from savgs_ident.effects.base import (
     PortSignals,
     Role,
 )
+from savgs_ident.effects.bristle import CREEP
 
 Scalar = Float[Array, ""]
 State = Float[Array, " s"]
@@ -116,7 +118,7 @@ class Dahl(AbstractForceLaw):
     def rate(self, v: Values, signals: PortSignals, state: State) -> State:
         """Rate of the bristle [1/s]."""
         speed = signals.velocity
-        return ((speed - jnp.abs(speed) * state[0]) / v["stretch"])[None]
+        return (speed - jnp.abs(speed) * state) / v["stretch"] - CREEP * state
 
 
 class LuGre(AbstractForceLaw):
@@ -162,7 +164,7 @@ class LuGre(AbstractForceLaw):
         """Rate of the bristle [1/s]."""
         speed = signals.velocity
         level = 1.0 + v["rise"] * jnp.exp(-((speed / v["velocity"]) ** 2))
-        return ((speed - jnp.abs(speed) * state[0] / level) / v["stretch"])[None]
+        return (speed - jnp.abs(speed) * state / level) / v["stretch"] - CREEP * state
 
 
 class BoucWen(AbstractForceLaw):
@@ -194,10 +196,10 @@ class BoucWen(AbstractForceLaw):
 
     def rate(self, v: Values, signals: PortSignals, state: State) -> State:
         """Rate of the hysteretic variable [1/s]."""
-        speed, z = signals.velocity, state[0]
-        along = v["beta"] * jnp.abs(speed) * jnp.abs(z) * z
-        across = (1.0 - v["beta"]) * speed * z**2
-        return ((speed - along - across) / v["stretch"])[None]
+        speed = signals.velocity
+        along = v["beta"] * jnp.abs(speed) * jnp.abs(state) * state
+        across = (1.0 - v["beta"]) * speed * state**2
+        return (speed - along - across) / v["stretch"] - CREEP * state
 
 
 class SmoothFriction(AbstractForceLaw):
