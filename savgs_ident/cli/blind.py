@@ -80,7 +80,9 @@ def blind(
 
     Exit code 1 if the diagnosis is not right as often as it should be.
 
-    Examples: savgs-ident blind --trials 60 --seed 1; savgs-ident blind --foreign --trials 60 --seed 1
+    Example: savgs-ident blind --trials 60 --seed 1
+
+    Example: savgs-ident blind --foreign --trials 60 --seed 1
     """
     # Checks that call back into Python from a compiled program would keep it from being kept for the next run; a
     # failed one gives NaN then, which is looked for. Has to be said before the libraries are loaded.

@@ -142,7 +142,7 @@ def verdict_of(score: Score) -> str:
     several = TWO if score.both_named else OTHERS
     if score.kind == "foreign" and score.family_right:
         return truth_of(score)
-    words = {"none": NOTHING, "several": several, "effect": "".join(score.said[:1])}
+    words = {"none": NOTHING, "several": several, "effect": "".join(score.said[:1]) or OTHERS}
     return words.get(score.verdict, score.verdict)
 
 

@@ -64,7 +64,8 @@ class Score:
         both_named: both drawn effects and no other are named; of trials with two.
         share_closed: share of the explainable gap that the diagnosis closed, on tests held out; None if there
             is none or the diagnosis does not say.
-        intervals: of the effects' parameters, where the verdict names all of them and no other.
+        intervals: of the effects' parameters, where the verdict names all of them and no other; in a foreign trial,
+            of those of the rig's own that mean something.
         wall_s: how long the diagnosis took [s].
         foreign: whether it is a foreign trial.
         families: what the verdict says is missing, each as port/family.
@@ -147,7 +148,8 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any], version: str = "") ->
     here = set(verdict["ports"]) == set(answer.ports) and verdict["kind"] != "none"
     beside = verdict["kind"] == "unknown" and set(answer.ports) <= {*verdict["confusable_ports"]}
     kind, families = answer.kind, tuple(verdict.get("families", ()))
-    cataloguing = kind not in ("none", "foreign")
+    cataloguing, foreign = kind not in ("none", "foreign"), answer.small_errors is not None
+    own = _intervals(answer, diagnosis) if right else {}
     return Score(
         number=answer.number,
         kind=kind,
@@ -163,11 +165,9 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any], version: str = "") ->
         unknown_recognised=verdict["kind"] == "unknown" if kind == "unknown" else None,
         both_named=right if kind == "two" else None,
         share_closed=diagnosis["shrink"]["share_closed"],
-        intervals=_intervals(answer, diagnosis)
-        if right and kind != "foreign"
-        else _rig_intervals(answer, diagnosis),
+        intervals=_rig_intervals(answer, diagnosis) if foreign else own,
         wall_s=float(diagnosis["wall_s"]),
-        foreign=answer.small_errors is not None,
+        foreign=foreign,
         families=families,
         sigmas=tuple(answer.sigmas[name] for name in answer.effects if name in answer.sigmas),
         port_right=_port_right(answer, verdict) if kind == "foreign" else None,
@@ -208,8 +208,6 @@ def _rig_intervals(answer: Answer, diagnosis: Mapping[str, Any]) -> dict[str, In
 
     Rail friction that drifts has its mean as the true value.
     """
-    if answer.small_errors is None or diagnosis["verdict"]["kind"] == FAILED:
-        return {}
     there = {f"{port}/{family}" for port in answer.ports for family in answer.families}
     given = diagnosis.get("intervals", {})
     return {
@@ -227,7 +225,7 @@ def score_from(record: Mapping[str, Any]) -> Score:
     if score.verdict not in _VERDICTS or not ({*score.effects} <= known and {*score.said} <= {*CATALOGUE}):
         raise ValueError(f"trial {score.number} is about something unknown")
     if (score.kind in ("effect", "foreign") and len(score.effects) != 1) or (
-        score.verdict == "effect" and not score.said
+        score.verdict == "effect" and not (score.said or score.families)
     ):
         raise ValueError(f"trial {score.number} names no effect")
     return score
