@@ -71,6 +71,7 @@ class Score:
         families: what the verdict says is missing, each as port/family.
         sigmas: by how many standard deviations each effect stands out, in the order of ``effects``.
         port_right: something is named or unknown, at ports that are right alone; of foreign trials with an effect.
+        port_listed: the same, or a right port is among those that the verdict lists as indistinguishable; of the same.
         family_right: a family is named, with ports and families that are right alone; of the same.
         probability: that the verdict states; None if it states none.
         closed_by_effect: share of the recalibrated gap that what is named closes, on tests held out; None as above.
@@ -97,6 +98,7 @@ class Score:
     families: tuple[str, ...] = ()
     sigmas: tuple[float, ...] = ()
     port_right: bool | None = None
+    port_listed: bool | None = None
     family_right: bool | None = None
     probability: float | None = None
     closed_by_effect: float | None = None
@@ -171,6 +173,7 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any], version: str = "") ->
         families=families,
         sigmas=tuple(answer.sigmas[name] for name in answer.effects if name in answer.sigmas),
         port_right=_port_right(answer, verdict) if kind == "foreign" else None,
+        port_listed=_port_listed(answer, verdict) if kind == "foreign" else None,
         family_right=_family_right(answer, verdict, families) if kind == "foreign" else None,
         probability=_number_or_none(verdict.get("probability")),
         closed_by_effect=_number_or_none(diagnosis["shrink"].get("closed_by_effect")),
@@ -182,6 +185,14 @@ def _port_right(answer: Answer, verdict: Mapping[str, Any]) -> bool:
     """Whether something is said to be missing, at ports that are right alone."""
     ports = set(verdict["ports"])
     return verdict["kind"] not in ("none", FAILED) and bool(ports) and ports <= {*answer.accepted}
+
+
+def _port_listed(answer: Answer, verdict: Mapping[str, Any]) -> bool:
+    """Whether the ports are right, or one that is right is listed as indistinguishable from them."""
+    listed = verdict["kind"] not in ("none", FAILED) and bool(
+        {*verdict["confusable_ports"]} & {*answer.accepted}
+    )
+    return listed or _port_right(answer, verdict)
 
 
 def _family_right(answer: Answer, verdict: Mapping[str, Any], families: Sequence[str]) -> bool:

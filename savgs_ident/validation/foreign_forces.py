@@ -353,8 +353,13 @@ class HardeningOscillator(AbstractForceLaw):
     )
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
-        """A small mass on mounts of 8 Hz that are twice as stiff at half the typical displacement."""
-        return _attached_mass(port) | {"damping_ratio": 0.1, "strain": 0.5 * port.displacement}
+        """A small mass on mounts of 9 Hz that are twice as stiff at one and a half times the typical displacement.
+
+        So much damping that there is one motion, not two.
+        """
+        frequency = _shape("frequency", 9.0, "Hz", "natural frequency in small motions", 1.5)
+        shapes = {"frequency": frequency, "damping_ratio": 0.15, "strain": 1.5 * port.displacement}
+        return _attached_mass(port) | shapes
 
     def states(self, port: Port) -> tuple[InternalState, ...]:
         """Displacement and velocity of the mass."""

@@ -82,6 +82,13 @@ def test_port_and_family_are_right_only_alone(verdict: dict[str, Any], port: boo
     assert score.foreign
 
 
+def test_a_right_port_may_be_listed_beside_the_one_that_is_named() -> None:
+    score = score_of(foreign("strut_buffer"), said("unknown", ports=["suspension"], beside=["strut"]))
+    assert (score.port_right, score.port_listed, score.family_right) == (False, True, False)
+    assert not said_right(score)
+    assert score_of(foreign("strut_buffer"), said("none", beside=["strut"])).port_listed is False
+
+
 def test_what_swings_on_the_body_may_be_put_at_the_masses() -> None:
     truth = foreign("body_oscillator")
     assert score_of(truth, said("effect", "inertia/oscillator")).family_right is True

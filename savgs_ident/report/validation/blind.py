@@ -37,6 +37,7 @@ RATE_WORDS: Mapping[str, str] = {
     "named_exactly": "Effect named strictly, without indistinguishable ones",
     "located_exactly": "Located strictly, without indistinguishable ports",
     "port_right": "Foreign effect put at a right port",
+    "port_listed": "The same, or a right port listed as not distinguishable",
     "family_right": "Foreign effect given a right family",
     "closed_by_effect_90": "Nine tenths of the recalibrated gap closed",
 }
