@@ -71,7 +71,7 @@ class Score:
         families: what the verdict says is missing, each as port/family.
         sigmas: by how many standard deviations each effect stands out, in the order of ``effects``.
         port_right: something is named or unknown, at ports that are right alone; of foreign trials with an effect.
-        port_listed: the same, or a right port is among those that the verdict lists as indistinguishable; of the same.
+        port_listed: the same, or a right port is listed as indistinguishable from them; of the same.
         family_right: a family is named, with ports and families that are right alone; of the same.
         probability: that the verdict states; None if it states none.
         closed_by_effect: share of the recalibrated gap that what is named closes, on tests held out; None as above.

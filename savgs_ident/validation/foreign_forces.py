@@ -358,6 +358,7 @@ class HardeningOscillator(AbstractForceLaw):
         So much damping that there is one motion, not two.
         """
         frequency = _shape("frequency", 9.0, "Hz", "natural frequency in small motions", 1.5)
+        shapes: dict[str, Parameter | float]
         shapes = {"frequency": frequency, "damping_ratio": 0.15, "strain": 1.5 * port.displacement}
         return _attached_mass(port) | shapes
 
