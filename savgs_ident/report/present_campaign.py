@@ -84,12 +84,12 @@ class _Fit(_Identified["Fit"]):
     def doubts(self, result: "Fit") -> tuple[str, ...]:
         if result.trusted:
             return ()
-        if not result.verdict.explained:
-            return ("the model does not explain the data: look for what is missing with `diagnose`.",)
         if not result.status.ok:
             return (f"{result.status.advice}.",)
         if not all(status.ok for status in result.dwell_status):
             return ("the model's periodic motion was not found in every dwell.",)
+        if not result.verdict.explained:
+            return ("the model does not explain the data: look for what is missing with `diagnose`.",)
         return ("the data do not identify every free parameter.",)
 
     def comparison(self, result: "Fit") -> "Comparison":
