@@ -51,12 +51,20 @@ SHARING = ("control", "diagnosis", "export", "fit", "inference", "simulate")
 """Folders whose tests share expensive fixtures and compiled programs: one process takes all of a folder."""
 
 
+UNOPTIMISED = "--xla_backend_optimization_level=0"
+"""The compiler takes half the time with it. The fast tests compile more than they compute; `make test-all` compiles
+everything as in use."""
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Nothing is cached outside temporary folders; and the compiler is set up before the first program."""
     if not hasattr(config, "workerinput"):
         folder = Path(tempfile.mkdtemp(prefix="savgs-ident-tests-"))
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
         os.environ.update({name: str(folder / name.lower()) for name in SCRATCH})
+        flags = os.environ.get("XLA_FLAGS", "")
+        if config.getoption("markexpr") == "not slow" and "optimization_level" not in flags:
+            os.environ["XLA_FLAGS"] = f"{flags} {UNOPTIMISED}".strip()
     from savgs_ident.simulate.program_cache import spare_the_compiler
 
     spare_the_compiler()
