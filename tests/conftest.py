@@ -47,8 +47,11 @@ SHARED = REPOSITORY.parent / "shared" / "data"
 SCRATCH = ("SAVGS_IDENT_CACHE", "XDG_CACHE_HOME", "MPLCONFIGDIR", "HYPOTHESIS_STORAGE_DIRECTORY")
 """Variables that name folders of caches; all processes of a run share one that is removed in the end."""
 
-SHARING = ("control", "diagnosis", "export", "fit", "inference", "simulate")
-"""Folders whose tests share expensive fixtures and compiled programs: one process takes all of a folder."""
+SHARING = {
+    **{folder: folder for folder in ("control", "diagnosis", "export", "fit", "inference", "simulate")},
+    **dict.fromkeys(("effects", "symbolic"), "laws"),
+}
+"""Folders whose tests share expensive fixtures and compiled programs, and their room: one process takes all of it."""
 
 
 UNOPTIMISED = "--xla_backend_optimization_level=0"
@@ -75,7 +78,7 @@ class _Rooms(LoadScopeScheduling):
 
     def _split_scope(self, nodeid: str) -> str:
         path = Path(nodeid.partition("::")[0])
-        return path.parts[1] if path.parts[0] == "tests" and path.parts[1] in SHARING else str(path)
+        return SHARING.get(path.parts[1], str(path)) if path.parts[0] == "tests" else str(path)
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -260,11 +260,13 @@ def test_distributed_masses_weigh_in_heave_what_the_lumped_ones_do(
     assert distributed.mass.sum() == pytest.approx(total, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_distributed_masses_are_positive_and_symmetric(distributed: TwoMasses) -> None:
     assert distributed.mass == pytest.approx(distributed.mass.T, rel=1e-12)
     assert np.min(np.linalg.eigvalsh(distributed.mass)) > 0.0
 
 
+@pytest.mark.slow
 def test_distributed_masses_hold_the_kinetic_energy_of_the_bodies(
     distributed: TwoMasses, numbers: Values
 ) -> None:
