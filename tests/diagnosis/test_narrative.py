@@ -21,6 +21,7 @@ RAIL: Any = SimpleNamespace(name="rail", share=0.9, evidence=50.0)
 PROBLEM: Any = SimpleNamespace(
     constants=DEFAULTS,
     locations=lambda hypothesis: tuple(CATALOGUE[name].port.location for name in hypothesis.effects),
+    families=lambda hypothesis: tuple(hypothesis.effects),
 )
 
 
