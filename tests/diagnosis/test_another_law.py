@@ -124,7 +124,7 @@ def test_an_effect_by_another_law_is_named(
     assert diagnosis.verdict.kind == "effect"
     assert diagnosis.verdict.effects == (name,)
     assert diagnosis.verdict.ports == (port,)
-    assert diagnosis.verdict.another_law
+    assert not diagnosis.verdict.law_known
     assert "Its law differs from that of the catalogue" in diagnosis.verdict.sentence
     assert diagnosis.candidates[0].effects == (name,)
     assert diagnosis.shrink.share_closed > 0.9
@@ -137,5 +137,5 @@ def test_a_wave_that_no_cam_of_the_catalogue_has_is_unknown_at_the_road(
     diagnosis = diagnose_response(_recorded(measure_few("nominal"), rig, WAVY), rig)
     assert diagnosis.verdict.kind == "unknown"
     assert diagnosis.verdict.ports == ("road",)
-    assert not diagnosis.verdict.another_law
+    assert diagnosis.verdict.law_known
     assert diagnosis.shrink.share_closed > 0.9
