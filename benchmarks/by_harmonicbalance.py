@@ -25,14 +25,12 @@ from numpy.typing import NDArray
 
 from benchmarks.outcome import Outcome, Progress
 from benchmarks.task import ORDERS, TOLERANCE_PERCENT, Harmonics, Task, errors_percent
-from savgs_ident.effects.base import PortSignals
-from savgs_ident.effects.bristle import Presliding, bristle
+from savgs_ident.effects.base import PortSignals, Presliding, bristle
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
 from savgs_ident.plants.quarter_car.kinematics import suspension_travel
-from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Inputs, Road
 
 LADDER = (40, 60, 80)
 """Orders that are tried, in turn."""

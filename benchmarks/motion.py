@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from benchmarks.task import ORDERS, Harmonics, Task
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.dynamics import Coordinates, SectionCurves
+from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
 from savgs_ident.plants.quarter_car.kinematics import suspension_travel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Inputs, Road
 from savgs_ident.simulate.transient import solve_rates
 
 STATE_SCALE = np.array([1e-2, 3e-2, 1e-1, 3e-1, 1e-2])

@@ -25,9 +25,8 @@ from savgs_ident.core.values import Values
 from savgs_ident.inference.problem import Problem
 from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.quarter_car.dynamics import SectionCurves, section_curves
-from savgs_ident.plants.quarter_car.equilibrium import static_equilibrium
-from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Inputs, Road
+from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
+from savgs_ident.plants.quarter_car.plant import static_equilibrium
 
 SEED = 2
 

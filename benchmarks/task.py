@@ -18,10 +18,9 @@ from savgs_ident.core.values import as_values
 from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
 from savgs_ident.plants.quarter_car.dynamics import SectionCurves, section_curves
-from savgs_ident.plants.quarter_car.equilibrium import static_equilibrium
-from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.inputs import cam_excitation
+from savgs_ident.plants.quarter_car.plant import QuarterCar, static_equilibrium
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
-from savgs_ident.plants.quarter_car.road import cam_excitation
 
 DWELLS_HZ = (
     0.5, 0.8, 1.1, 1.4, 1.6, 1.75, 1.85, 1.95, 2.0, 2.05, 2.15, 2.25, 2.3, 2.35, 2.4, 2.45, 2.55, 2.65, 2.75,

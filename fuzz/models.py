@@ -14,10 +14,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from fuzz.loader import Original
-from savgs_ident.control.design import DigitalController, controller_record, read_controller
+from savgs_ident.control.design import (
+    DigitalController,
+    controller_record,
+    read_controller,
+    rigs_from_covariance,
+    rigs_from_posterior,
+)
 from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS, read_weights
 from savgs_ident.control.linear_equivalent import AlphaMap
-from savgs_ident.control.rigs import rigs_from_covariance, rigs_from_posterior
 from savgs_ident.export.document import json_text
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.json_export import model_record, read_model_json, write_json

@@ -13,8 +13,8 @@ from scipy.io import savemat
 from fuzz.cdr import IMU, JOINTS, imu_message, joint_message, number_message, text_message
 from fuzz.loader import Original
 from fuzz.mcap_files import Message, Topic, mcap_bytes
+from savgs_ident.plants.quarter_car.inputs import read_road
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
-from savgs_ident.plants.quarter_car.road import read_road
 from savgs_ident.recordings.axis_recording import read_axis
 from savgs_ident.recordings.channels import read_channel_map
 

@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from savgs_ident.diagnosis.public import diagnose
     from savgs_ident.diagnosis.result import Diagnosis
     from savgs_ident.effects.base import Number, Port, PortKind, PortSignals
-    from savgs_ident.effects.effect import Effect
-    from savgs_ident.effects.generic import generic_effects
+    from savgs_ident.effects.effect import Effect, generic_effects
     from savgs_ident.export.public import Exported, export
     from savgs_ident.fit.comparison import Comparison, compare
     from savgs_ident.fit.public import demo, fit
@@ -50,7 +49,7 @@ if TYPE_CHECKING:
     from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
     from savgs_ident.plants.two_mass import TwoMass
     from savgs_ident.recordings.recording import Campaign
-    from savgs_ident.report.public import plot_bode
+    from savgs_ident.report.presenters import plot_bode
     from savgs_ident.responses.driven_motion import DrivenMotion, load_motion
     from savgs_ident.responses.harmonic_response import HarmonicResponse
     from savgs_ident.responses.summary import CampaignSummary, inspect
@@ -84,7 +83,7 @@ _PLACES = {
     "PortKind": "effects.base",
     "PortSignals": "effects.base",
     "TwoMass": "plants.two_mass",
-    "generic_effects": "effects.generic",
+    "generic_effects": "effects.effect",
     # What is done with it, a command each.
     "demo": "fit.public",
     "inspect": "responses.summary",
@@ -102,7 +101,7 @@ _PLACES = {
     "close_loop": "control.public",
     "export": "export.public",
     "run_campaigns": "campaigns.run",
-    "plot_bode": "report.public",
+    "plot_bode": "report.presenters",
     # Campaigns of rigs whose truth is known.
     "DWELLS": "simulate.public",
     "draw_truth": "validation.public",

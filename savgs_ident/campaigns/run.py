@@ -17,12 +17,15 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from savgs_ident import __version__
-from savgs_ident.campaigns.search import Found, check_apart, find_campaigns, in_natural_order
 from savgs_ident.campaigns.store import (
+    Found,
     Kept,
     MadeFrom,
+    check_apart,
+    find_campaigns,
     forget_parts,
     has_result,
+    in_natural_order,
     keep_result,
     kept_result,
     made_from,
@@ -30,8 +33,7 @@ from savgs_ident.campaigns.store import (
 from savgs_ident.campaigns.study import CampaignRow, CampaignStudy, RowStatus, row_of, study_campaigns
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import Lost, cores, run_tasks
-from savgs_ident.core.files import spelled_out
-from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.files import prepare_folder, spelled_out
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.fit.least_squares import FitSettings
 from savgs_ident.fit.public import fit_with

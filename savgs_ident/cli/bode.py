@@ -34,7 +34,7 @@ def bode(
     Example: savgs-ident bode out/fit/model.toml campaign.csv.gz
     """
     import savgs_ident as si
-    from savgs_ident.core.output import prepare_folder
+    from savgs_ident.core.files import prepare_folder
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)

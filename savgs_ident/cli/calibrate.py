@@ -54,7 +54,7 @@ def calibrate(
     Example: savgs-ident calibrate out/fit/model.toml campaign.csv.gz --trials 100 --every 3
     """
     import savgs_ident as si
-    from savgs_ident.core.output import prepare_folder
+    from savgs_ident.core.files import prepare_folder
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)

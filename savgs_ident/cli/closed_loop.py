@@ -95,7 +95,7 @@ def closed_loop(
     Example: savgs-ident closed-loop out/fit/model.toml --test sweep --rigs 5
     """
     import savgs_ident as si
-    from savgs_ident.core.output import prepare_folder
+    from savgs_ident.core.files import prepare_folder
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)

@@ -18,7 +18,7 @@ def demo(out: OutOption = Path("out/demo"), json: JsonOption = False, quiet: Qui
     Example: savgs-ident demo
     """
     import savgs_ident as si
-    from savgs_ident.core.output import prepare_folder
+    from savgs_ident.core.files import prepare_folder
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)

@@ -67,7 +67,7 @@ def design(
     Example: savgs-ident design out/fit/model.toml --posterior out/posterior/posterior.nc
     """
     import savgs_ident as si
-    from savgs_ident.core.output import prepare_folder
+    from savgs_ident.core.files import prepare_folder
 
     if not SLOWEST <= rate <= FASTEST:
         raise typer.BadParameter(f"--rate {rate:g}: give a rate from {SLOWEST:g} to {FASTEST:g} Hz")

@@ -86,7 +86,7 @@ def diagnose(
     Example: savgs-ident diagnose axis.mat --plant axis --held-out axis_again.mat
     """
     import savgs_ident as si
-    from savgs_ident.core.output import prepare_folder
+    from savgs_ident.core.files import prepare_folder
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)

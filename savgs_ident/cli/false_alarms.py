@@ -59,7 +59,7 @@ def false_alarms(
     Example: savgs-ident false-alarms campaign.csv.gz --draws 100
     """
     import savgs_ident as si
-    from savgs_ident.core.output import prepare_folder
+    from savgs_ident.core.files import prepare_folder
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)

@@ -52,7 +52,7 @@ def fit(
     Example: savgs-ident fit campaign.csv.gz --free mu_r c_sd --max-frequency 4
     """
     import savgs_ident as si
-    from savgs_ident.core.output import prepare_folder
+    from savgs_ident.core.files import prepare_folder
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)

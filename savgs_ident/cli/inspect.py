@@ -28,7 +28,7 @@ def inspect(
     Example: savgs-ident inspect campaign.csv.gz
     """
     import savgs_ident as si
-    from savgs_ident.core.output import prepare_folder
+    from savgs_ident.core.files import prepare_folder
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)

@@ -36,7 +36,7 @@ def linearise(
     Example: savgs-ident linearise out/fit/model.toml
     """
     import savgs_ident as si
-    from savgs_ident.core.output import prepare_folder
+    from savgs_ident.core.files import prepare_folder
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)

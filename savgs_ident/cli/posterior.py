@@ -71,7 +71,7 @@ def posterior(
     Example: savgs-ident posterior out/fit/model.toml campaign.csv.gz --sampler nuts
     """
     import savgs_ident as si
-    from savgs_ident.core.output import prepare_folder
+    from savgs_ident.core.files import prepare_folder
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)

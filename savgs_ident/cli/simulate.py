@@ -48,7 +48,7 @@ def simulate(
     Example: savgs-ident simulate out/fit/model.toml --frequency 1 2 2.35
     """
     import savgs_ident as si
-    from savgs_ident.core.output import prepare_folder
+    from savgs_ident.core.files import prepare_folder
 
     if sum((bool(frequency), sweep, campaign is not None)) > 1:
         raise typer.BadParameter("choose one of --frequency, --sweep and --campaign")

@@ -31,14 +31,19 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
+from savgs_ident.plants.quarter_car.inputs import cam_excitation
 from savgs_ident.plants.quarter_car.kinematics import suspension_travel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.road import cam_excitation
-from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Inputs, Road
 from savgs_ident.simulate.collocation import Trajectory
-from savgs_ident.simulate.harmonics import analyse, harmonics
-from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, simulate_periodic, solve_on_mesh
+from savgs_ident.simulate.periodic import (
+    PeriodicSettings,
+    PeriodicSolution,
+    analyse,
+    harmonics,
+    simulate_periodic,
+    solve_on_mesh,
+)
 from savgs_ident.simulate.sensitivity import loads_at_nodes
 
 ELEMENTS = ("rail", "strut", "tyre_lateral")

@@ -45,9 +45,8 @@ from numpy.typing import NDArray
 
 from savgs_ident.control.linearisation import nominal_rest, slopes
 from savgs_ident.core.values import Values
-from savgs_ident.plants.quarter_car.equilibrium import static_equilibrium
 from savgs_ident.plants.quarter_car.kinematics import installation_ratio, strut_length, suspension_travel
-from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.plant import QuarterCar, static_equilibrium
 
 Scalar = Float[Array, ""]
 

@@ -27,11 +27,9 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
-from savgs_ident.plants.quarter_car.equilibrium import static_equilibrium
+from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
 from savgs_ident.plants.quarter_car.kinematics import suspension_travel
-from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Inputs, Road
+from savgs_ident.plants.quarter_car.plant import QuarterCar, static_equilibrium
 from savgs_ident.simulate.transient import solve_rates
 
 INPUTS = ("road_velocity", "link_velocity")

@@ -17,13 +17,15 @@ from savgs_ident.control.closed_loop.study import LoopStudy, study_loop
 from savgs_ident.control.design import (
     Design,
     DigitalController,
+    Rigs,
     controller_for,
     design_controller,
     read_controller,
+    rigs_from_covariance,
+    rigs_from_posterior,
 )
 from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS, read_weights
 from savgs_ident.control.linear_study import LinearStudy, study_linear
-from savgs_ident.control.rigs import Rigs, rigs_from_covariance, rigs_from_posterior
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Progress, no_progress

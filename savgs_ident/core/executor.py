@@ -16,6 +16,9 @@ the others, but is an optional dependency, opens ports, takes seconds to start, 
 of its workers. Neither replaces processes after so many tasks, which bounds the memory that compiled programs take.
 
 It stands in ``core`` because validation and campaigns use it, which are apart in the order of imports.
+
+:func:`in_parallel` and :func:`side_by_side` are the same within a process, for what is short: threads over all cores;
+compiled solvers release Python's lock while they run.
 """
 
 import asyncio
@@ -30,6 +33,7 @@ import time
 import uuid
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -353,3 +357,20 @@ def _no_answer(address: str, what: str) -> InputError:
         source="--scheduler",
         remedy="start `dask scheduler` and `dask worker ADDRESS`, and give the address that it prints",
     )
+
+
+Item = TypeVar("Item")
+Other = TypeVar("Other")
+
+
+def in_parallel(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """Apply ``work`` to every item on all cores; results in the order of the items."""
+    with ThreadPoolExecutor(cores()) as pool:
+        return list(pool.map(work, items))
+
+
+def side_by_side(one: Callable[[], Result], other: Callable[[], Other]) -> tuple[Result, Other]:
+    """Run two functions at the same time and return both results."""
+    with ThreadPoolExecutor(1) as pool:
+        begun = pool.submit(other)
+        return one(), begun.result()

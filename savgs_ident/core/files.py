@@ -1,8 +1,9 @@
-"""Atomic writing of files, and strict reading of records.
+"""Files: each written whole or not at all, as bytes, JSON or a table; and records read strictly.
 
 :func:`write_bytes` writes a temporary file beside the target and then renames it, so that an interrupted command or
-a full disk leaves finished files only. :func:`record_of` reads a dataclass back from the JSON object that
-``dataclasses.asdict`` made of it, checked against the annotations of the dataclass.
+a full disk leaves finished files only; :func:`write_json` and :func:`write_table` make its bytes of a result.
+:func:`record_of` reads a dataclass back from the JSON object that ``dataclasses.asdict`` made of it, checked against
+the annotations of the dataclass.
 
 >>> from savgs_ident.core.errors import DataWarning
 >>> record_of(DataWarning, {"code": "clipped", "what": "is clipped", "time": 1}).time
@@ -12,6 +13,9 @@ Traceback (most recent call last):
 ValueError: what is a whole number, not a text
 """
 
+import csv
+import io
+import json
 import os
 import shutil
 import tempfile
@@ -25,7 +29,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from savgs_ident.core.errors import InputError
+from savgs_ident.core.errors import DataWarning, InputError
 
 _LEAST_FREE_SPACE = 32 * 2**20
 """Free space that a temporary folder must have [byte]."""
@@ -125,7 +129,7 @@ def _value(hint: Any, found: object, where: str) -> Any:
     if origin in (dict, Mapping):
         entries = _of_type(found, Mapping, where, "a table")
         return {name: _value(inner[1], each, f"{where}.{name:.40}") for name, each in entries.items()}
-    return _record(hint, found, where) if is_dataclass(hint) else _plain(hint, found, where)
+    return _record(hint, found, where) if is_dataclass(hint) else _scalar(hint, found, where)
 
 
 def _one_of(hints: tuple[Any, ...], found: object, where: str) -> Any:
@@ -136,7 +140,7 @@ def _one_of(hints: tuple[Any, ...], found: object, where: str) -> Any:
     return _value(hint, found, where)
 
 
-def _plain(hint: type, found: object, where: str) -> object:
+def _scalar(hint: type, found: object, where: str) -> object:
     if hint is float:
         return _number(found, where)
     if hint is int and isinstance(found, bool):
@@ -167,3 +171,70 @@ def _wrong(found: object, where: str, expected: str) -> ValueError:
     # Long lists, deep ones and numbers of thousands of digits are not shown.
     shown = {list: "a list", dict: "a table", int: "a whole number"}.get(type(found), f"{found!r:.60}")
     return ValueError(f"{where or 'the record'} is {shown}, not {expected}")
+
+
+Json = dict[str, object] | list[object] | str | int | float | bool | None
+"""What a JSON file can say."""
+
+
+def prepare_folder(folder: Path) -> Path:
+    """Make ``folder`` if need be and try to write there, so that a long run does not end in a refusal.
+
+    Raises :class:`InputError` where it is not a folder or cannot be written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+
+
+def to_json(record: object) -> str:
+    """``record`` as indented JSON; numpy becomes plain, a number that is not finite becomes null."""
+    return json.dumps(_plain(record), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def json_bytes(record: object) -> bytes:
+    """:func:`to_json` of a record as UTF-8; a byte of a file name that is no text is spelled out as JSON does."""
+    return to_json(record).encode("utf-8", "backslashreplace")
+
+
+def write_json(path: Path, record: object) -> Path:
+    """Write :func:`json_bytes` of a record."""
+    return write_bytes(path, json_bytes(record))
+
+
+def write_table(path: Path, columns: Mapping[str, Sequence[object]]) -> Path:
+    """Write columns, headed by their names with units, as CSV."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return write_bytes(path, text.getvalue().encode())
+
+
+def warning_record(warning: DataWarning) -> dict[str, object]:
+    """A warning as JSON has it."""
+    return {
+        "code": warning.code,
+        "message": str(warning),
+        "test": warning.test or None,
+        "channel": warning.channel or None,
+        "time_s": warning.time,
+        "remedy": warning.remedy or None,
+    }
+
+
+def _plain(value: object) -> Json:
+    if hasattr(value, "tolist"):  # Arrays and scalars of numpy, without loading it.
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    if value is None or isinstance(value, str | int | float | bool):
+        return value
+    raise TypeError(f"{type(value).__name__} has no place in JSON")

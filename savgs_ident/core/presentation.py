@@ -23,8 +23,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 from savgs_ident import __version__
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.core.files import write_bytes
-from savgs_ident.core.output import json_bytes, prepare_folder, to_json, write_json
+from savgs_ident.core.files import json_bytes, prepare_folder, to_json, write_bytes, write_json
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,6 +1,6 @@
 """Hypotheses as a report shows them: with probabilities, parameters and what they gain on tests left out."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -24,9 +24,13 @@ def candidates_of(
     weighed: Sequence[WeighedHypothesis],
     held: Mapping[Hypothesis, HeldOut],
     search: Search,
+    kinds: Callable[[Hypothesis], tuple[str, ...]],
     constants: DecisionConstants = DEFAULTS,
 ) -> tuple[Candidate, ...]:
-    """All hypotheses, the most probable first, with what they predict of tests left out where that was ``held``."""
+    """All hypotheses, the most probable first, with what they predict of tests left out where that was ``held``.
+
+    ``kinds`` says where a hypothesis acts and of which kind it is, as port/family each.
+    """
     scores = {score.term.name: score for score in findings.scores}
     gap, found = excess(search, findings.base), []
     for each, share in zip(weighed, probabilities(weighed), strict=True):
@@ -35,7 +39,8 @@ def candidates_of(
         closed = float("nan")
         if mode is not None and gap > constants.negligible_misfit:
             left = left_over(search, findings.base, mode, constants)
-            closed = 1.0 - left if hypothesis.effects else 0.0
+            closed = 1.0 - left if hypothesis.effects or hypothesis.flexible else 0.0
+        there = [kind.split("/") for kind in kinds(hypothesis)]
         found.append(
             Candidate(
                 hypothesis=hypothesis,
@@ -43,8 +48,10 @@ def candidates_of(
                 score_sigma=joint_sigma([scores[name] for name in hypothesis.effects if name in scores]),
                 heldout_gain=float(gain),
                 share_closed=closed,
-                parameters=() if mode is None else estimates_of(mode, scores),
+                parameters=() if mode is None or hypothesis.flexible else estimates_of(mode, scores),
                 refitted=mode is not None,
+                ports=tuple(dict.fromkeys(port for port, _ in there)),
+                families=tuple(dict.fromkeys(family for _, family in there)),
             )
         )
     return tuple(found)

@@ -19,18 +19,18 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.parallel import in_parallel, side_by_side
+from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.diagnosis.candidates import candidates_of, confusable_of, estimates_among, not_judgeable_of
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
 from savgs_ident.diagnosis.gap import Rows, shrinks
 from savgs_ident.diagnosis.held_out import HeldOut, held_out_by_law, hold_out
-from savgs_ident.diagnosis.learning import LearnedLaw, learn
-from savgs_ident.diagnosis.location_hypotheses import force_port
+from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.model_selection import (
     DiagnosisEvidence,
     DiagnosisProblem,
+    FlexibleMember,
     recalibrate,
     refit_named,
     select_model,
@@ -41,6 +41,7 @@ from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import (
     NONE,
     UNKNOWN,
+    Candidate,
     Diagnosis,
     DiagnosisSettings,
     ForceLoop,
@@ -183,16 +184,16 @@ def _diagnose(
         lambda: refit_named(problem, selected, progress),
         lambda: (_next_tests(problem, selected, progress), _held_out(problem, others, progress)),
     )
-    law = _learned(refitted, evidence, held, progress) if evidence.kind == "unknown" else None
-    chosen = [] if evidence.chosen.mode is None else [evidence.chosen.mode]
+    member = evidence.named_law or (evidence.offered if evidence.kind == "unknown" else None)
+    law = None if member is None else member.law
+    fits = [] if evidence.chosen.mode is None or law is not None else [evidence.chosen.mode]
     last, apart = side_by_side(
-        lambda: _held_out(refitted, chosen, progress),
+        lambda: {**_held_out(refitted, fits, progress), **_held_out_by_member(member, progress, settings)},
         lambda: _predict_further(refitted, evidence, law, values, further),
     )
-    linear = held_out_by_law(refitted.search, evidence.localisation.held_out)
-    held = {**held, **last}
-    unknown = max(linear, held[NONE], key=lambda each: each.mean) if law is None else law.held
-    held = {**held, UNKNOWN: unknown}
+    held = {**held, **last, UNKNOWN: _held_out_unknown(refitted, evidence, held[NONE])}
+    if evidence.kind == "unknown" and member is not None and held[member.hypothesis].mean <= held[NONE].mean:
+        law = None
 
     base, model = problem.base, _corrected_model(refitted, evidence, law)
     together, by_channel = shrinks(data, _left_out_rows(problem, held, model))
@@ -202,6 +203,9 @@ def _diagnose(
         together, by_channel = shrinks(data, _left_out_rows(problem, held, model))
         apart = _predict_further(refitted, evidence, law, values, further)
     # Before what is named was refitted: the alternatives were not.
+    candidates = candidates_of(
+        evidence.findings, evidence.weighed, held, refitted.search, problem.families, problem.constants
+    )
     alternatives = indistinguishable(selected.weighed, selected.chosen, problem.constants)
     verdict = write_verdict(refitted, evidence, alternatives, together)
     return Diagnosis(
@@ -211,19 +215,17 @@ def _diagnose(
         parameters=base.values,
         identified=model.fit.values,
         verdict=verdict,
-        ports=_port_shares(evidence),
+        ports=_port_shares(evidence, candidates),
         map=plant.gap_map(data, base.prediction.rows),
         cycle=plant.cycle_positions(data, base.prediction.rows),
-        candidates=candidates_of(
-            evidence.findings, evidence.weighed, held, refitted.search, problem.constants
-        ),
+        candidates=candidates,
         shrink=together,
         by_channel=by_channel,
         further=apart,
         next_tests=tests,
         not_judgeable=not_judgeable_of(evidence.findings, problem.constants),
         confusable=confusable_of(evidence.findings, problem.constants),
-        loops=_loops(refitted, model, evidence, verdict.ports, progress),
+        loops=_loops(refitted, model, evidence, law, verdict.ports, progress),
         responses=plant.responses(data, problem.given, base.prediction.rows, model.rows),
         measured=measured,
         converged=all(each.status.ok for each in _decisive_fits(problem, selected, evidence, law)),
@@ -231,6 +233,22 @@ def _diagnose(
         learned=None if law is None else _offered(law),
         wall_s=time.perf_counter() - began,
     )
+
+
+def _held_out_by_member(
+    member: FlexibleMember | None, progress: Progress, settings: DiagnosisSettings
+) -> dict[Hypothesis, HeldOut]:
+    """What a learned law predicts of tests left out."""
+    if member is None:
+        return {}
+    progress(f"leaving tests out: {member.hypothesis}")
+    return {member.hypothesis: member.law.held_out(settings.constants)}
+
+
+def _held_out_unknown(problem: DiagnosisProblem, evidence: DiagnosisEvidence, without: HeldOut) -> HeldOut:
+    """What a law known to first order predicts of tests left out; the baseline where it does worse than that."""
+    linear = held_out_by_law(problem.search, evidence.localisation.held_out)
+    return max(linear, without, key=lambda each: each.mean)
 
 
 def _unsupported(evidence: DiagnosisEvidence, gap: Shrink, constants: DecisionConstants) -> bool:
@@ -245,8 +263,18 @@ def _unsupported(evidence: DiagnosisEvidence, gap: Shrink, constants: DecisionCo
     return gap.recalibrated**2 - gap.floor**2 <= constants.material_share**2
 
 
-def _port_shares(evidence: DiagnosisEvidence) -> tuple[PortShare, ...]:
-    return tuple(PortShare(each.name, each.share, each.free_input_share) for each in evidence.localisations)
+def _port_shares(evidence: DiagnosisEvidence, candidates: Sequence[Candidate]) -> tuple[PortShare, ...]:
+    """Shares of all ports, with the probability that something acts there."""
+    unknown = next((each.probability for each in candidates if each.hypothesis == UNKNOWN), 0.0)
+
+    def probability(port: str) -> float:
+        named = sum(each.probability for each in candidates if port in each.ports)
+        return named + (unknown if port == evidence.port else 0.0)
+
+    return tuple(
+        PortShare(each.name, each.share, each.free_input_share, probability(each.name))
+        for each in evidence.localisations
+    )
 
 
 def _left_out_rows(
@@ -280,9 +308,11 @@ class _CorrectedModel:
 def _corrected_model(
     problem: DiagnosisProblem, evidence: DiagnosisEvidence, law: LearnedLaw | None
 ) -> _CorrectedModel:
+    if law is not None:
+        member = next(each for each in evidence.flexible if each.law is law)
+        return _CorrectedModel(member.hypothesis, law.mode, law.mode.prediction.rows)
     if evidence.kind == "unknown":
-        rows = evidence.localisation.held_out if law is None else law.mode.prediction.rows
-        return _CorrectedModel(UNKNOWN, problem.base, rows)
+        return _CorrectedModel(UNKNOWN, problem.base, evidence.localisation.held_out)
     fit = evidence.chosen.mode or problem.base
     return _CorrectedModel(hypothesis_of(fit), fit, fit.prediction.rows)
 
@@ -317,21 +347,6 @@ def _held_out(
     return dict(in_parallel(without_parts, modes))
 
 
-def _learned(
-    problem: DiagnosisProblem,
-    evidence: DiagnosisEvidence,
-    held: Mapping[Hypothesis, HeldOut],
-    progress: Progress,
-) -> LearnedLaw | None:
-    """The law at the port of something unknown, on the nonlinear plant; None where that does not help."""
-    port = force_port(problem.plant.plant, evidence.port)
-    if port is None:
-        return None
-    progress(f"learning a force at the port {evidence.port}")
-    law = learn(problem.plant, problem.data, problem.base, port)
-    return law if law.mode.status.ok and law.held.mean > held[NONE].mean else None
-
-
 def _offered(law: LearnedLaw) -> Learned:
     coefficients = coefficients_at(law.port)
     return Learned(law.name, law.port.location, estimates_among(law.mode, coefficients), law.values)
@@ -364,17 +379,19 @@ def _loops(
     problem: DiagnosisProblem,
     model: _CorrectedModel,
     evidence: DiagnosisEvidence,
+    law: LearnedLaw | None,
     ports: Sequence[str],
     progress: Progress,
 ) -> tuple[ForceLoop, ...]:
-    """The signal inferred at the first named port, beside the law of the effect that is named there."""
+    """The signal inferred at the first named port, beside the law that is named or learned there."""
     found = next((each for each in evidence.localisations if each.name in ports[:1]), None)
     if found is None:
         return ()
     progress("inferring the signal at the port")
-    named = model.hypothesis.effects
-    here = next((problem.plant.catalogue[name] for name in named if problem.location(name) == ports[0]), None)
-    values = problem.base.values | model.fit.values
+    effects = [problem.plant.catalogue[name] for name in model.hypothesis.effects]
+    effects += [] if law is None else [law.effect]
+    here = next((each for each in effects if each.port.location == ports[0]), None)
+    values = problem.base.values | model.fit.values | ({} if law is None else law.values)
     return problem.plant.loops(values, problem.base.prediction.warm_start, found, here)
 
 

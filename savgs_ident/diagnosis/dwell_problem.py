@@ -28,10 +28,10 @@ from savgs_ident.diagnosis.localisation import InputLocation, Localisation
 from savgs_ident.diagnosis.location_hypotheses import input_locations
 from savgs_ident.diagnosis.loops import force_loops
 from savgs_ident.diagnosis.next_test import next_tests
-from savgs_ident.diagnosis.problem import AbstractProblem
+from savgs_ident.diagnosis.problem import AbstractProblem, largest_with_margin, spans_of_force
 from savgs_ident.diagnosis.result import CyclePosition, ForceLoop, MapCell, NextTest, Responses
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.effects.base import PortSignals
+from savgs_ident.effects.base import Port, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of
@@ -41,12 +41,12 @@ from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.excitation import measured_excitation
-from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.mesh import Layout, layout_for
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
     adapt,
+    harmonics,
     resolve,
     simulate_periodic,
 )
@@ -289,6 +289,23 @@ class DwellProblem(AbstractProblem):
     ) -> Mapping[str, PortSignals]:
         """What laws see at the force ports at the nodes of the baseline's motions."""
         return node_loads(self.model(()), self.values(values), warm_start)[0]
+
+    def learned_spans(
+        self, port: Port, values: Mapping[str, float], warm_start: PeriodicSolution
+    ) -> Mapping[str, float] | None:
+        """The range of what is seen at a force, of the load of what gives way, of the speed of an input."""
+        if port.kind is PortKind.SENSOR:
+            return {}
+        if port.kind is PortKind.INPUT:
+            fastest = float(2.0 * np.pi * np.max(np.asarray(self.excitation.frequency)))
+            return {f"learned_{port.name}_fastest": fastest}
+        signals, loads = node_loads(self.model(()), self.values(values), warm_start)
+        if port.kind is PortKind.FORCE:
+            return spans_of_force(port, signals[port.name])
+        if port.kind is PortKind.SERIES and not port.resonant:
+            carried = largest_with_margin(np.asarray(loads[port.name].beyond_rest))
+            return {f"learned_{port.name}_carried": carried}
+        return None
 
     def gap_map(self, data: Data, rows: NDArray[np.float64]) -> tuple[MapCell, ...]:
         """The gap of every harmonic that is compared."""

@@ -17,8 +17,15 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.small_root import solve_dense
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.effects.base import AbstractForceLaw, AbstractSeriesLaw, Load, Port, PortKind, PortSignals
-from savgs_ident.effects.bristle import Bristle
+from savgs_ident.effects.base import (
+    AbstractForceLaw,
+    AbstractSeriesLaw,
+    Bristle,
+    Load,
+    Port,
+    PortKind,
+    PortSignals,
+)
 from savgs_ident.effects.composition import contact_bristle, nothing_imposed
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.likelihood import Likelihood

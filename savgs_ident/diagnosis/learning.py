@@ -1,11 +1,15 @@
-"""A law at the port where something unknown acts, learned in full: on the true, nonlinear plant.
+"""Flexible members as hypotheses: a learned law at a port, fitted on the true, nonlinear plant.
 
-Localisation learns a law to first order about the baseline. Here the same functions of what the port sees become a
-force of the model (:mod:`savgs_ident.effects.learned`), and their coefficients are fitted beside the
-baseline's own parameters, as those of any effect; so the correction can be solved, simulated and exported. Laws of
-what is no force (something that gives way, a sensor, an input) are not learned this way.
+Localisation learns a law to first order about the baseline. Here the same functions of what the port sees become part
+of the model (:mod:`savgs_ident.effects.learned`), and their coefficients are fitted beside the baseline's own
+parameters, as those of any effect: with a prior, a null and an evidence. So the law can be weighed against the
+catalogue's formulas, solved, simulated and exported.
+
+Which family the law is of follows from the fit: its functions of all other families are taken away, to first order
+about the fit, and what remains is weighed.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,18 +18,19 @@ from numpy.typing import NDArray
 from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out
 from savgs_ident.diagnosis.localisation import widths_of
-from savgs_ident.diagnosis.problem import AbstractProblem
-from savgs_ident.effects.base import Port
-from savgs_ident.effects.learned import SMALLEST, coefficients_at, learned_effect
-from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.diagnosis.problem import AbstractProblem, term_of
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.effects.base import Family, Port
+from savgs_ident.effects.effect import Effect
+from savgs_ident.effects.learned import coefficients_at, coefficients_of, functions_at, learned_effect
+from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
+from savgs_ident.inference.laplace import log_evidence
+from savgs_ident.inference.noise_scales import linearised_optimum
 from savgs_ident.inference.observations import Data, Term
-from savgs_ident.inference.prior import Linear
+from savgs_ident.inference.prior import Linear, bounds_of
 
-STEPS = 8
+STEPS = 12
 """Most steps of the fit."""
-
-MARGIN = 1.1
-"""By how much the law reaches beyond the baseline's motion, for that of the plant with it is another."""
 
 
 @dataclass(frozen=True)
@@ -34,66 +39,105 @@ class LearnedLaw:
 
     Attributes:
         name: of the effect.
-        port: the force port where it acts.
+        port: where it acts.
+        term: its coefficients as a search takes them.
         problem: the baseline with the law as its only candidate.
+        search: that, and the data.
         mode: the best point of both.
-        held: what it predicts of tests left out.
-        spans: the range of the port's motion that it knows, by name, SI.
+        spans: the range of the port's signals that it knows, by name, SI.
+        families: log evidence of the functions of each family alone, to first order about the best point.
     """
 
     name: str
     port: Port
+    term: Term
     problem: AbstractProblem
+    search: Search
     mode: LaplaceFit
-    held: HeldOut
-    spans: dict[str, float]
+    spans: Mapping[str, float]
+    families: Mapping[Family, float]
+
+    @property
+    def effect(self) -> Effect:
+        """The law as an effect of a model."""
+        return self.problem.catalogue[self.name]
 
     @property
     def values(self) -> dict[str, float]:
         """All its numbers, and those of the plant that were fitted beside it, SI."""
-        return self.mode.values | self.spans
+        return self.mode.values | dict(self.spans)
+
+    @property
+    def family(self) -> Family:
+        """The family that explains most."""
+        return max(self.families, key=lambda family: self.families[family])
+
+    def held_out(self, constants: DecisionConstants = DEFAULTS) -> HeldOut:
+        """What it predicts of tests left out."""
+        return hold_out(self.search, self.mode, (self.term,), constants)
 
 
-def learn(problem: AbstractProblem, data: Data, base: LaplaceFit, port: Port) -> LearnedLaw:
-    """The law at a force ``port``; ``base`` is the recalibrated baseline.
+def learn(
+    problem: AbstractProblem,
+    data: Data,
+    base: LaplaceFit,
+    port: Port,
+    constants: DecisionConstants = DEFAULTS,
+) -> LearnedLaw | None:
+    """The law at a port; ``base`` is the recalibrated baseline. None where nothing can be learned.
 
     Look at the status of its mode.
     """
+    spans = problem.learned_spans(port, base.values, base.prediction.warm_start)
+    if spans is None:
+        return None
     effect = learned_effect(port)
-    spans = _spans(problem, base, port)
-    table = ParameterTable(effect.parameters).with_values(spans)
     there = {name: each for name, each in problem.catalogue.items() if name in problem.baseline}
+    table = ParameterTable(effect.parameters).with_values(spans)
     mine = replace(
         problem,
         parameters=merge_parameters(problem.parameters, table),
         catalogue={**there, effect.name: effect},
     ).uncorrected()
-    search = search_of(mine, data)
-    names = coefficients_at(port)
-    slopes = mine.predict((effect.name,), base.values, names, base.prediction.warm_start).slopes
-    widths = widths_of(search, base, slopes)
+    search, names = search_of(mine, data), coefficients_at(port)
+    start = base.prediction.warm_start
+    there_now = mine.predict((effect.name,), base.values, names, start)
+    if not there_now.solved:
+        return None
+    widths = widths_of(search, base, there_now.slopes, constants)
+    units = {each.name: each.unit for each in effect.parameters}
     amplitudes = tuple(
-        Linear(name, port.force_unit, 0.0, float(each)) for name, each in zip(names, widths, strict=True)
+        Linear(name, units[name], 0.0, float(width)) for name, width in zip(names, widths, strict=True)
     )
-    term = Term(effect.name, port.location, amplitudes)
-    mode = find_map(search, (term,), base.values, base.prediction.warm_start, STEPS)
-    return LearnedLaw(effect.name, port, mine, mode, hold_out(search, mode, (term,)), spans)
+    shapes = tuple(each for each in term_of(effect, constants).shapes if each.name not in spans)
+    term = Term(effect.name, port.location, amplitudes, shapes)
+    mode = find_map(search, (term,), base.values, there_now.warm_start, STEPS)
+    families = _families(search, mode, port) if mode.solved else {}
+    return LearnedLaw(effect.name, port, term, mine, search, mode, spans, families)
 
 
-def _spans(problem: AbstractProblem, base: LaplaceFit, port: Port) -> dict[str, float]:
-    """The middle of the displacement, its stroke, the largest velocity and load at a port [units of the port]."""
-    ports = problem.port_signals(base.values, base.prediction.warm_start)
-    displacement, velocity, load = (np.asarray(each) for each in ports[port.name][:3])
-    middle = float(displacement.mean())
-    spans = {
-        "middle": middle,
-        "stroke": MARGIN * _largest(displacement - middle),
-        "speed": MARGIN * _largest(velocity),
-    }
-    if port.loaded:
-        spans["carried"] = MARGIN * _largest(load)
-    return {f"learned_{port.name}_{name}": value for name, value in spans.items()}
+def _families(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, float]:
+    """Log evidence of each family's functions without those of the others, to first order about the fit."""
+    missed, slopes = search.missed(mode.prediction), search.turned(mode.slopes)
+    names = [each.name for each in mode.coordinates]
+    of_all = set(coefficients_at(port))
+    found = {}
+    for family in dict.fromkeys(each.family for each in functions_at(port)):
+        mine = set(coefficients_of(port, family))
+        kept = np.array([name in mine or name not in of_all for name in names])
+        found[family] = _evidence_without(search, mode, missed, slopes, kept)
+    return found
 
 
-def _largest(signal: NDArray[np.float64]) -> float:
-    return max(float(np.abs(signal).max()), SMALLEST)
+def _evidence_without(
+    search: Search,
+    mode: LaplaceFit,
+    missed: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+    kept: NDArray[np.bool_],
+) -> float:
+    """Log evidence with the coordinates that are not ``kept`` (n,) at zero, to first order."""
+    coordinates = tuple(each for each, keep in zip(mode.coordinates, kept, strict=True) if keep)
+    without = missed + slopes[:, ~kept] @ mode.x[~kept]
+    top = linearised_optimum(search.rows, without, slopes[:, kept], mode.x[kept], bounds_of(coordinates))
+    return log_evidence(top.value, top.precision, coordinates)

@@ -9,8 +9,8 @@ All is linearised about a fit: rows r + J d, coordinates with unit-normal priors
 of the widths ``law_widths``. The log evidence of a location is averaged over its laws and over the widths.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from math import exp, log
 from typing import NamedTuple
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.effects.base import Family
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.laplace import log_evidence
 from savgs_ident.inference.noise_scales import linearised_optimum
@@ -33,11 +34,15 @@ class Law(NamedTuple):
         columns: change of the rows per function of the law, the same in all tests [unit of the row], (m, q).
         prior: its prior probability relative to the other laws of the location.
         whole: whether it may be any sum of a set of functions; a few of them otherwise.
+        family: what kind of thing it is; None where it mixes several.
+        port: name of the port where it acts; empty where that has no learned law.
     """
 
     columns: Matrix
     prior: float = 1.0
     whole: bool = True
+    family: Family | None = None
+    port: str = ""
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,8 @@ class Localisation:
         evidence: log evidence of the fit with a law, linearised, over all laws and widths of their priors.
         held_out: rows (m,) [their units] of each test, predicted by the law and parameters that the others set.
         free_input: coefficients of the free input by test [its unit], (tests, f).
+        families: log weight of the laws of each family, prior included; those that mix several are under None.
+        ports: the same of the laws at each port, by its name.
     """
 
     name: str
@@ -79,6 +86,8 @@ class Localisation:
     evidence: float
     held_out: NDArray[np.float64]
     free_input: NDArray[np.float64]
+    families: Mapping[Family | None, float] = field(default_factory=dict)
+    ports: Mapping[str, float] = field(default_factory=dict)
 
 
 def localise(
@@ -166,7 +175,12 @@ def _localisation(
     whole = float(np.sum((without * weight) ** 2))
     share = max(0.0, 1.0 - float(np.sum((missed * weight) ** 2)) / whole) if whole > 0.0 else 0.0
     held_out = search.data.measured - missed
-    return Localisation(location.name, share, free_share, evidence, held_out, free_input)
+    families: dict[Family | None, float] = {}
+    ports: dict[str, float] = {}
+    for each, one in zip(location.laws, weights.tolist(), strict=True):
+        families[each.family] = float(np.logaddexp(families.get(each.family, -np.inf), one))
+        ports[each.port] = float(np.logaddexp(ports.get(each.port, -np.inf), one))
+    return Localisation(location.name, share, free_share, evidence, held_out, free_input, families, ports)
 
 
 def _rms(search: Search, mode: LaplaceFit, columns: Matrix) -> NDArray[np.float64]:

@@ -28,11 +28,19 @@ from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.effect_sensitivities import impose, node_loads
 from savgs_ident.diagnosis.localisation import InputLocation, Law
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.effects.base import Load, Port, PortKind, PortSignals
-from savgs_ident.effects.learned import OF_THE_LOAD, OF_THE_MOTION, functions
+from savgs_ident.effects.base import Family, Load, Port, PortKind, PortSignals
+from savgs_ident.effects.learned import (
+    OF_SLIDERS,
+    OF_THE_LOAD,
+    OF_THE_MOTION,
+    OF_WHAT_GIVES,
+    STRETCHES,
+    filters,
+    functions,
+    what_gives,
+)
 from savgs_ident.plants.base import AbstractPlant
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.periodic import PeriodicSolution, harmonics
 from savgs_ident.simulate.program_cache import placed
 
 if TYPE_CHECKING:
@@ -65,9 +73,6 @@ def rate_of(signal: Signal, nodes: MeshPoints, solution: PeriodicSolution) -> Si
     return np.asarray(nodes.omega * (forward * behind + backward * ahead) / (ahead + behind))
 
 
-STRETCHES = (0.01, 0.1)
-"""How far a contact gives before it slides, as shares of a typical displacement of the port [1]."""
-
 RESONANCES = (3.0, 4.0, 5.4, 7.3, 9.8, 13.0, 18.0, 24.0, 33.0, 50.0)
 """Natural frequencies [Hz] of what may swing under its load."""
 
@@ -77,11 +82,12 @@ WAVES = (4, 5, 6, 7, 8, 9)
 INSTANTS = 256
 """Instants of a period at which a law of a sensor's reading is evaluated."""
 
-_FRICTION, _DAMPING, _STIFFNESS = (OF_THE_MOTION.index(words) for words in ("tanh(v/0.01)", "v", "x"))
-PLAIN_FORCES = (_FRICTION, _DAMPING, _STIFFNESS)
+_WORDS = [each.words for each in (*OF_THE_MOTION, *OF_THE_LOAD)]
+PLAIN_FORCES = tuple(_WORDS.index(words) for words in ("tanh(v/0.01)", "v", "x"))
 """Indices of the plain ones among the :func:`motion_functions`: a friction, a damper, a spring."""
 
-_LOADED_FRICTION = len(OF_THE_MOTION) + OF_THE_LOAD.index("n tanh(v/0.01)")
+_LOADED_FRICTION = _WORDS.index("n tanh(v/0.01)")
+
 
 GAIN_AND_RATE = (0, 1)
 """Indices of the plain ones among the :func:`sensor_filters`: a gain, and the rate, which is a small delay."""
@@ -92,48 +98,73 @@ class Functions(NamedTuple):
 
     Attributes:
         values: q of them [1, or the unit of what they are made of], (P,) each.
+        families: to which family each belongs.
         plain: indices of those that make a simple law together.
     """
 
     values: list[Signal]
+    families: tuple[Family, ...]
     plain: tuple[int, ...] = ()
 
 
-def laws_of_functions(columns: NDArray[np.float64], plain: tuple[int, ...] = ()) -> tuple[Law, ...]:
-    """The laws of a set of functions: any sum of them, each of them alone, and the plain ones together.
+def laws_of_functions(
+    columns: NDArray[np.float64], families: Sequence[Family], plain: tuple[int, ...] = (), port: str = ""
+) -> tuple[Law, ...]:
+    """The laws of a set of functions: any sum of them or of those of a family, each alone, the plain ones together.
 
-    The functions change the rows by ``columns`` [unit of the row], (m, q); ``plain`` are indices among the q.
+    The functions change the rows by ``columns`` [unit of the row], (m, q); they are of the ``families``, and
+    ``plain`` are indices among the q; ``port`` is the name of the port where they act.
     """
-    alone = [columns[:, [place]] for place in range(columns.shape[1])]
+    alone = [([place], families[place]) for place in range(columns.shape[1])]
     shares = [DEFAULTS.simple_law_prior / len(alone)] * len(alone)
+    simple = [
+        Law(columns[:, places], share, False, family, port)
+        for (places, family), share in zip(alone, shares, strict=True)
+    ]
     if plain:
-        shares = [*(share / 2.0 for share in shares), DEFAULTS.simple_law_prior / 2.0]
-        alone.append(columns[:, list(plain)])
-    return (Law(columns), *(Law(few, share, whole=False) for few, share in zip(alone, shares, strict=True)))
+        simple = [each._replace(prior=each.prior / 2.0) for each in simple]
+        simple.append(Law(columns[:, list(plain)], DEFAULTS.simple_law_prior / 2.0, False, None, port))
+    different = dict.fromkeys(families)
+    if len(different) == 1:
+        return (Law(columns, 1.0, True, families[0], port), *simple)
+    flexible = []
+    for family in different:
+        places = [place for place, each in enumerate(families) if each is family]
+        if len(places) > 1:
+            flexible.append(Law(columns[:, places], 1.0 / len(different), False, family, port))
+    return (Law(columns, 1.0, True, None, port), *flexible, *simple)
 
 
 def force_functions(port: Port, seen: PortSignals, solution: PeriodicSolution) -> Functions:
-    """Forces as functions of what a ``port`` sees at the nodes of ``solution``, and those of contacts that give."""
+    """Forces as functions of what a ``port`` sees at the nodes of ``solution``, and those of spring-sliders."""
     displacement, velocity, load = (np.asarray(part) for part in seen[:3])
-    found = motion_functions(displacement, velocity, load)
-    plain = [*PLAIN_FORCES, *([_LOADED_FRICTION] if np.any(load) else [])]
-    held = [_stop(displacement, share * port.displacement, solution) for share in STRETCHES]
-    return Functions([*found, *held], (*plain, *range(len(found), len(found) + len(held))))
+    held = [_slider(displacement, share * port.displacement, solution) for share in STRETCHES]
+    return motion_functions(displacement, velocity, load, held)
 
 
-def series_functions(beyond: Signal, nodes: MeshPoints, solution: PeriodicSolution) -> Functions:
-    """Ways by which something gives under a load, as functions of this and of its rate.
+def series_functions(load: Load) -> Functions:
+    """Ways by which something gives under a ``load`` [the port's unit of force], (P,), as functions of it."""
+    beyond = np.asarray(load.beyond_rest)
+    largest = max(float(np.abs(beyond).max()), np.finfo(float).tiny)
+    n, whole, rest = (
+        jnp.asarray(np.broadcast_to(each, beyond.shape) / largest) for each in (beyond, load.total, load.rest)
+    )
+    values = [np.asarray(each) for each in what_gives(n, whole, rest)]
+    return Functions(values, tuple(each.family for each in OF_WHAT_GIVES), (0,))
 
-    ``beyond`` is the load less that at rest [the port's unit of force], (P,).
-    """
+
+def damped_functions(beyond: Signal, nodes: MeshPoints, solution: PeriodicSolution) -> Functions:
+    """Ways by which something gives under a load (P,) [its unit] and its rate: what a damper beside it changes."""
     rate = rate_of(beyond, nodes, solution)
-    return Functions(motion_functions(beyond, rate, np.zeros_like(beyond)), (_STIFFNESS, _DAMPING))
+    found = [each / max(float(np.abs(each).max()), np.finfo(float).tiny) for each in (beyond, rate)]
+    values = [*found, found[1] * np.abs(found[1]), found[0] * found[1]]
+    return Functions(values, (Family.COMPLIANCE,) * len(values), (0, 1))
 
 
 def resonance_functions(beyond: Signal, nodes: MeshPoints) -> Functions:
     """What gives under a load [the port's unit of force], (P,), and what slightly damped modes would make of it."""
     modes = [_resonance(beyond, natural, nodes) for natural in RESONANCES]
-    return Functions([beyond, *modes])
+    return Functions([beyond, *modes], (Family.OSCILLATOR,) * (1 + len(modes)))
 
 
 def input_shape(angle: Signal, nodes: MeshPoints) -> Functions:
@@ -143,22 +174,22 @@ def input_shape(angle: Signal, nodes: MeshPoints) -> Functions:
     """
     speed = nodes.omega / np.max(nodes.omega)
     shapes = [wave(order * angle) for order in (1, 2, 3) for wave in (np.cos, np.sin)]
-    return Functions([*shapes, speed * np.cos(angle), speed * np.sin(angle)], (0, 1))
+    families = (Family.GAIN, Family.DYNAMICS, *(Family.SHAPE,) * 4, Family.DYNAMICS, Family.DYNAMICS)
+    return Functions([*shapes, speed * np.cos(angle), speed * np.sin(angle)], families, (0, 1))
 
 
 def input_ripple(angle: Signal) -> Functions:
     """Waves [1] on an input that are shorter than those of a wrong shape; ``angle`` [rad], (P,), is the test's."""
-    return Functions([wave(order * angle) for order in WAVES for wave in (np.cos, np.sin)])
+    waves = [wave(order * angle) for order in WAVES for wave in (np.cos, np.sin)]
+    return Functions(waves, (Family.SHAPE,) * len(waves))
 
 
 def sensor_filters(omega: Signal) -> list[NDArray[np.complex128]]:
-    """Linear filters of a reading [1]: gain, rate, rate of the rate, lags.
+    """Linear filters of a reading [1]: those of a learned transfer function.
 
     Filters and angular frequencies ``omega`` [rad/s] are (dwells, orders) each.
     """
-    rate = 1j * omega / 20.0
-    lags = [corner / (corner + 1j * omega) for corner in (20.0, 60.0, 180.0)]
-    return [np.asarray(each, np.complex128) for each in (np.ones_like(rate), rate, rate**2, *lags)]
+    return [np.asarray(each, np.complex128) for each in filters(jnp.asarray(1j * omega))]
 
 
 def sensor_functions(reading: NDArray[np.complex128], omega: Signal) -> list[NDArray[np.complex128]]:
@@ -171,22 +202,30 @@ def sensor_functions(reading: NDArray[np.complex128], omega: Signal) -> list[NDA
     turn = np.exp(2j * np.pi * np.outer(np.arange(orders), np.arange(INSTANTS)) / INSTANTS)
     along, rate = (np.real(each[:, 1:] @ turn[1:]) for each in (reading, 1j * omega * reading))
     found = motion_functions(along.ravel(), rate.ravel(), np.zeros(along.size))
-    return [np.fft.rfft(each.reshape(along.shape))[:, :orders] * 2.0 / INSTANTS for each in found]
+    return [np.fft.rfft(each.reshape(along.shape))[:, :orders] * 2.0 / INSTANTS for each in found.values]
 
 
-def motion_functions(displacement: Signal, velocity: Signal, load: Signal) -> list[Signal]:
-    """Functions of what a port sees, each of about unit size."""
+def motion_functions(
+    displacement: Signal, velocity: Signal, load: Signal, held: Sequence[Signal] = ()
+) -> Functions:
+    """Functions of what a port sees, each of about unit size, and what its spring-sliders carry, ``held``."""
     x = displacement - displacement.mean()
     x = x / max(float(np.abs(x).max()), np.finfo(float).tiny)
     v = velocity / max(float(np.abs(velocity).max()), np.finfo(float).tiny)
     loaded = bool(np.any(load))
     n = load / np.abs(load).max() if loaded else load
     found = [np.asarray(each) for each in functions(jnp.asarray(x), jnp.asarray(v), jnp.asarray(n))]
-    return found if loaded else found[: -len(OF_THE_LOAD)]
+    if not loaded:
+        found = found[: -len(OF_THE_LOAD)]
+    families = [each.family for each in (*OF_THE_MOTION, *OF_THE_LOAD)][: len(found)]
+    plain = (*PLAIN_FORCES, *([_LOADED_FRICTION] if loaded else []))
+    sliders = tuple(each.family for each in OF_SLIDERS[: len(held)])
+    beyond = tuple(range(len(found), len(found) + len(held)))
+    return Functions([*found, *held], (*families, *sliders), (*plain, *beyond))
 
 
-def _stop(displacement: Signal, width: float, solution: PeriodicSolution) -> Signal:
-    """What a contact of unit grip carries that gives by ``width`` [m] before it slides, over a period."""
+def _slider(displacement: Signal, width: float, solution: PeriodicSolution) -> Signal:
+    """What a spring-slider of unit grip carries that gives by ``width`` [m] before it slides, over a period."""
     carried = np.zeros_like(displacement)
     for first, count in zip(solution.mesh.layout.starts, solution.mesh.layout.counts, strict=True):
         along = displacement[first : first + count]
@@ -305,8 +344,10 @@ def _signals(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
     columns = seen.imposed([*(each for some in fields for each in some), *free])
     laws: list[Law] = []
     start = 0
-    for (_, each), some in zip(sets, fields, strict=True):
-        laws += laws_of_functions(columns[:, start : start + len(some)], each.plain)
+    for (where, each), some in zip(sets, fields, strict=True):
+        laws += laws_of_functions(
+            columns[:, start : start + len(some)], each.families, each.plain, where.name
+        )
         start += len(some)
     return InputLocation(name, tuple(laws), columns[:, start:])
 
@@ -320,28 +361,39 @@ def _functions(port: Port, seen: _Seen) -> Iterator[Functions]:
         if port.resonant:
             yield resonance_functions(beyond, seen.nodes)
         else:
-            yield series_functions(beyond, seen.nodes, seen.solution)
+            yield series_functions(seen.loads[port.name])
+            yield damped_functions(beyond, seen.nodes, seen.solution)
     elif port.kind is PortKind.INPUT:
         yield input_shape(seen.angle, seen.nodes)
         yield input_ripple(seen.angle)
 
 
 def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
-    """A location of numbers alone: forces of masses where they are declared, slopes in the numbers otherwise."""
+    """A location of numbers alone: forces of masses where they are declared, slopes in the numbers otherwise.
+
+    What hangs on a mass may swing: it pulls as modes make it of the mass's acceleration.
+    """
     inertias = [each for port in ports for each in port.inertias]
-    if inertias:
-        fields = []
-        for each in inertias:
-            velocity = sum(np.asarray(seen.signals[where].velocity) for where in each.velocity)
-            fields.append((each.force, rate_of(np.asarray(velocity), seen.nodes, seen.solution)))
-        columns = seen.imposed(fields)
-    else:
+    if not inertias:
         numbers = [number for port in ports for number in port.numbers]
         slopes = seen.problem.slopes(
             seen.model, placed(dict(seen.p)), seen.solution, [number.name for number in numbers]
         )
         columns = slopes * np.array([number.change for number in numbers])
-    return InputLocation(name, laws_of_functions(columns), columns)
+        return InputLocation(name, laws_of_functions(columns, (Family.NUMBER,) * len(numbers)), columns)
+    fields, swinging = [], []
+    for each in inertias:
+        velocity = sum(np.asarray(seen.signals[where].velocity) for where in each.velocity)
+        acceleration = rate_of(np.asarray(velocity), seen.nodes, seen.solution)
+        fields.append((each.force, acceleration))
+        swinging += [(each.force, _resonance(acceleration, natural, seen.nodes)) for natural in RESONANCES]
+    columns = seen.imposed([*fields, *swinging])
+    still, moving = columns[:, : len(fields)], columns[:, len(fields) :]
+    laws = [*laws_of_functions(still, (Family.NUMBER,) * len(fields))]
+    for first in range(0, moving.shape[1], len(RESONANCES)):
+        mine = moving[:, first : first + len(RESONANCES)]
+        laws += laws_of_functions(mine, (Family.OSCILLATOR,) * mine.shape[1])
+    return InputLocation(name, tuple(laws), still)
 
 
 def free_signal(coefficients: Signal, phase: Signal) -> Signal:
@@ -379,6 +431,15 @@ def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
             np.where(order == k, 1.0, 0.0) * turn for k in range(1, problem.orders + 1) for turn in (1.0, -1j)
         ]
         free = np.stack([rows(np.broadcast_to(each, mine.shape)) for each in unit], axis=1)
-        laws = (*laws_of_functions(dynamic, GAIN_AND_RATE), *laws_of_functions(static))
+        port = next(
+            each.name
+            for each in problem.plant.ports
+            if each.location == name and each.kind is PortKind.SENSOR
+        )
+        dynamics = (Family.GAIN, *(Family.DYNAMICS,) * (dynamic.shape[1] - 1))
+        laws = (
+            *laws_of_functions(dynamic, dynamics, GAIN_AND_RATE, port),
+            *laws_of_functions(static, (Family.SHAPE,) * static.shape[1], (), port),
+        )
         locations.append(InputLocation(name, laws, free))
     return locations

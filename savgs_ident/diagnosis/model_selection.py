@@ -5,14 +5,14 @@ Four stages, each of which returns a whole record:
 1. :func:`recalibrate`: the baseline at its own best, a :class:`DiagnosisProblem`.
 2. :func:`select_model`: all hypotheses fitted and weighed, what a law at each port would explain, and the kind of the
    verdict, a :class:`DiagnosisEvidence`.
-3. Where something unknown is most probable, that evidence seen beside the nearest single effect (below).
+3. Where no formula of the catalogue explains the data, the flexible members of the ports that explain most, fitted on
+   the nonlinear plant (below).
 4. :func:`refit_named`: the named effects found again, free of the discretisation error of the mesh.
 
-A law that is learned at a port may stand alone or beside the best effect, and the two say different things. Where a
-wrong effect does nearly the same as what is missing, a law of what it leaves still shows where that really acts. And
-where an effect is right, but the rig follows another law than the catalogue's (the rise of a Stribeck friction falls
-off as a bell or exponentially, a stop is straight or progressive), what it leaves is explained at its own port: then
-the effect is named, by another law.
+No rig follows the catalogue's formulas to the letter: the rise of a Stribeck friction falls off as a bell or
+exponentially, a stop is straight or progressive. Hypotheses are a tree: a port, a family of laws there, a law. Where
+the laws of the catalogue leave something, the flexible member of a port takes their place (:mod:`.learning`): its
+evidence says where, its functions say of which family, and the effect that comes nearest is named beside it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,19 +25,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.parallel import side_by_side
+from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
+from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import NONE, Hypothesis, Kind
 from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.search import (
     Findings,
-    forward_selection,
     hypothesis_of,
     left_over,
     pairs_with,
+    single_effects,
     singles_among,
+    with_pairs,
 )
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
@@ -47,13 +49,12 @@ from savgs_ident.diagnosis.verdict import (
     WeighedHypothesis,
     broken_tolerance,
     decide,
-    log_prior,
     most_probable,
-    reweighed,
     unknown_evidence,
     weigh,
     without_immaterial_members,
 )
+from savgs_ident.effects.base import Family, Port
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, refine, search_of
 from savgs_ident.inference.observations import Data, Term
 
@@ -87,13 +88,19 @@ class DiagnosisProblem:
         return tuple(dict.fromkeys(self.location(name) for name in hypothesis.effects))
 
     def families(self, hypothesis: Hypothesis) -> tuple[str, ...]:
-        """Where the effects of a hypothesis act and of which kind they are, as location/family, each once."""
+        """Where a hypothesis acts and of which kind it is, as location/family, each once."""
+        if hypothesis.flexible:
+            return (hypothesis.flexible,)
         effects = (self.plant.catalogue[name] for name in hypothesis.effects)
         return tuple(dict.fromkeys(f"{each.port.location}/{each.law.family.value}" for each in effects))
 
     def parameter_port(self, parameter: str) -> str | None:
         """The location at which a parameter of the plant acts; None for one that no port has (hardpoints)."""
         return self._parameter_ports.get(parameter)
+
+    def port(self, name: str) -> Port:
+        """The port of a name."""
+        return next(each for each in self.plant.plant.ports if each.name == name)
 
     def terms(self, hypothesis: Hypothesis) -> tuple[Term, ...]:
         """The candidates that a hypothesis consists of."""
@@ -108,11 +115,33 @@ class DiagnosisProblem:
         return {term.name: term for term in self.plant.candidates}
 
 
-class LocationWeight(NamedTuple):
-    """A law at a location, alone or beside effects: its log evidence plus the log prior of the effects."""
+class FlexibleMember(NamedTuple):
+    """A learned law at a port as a hypothesis.
 
-    location: str
+    Attributes:
+        law: the law at its best.
+        weight: log evidence plus log prior.
+        left: share of the baseline's misfit that it leaves.
+    """
+
+    law: LearnedLaw
     weight: float
+    left: float
+
+    @property
+    def location(self) -> str:
+        """Where it acts."""
+        return self.law.port.location
+
+    @property
+    def family(self) -> Family:
+        """The kind of thing that it is."""
+        return self.law.family
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """As a hypothesis among others."""
+        return Hypothesis(flexible=f"{self.location}/{self.family.value}")
 
 
 @dataclass(frozen=True)
@@ -122,36 +151,55 @@ class DiagnosisEvidence:
     Attributes:
         findings: all hypotheses that were scored and fitted.
         localisations: what a law at each location would explain.
-        location_weights: laws at all locations, alone and, where that was compared, beside the best single effect.
+        flexible: learned laws that were fitted on the nonlinear plant, the most probable first.
         weighed: hypotheses by falling weight.
         unknown: what speaks most for something that the catalogue lacks.
         broken: the tolerance that most probably does not hold.
         kind: what may be said.
         chosen: the hypothesis that it rests on.
         left: share of the baseline's misfit that the most probable hypothesis leaves.
-        another_law: whether the named effect acts by another law than the catalogue's.
+        named_law: the learned law that is named, where no formula of the catalogue explains the data.
         refit_failed: whether what is named could not be found again on a finer mesh.
         unsupported: whether what would be named predicts tests that were held out no better than the baseline.
     """
 
     findings: Findings
     localisations: tuple[Localisation, ...]
-    location_weights: tuple[LocationWeight, ...]
+    flexible: tuple[FlexibleMember, ...]
     weighed: tuple[WeighedHypothesis, ...]
     unknown: UnknownEvidence
     broken: BrokenTolerance
     kind: Kind
     chosen: WeighedHypothesis
     left: float
-    another_law: bool = False
+    named_law: FlexibleMember | None = None
     refit_failed: bool = False
     unsupported: bool = False
 
     @property
     def localisation(self) -> Localisation:
         """The location at which a law of something unknown is most probable."""
-        first = next(iter(weight_by_location(self.location_weights)))
+        first = next(iter(self.weight_by_location))
         return next(each for each in self.localisations if each.name == first)
+
+    @property
+    def offered(self) -> FlexibleMember | None:
+        """The learned law that explains most, where it acts at the most probable location."""
+        there = [each for each in self.flexible if each.location == self.localisation.name]
+        return max(there, key=lambda each: each.weight, default=None)
+
+    @property
+    def weight_by_location(self) -> Mapping[str, float]:
+        """Log weight of a law at every location, the most probable first.
+
+        A law that was fitted on the nonlinear plant counts instead of its linear estimate.
+        """
+        found = {each.name: each.evidence for each in self.localisations}
+        solved: dict[str, float] = {}
+        for each in self.flexible:
+            evidence = each.law.mode.evidence
+            solved[each.location] = max(evidence, solved.get(each.location, -np.inf))
+        return dict(sorted((found | solved).items(), key=lambda item: -item[1]))
 
     @property
     def port(self) -> str:
@@ -161,9 +209,9 @@ class DiagnosisEvidence:
 
     def indistinguishable_ports(self, constants: DecisionConstants = DEFAULTS) -> tuple[str, ...]:
         """Other ports at which a law of something unknown is nearly as probable, the most probable first."""
-        if self.port != self.localisation.name:
+        (first, most), *others = self.weight_by_location.items()
+        if self.port != first:
             return ()
-        (_, most), *others = weight_by_location(self.location_weights).items()
         least = most - constants.indistinguishable_log_odds
         return tuple(name for name, weight in others if weight > least)
 
@@ -198,33 +246,61 @@ def recalibrate(
 
 
 def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvidence:
-    """Hypotheses, ports and the kind of the verdict."""
+    """Hypotheses, ports and the kind of the verdict.
+
+    Single effects first; where none explains all, the flexible members of the ports; where these do not either, pairs
+    of effects, and laws beside the best of all.
+    """
     plant, search, base, constants = problem.plant, problem.search, problem.base, problem.constants
     progress("locating the gap, and looking for its cause")
     findings, localisations = side_by_side(
-        lambda: forward_selection(search, base, plant.candidates, progress, plant.known, constants),
+        lambda: single_effects(search, base, plant.candidates, progress, plant.known, constants),
         lambda: _localised(problem, base),
     )
-    findings = _with_nearest(problem, findings, localisations, progress)
-    findings, beside = _law_beside_best(problem, _material(problem, findings), progress)
-    best = most_probable(findings, constants)
-    left = left_over(search, base, best, constants)
+    members = _flexible_members(problem, findings, localisations, progress)
+    beside = -np.inf
+    if not members or members[0].left > constants.explained_share_flexible:
+        findings = with_pairs(search, findings, plant.candidates, progress, constants)
+        findings = _with_nearest(problem, findings, localisations, progress)
+        findings, beside = _law_beside_best(problem, _material(problem, findings), progress)
     broken = broken_tolerance(
         findings,
         lambda mode: prior_conflict(mode, plant.nuisances, constants),
         problem.parameter_port,
         constants,
     )
-    first = max(localisations, key=lambda each: each.evidence)
-    change = _change(problem, first.held_out - base.prediction.rows)
-    alone = anywhere(localisations) if change.matters(constants) else -np.inf
+    return _decided(problem, findings, localisations, members, beside, broken)
+
+
+def _decided(
+    problem: DiagnosisProblem,
+    findings: Findings,
+    localisations: Sequence[Localisation],
+    members: Sequence[FlexibleMember],
+    beside: float,
+    broken: BrokenTolerance,
+) -> DiagnosisEvidence:
+    """What the weights of all hypotheses allow to say; ``beside`` is the log evidence of a law beside effects."""
+    search, base, constants = problem.search, problem.base, problem.constants
+    best = most_probable(findings, constants)
+    left = left_over(search, base, best, constants)
+    # A law that was learned on the nonlinear plant stands for itself.
+    learned = {each.location for each in members}
+    others = [each for each in localisations if each.name not in learned]
+    alone = -np.inf
+    if others:
+        first = max(others, key=lambda each: each.evidence)
+        change = _change(problem, first.held_out - base.prediction.rows)
+        alone = anywhere(others) if change.matters(constants) else -np.inf
     unknown = unknown_evidence(findings, alone, beside, broken.weight, constants)
     weighed = weigh(findings, unknown, constants)
     kind, chosen = decide(weighed, change_without(problem, best, best.terms), left, constants)
+    more = [WeighedHypothesis(each.hypothesis, each.weight, each.law.mode) for each in members]
+    weighed = tuple(sorted((*weighed, *more), key=lambda each: -each.weight))
     found = DiagnosisEvidence(
         findings=findings,
         localisations=tuple(localisations),
-        location_weights=weights_of(localisations),
+        flexible=tuple(members),
         weighed=weighed,
         unknown=unknown,
         broken=broken,
@@ -232,15 +308,29 @@ def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvid
         chosen=chosen,
         left=left,
     )
-    if kind != "unknown" or unknown.reason == "tolerance":
+    if not members or not _is_named(problem, found, members[0]):
         return found
-    return _beside_nearest_effect(problem, found, progress)
+    chosen = next(each for each in weighed if each.mode is members[0].law.mode)
+    return replace(found, kind="effect", chosen=chosen, left=members[0].left, named_law=members[0])
+
+
+def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: FlexibleMember) -> bool:
+    """Whether a learned law is what is missing: more probable than the catalogue's, near to all, and of some size."""
+    constants = problem.constants
+    none = next(each for each in evidence.weighed if each.hypothesis == NONE)
+    fitted = [each.weight for each in evidence.weighed if each.mode is not None and each.hypothesis.effects]
+    if member.weight < max([none.weight + constants.alarm_log_odds, *fitted]):
+        return False
+    if evidence.unknown.reason == "tolerance" and evidence.unknown.weight > member.weight:
+        return False
+    change = _change(problem, member.law.mode.prediction.rows - problem.base.prediction.rows)
+    return member.left <= constants.unexplained_share_flexible and change.matters(constants)
 
 
 def without_support(evidence: DiagnosisEvidence) -> DiagnosisEvidence:
     """The evidence where held-out tests do not bear out what it speaks for: then nothing may be named."""
     none = next(each for each in evidence.weighed if each.hypothesis == NONE)
-    return replace(evidence, kind="none", chosen=none, another_law=False, unsupported=True)
+    return replace(evidence, kind="none", chosen=none, named_law=None, unsupported=True)
 
 
 def refit_named(
@@ -248,7 +338,7 @@ def refit_named(
 ) -> tuple[DiagnosisProblem, DiagnosisEvidence]:
     """The problem and its evidence with the named effects found again, free of the mesh's discretisation error."""
     mode = evidence.chosen.mode
-    if evidence.kind not in ("effect", "several") or mode is None:
+    if evidence.kind not in ("effect", "several") or mode is None or evidence.named_law is not None:
         return problem, evidence
     progress(f"refitting {evidence.chosen.hypothesis}")
     plant = problem.plant.corrected(mode.terms, mode.values, mode.prediction.warm_start)
@@ -271,36 +361,66 @@ def refit_named(
     )
 
 
-def _beside_nearest_effect(
-    problem: DiagnosisProblem, evidence: DiagnosisEvidence, progress: Progress
-) -> DiagnosisEvidence:
-    """Evidence for something unknown, seen beside the single effect that does nearly the same, if there is one.
+def _flexible_members(
+    problem: DiagnosisProblem,
+    findings: Findings,
+    localisations: Sequence[Localisation],
+    progress: Progress,
+) -> list[FlexibleMember]:
+    """Learned laws on the nonlinear plant at the ports that explain most, the most probable first.
 
-    It may act elsewhere than it seems without the effect, or be that effect by another law.
+    None where a single effect explains all, or where nothing seems to be missing.
     """
     constants, base = problem.constants, problem.base
-    singles = [mode for mode in evidence.findings.modes if len(mode.terms) == 1]
-    best = max(singles, key=lambda mode: mode.evidence, default=base)
-    if not best.terms:
-        return evidence
-    left = left_over(problem.search, base, best, constants)
-    material = change_without(problem, best, best.terms).matters(constants)
-    if left > constants.unexplained_share_other_law or not material:
-        return evidence
-    progress(f"what {best.terms[0]} leaves")
-    prior = log_prior(hypothesis_of(best), len(evidence.findings.scores), constants)
-    port = problem.location(best.terms[0])
-    names = {port, *may_be_imitated(evidence.localisations, base.evidence, constants)}
-    beside = [each for each in _localised(problem, best) if each.name in names]
-    location_weights = (*evidence.location_weights, *weights_of(beside, prior))
-    closer = replace(evidence, location_weights=location_weights)
-    own, elsewhere = weights_here_and_elsewhere(location_weights, port)
-    if own < elsewhere + constants.indistinguishable_log_odds:
-        return closer
-    unknown = log(constants.prior_unknown)
-    weighed = reweighed(evidence.weighed, best, own + unknown, elsewhere + unknown)
-    chosen = next(each for each in weighed if each.mode is best)
-    return replace(closer, weighed=weighed, kind="effect", chosen=chosen, left=left, another_law=True)
+    best = most_probable(findings, constants)
+    most = max(best.evidence, *(each.evidence for each in localisations))
+    if most < base.evidence + constants.alarm_log_odds or left_over(
+        problem.search, base, best, constants
+    ) <= (constants.explained_share):
+        return []
+
+    def fitted(port: Port) -> LearnedLaw | None:
+        progress(f"learning a law at {port.location} ({port.name})")
+        return learn(problem.plant, problem.data, base, port, constants)
+
+    ports = _worth_learning(problem, findings, localisations)
+    laws = [each for each in in_parallel(fitted, ports) if each is not None and each.mode.solved]
+    prior = log(constants.prior_unknown / max(len(localisations), 1))
+    members = [
+        FlexibleMember(law, law.mode.evidence + prior, left_over(law.search, base, law.mode, constants))
+        for law in laws
+    ]
+    return sorted(members, key=lambda each: -each.weight)
+
+
+def _worth_learning(
+    problem: DiagnosisProblem, findings: Findings, localisations: Sequence[Localisation]
+) -> list[Port]:
+    """The ports whose learned laws are worth a fit: those that explain most to first order.
+
+    And the ports of the best single effects: to first order about the baseline a strong effect may explain little.
+    """
+    constants = problem.constants
+    ports = {name: weight for each in localisations for name, weight in each.ports.items() if name}
+    ranked = sorted(ports, key=lambda name: -ports[name])[: constants.learned_fits]
+    singles = [mode for mode in findings.modes if len(mode.terms) == 1]
+    ranked += [
+        problem.plant.catalogue[mode.terms[0]].port.name for mode in singles[: constants.nearest_ports]
+    ]
+    return [problem.port(name) for name in dict.fromkeys(ranked)]
+
+
+def nearest_effect(
+    problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: FlexibleMember
+) -> str | None:
+    """The catalogue's effect that comes nearest to a learned law: of its family if there is one, at its location."""
+    catalogue = problem.plant.catalogue
+    scored = {each.term.name: each.evidence for each in evidence.findings.scores}
+    fitted = {mode.terms[0]: mode.evidence for mode in evidence.findings.modes if len(mode.terms) == 1}
+    known = scored | fitted
+    there = [name for name in known if problem.location(name) == member.location]
+    same = [name for name in there if catalogue[name].law.family is member.family]
+    return max(same or there, key=lambda name: known[name], default=None)
 
 
 def _with_nearest(
@@ -346,40 +466,6 @@ def _law_beside_best(
             return _law_beside_best(problem, findings, progress)
     change = _change(problem, localisations[0].held_out - best.prediction.rows)
     return findings, anywhere(localisations) if change.matters(constants) else -np.inf
-
-
-def weights_of(localisations: Sequence[Localisation], prior: float = 0.0) -> tuple[LocationWeight, ...]:
-    """Log weights of laws at locations, beside effects of this log prior if there are any."""
-    return tuple(LocationWeight(each.name, each.evidence + prior) for each in localisations)
-
-
-def may_be_imitated(
-    localisations: Sequence[Localisation], without: float, constants: DecisionConstants = DEFAULTS
-) -> frozenset[str]:
-    """Locations at which something unknown may act that an effect elsewhere only imitates.
-
-    A law there explains alone much of what one does anywhere; ``without`` is the log evidence of the model without
-    a law. What explains little unless the effect is beside it is not what the effect stands in for.
-    """
-    least = constants.stand_in_share * (max(each.evidence for each in localisations) - without)
-    return frozenset(each.name for each in localisations if each.evidence - without >= least)
-
-
-def weight_by_location(weights: Sequence[LocationWeight]) -> Mapping[str, float]:
-    """Log weight of every location, whatever stands beside a law there; the most probable first."""
-    found: dict[str, float] = {}
-    for each in weights:
-        found[each.location] = float(np.logaddexp(found.get(each.location, -np.inf), each.weight))
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
-
-
-def weights_here_and_elsewhere(weights: Sequence[LocationWeight], location: str) -> tuple[float, float]:
-    """Log weights of a law at a location and at any other, all locations with equal prior probability."""
-    by_location = weight_by_location(weights)
-    others = [weight for name, weight in by_location.items() if name != location]
-    shared = float(np.log(max(len(by_location), 1)))
-    elsewhere = float(np.logaddexp.reduce([-np.inf, *others]))
-    return by_location.get(location, -np.inf) - shared, elsewhere - shared
 
 
 def _localised(problem: DiagnosisProblem, mode: LaplaceFit) -> list[Localisation]:

@@ -21,8 +21,6 @@ from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation
 from savgs_ident.diagnosis.location_hypotheses import (
-    PLAIN_FORCES,
-    STRETCHES,
     Functions,
     force_port,
     laws_of_functions,
@@ -30,10 +28,11 @@ from savgs_ident.diagnosis.location_hypotheses import (
     ports_by_location,
     prandtl_element,
 )
-from savgs_ident.diagnosis.problem import AbstractProblem
+from savgs_ident.diagnosis.problem import AbstractProblem, spans_of_force
 from savgs_ident.diagnosis.result import CyclePosition, DriveForces, ForceLoop, FurtherShrink, NextTest
-from savgs_ident.effects.base import Port, PortKind, PortSignals
+from savgs_ident.effects.base import Family, Port, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
+from savgs_ident.effects.learned import STRETCHES
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.plants.base import AbstractPlant, AtPorts
@@ -190,7 +189,7 @@ class MotionProblem(AbstractProblem):
         for port in acting:
             functions = self._functions(port, seen)
             columns = self._imposed(port, terms, values, np.stack(functions.values))
-            laws += laws_of_functions(columns, functions.plain)
+            laws += laws_of_functions(columns, functions.families, functions.plain, port.name)
         return InputLocation(name, tuple(laws), self._imposed(acting[0], terms, values, self._free()))
 
     def _functions(self, port: Port, seen: _Seen) -> Functions:
@@ -200,12 +199,11 @@ class MotionProblem(AbstractProblem):
         """
         if port.kind is PortKind.INPUT:
             drive = seen.drive / np.abs(seen.drive).max()
-            return Functions([np.ones_like(drive), drive, drive * np.abs(drive)], (0, 1))
+            families = (Family.SHAPE, Family.GAIN, Family.SHAPE)
+            return Functions([np.ones_like(drive), drive, drive * np.abs(drive)], families, (0, 1))
         displacement, velocity, load = (np.asarray(each) for each in seen.signals[port.name][:3])
-        found = motion_functions(displacement, velocity, load)
         held = [prandtl_element(displacement, share * port.displacement) for share in STRETCHES]
-        plain = (*PLAIN_FORCES, *range(len(found), len(found) + len(held)))
-        return Functions([*found, *held], plain)
+        return motion_functions(displacement, velocity, load, held)
 
     def _imposed(
         self,
@@ -227,13 +225,21 @@ class MotionProblem(AbstractProblem):
         model, p = self.complete(terms), placed(self.values(values))
         columns = self._slopes(model, p, [each.name for each in numbers])
         columns = columns * np.array([each.change for each in numbers])
-        return InputLocation(name, laws_of_functions(columns), columns)
+        return InputLocation(name, laws_of_functions(columns, (Family.NUMBER,) * len(numbers)), columns)
 
     def _free(self) -> NDArray[np.float64]:
         """Waves over a block of time and a constant [1], (f, n): what a signal free in every block is made of."""
         turned = 2.0 * np.pi * self.motion.step * np.arange(self.motion.position.size)
         waves = [wave(order * turned) for order in range(1, FREE_ORDERS + 1) for wave in (np.cos, np.sin)]
         return np.stack([np.ones_like(turned), *waves])
+
+    def learned_spans(
+        self, port: Port, values: Mapping[str, float], warm_start: Any
+    ) -> Mapping[str, float] | None:
+        """The range of what is seen at a force; nothing else is learned along a measured motion."""
+        if port.kind is not PortKind.FORCE:
+            return None
+        return spans_of_force(port, self.port_signals(values, warm_start)[port.name])
 
     def gap_map(self, data: Data, rows: NDArray[np.float64]) -> tuple[()]:
         """None: the force of a drive has no harmonics of its own."""

@@ -2,11 +2,17 @@
 
 from collections.abc import Sequence
 
-from savgs_ident.diagnosis.model_selection import DiagnosisEvidence, DiagnosisProblem
+from savgs_ident.diagnosis.model_selection import (
+    DiagnosisEvidence,
+    DiagnosisProblem,
+    FlexibleMember,
+    nearest_effect,
+)
 from savgs_ident.diagnosis.result import Shrink, Verdict
-from savgs_ident.diagnosis.search import hypothesis_of
+from savgs_ident.diagnosis.search import hypothesis_of, left_over
 from savgs_ident.diagnosis.thresholds import DecisionConstants
-from savgs_ident.diagnosis.verdict import alarm_odds, most_probable
+from savgs_ident.diagnosis.verdict import alarm_odds, most_probable, probabilities
+from savgs_ident.effects.base import Family
 from savgs_ident.inference.find_map import LaplaceFit
 
 
@@ -18,11 +24,38 @@ def write_verdict(
     ``alternatives`` are effects that the campaign cannot distinguish from those named.
     """
     if evidence.kind == "none":
-        return Verdict("none", (), (), (), _nothing_missing(problem, evidence, gap))
+        sentence = _nothing_missing(problem, evidence, gap)
+        return Verdict("none", (), (), (), sentence, probability=_probability(evidence, "none"))
     if evidence.kind == "unknown":
         ports = evidence.indistinguishable_ports(problem.constants)
         sentence = _something_unknown(problem, evidence, ports, gap)
-        return Verdict("unknown", (), (evidence.port,), (), sentence, ports)
+        offered = evidence.offered
+        families = () if offered is None or offered.location != evidence.port else (str(offered.hypothesis),)
+        return Verdict(
+            "unknown",
+            (),
+            (evidence.port,),
+            (),
+            sentence,
+            ports,
+            families=families,
+            law_known=False,
+            probability=_probability(evidence, "unknown"),
+        )
+    member = evidence.named_law
+    if member is not None:
+        nearest = nearest_effect(problem, evidence, member)
+        return Verdict(
+            kind="effect",
+            effects=() if nearest is None else (nearest,),
+            ports=(member.location,),
+            confusable_with=(),
+            sentence=_law_missing(problem, evidence, member, nearest, gap),
+            confusable_ports=evidence.indistinguishable_ports(problem.constants),
+            families=(str(member.hypothesis),),
+            law_known=False,
+            probability=_probability(evidence, str(member.hypothesis)),
+        )
     hypothesis = evidence.chosen.hypothesis
     return Verdict(
         kind=evidence.kind,
@@ -31,8 +64,59 @@ def write_verdict(
         confusable_with=tuple(alternatives),
         sentence=_effects_missing(problem, evidence, alternatives, gap),
         families=problem.families(hypothesis),
-        law_known=not evidence.another_law,
+        probability=_probability(evidence, str(hypothesis)),
     )
+
+
+def _probability(evidence: DiagnosisEvidence, hypothesis: str) -> float:
+    """The probability [1] of a hypothesis among all."""
+    shares = probabilities(evidence.weighed)
+    both = zip(evidence.weighed, shares, strict=True)
+    return float(next(share for each, share in both if str(each.hypothesis) == hypothesis))
+
+
+def _law_missing(
+    problem: DiagnosisProblem,
+    evidence: DiagnosisEvidence,
+    member: FlexibleMember,
+    nearest: str | None,
+    gap: Shrink,
+) -> str:
+    sentence = (
+        f"The model lacks {_KINDS[member.family]} at the port '{member.location}' by a law that the catalogue does "
+        f"not have: with a law learned there the gap shrinks from {_percent(gap.recalibrated)} recalibrated "
+        f"({_percent(gap.before)} as given) to {_percent(gap.after)} of the response in held-out tests; the noise is "
+        f"{_percent(gap.floor)}."
+    )
+    fits = [mode for mode in evidence.findings.modes if mode.terms == (nearest,)]
+    if fits:
+        left = left_over(problem.search, problem.base, fits[0], problem.constants)
+        sentence += (
+            f" The nearest formula of the catalogue, {nearest}, leaves {_left(left)} of the misfit beyond the noise, "
+            f"the learned law {_left(member.left)}."
+        )
+    elif nearest is not None:
+        sentence += f" The nearest formula of the catalogue is {nearest}."
+    ports = evidence.indistinguishable_ports(problem.constants)
+    if ports:
+        sentence += f" This campaign cannot distinguish the port {member.location} from {' or '.join(ports)}."
+    return sentence
+
+
+_KINDS = {
+    Family.FRICTION: "a friction",
+    Family.DAMPING: "a damping",
+    Family.STIFFNESS: "a stiffness",
+    Family.STOP: "a stop",
+    Family.COMPLIANCE: "something that gives way",
+    Family.PLAY: "a play",
+    Family.OSCILLATOR: "something that swings",
+    Family.NUMBER: "a number that differs from the sheet",
+    Family.GAIN: "an error of gain",
+    Family.DYNAMICS: "dynamics",
+    Family.SHAPE: "an error of shape",
+    Family.LEARNED: "something",
+}
 
 
 def _nothing_missing(problem: DiagnosisProblem, evidence: DiagnosisEvidence, gap: Shrink) -> str:
@@ -119,11 +203,6 @@ def _effects_missing(
         f"{_percent(gap.recalibrated)} recalibrated ({_percent(gap.before)} as given) to {_percent(gap.after)} of "
         f"the response; the noise is {_percent(gap.floor)}."
     )
-    if evidence.another_law:
-        sentence += (
-            f" Its law differs from that of the catalogue, which leaves {_left(evidence.left)} of the misfit beyond "
-            f"the noise; the rest is explained at the same port, '{ports[0]}'."
-        )
     if alternatives:
         which = "it" if one else "one of them"
         sentence += f" This campaign cannot distinguish {which} from {' or '.join(alternatives)}."

@@ -35,8 +35,9 @@ from savgs_ident.diagnosis.result import (
     Responses,
 )
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.effects.base import AbstractFrictionLimitLaw, PortSignals
+from savgs_ident.effects.base import AbstractFrictionLimitLaw, Port, PortSignals
 from savgs_ident.effects.effect import Effect
+from savgs_ident.effects.learned import SMALLEST
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.inference.prior import Coordinates, Linear, Logarithmic, sheet_coordinate
@@ -53,6 +54,29 @@ def term_of(effect: Effect, constants: DecisionConstants = DEFAULTS) -> Term:
     )
     shapes = tuple(_shape(each, shape_width) for each in own if each.name not in effect.null)
     return Term(effect.name, effect.port.location, amplitudes, shapes, effect.tried)
+
+
+MARGIN = 1.1
+"""By how much a learned law reaches beyond the baseline's motion, for that of the plant with it is another."""
+
+
+def spans_of_force(port: Port, signals: PortSignals) -> dict[str, float]:
+    """The middle of the displacement, its stroke, the largest velocity and load at a force port [its units]."""
+    displacement, velocity, load = (np.asarray(each) for each in signals[:3])
+    middle = float(displacement.mean())
+    spans = {
+        "middle": middle,
+        "stroke": largest_with_margin(displacement - middle),
+        "speed": largest_with_margin(velocity),
+    }
+    if port.loaded:
+        spans["carried"] = largest_with_margin(load)
+    return {f"learned_{port.name}_{name}": value for name, value in spans.items()}
+
+
+def largest_with_margin(signal: NDArray[np.float64]) -> float:
+    """The largest size of a signal, and a margin [unit of the signal]."""
+    return max(MARGIN * float(np.abs(signal).max()), SMALLEST)
 
 
 def _amplitude(each: Parameter, null: float, width: float) -> Linear:
@@ -227,6 +251,15 @@ class AbstractProblem(ABC):
     @abstractmethod
     def port_signals(self, values: Mapping[str, float], warm_start: Any) -> Mapping[str, PortSignals]:
         """What laws see at the force ports along the baseline's motion [the ports' units], (P,) each."""
+
+    @abstractmethod
+    def learned_spans(
+        self, port: Port, values: Mapping[str, float], warm_start: Any
+    ) -> Mapping[str, float] | None:
+        """The range of a port's signals along the baseline's motion, as a learned law takes it, by name, SI.
+
+        None where no law can be learned at the port.
+        """
 
     @abstractmethod
     def gap_map(self, data: Data, rows: NDArray[np.float64]) -> tuple[MapCell, ...]:

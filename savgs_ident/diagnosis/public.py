@@ -20,7 +20,7 @@ from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.driven_motion import DrivenMotion
-from savgs_ident.simulate.measured import Measurements, campaign_of, first_sweep, measured_response
+from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep, measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 

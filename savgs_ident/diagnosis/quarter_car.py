@@ -8,7 +8,7 @@ from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
-from savgs_ident.plants.quarter_car.damper import damper_curve
+from savgs_ident.plants.quarter_car.forces import damper_curve
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig

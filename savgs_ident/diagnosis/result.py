@@ -35,10 +35,12 @@ class Hypothesis:
     Attributes:
         effects: names of the effects; none of them if nothing is missing.
         unknown: whether it is something else. Then there are no effects.
+        flexible: port/family of a learned law; empty where there is none. Then there are no effects either.
     """
 
     effects: tuple[str, ...] = ()
     unknown: bool = False
+    flexible: str = ""
 
     def __eq__(self, other: object) -> bool:
         """Whether the other one has the same effects."""
@@ -49,16 +51,16 @@ class Hypothesis:
         return hash(self._key)
 
     def __str__(self) -> str:
-        """The effects joined by plus signs, "none" or "unknown"."""
-        return "unknown" if self.unknown else " + ".join(self.effects) or "none"
+        """The effects joined by plus signs, a port/family, "none" or "unknown"."""
+        return "unknown" if self.unknown else self.flexible or " + ".join(self.effects) or "none"
 
     def with_effect(self, name: str) -> Self:
         """The hypothesis with one more effect."""
         return type(self)((*self.effects, name))
 
     @property
-    def _key(self) -> tuple[frozenset[str], bool]:
-        return frozenset(self.effects), self.unknown
+    def _key(self) -> tuple[frozenset[str], bool, str]:
+        return frozenset(self.effects), self.unknown, self.flexible
 
 
 NONE = Hypothesis()
@@ -106,11 +108,13 @@ class PortShare:
         port: name of the port.
         share: share of the gap (in squared sd) in tests left out that the law learned from the others explains.
         free_input_share: share that any input at this port, free in every test, would explain.
+        probability: of what acts there, over all hypotheses; effects of a pair count at the port of each.
     """
 
     port: str
     share: float
     free_input_share: float
+    probability: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -175,6 +179,8 @@ class Candidate:
             tests; NaN where it leaves nothing.
         parameters: those of its effects.
         refitted: whether it was fitted in full, or assessed by its score alone.
+        ports: where it acts.
+        families: of which kind what acts there is.
     """
 
     hypothesis: Hypothesis
@@ -184,6 +190,18 @@ class Candidate:
     share_closed: float
     parameters: tuple[Estimate, ...]
     refitted: bool
+    ports: tuple[str, ...] = ()
+    families: tuple[str, ...] = ()
+
+    @property
+    def port(self) -> str | None:
+        """Where it acts; None for nothing, something unknown, and for what acts at several ports."""
+        return self.ports[0] if len(self.ports) == 1 else None
+
+    @property
+    def family(self) -> str | None:
+        """Of which kind it is; None for nothing, something unknown, and for what is of several."""
+        return self.families[0] if len(self.families) == 1 else None
 
     @property
     def effects(self) -> tuple[str, ...]:

@@ -12,13 +12,13 @@ named in :attr:`Findings.lost`.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.parallel import in_parallel
+from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.result import Hypothesis
@@ -44,12 +44,14 @@ class Findings:
         scores: scores of all effects at the baseline, best first.
         modes: hypotheses that were fitted in full, the best first; the baseline is not among them.
         lost: hypotheses whose fit found no solution of the plant, and how that ended.
+        sensitivities: by effect, what it does to the rows about the baseline [units of the rows], (tries, m, k).
     """
 
     base: LaplaceFit
     scores: tuple[Score, ...]
     modes: tuple[LaplaceFit, ...]
     lost: tuple[LostHypothesis, ...] = ()
+    sensitivities: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     @property
     def best(self) -> LaplaceFit:
@@ -94,7 +96,20 @@ def forward_selection(
     known: Sequence[tuple[str, ...]] = (),
     constants: DecisionConstants = DEFAULTS,
 ) -> Findings:
-    """Hypotheses about what is missing in the recalibrated baseline ``base``.
+    """Hypotheses about what is missing in the recalibrated baseline ``base``: single effects, then pairs."""
+    singles = single_effects(search, base, terms, progress, known, constants)
+    return with_pairs(search, singles, terms, progress, constants)
+
+
+def single_effects(
+    search: Search,
+    base: LaplaceFit,
+    terms: Sequence[Term],
+    progress: Progress,
+    known: Sequence[tuple[str, ...]] = (),
+    constants: DecisionConstants = DEFAULTS,
+) -> Findings:
+    """Single effects that may be missing in the recalibrated baseline ``base``, scored, the promising ones fitted.
 
     ``known`` are sets of terms that are often missing together. They are fitted from their typical sizes, because a
     search from a baseline that lacks all of them, and misses by as much as it moves, would not arrive.
@@ -107,12 +122,25 @@ def forward_selection(
     progress(f"scores of {len(terms)} effects")
     sensitivities = search.plant.columns((), base.values, base.prediction.warm_start, list(terms))
     scores = scores_of(search, base, terms, sensitivities, constants)
-    singles = _single_effects(fits, scores)
-    pairs: list[LaplaceFit] = []
-    if singles and singles[0].evidence > base.evidence + constants.pair_log_evidence:
-        by_name = dict(zip((term.name for term in terms), sensitivities, strict=True))
-        pairs = _pairs(fits, singles, scores, by_name)
-    return _findings(base, scores, [*together, *singles, *pairs])
+    by_name = dict(zip((term.name for term in terms), sensitivities, strict=True))
+    return _findings(base, scores, [*together, *_single_effects(fits, scores)], by_name)
+
+
+def with_pairs(
+    search: Search,
+    findings: Findings,
+    terms: Sequence[Term],
+    progress: Progress,
+    constants: DecisionConstants = DEFAULTS,
+) -> Findings:
+    """The findings, and pairs of effects where the best single one is not enough."""
+    fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
+    singles = [mode for mode in findings.modes if len(mode.terms) == 1]
+    if not singles or singles[0].evidence <= findings.base.evidence + constants.pair_log_evidence:
+        return findings
+    pairs = _pairs(fits, singles, findings.scores, findings.sensitivities)
+    more = _findings(findings.base, findings.scores, [*findings.modes, *pairs], findings.sensitivities)
+    return replace(more, lost=(*findings.lost, *more.lost))
 
 
 def singles_among(
@@ -131,7 +159,9 @@ def singles_among(
     fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
     others = [term for term in wanted if (term.name,) not in tried]
     singles = fits.extended(findings.base, score_terms(search, findings.base, others))
-    more = _findings(findings.base, findings.scores, fits.refined([*findings.modes, *singles]))
+    more = _findings(
+        findings.base, findings.scores, fits.refined([*findings.modes, *singles]), findings.sensitivities
+    )
     return replace(more, lost=(*findings.lost, *more.lost))
 
 
@@ -159,14 +189,21 @@ def pairs_with(
                 if term.name not in parent.terms and hypothesis_of(parent).with_effect(term.name) not in tried
             ]
             pairs += fits.extended(parent, score_terms(search, parent, others))
-    more = _findings(findings.base, findings.scores, fits.refined([*findings.modes, *pairs]))
+    more = _findings(
+        findings.base, findings.scores, fits.refined([*findings.modes, *pairs]), findings.sensitivities
+    )
     return replace(more, lost=(*findings.lost, *more.lost))
 
 
-def _findings(base: LaplaceFit, scores: Sequence[Score], modes: Sequence[LaplaceFit]) -> Findings:
+def _findings(
+    base: LaplaceFit,
+    scores: Sequence[Score],
+    modes: Sequence[LaplaceFit],
+    sensitivities: Mapping[str, NDArray[np.float64]] | None = None,
+) -> Findings:
     found = sorted((mode for mode in modes if mode.solved), key=lambda mode: -mode.evidence)
     lost = tuple(LostHypothesis(hypothesis_of(mode), mode.status) for mode in modes if not mode.solved)
-    return Findings(base, tuple(scores), tuple(found), lost)
+    return Findings(base, tuple(scores), tuple(found), lost, sensitivities or {})
 
 
 @dataclass(frozen=True)

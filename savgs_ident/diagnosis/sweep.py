@@ -20,8 +20,7 @@ from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.result import FurtherShrink
 from savgs_ident.plants.base import Excitation
 from savgs_ident.responses.harmonic_response import SweepResponse
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 
 DWELLS = 6
 """Dwells of the campaign that must lie in the sweep's range: then the motions between them can be found, too."""

@@ -77,7 +77,7 @@ class BrokenTolerance(NamedTuple):
 
 def log_prior(hypothesis: Hypothesis, count: int, constants: DecisionConstants = DEFAULTS) -> float:
     """Log prior probability of a hypothesis, where the catalogue has ``count`` effects that may be missing."""
-    if hypothesis.unknown:
+    if hypothesis.unknown or hypothesis.flexible:
         return log(constants.prior_unknown)
     if not hypothesis.effects:
         return log(constants.prior_none)
@@ -173,21 +173,6 @@ def weigh(
             *(weighed(each, evidence, None) for each, evidence in scored if each not in decided),
         ]
     )
-
-
-def reweighed(
-    weighed: Sequence[WeighedHypothesis], mode: LaplaceFit, own: float, unknown: float
-) -> tuple[WeighedHypothesis, ...]:
-    """All hypotheses by falling weight, with other log weights of the one fitted by ``mode`` and of *unknown*."""
-    found = [
-        replace(each, weight=own)
-        if each.mode is mode
-        else replace(each, weight=unknown)
-        if each.hypothesis == UNKNOWN
-        else each
-        for each in weighed
-    ]
-    return _by_weight(found)
 
 
 def _by_weight(weighed: Sequence[WeighedHypothesis]) -> tuple[WeighedHypothesis, ...]:

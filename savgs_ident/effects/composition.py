@@ -19,6 +19,7 @@ from savgs_ident.effects.base import (
     AbstractNumberLaw,
     AbstractSensorLaw,
     AbstractSeriesLaw,
+    Bristle,
     FrictionLimit,
     Fundamental,
     InputSignal,
@@ -27,8 +28,9 @@ from savgs_ident.effects.base import (
     Port,
     PortKind,
     PortSignals,
+    Presliding,
+    bristle,
 )
-from savgs_ident.effects.bristle import Bristle, Presliding, bristle
 from savgs_ident.effects.effect import Effect
 
 

@@ -1,26 +1,59 @@
-"""Forces learned at a port: what is there, without a name for it.
+"""Learned laws: the flexible member of every family, for what is there without a formula for it.
 
-    F = sum over k of c_k f_k(x, v, n)
+A learned law is a sum of known functions of what its port sees, with coefficients that a diagnosis fits:
 
-with x = (displacement - middle)/stroke, v = velocity/speed and n = load/carried of the port, each held at the edge of
-what was seen when the law was learned: it says nothing about what lies beyond. The f_k are those with which a
-diagnosis looks for an unknown force: frictions that turn round within a hundredth and a tenth of the largest
-velocity, a friction that falls with velocity, dampings, stiffnesses, and products of them. With all c_k at zero the
-force vanishes.
+    port     law                a sum of functions of
+    force    LearnedForce       displacement, velocity and load, and of spring-sliders that follow the displacement
+    series   LearnedCompliance  the load: by how much something gives way
+    input    LearnedInput       the angle of the test: what comes on top of the recorded value
+    sensor   LearnedTransfer    the frequency: what comes on top of a transfer function of one
+
+Every function belongs to a family (:class:`~savgs_ident.effects.base.Family`): those of one family alone are its
+flexible member, all together the general law of the port. With all coefficients at zero the law vanishes. The
+functions are held at the edge of what was seen when the law was learned: it says nothing about what lies beyond.
+
+    law = learned_effect(plant_port)             # nothing learned yet: "learned_rail" at the port "rail"
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Complex, Float
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values
-from savgs_ident.effects.base import AbstractForceLaw, Family, Port, PortSignals, Role
+from savgs_ident.effects.base import (
+    SETTLING,
+    AbstractForceLaw,
+    AbstractInputLaw,
+    AbstractSensorLaw,
+    AbstractSeriesLaw,
+    Bristle,
+    Family,
+    FrictionLimit,
+    Fundamental,
+    InputSignal,
+    InternalState,
+    Load,
+    Port,
+    PortKind,
+    PortSignals,
+    Presliding,
+    Role,
+    bristle,
+)
 from savgs_ident.effects.effect import Effect, effect_at
+
+
+class Function(NamedTuple):
+    """A function of a learned law: in words, and the family to which it belongs."""
+
+    words: str
+    family: Family
+
 
 SHARP = (0.01, 0.1)
 """Velocities over which friction-like functions turn round, as shares of the largest [1]."""
@@ -28,57 +61,155 @@ SHARP = (0.01, 0.1)
 FALLING = (0.05, 0.2)
 """Velocities over which a friction falls, as shares of the largest [1]."""
 
+GAPS = (0.4, 0.8)
+"""Where stops begin, as shares of the stroke [1]."""
+
+STRETCHES = (0.01, 0.1)
+"""How far a spring-slider gives before it slides, as shares of the port's typical displacement [1]."""
+
+SLIDER_LAG = 3e-4
+"""Damping over stiffness of a spring-slider [s]."""
+
 OF_THE_MOTION = (
-    "tanh(v/0.01)", "tanh(v/0.1)", "v", "v|v|", "v^2", "x", "x^2", "x^3", "x tanh(v/0.01)", "x v", "x^2 v",
-    "tanh(v/0.01) exp(-(v/0.05)^2)", "tanh(v/0.01) exp(-(v/0.2)^2)",
-)  # fmt: skip
-"""The functions f_k of displacement and velocity, in words."""
+    Function("tanh(v/0.01)", Family.FRICTION),
+    Function("tanh(v/0.1)", Family.FRICTION),
+    Function("v", Family.DAMPING),
+    Function("v|v|", Family.DAMPING),
+    Function("v^2", Family.DAMPING),
+    Function("x", Family.STIFFNESS),
+    Function("x^2", Family.STIFFNESS),
+    Function("x^3", Family.STIFFNESS),
+    Function("x tanh(v/0.01)", Family.FRICTION),
+    Function("x v", Family.DAMPING),
+    Function("x^2 v", Family.DAMPING),
+    Function("tanh(v/0.01) exp(-(v/0.05)^2)", Family.FRICTION),
+    Function("tanh(v/0.01) exp(-(v/0.2)^2)", Family.FRICTION),
+    Function("|v|", Family.DAMPING),
+    Function("max(x - 0.4, 0)", Family.STOP),
+    Function("max(-x - 0.4, 0)", Family.STOP),
+    Function("max(x - 0.8, 0)", Family.STOP),
+    Function("max(-x - 0.8, 0)", Family.STOP),
+)
+"""Functions of x = (displacement - middle)/stroke and v = velocity/speed."""
 
-OF_THE_LOAD = ("n tanh(v/0.01)", "n v", "n")
-"""Those that come on top at a port with a load."""
+OF_SLIDERS = tuple(
+    Function(f"a spring-slider that gives by {width:g} typical displacements", Family.FRICTION)
+    for width in STRETCHES
+)
+"""Functions of the displacement's past: what a spring carries before it slides."""
 
-FRICTIONS = (
-    "tanh(v/0.01)", "tanh(v/0.1)", "x tanh(v/0.01)", "tanh(v/0.01) exp(-(v/0.05)^2)", "tanh(v/0.01) exp(-(v/0.2)^2)",
-    "n tanh(v/0.01)",
-)  # fmt: skip
-"""Those of both that turn round with the velocity: how steep they are at rest is a width, not a damping."""
+OF_THE_LOAD = (
+    Function("n tanh(v/0.01)", Family.FRICTION),
+    Function("n v", Family.DAMPING),
+    Function("n", Family.DAMPING),
+)
+"""Functions with n = load/carried, at a port with a load."""
+
+OF_WHAT_GIVES = (
+    Function("n", Family.COMPLIANCE),
+    Function("n|n|", Family.COMPLIANCE),
+    Function("n^2", Family.COMPLIANCE),
+    Function("n^3", Family.COMPLIANCE),
+    Function("tanh(50 N)", Family.PLAY),
+    Function("tanh(5 N)", Family.PLAY),
+)
+"""Functions of the load n beyond that at rest and of the whole load N, in units of the largest, at a series port."""
+
+ORDERS = tuple(range(1, 10))
+"""Orders of a learned input."""
+
+OF_THE_ANGLE = (
+    *(
+        Function(f"{wave}({order} a)", family)
+        for order in ORDERS
+        for wave, family in (
+            ("cos", Family.GAIN if order == 1 else Family.SHAPE),
+            ("sin", Family.DYNAMICS if order == 1 else Family.SHAPE),
+        )
+    ),
+    Function("w sin(a)", Family.DYNAMICS),
+    Function("w cos(a)", Family.DYNAMICS),
+)
+"""Functions of the angle a of the fundamental and of its speed w, in units of the largest, at an input."""
+
+CORNERS = (20.0, 60.0, 180.0)
+"""Corner frequencies [rad/s] of the lags of a learned transfer function."""
+
+RATE = 20.0
+"""Angular frequency [rad/s] in units of which it has rates."""
+
+OF_THE_FREQUENCY = (
+    Function("1", Family.GAIN),
+    Function("s/20", Family.DYNAMICS),
+    Function("(s/20)^2", Family.DYNAMICS),
+    *(Function(f"1/(1 + s/{corner:g}) - 1", Family.DYNAMICS) for corner in CORNERS),
+)
+"""Functions of s = j 2 pi f [rad/s] at a sensor."""
 
 SMALLEST = 1e-9
 """Least stroke [m], speed [m/s] and load [N] by which is divided."""
 
 
-def functions(x: Float[Array, ""], v: Float[Array, ""], n: Float[Array, ""]) -> list[Float[Array, ""]]:
-    """The values of all f_k [1], those of the motion first, then those of the load."""
+def functions(
+    x: Float[Array, "*n"], v: Float[Array, "*n"], n: Float[Array, "*n"]
+) -> list[Float[Array, "*n"]]:
+    """The values of all functions [1] that have no past, those of the motion first, then those of the load."""
     sharp, blunt = (jnp.tanh(v / width) for width in SHARP)
     falling = [sharp * jnp.exp(-((v / width) ** 2)) for width in FALLING]
     smooth = [v, v * jnp.abs(v), v**2, x, x**2, x**3, x * sharp, x * v, x**2 * v]
-    return [sharp, blunt, *smooth, *falling, n * sharp, n * v, n]
+    stops = [jnp.maximum(side * x - gap, 0.0) for gap in GAPS for side in (1.0, -1.0)]
+    return [sharp, blunt, *smooth, *falling, jnp.abs(v), *stops, n * sharp, n * v, n]
 
 
-def functions_at(port: Port) -> tuple[str, ...]:
-    """The functions at a port, in words."""
-    return (*OF_THE_MOTION, *OF_THE_LOAD) if port.loaded else OF_THE_MOTION
+def functions_at(port: Port) -> tuple[Function, ...]:
+    """The functions of the learned law at a port; none where nothing is learned."""
+    if port.kind is PortKind.FORCE:
+        return (*OF_THE_MOTION, *OF_SLIDERS, *(OF_THE_LOAD if port.loaded else ()))
+    if port.kind is PortKind.SERIES:
+        return () if port.resonant else OF_WHAT_GIVES
+    return {PortKind.INPUT: OF_THE_ANGLE, PortKind.SENSOR: OF_THE_FREQUENCY}.get(port.kind, ())
 
 
 def coefficients_at(port: Port) -> tuple[str, ...]:
-    """Names of the c_k at a port, one for each of its functions."""
+    """Names of the coefficients at a port, one for each of its functions."""
     return tuple(f"learned_{port.name}_{number}" for number in range(1, len(functions_at(port)) + 1))
 
 
-def frictions_at(port: Port) -> tuple[str, ...]:
-    """Names of the c_k of the frictions at a port; with all of them at zero, what remains is smooth at rest."""
+def coefficients_of(port: Port, family: Family) -> tuple[str, ...]:
+    """Names of the coefficients of a family's functions at a port."""
     both = zip(coefficients_at(port), functions_at(port), strict=True)
-    return tuple(name for name, words in both if words in FRICTIONS)
+    return tuple(name for name, function in both if function.family is family)
+
+
+def frictions_at(port: Port) -> tuple[str, ...]:
+    """Names of the coefficients of frictions at a port; with all at zero, what remains is smooth at rest."""
+    return coefficients_of(port, Family.FRICTION)
+
+
+def _coefficients(port: Port, unit: str) -> dict[str, Parameter | float]:
+    """By role, a coefficient for every function of the port: nothing learned yet."""
+    return {
+        str(number): Parameter(str(number), 0.0, unit, about=f"learned in proportion to {each.words}")
+        for number, each in enumerate(functions_at(port), start=1)
+    }
+
+
+def _roles(spans: tuple[str, ...], count: int) -> tuple[Role, ...]:
+    return (*(Role(span) for span in spans), *(Role(str(number), 0.0) for number in range(1, count + 1)))
+
+
+def _sum(v: Values, values: list[Array]) -> Array:
+    """The functions in proportion to their coefficients."""
+    return sum((v[str(k)] * value for k, value in enumerate(values[1:], start=2)), v["1"] * values[0])
 
 
 class LearnedForce(AbstractForceLaw):
-    """A learned force at a ``port``, in the port's own sense."""
+    """A learned force at a ``port``, in the port's own sense: F = sum over k of c_k f_k(x, v, n)."""
 
     name: ClassVar[str] = "learned"
     family: ClassVar[Family] = Family.LEARNED
-    roles: ClassVar[tuple[Role, ...]] = (
-        *(Role(span) for span in ("middle", "stroke", "speed", "carried")),
-        *(Role(str(number), 0.0) for number in range(1, len((*OF_THE_MOTION, *OF_THE_LOAD)) + 1)),
+    roles: ClassVar[tuple[Role, ...]] = _roles(
+        ("middle", "stroke", "speed", "carried"), len((*OF_THE_MOTION, *OF_SLIDERS, *OF_THE_LOAD))
     )
     port: Port = eqx.field(static=True)
 
@@ -92,11 +223,14 @@ class LearnedForce(AbstractForceLaw):
             "speed": Parameter("speed", 1.0, f"{unit}/s", lower=SMALLEST, about="largest velocity seen"),
             "carried": carried if port.loaded else 1.0,
         }
-        coefficients = {
-            str(number): Parameter(str(number), 0.0, force, about=f"learned force in proportion to {words}")
-            for number, words in enumerate(functions_at(port), start=1)
-        }
-        return {role.name: 0.0 for role in self.roles} | spans | coefficients
+        return {role.name: 0.0 for role in self.roles} | spans | _coefficients(port, force)
+
+    def states(self, port: Port) -> tuple[InternalState, ...]:
+        """Where the spring-sliders are anchored."""
+        return tuple(
+            InternalState(f"anchor_{number}", port.displacement_unit, port.displacement, slips=True)
+            for number, _ in enumerate(STRETCHES, start=1)
+        )
 
     def suits(self, port: Port) -> bool:
         """Only where it was made for."""
@@ -107,14 +241,137 @@ class LearnedForce(AbstractForceLaw):
         x = jnp.clip((signals.displacement - v["middle"]) / v["stroke"], -1.0, 1.0)
         speed = jnp.clip(signals.velocity / v["speed"], -1.0, 1.0)
         n = jnp.clip(signals.load / v["carried"], -1.0, 1.0) if self.port.loaded else jnp.zeros_like(x)
-        terms = zip(functions_at(self.port), functions(x, speed, n), strict=False)
-        total = sum((v[str(k)] * value for k, (_, value) in enumerate(terms, start=1)), jnp.zeros_like(x))
-        return self.port.sense * total
+        found = functions(x, speed, n)
+        motion, load = found[: len(OF_THE_MOTION)], found[len(OF_THE_MOTION) :]
+        sliders = [-each.force for each in self._sliders(signals, state)]
+        return self.port.sense * _sum(v, [*motion, *sliders, *(load if self.port.loaded else [])])
+
+    def rate(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:
+        """Velocities of the anchors [m/s]."""
+        return jnp.stack([each.rate for each in self._sliders(signals, state)])
+
+    def _sliders(self, signals: PortSignals, state: Float[Array, " s"]) -> list[Bristle]:
+        """Spring-sliders of unit friction: what they carry is a function of the motion alone."""
+        one = jnp.ones_like(signals.displacement)
+        moved = signals._replace(displacement=signals.displacement - signals.rest)
+        widths = [share * self.port.displacement for share in STRETCHES]
+        sticks = [Presliding(one / width, one * (SLIDER_LAG / width)) for width in widths]
+        return [
+            bristle(stick, moved, FrictionLimit(one, one), state[place]) for place, stick in enumerate(sticks)
+        ]
+
+
+class LearnedCompliance(AbstractSeriesLaw):
+    """What gives way under a load by a learned law: x + T xd = sum over k of c_k f_k(n, N)."""
+
+    name: ClassVar[str] = "learned_compliance"
+    family: ClassVar[Family] = Family.LEARNED
+    roles: ClassVar[tuple[Role, ...]] = _roles(("carried", "lag"), len(OF_WHAT_GIVES))
+    port: Port = eqx.field(static=True)
+
+    def typical(self, port: Port) -> Mapping[str, Parameter | float]:
+        """Nothing learned yet."""
+        spans = {
+            "carried": Parameter("carried", 1.0, port.force_unit, lower=SMALLEST, about="largest load seen"),
+            "lag": Parameter("lag", 3e-4, "s", lower=1e-5, upper=0.1, about="time in which it gives way"),
+        }
+        return spans | _coefficients(port, port.displacement_unit)
+
+    def states(self, port: Port) -> tuple[InternalState, ...]:
+        """The deflection."""
+        return (InternalState("deflection", port.displacement_unit, port.displacement),)
+
+    def suits(self, port: Port) -> bool:
+        """Only where it was made for."""
+        return port == self.port
+
+    def balance(
+        self, v: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
+    ) -> Float[Array, " s"]:
+        """The deflection out of balance [the port's unit]."""
+        n = jnp.clip(load.beyond_rest / v["carried"], -1.0, 1.0)
+        whole, rest = load.total / v["carried"], load.rest / v["carried"]
+        return jnp.sqrt(v["lag"] ** 2 + SETTLING**2) * rate + state - _sum(v, what_gives(n, whole, rest))
+
+
+class LearnedInput(AbstractInputLaw):
+    """What comes on top of a recorded input by a learned law of its angle."""
+
+    name: ClassVar[str] = "learned_input"
+    family: ClassVar[Family] = Family.LEARNED
+    roles: ClassVar[tuple[Role, ...]] = _roles(("fastest",), len(OF_THE_ANGLE))
+    port: Port = eqx.field(static=True)
+
+    def typical(self, port: Port) -> Mapping[str, Parameter | float]:
+        """Nothing learned yet."""
+        fastest = Parameter("fastest", 1.0, "rad/s", lower=SMALLEST, about="greatest speed of the angle seen")
+        return {"fastest": fastest} | _coefficients(port, port.displacement_unit)
+
+    def suits(self, port: Port) -> bool:
+        """Only where it was made for."""
+        return port == self.port
+
+    def shift(self, v: Values, signal: InputSignal, fundamental: Fundamental) -> InputSignal:
+        """The learned value and its rate."""
+        angle, speed = fundamental
+        relative = speed / v["fastest"]
+        value, slope = [], []
+        for order in ORDERS:
+            value += [jnp.cos(order * angle), jnp.sin(order * angle)]
+            slope += [-order * jnp.sin(order * angle), order * jnp.cos(order * angle)]
+        value += [relative * jnp.sin(angle), relative * jnp.cos(angle)]
+        slope += [relative * jnp.cos(angle), -relative * jnp.sin(angle)]
+        return InputSignal(_sum(v, value), speed * _sum(v, slope))
+
+
+class LearnedTransfer(AbstractSensorLaw):
+    """A sensor with a learned transfer function: 1 + sum over k of c_k H_k(s)."""
+
+    name: ClassVar[str] = "learned_transfer"
+    family: ClassVar[Family] = Family.LEARNED
+    roles: ClassVar[tuple[Role, ...]] = _roles((), len(OF_THE_FREQUENCY))
+    port: Port = eqx.field(static=True)
+
+    def typical(self, port: Port) -> Mapping[str, Parameter | float]:
+        """Nothing learned yet."""
+        return _coefficients(port, "1")
+
+    def suits(self, port: Port) -> bool:
+        """Only where it was made for."""
+        return port == self.port
+
+    def transfer(self, v: Values, frequency: Float[Array, "*f"]) -> Complex[Array, "*f"]:
+        """Reading over truth at frequencies [Hz]."""
+        return 1.0 + _sum(v, filters(2j * jnp.pi * frequency))
+
+
+def what_gives(
+    n: Float[Array, "*n"], whole: Float[Array, "*n"], rest: Float[Array, "*n"]
+) -> list[Float[Array, "*n"]]:
+    """The functions of a load beyond that at rest ``n``, of the whole and of that at rest [1]: nothing at rest."""
+    plays = [jnp.tanh(steep * whole) - jnp.tanh(steep * rest) for steep in (50.0, 5.0)]
+    return [n, n * jnp.abs(n), n**2, n**3, *plays]
+
+
+def filters(s: Complex[Array, "*f"]) -> list[Complex[Array, "*f"]]:
+    """The functions of a sensor at s [rad/s]."""
+    rate = s / RATE
+    return [jnp.ones_like(s), rate, rate**2, *(1.0 / (1.0 + s / corner) - 1.0 for corner in CORNERS)]
+
+
+_Law = LearnedForce | LearnedCompliance | LearnedInput | LearnedTransfer
+
+_LAWS: Mapping[PortKind, Callable[[Port], _Law]] = {
+    PortKind.FORCE: LearnedForce,
+    PortKind.SERIES: LearnedCompliance,
+    PortKind.INPUT: LearnedInput,
+    PortKind.SENSOR: LearnedTransfer,
+}
 
 
 def learned_effect(port: Port) -> Effect:
-    """The learned force of a port, with nothing learned yet: ``learned_rail`` at the port ``rail``."""
-    law, name = LearnedForce(port), f"learned_{port.name}"
+    """The learned law of a port, with nothing learned yet: ``learned_rail`` at the port ``rail``."""
+    law, name = _LAWS[port.kind](port), f"learned_{port.name}"
     numbers = {
         role: replace(given, name=f"{name}_{role}") if isinstance(given, Parameter) else given
         for role, given in law.typical(port).items()
@@ -124,6 +381,7 @@ def learned_effect(port: Port) -> Effect:
         port,
         law,
         numbers,
+        states=tuple(f"{name}_{each.name}" for each in law.states(port)),
         symptom="no effect of the catalogue explains what is measured",
-        reference="this project: linear regression on functions of the port's motion",
+        reference="this project: linear regression on functions of what the port sees",
     )

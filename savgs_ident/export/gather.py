@@ -186,7 +186,7 @@ def with_diagnosis(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, A
     if verdict["kind"] == "none":
         said = "The diagnosis finds nothing missing: the numbers are those of the rig file."
         return Diagnosed(rig, effects, (), (said,))
-    if verdict["kind"] == "unknown":
+    if verdict["kind"] == "unknown" or (diagnosis.get("learned") and not verdict.get("law_known", True)):
         return _with_unknown(rig, effects, diagnosis)
     named = tuple(verdict["effects"])
     added = tuple(name for name in named if name not in effects)
@@ -332,8 +332,9 @@ def _check_verdict(place: JsonValue) -> None:
     fields["sentence"].text()
     if "confusable_ports" in fields:
         fields["confusable_ports"].names()
-    if "another_law" in fields and not isinstance(fields["another_law"].value, bool):
-        raise fields["another_law"].wrong("true or false")
+    for name in ("law_known", "another_law"):
+        if name in fields and not isinstance(fields[name].value, bool):
+            raise fields[name].wrong("true or false")
 
 
 def _check_candidate(place: JsonValue) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from savgs_ident.core.errors import InputError, SavgsIdentError, blamed_on
-from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.files import prepare_folder
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.diagnosis.result import Diagnosis
 from savgs_ident.export.exported_model import ExportedModel

@@ -12,14 +12,13 @@ from savgs_ident.fit.residuals import comparable
 from savgs_ident.fit.result import Fit
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.excitation import measured_excitation
+from savgs_ident.simulate.excitation import Measurements, campaign_of, measured_excitation, measured_response
 from savgs_ident.simulate.frequency_response import (
     SimulatedResponse,
     disable_effects,
     simulate_between,
     simulate_response,
 )
-from savgs_ident.simulate.measured import Measurements, campaign_of, measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 

@@ -25,8 +25,7 @@ from savgs_ident.fit.result import Verdict
 from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import Pins, Problem, Task
 from savgs_ident.plants.base import Excitation
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
 
 LARGEST_SD = 0.25
 """A free parameter is identifiable if its standard error is below this share of its value."""

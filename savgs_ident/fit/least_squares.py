@@ -26,8 +26,7 @@ from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import ProblemSettings, Quantity, Task, plan_task
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSettings, adapt, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, adapt, harmonics, simulate_periodic
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.model import load_model
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
-from savgs_ident.simulate.measured import Measurements, campaign_of, measured_response
+from savgs_ident.simulate.excitation import Measurements, campaign_of, measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 

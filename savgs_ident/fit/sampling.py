@@ -12,7 +12,7 @@ from savgs_ident.inference.sample import Question, sample_posterior
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.measured import Measurements, campaign_of, measured_response
+from savgs_ident.simulate.excitation import Measurements, campaign_of, measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 

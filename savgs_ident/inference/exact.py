@@ -19,8 +19,7 @@ from jaxtyping import Array, Complex, Float
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.inference.problem import Problem
 from savgs_ident.simulate.collocation import Trajectory
-from savgs_ident.simulate.harmonics import harmonics, harmonics_of
-from savgs_ident.simulate.periodic import PeriodicSolution, resolve, solve_near
+from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, harmonics_of, resolve, solve_near
 from savgs_ident.simulate.program_cache import placed, stored
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities, trajectory_sensitivities
 

@@ -16,8 +16,7 @@ from typing import Any, Protocol, Self
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.core.parameter import Parameter, ParameterTable, merge_parameters
 from savgs_ident.core.presentation import Origin
-from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.generic import generic_effects
+from savgs_ident.effects.effect import Effect, generic_effects
 from savgs_ident.plants.base import AbstractPlant, Channel
 from savgs_ident.recordings.recording import Campaign
 

@@ -26,9 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning
-from savgs_ident.recordings.binding import SignalCandidate
-from savgs_ident.recordings.layout import RecordingLayout
+from savgs_ident.recordings.channels import SignalCandidate
 from savgs_ident.recordings.mcap_records import DecodeError, MessageBlock, gather
+from savgs_ident.recordings.recording import RecordingLayout
 
 PRIMITIVES: Mapping[str, str] = MappingProxyType(
     {

@@ -23,8 +23,7 @@ from savgs_ident.recordings.checks_signal import (
     check_time,
     find_longest_constant,
 )
-from savgs_ident.recordings.layout import RecordingLayout
-from savgs_ident.recordings.recording import RecordedChannel, Recording
+from savgs_ident.recordings.recording import RecordedChannel, Recording, RecordingLayout
 
 _FEWEST_PERIODS, _FEW_PERIODS = 3.0, 6.0
 """Periods below which the noise (what does not repeat) cannot be estimated, or is estimated poorly."""

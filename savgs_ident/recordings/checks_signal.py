@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.layout import ChannelSpec
-from savgs_ident.recordings.recording import RecordedChannel, Recording
+from savgs_ident.recordings.recording import ChannelSpec, RecordedChannel, Recording
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.binding import (
+from savgs_ident.recordings.channels import (
     Binding,
+    ChannelMap,
+    ChannelRule,
     Progress,
     Reader,
     Reading,
@@ -23,13 +25,13 @@ from savgs_ident.recordings.binding import (
     bind,
     unit_factor_or_si,
 )
-from savgs_ident.recordings.channels import ChannelMap, ChannelRule
 from savgs_ident.recordings.csv_table import GZIP_MAGIC, CsvHead, CsvTable, TextBlocks, read_head
-from savgs_ident.recordings.layout import RecordingLayout, normalise
 from savgs_ident.recordings.recording import (
     RecordedChannel,
     Recording,
+    RecordingLayout,
     classify_test,
+    normalise,
     unix_time,
 )
 

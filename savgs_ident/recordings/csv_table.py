@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.recordings.binding import Progress, SignalCandidate
-from savgs_ident.recordings.layout import RecordingLayout, find_unit
+from savgs_ident.recordings.channels import Progress, SignalCandidate
+from savgs_ident.recordings.recording import RecordingLayout, find_unit
 
 if TYPE_CHECKING:
     import pandas as pd

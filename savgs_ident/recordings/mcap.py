@@ -20,8 +20,10 @@ from mcap.records import Schema
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.binding import (
+from savgs_ident.recordings.cdr import CdrDecoder
+from savgs_ident.recordings.channels import (
     Binding,
+    ChannelMap,
     Progress,
     Reader,
     Reading,
@@ -29,13 +31,10 @@ from savgs_ident.recordings.binding import (
     ambiguous,
     bind,
 )
-from savgs_ident.recordings.cdr import CdrDecoder
-from savgs_ident.recordings.channels import ChannelMap
-from savgs_ident.recordings.json_messages import JsonDecoder
-from savgs_ident.recordings.layout import RecordingLayout
 from savgs_ident.recordings.mcap_records import (
     MAGIC,
     DecodeError,
+    JsonDecoder,
     McapRecords,
     MessageBlock,
     Segment,
@@ -52,6 +51,7 @@ from savgs_ident.recordings.mcap_timing import (
 from savgs_ident.recordings.recording import (
     RecordedChannel,
     Recording,
+    RecordingLayout,
     classify_test,
     unix_time,
 )

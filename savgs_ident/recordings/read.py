@@ -9,7 +9,7 @@
 
 Usual names and units are recognised; others are mapped in ``channels.toml`` beside the file (see
 :mod:`savgs_ident.recordings.channels`). A new file format is a module with a
-:class:`~savgs_ident.recordings.binding.Reader` and one line in ``READERS``.
+:class:`~savgs_ident.recordings.channels.Reader` and one line in ``READERS``.
 """
 
 import hashlib
@@ -17,13 +17,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.binding import Progress, Reader, Reading
-from savgs_ident.recordings.channels import FILE_NAME, ChannelMap, read_channel_map
+from savgs_ident.recordings.channels import FILE_NAME, ChannelMap, Progress, Reader, Reading, read_channel_map
 from savgs_ident.recordings.checks import screen
 from savgs_ident.recordings.csv import CSV
-from savgs_ident.recordings.layout import RecordingLayout
 from savgs_ident.recordings.mcap import MCAP
-from savgs_ident.recordings.recording import Campaign, Recording
+from savgs_ident.recordings.recording import Campaign, Recording, RecordingLayout
 
 READERS: tuple[Reader, ...] = (
     CSV,

@@ -1,9 +1,13 @@
 """How each class of results is shown: its JSON object, its text, its report, its pictures, its files.
 
 A result names its presenter (:mod:`savgs_ident.core.presentation`); the command line and a notebook show it by the
-same one. Each room has its presenters in ``present.py``, which is loaded when something is to be shown:
+same one. Presenters are in files that are loaded when something is to be shown, and load what draws when something
+is drawn:
 
     presenters.FIT.text(fit)
+
+:func:`plot_bode` is what ``import savgs_ident`` offers of pictures besides: the frequency response of whatever has
+one.
 """
 
 from abc import ABC, abstractmethod
@@ -14,8 +18,8 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rich.console import RenderableType
 
-from savgs_ident.core.files import write_bytes
-from savgs_ident.core.output import write_json
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.files import write_bytes, write_json
 from savgs_ident.core.presentation import Progress, Result
 
 if TYPE_CHECKING:
@@ -86,28 +90,55 @@ def is_quarter_car(model: object) -> bool:
     return isinstance(model, RigModel)
 
 
-_ROOMS = {
-    "CAMPAIGN_SUMMARY": "campaigns.present",
-    "CAMPAIGN_STUDY": "campaigns.present",
-    "BLIND_STUDY": "validation.present",
-    "ALARM_STUDY": "validation.present",
-    "CALIBRATION_STUDY": "validation.present",
-    "FIT": "fit.present",
-    "COMPARISON": "fit.present",
-    "SIMULATED_RESPONSE": "present",
-    "SIMULATED_SWEEP": "present",
-    "POSTERIOR": "posterior.present",
-    "DIAGNOSIS": "diagnosis.present",
-    "LINEAR_STUDY": "control.present",
-    "DESIGN": "control.present",
-    "LOOP_STUDY": "control.present",
-    "EXPORTED": "present",
+_FILES = {
+    "CAMPAIGN_SUMMARY": "present_campaign",
+    "CAMPAIGN_STUDY": "present_studies",
+    "BLIND_STUDY": "present_studies",
+    "ALARM_STUDY": "present_studies",
+    "CALIBRATION_STUDY": "present_studies",
+    "FIT": "present_campaign",
+    "COMPARISON": "present_campaign",
+    "SIMULATED_RESPONSE": "present_models",
+    "SIMULATED_SWEEP": "present_models",
+    "POSTERIOR": "present_campaign",
+    "DIAGNOSIS": "present_campaign",
+    "LINEAR_STUDY": "present_models",
+    "DESIGN": "present_models",
+    "LOOP_STUDY": "present_models",
+    "EXPORTED": "present_models",
 }
 
 
 def __getattr__(name: str) -> "Presenter":
-    """The presenter ``name``, from its room."""
-    if name not in _ROOMS:
+    """The presenter ``name``, from its file."""
+    if name not in _FILES:
         raise AttributeError(f"there is no presenter {name!r}")
-    found: Presenter = getattr(import_module(f"savgs_ident.report.{_ROOMS[name]}"), name)
+    found: Presenter = getattr(import_module(f"savgs_ident.report.{_FILES[name]}"), name)
     return found
+
+
+_FIGURES = {
+    "FIT": "bode",
+    "COMPARISON": "bode",
+    "SIMULATED_RESPONSE": "simulate",
+    "POSTERIOR": "predicted",
+    "DIAGNOSIS": "bode",
+}
+"""By presenter, the first word of the name of the figure that shows the response."""
+
+
+def plot_bode(result: Result) -> "Figure":
+    """Magnitude, phase and peak to peak over frequency: the model against the measurement where there is one.
+
+    Of a fit, a comparison, a simulated response, a posterior or a diagnosis. The other figures of a result are
+    ``result.figure(name)``, with a name of ``result.figure_names``.
+
+    Raises :class:`InputError` for a result that has no frequency response.
+    """
+    names = [each for each in result.figure_names if each.split(" ")[0] == _FIGURES.get(result.presenter)]
+    if not names:
+        raise InputError(
+            f"a {type(result).__name__} has no frequency response",
+            remedy="choose among its figures: " + ", ".join(result.figure_names),
+        )
+    return result.figure(names[0])

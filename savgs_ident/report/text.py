@@ -23,7 +23,7 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from savgs_ident.plants.model import Model
-    from savgs_ident.recordings.layout import RecordingLayout
+    from savgs_ident.recordings.recording import RecordingLayout
 
 MINUS = "\u2212"
 """A minus as long as a plus."""

@@ -11,7 +11,19 @@ eliminates y at each node, dy = J dx + e, and what is left is
     A_{n+1} dx_{n+1} = B_n dx_n + d_n,    A_n = I - h_{n-1} g F_n,    B_n = I + h_n (1 - g) F_n,
 
 with F = d(xd)/dx. In terms of A_n dx_n it is an affine recurrence whose matrices B_n A_n^-1 need one node
-only; it closes after one period (:mod:`savgs_ident.simulate.cyclic`).
+only; it closes after one period.
+
+Affine recurrences that close after one period,
+
+    x_{n+1} = M_n x_n + d_n,    x_N = x_0,
+
+with small matrices M_n, are solved dwell by dwell. Eliminating from node to node is stable because a rig
+forgets its past (the products of M_n shrink). Products are formed in chunks, all chunks of all dwells at a
+time, then over the chunks of a dwell; the period closes with (I - M_{N-1} ... M_0) x_0 = d. The
+factorisation serves any number of right sides, which is what makes sensitivities cheap.
+
+Arrays are laid out with the matrix indices first and the nodes of all dwells last, so that every operation is
+a long vector.
 """
 
 from collections.abc import Callable
@@ -24,8 +36,99 @@ from jaxtyping import Array, Float
 
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import AbstractPlant, Motion
-from savgs_ident.simulate import cyclic
 from savgs_ident.simulate.mesh import CHUNK, Layout
+
+Matrices = Float[Array, "m k P"]
+Vectors = Float[Array, "m P"]
+
+
+def multiply_nodes(left: Matrices, right: Matrices) -> Matrices:
+    """Matrix products at every node, of any units."""
+    return jnp.sum(left[:, :, None] * right[None], axis=1)
+
+
+def apply_nodes(left: Matrices, right: Vectors) -> Vectors:
+    """Matrix times vector at every node, of any units."""
+    return jnp.sum(left * right[None], axis=1)
+
+
+def solve_nodes(matrix: Matrices, right: Matrices) -> Matrices:
+    """Solve small systems of any units at every node by Gaussian elimination without pivoting.
+
+    For matrices with a dominant diagonal (mass matrices; I - h J with a small step h).
+    """
+    size = matrix.shape[0]
+    rows = [jnp.concatenate([matrix[i], right[i]], axis=0) for i in range(size)]
+    for i in range(size):
+        pivot = rows[i] / rows[i][i]
+        rows = [pivot if j == i else rows[j] - rows[j][i] * pivot for j in range(size)]
+    return jnp.stack([row[size:] for row in rows])
+
+
+class CyclicFactors(NamedTuple):
+    """Factorised recurrence: step matrices, products over chunks, inverses of I - (product of a period).
+
+    Entries are in the units of the states per those of the states.
+    """
+
+    steps: Float[Array, "m m P"]
+    chunks: Float[Array, "m m C"]
+    closing: Float[Array, "D m m"]
+
+
+def _inside_chunks(array: Float[Array, "*k P"]) -> Float[Array, "L *k C"]:
+    return jnp.moveaxis(array.reshape(*array.shape[:-1], -1, CHUNK), -1, 0)
+
+
+def _over_chunks(layout: Layout, array: Float[Array, "*k C"], absent: Array) -> Float[Array, "most *k D"]:
+    padded = jnp.concatenate([array, absent[..., None]], axis=-1)
+    return jnp.moveaxis(padded[..., layout.chunk_table], -1, 0)
+
+
+def factorise_recurrence(layout: Layout, steps: Float[Array, "m m P"]) -> CyclicFactors:
+    """Factorise the recurrence with step matrices M_n [units of the states per those of the states]."""
+
+    def compose(matrices: Array) -> Array:
+        total, _ = jax.lax.scan(
+            lambda done, step: (multiply_nodes(step, done), None), matrices[0], matrices[1:]
+        )
+        return total
+
+    eye = jnp.eye(steps.shape[0])
+    chunks = compose(_inside_chunks(steps))
+    period = compose(_over_chunks(layout, chunks, eye))
+    closing = jnp.linalg.inv(jnp.moveaxis(eye[:, :, None] - period, -1, 0))
+    return CyclicFactors(steps, chunks, closing)
+
+
+def solve_recurrence(
+    layout: Layout, factors: CyclicFactors, right: Float[Array, "m P"]
+) -> Float[Array, "m P"]:
+    """The periodic x_n for right sides d_n, which belong to the step from node n to the next.
+
+    States keep the units of the right sides.
+    """
+
+    def end(x: Array, step: tuple[Array, Array]) -> tuple[Array, None]:
+        return apply_nodes(step[0], x) + step[1], None
+
+    def pass_on(x: Array, step: tuple[Array, Array]) -> tuple[Array, Array]:
+        return apply_nodes(step[0], x) + step[1], x
+
+    size = right.shape[0]
+    inside = (_inside_chunks(factors.steps), _inside_chunks(right))
+    sides, _ = jax.lax.scan(end, jnp.zeros_like(inside[1][0]), inside)
+    over = (
+        _over_chunks(layout, factors.chunks, jnp.eye(size)),
+        _over_chunks(layout, sides, jnp.zeros(size)),
+    )
+    period_side, _ = jax.lax.scan(end, jnp.zeros_like(over[1][0]), over)
+    start = jnp.einsum("dij,jd->id", factors.closing, period_side)
+    _, starts = jax.lax.scan(pass_on, start, over)
+    present = layout.chunk_table < factors.chunks.shape[-1]
+    _, nodes = jax.lax.scan(pass_on, jnp.moveaxis(starts, 0, -1)[:, present], inside)
+    return jnp.moveaxis(nodes, 0, -1).reshape(right.shape)
+
 
 Nodes = Float[Array, "k P"]
 
@@ -48,7 +151,7 @@ class Linearised(NamedTuple):
     slope: Float[Array, "k m P"]
     mass: Float[Array, "k k P"]
     inverse: Float[Array, "m m P"]
-    factors: cyclic.CyclicFactors
+    factors: CyclicFactors
 
 
 def blank_linearised(model: AbstractPlant, layout: Layout) -> Linearised:
@@ -61,7 +164,7 @@ def blank_linearised(model: AbstractPlant, layout: Layout) -> Linearised:
         slope=jnp.zeros((inner, size, nodes)),
         mass=jnp.zeros((inner, inner, nodes)),
         inverse=jnp.zeros((size, size, nodes)),
-        factors=cyclic.CyclicFactors(
+        factors=CyclicFactors(
             steps=jnp.zeros((size, size, nodes)),
             chunks=jnp.zeros((size, size, nodes // CHUNK)),
             closing=jnp.zeros((dwells, size, size)),
@@ -124,16 +227,16 @@ def linearise(
     size = at.x.shape[0]
     mass = jacobian[:, size:]
     right = -jnp.concatenate([jacobian[:, :size], residual[:, None]], axis=1)
-    solved = cyclic.solve_nodes(mass, right)
+    solved = solve_nodes(mass, right)
     slope, imbalance = solved[:, :size], solved[:, size]
     n = len(model.coordinates)
     kinematic = jnp.broadcast_to(jnp.eye(n, size, k=n)[:, :, None], (n, *slope.shape[1:]))
     flow = jnp.concatenate([kinematic, slope])
     weight = implicitness(model)[:, None]
     eye = jnp.broadcast_to(jnp.eye(size)[:, :, None], flow.shape)
-    inverse = cyclic.solve_nodes(eye - steps[layout.preceding] * weight * flow, eye)
-    matrices = cyclic.product(eye + steps * (1.0 - weight) * flow, inverse)
-    return Linearised(imbalance, slope, mass, inverse, cyclic.factorise(layout, matrices))
+    inverse = solve_nodes(eye - steps[layout.preceding] * weight * flow, eye)
+    matrices = multiply_nodes(eye + steps * (1.0 - weight) * flow, inverse)
+    return Linearised(imbalance, slope, mass, inverse, factorise_recurrence(layout, matrices))
 
 
 def step_defects(
@@ -147,5 +250,5 @@ def step_defects(
 
 def solve_linearised(layout: Layout, lin: Linearised, defects: Nodes, imbalance: Nodes) -> Trajectory:
     """Changes (dx, dy) that cancel step defects given that dy = slope dx + imbalance at the nodes, all in SI."""
-    dx = cyclic.apply(lin.inverse, cyclic.solve(layout, lin.factors, defects))
-    return Trajectory(dx, imbalance + cyclic.apply(lin.slope, dx))
+    dx = apply_nodes(lin.inverse, solve_recurrence(layout, lin.factors, defects))
+    return Trajectory(dx, imbalance + apply_nodes(lin.slope, dx))

@@ -20,9 +20,8 @@ from savgs_ident.core.values import as_values
 from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import peak_to_peak
-from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.mesh import Layout, layout_for
-from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Periodic steady states of all dwells at once.
+"""Periodic steady states of all dwells at once, and what the sensors read along them.
 
 A dwell's motion is periodic but not smooth: the rail sticks at every reversal. The motion is found by
 periodic collocation in time (:mod:`savgs_ident.simulate.collocation`): a coarse, evenly spaced solution shows
@@ -6,14 +6,14 @@ where the accelerations change, the nodes move there, and the solution is repeat
 serve any nearby parameter set, which is how fits warm-start.
 
     solution = simulate_periodic(plant, p, excitation)
+    response = harmonics(plant, p, solution, orders=9)   # complex, (dwells, channels, 10)
 
-:mod:`savgs_ident.simulate.harmonics` says what sensors read along it, and
-:mod:`savgs_ident.simulate.sensitivity` how that changes with the parameters.
+:mod:`savgs_ident.simulate.sensitivity` says how the response changes with the parameters. What the truncation to a
+finite number of nodes costs is stated by :func:`truncation_error`, which solves once more on twice as many nodes.
 
-Damped Newton iteration on all dwells at once.
-
-Each dwell has its own damping: where a step is longer than the one before it (a friction that sticks now
-here, now there), the next ones are shortened; where steps shrink they are taken whole again.
+Newton's iteration is damped, and on all dwells at once. Each dwell has its own damping: where a step is longer than
+the one before it (a friction that sticks now here, now there), the next ones are shortened; where steps shrink they
+are taken whole again.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.tree_util import PyTreeDef
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Complex, Float, Int
 from numpy.typing import NDArray
 
 from savgs_ident.core.status import Status
@@ -32,16 +32,17 @@ from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import InputSignal
 from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.simulate.collocation import (
+    CyclicFactors,
     Linearised,
     Trajectory,
     blank_linearised,
     linearise,
+    node_motion,
     solve_linearised,
     step_defects,
 )
-from savgs_ident.simulate.cyclic import CyclicFactors
 from savgs_ident.simulate.excitation import inputs_at, signals_at
-from savgs_ident.simulate.mesh import Layout, Mesh, adapted_mesh, layout_for, uniform_mesh
+from savgs_ident.simulate.mesh import Layout, Mesh, adapted_mesh, layout_for, turns, uniform_mesh
 from savgs_ident.simulate.program_cache import placed, stored
 
 TOLERANCE = 1e-7
@@ -320,3 +321,66 @@ def resolve(
     """The solution at other parameters, on the same nodes, started from ``solution`` or a better ``start``."""
     begin = solution.trajectory if start is None else start
     return solve_on_mesh(model, as_values(p), solution.excitation, solution.mesh, begin, limit)
+
+
+def _readings(
+    model: AbstractPlant, p: Values, trajectory: Trajectory, known: PeriodicSolution
+) -> Float[Array, "P C"]:
+    def one(u: Any, *parts: Array) -> tuple[Array, ...]:
+        motion, states, rates = node_motion(model, parts)
+        return model.read(p, motion, states, rates, u)
+
+    u = inputs_at(model, known.excitation, known.mesh)
+    return jnp.stack(jax.vmap(one)(u, *trajectory.x, *trajectory.y), axis=-1)
+
+
+def analyse(signals: Float[Array, "P C"], mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
+    """Complex harmonics 0..orders of C signals at the nodes of a mesh, in their own units."""
+    twice = jnp.full(orders + 1, 2.0).at[0].set(1.0)
+    kernel = twice * jnp.conj(turns(mesh.phase, orders))
+    terms = signals[:, :, None] * (kernel * jnp.asarray(mesh.weight)[:, None])[:, None, :]
+    layout = mesh.layout
+    return jax.ops.segment_sum(terms, layout.dwell, len(layout.counts), indices_are_sorted=True)
+
+
+@eqx.filter_jit
+def harmonics(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int
+) -> Complex[Array, "D C K"]:
+    """Complex harmonics 0..orders of the sensor readings, (D, C, orders + 1), in the channels' SI units.
+
+    Channels are those of the plant, in its order.
+    """
+    return harmonics_of(model, p, solution.trajectory, solution, orders)
+
+
+def harmonics_of(
+    model: AbstractPlant, p: Values, motions: Trajectory, known: PeriodicSolution, orders: int
+) -> Complex[Array, "D C K"]:
+    """The same of motions on the nodes of a ``known`` solution, as a part of a larger program that is compiled.
+
+    Each is in the unit of its reading.
+    """
+    seen = analyse(_readings(model, p, motions, known), known.mesh, orders)
+    return seen * _sensors(model, p, known.excitation.frequency, orders)
+
+
+def _sensors(
+    model: AbstractPlant, p: Values, frequency: Float[Array, " D"], orders: int
+) -> Complex[Array, "D C K"]:
+    """What the sensors make of each order."""
+    order = jnp.arange(orders + 1, dtype=frequency.dtype)
+    return jnp.moveaxis(model.transfers(p, frequency[:, None] * order), 0, 1)
+
+
+def truncation_error(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int
+) -> Float[Array, "D C"]:
+    """Largest change of any order 1..orders when the nodes are doubled, relative to the first harmonic [1].
+
+    The error of ``solution`` itself is about four thirds of it (the rule is of second order).
+    """
+    doubled = Layout(tuple(2 * count for count in solution.mesh.layout.counts))
+    finer = adapt(model, p, solution, doubled, PeriodicSettings.iterations)
+    coarse, fine = (harmonics(model, p, each, orders) for each in (solution, finer))
+    return jnp.max(jnp.abs(coarse - fine)[..., 1:], axis=-1) / jnp.abs(fine[..., 1])

@@ -12,10 +12,15 @@ from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.core.values import as_values
 from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.plants.model import Model
-from savgs_ident.plants.quarter_car.actuation import RigSource, held_link
+from savgs_ident.plants.quarter_car.inputs import (
+    RigSource,
+    cam_excitation,
+    held_link,
+    nominal_test,
+    sweep_road,
+)
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.road import cam_excitation, nominal_test, sweep_road
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse, unbiased_peak_to_peak
@@ -29,8 +34,7 @@ from savgs_ident.simulate.frequency_response import (
     SimulatedSweep,
     simulate_response,
 )
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.simulate.transient import simulate_transient
 

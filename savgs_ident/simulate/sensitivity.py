@@ -20,12 +20,11 @@ from savgs_ident.simulate.collocation import (
     node_motion,
     residual_at_nodes,
     solve_linearised,
+    solve_nodes,
     step_defects,
 )
-from savgs_ident.simulate.cyclic import solve_nodes
 from savgs_ident.simulate.excitation import inputs_at, signals_at
-from savgs_ident.simulate.harmonics import harmonics_of
-from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
+from savgs_ident.simulate.periodic import PeriodicSolution, harmonics_of, node_steps
 
 
 @eqx.filter_jit

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
-from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.files import prepare_folder
 from savgs_ident.core.presentation import Origin, Progress, Result, no_progress
 from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig, rig_content
 from savgs_ident.simulate.program_cache import use_persistent_cache

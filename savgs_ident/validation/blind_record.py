@@ -37,9 +37,9 @@ from scipy.interpolate import CubicSpline
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import record_of, write_bytes
 from savgs_ident.core.values import Values
+from savgs_ident.plants.quarter_car.inputs import nominal_test
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
-from savgs_ident.plants.quarter_car.road import nominal_test
 from savgs_ident.recordings.recording import RecordedChannel, Recording, TestKind
 from savgs_ident.validation.virtual_rig import Bench, Sensors, Steady, steady_dwells, sweep_readings
 

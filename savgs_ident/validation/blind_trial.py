@@ -20,15 +20,14 @@ from typing import Any, TypeVar
 import numpy as np
 
 from savgs_ident.core.errors import InputError, blamed_on
-from savgs_ident.core.files import is_begun, record_of
-from savgs_ident.core.output import prepare_folder, write_json
+from savgs_ident.core.files import is_begun, prepare_folder, record_of, write_json
 from savgs_ident.diagnosis.quarter_car import SIMTR, diagnose_response
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, parse_rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Recording
-from savgs_ident.simulate.measured import first_sweep, measured_response
+from savgs_ident.simulate.excitation import first_sweep, measured_response
 from savgs_ident.simulate.public import DWELLS
 from savgs_ident.validation.blind_draw import Shares, draw_answer
 from savgs_ident.validation.blind_record import (

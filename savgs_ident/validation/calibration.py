@@ -23,8 +23,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from savgs_ident.core.files import record_of
-from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.files import prepare_folder, record_of
 from savgs_ident.core.parameter import Parameter, ParameterTable
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.sampling import question_about
@@ -38,9 +37,8 @@ from savgs_ident.inference.sample import SAMPLERS, Question, plan
 from savgs_ident.inference.samplers.chains import SamplingSettings, new_checkpoint
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.measured import every_so_many, measured_response
-from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
+from savgs_ident.simulate.excitation import every_so_many, measured_response
+from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.validation.trials import Kept, marks_of, once_a_process, run_trials
 

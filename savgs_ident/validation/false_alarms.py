@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from scipy.stats import beta
 from threadpoolctl import threadpool_limits
 
-from savgs_ident.core.files import record_of
-from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.files import prepare_folder, record_of
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.diagnosis.model_selection import DiagnosisProblem, recalibrate, select_model
 from savgs_ident.diagnosis.public import baseline_of
@@ -33,7 +32,7 @@ from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.measured import measured_response
+from savgs_ident.simulate.excitation import measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.validation.trials import Kept, marks_of, once_a_process, run_trials
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from savgs_ident.core.output import prepare_folder
+from savgs_ident.core.files import prepare_folder
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.recordings.recording import Campaign, Recording

@@ -32,20 +32,27 @@ from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import AbstractSensorLaw
 from savgs_ident.plants.base import Excitation, state_sizes
-from savgs_ident.plants.quarter_car.actuation import ImposedLink, RigSource, held_link
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, build_model
-from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.road import (
+from savgs_ident.plants.quarter_car.inputs import (
+    ImposedLink,
+    RigSource,
     RoadMotion,
     cam_excitation,
     cam_road,
     flat_road,
+    held_link,
     nominal_test,
     sweep_road,
 )
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, resolve, simulate_periodic
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.simulate.periodic import (
+    PeriodicSettings,
+    PeriodicSolution,
+    harmonics,
+    resolve,
+    simulate_periodic,
+)
 from savgs_ident.simulate.program_cache import placed
 from savgs_ident.simulate.public import DWELLS
 from savgs_ident.simulate.transient import pack_state, rest_state, simulate_transient, unpack_state

@@ -11,10 +11,9 @@ import pytest
 from savgs_ident.campaigns.study import CampaignRow, CampaignStudy, Identified, RowStatus, study_campaigns
 from savgs_ident.control.closed_loop.programme import DEFAULT_SPEED, LoopKind, bump_test
 from savgs_ident.control.closed_loop.study import LoopStudy, study_loop
-from savgs_ident.control.design import Design, controller_for, design_controller
+from savgs_ident.control.design import Design, controller_for, design_controller, rigs_from_covariance
 from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS
 from savgs_ident.control.linear_study import LinearStudy, study_linear
-from savgs_ident.control.rigs import rigs_from_covariance
 from savgs_ident.core.presentation import Origin
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from savgs_ident.core import output
 from savgs_ident.plants.quarter_car.catalogue import EFFECTS
 from savgs_ident.plants.quarter_car.rig import default_rig_path
+from savgs_ident.report import presenters
 
 
 def flat(text: str) -> str:
@@ -71,10 +71,10 @@ def test_a_file_in_place_of_the_output_folder(
 def test_a_full_disk_is_said(
     invoke, short_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(path: Path, content: bytes) -> Path:
+    def full(path: Path, record: object) -> Path:
         raise OSError(errno.ENOSPC, "No space left on device", str(path))
 
-    monkeypatch.setattr(output, "write_bytes", full)
+    monkeypatch.setattr(presenters, "write_json", full)
     done = invoke("inspect", short_campaign, "--out", tmp_path / "o")
     assert done.exit_code == 2
     assert "inspect.json: No space left on device" in flat(done.stderr)

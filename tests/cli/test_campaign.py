@@ -11,8 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from savgs_ident.campaigns.search import LONGEST_NAME, find_campaigns, safe_name
-from savgs_ident.campaigns.store import FILES
+from savgs_ident.campaigns.store import FILES, LONGEST_NAME, find_campaigns, safe_name
 from savgs_ident.cli.console import BAD_INPUT, NOT_TRUSTED, OK
 from savgs_ident.core import executor
 from savgs_ident.core.errors import InputError

@@ -14,7 +14,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.fit import public
 from savgs_ident.fit.result import Fit, Verdict
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
-from savgs_ident.report.fit import present
+from savgs_ident.report import present_campaign
 
 Invoke = Callable[..., Result]
 WORDS = ("--free", "mu_r", "c_sd", "--fixed-tolerances", "--orders", "5")
@@ -56,7 +56,7 @@ def again(
 
     def run(fit: Fit, *words: str, draw: Callable[..., tuple[Path, ...]] = _no_picture) -> Result:
         monkeypatch.setattr(public, "fit_least_squares", lambda *args, **kwargs: fit)
-        monkeypatch.setattr(present, "draw_comparison", draw)
+        monkeypatch.setattr(present_campaign, "draw_comparison", draw)
         return invoke("fit", short_campaign, *WORDS, "--out", tmp_path / "again", *words)
 
     return run

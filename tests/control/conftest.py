@@ -8,7 +8,7 @@ import pytest
 
 from savgs_ident.control.closed_loop.run import Loop
 from savgs_ident.control.closed_loop.study import loop_around
-from savgs_ident.control.design import Design, DigitalController, design_controller
+from savgs_ident.control.design import Design, DigitalController, design_controller, rigs_from_covariance
 from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS, generalised_plant
 from savgs_ident.control.linear_equivalent import TwoMasses, alpha_map, paper_masses, quarter_car_space
 from savgs_ident.control.linear_study import (
@@ -17,7 +17,6 @@ from savgs_ident.control.linear_study import (
     study_small_motions,
     study_test_motions,
 )
-from savgs_ident.control.rigs import rigs_from_covariance
 from savgs_ident.control.synthesis import Synthesis, discretise, synthesise_hinf
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.values import Values, as_values

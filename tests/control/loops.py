@@ -11,9 +11,9 @@ from savgs_ident.control.closed_loop.laws import hold_law, ideal_instruments
 from savgs_ident.control.closed_loop.programme import LoopTest, harmonic_test
 from savgs_ident.control.closed_loop.run import ClosedLoopRun, Loop, Signals, run_loop
 from savgs_ident.core.values import Values, as_values
+from savgs_ident.plants.quarter_car.forces import Road
+from savgs_ident.plants.quarter_car.inputs import RoadMotion
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.road import RoadMotion
-from savgs_ident.plants.quarter_car.tyre import Road
 
 CAM = 0.0275
 """The cam of the rig, peak to peak [m]."""

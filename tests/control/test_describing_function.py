@@ -19,11 +19,10 @@ from savgs_ident.control.linear_study import TEST_FREQUENCY, SmallMotions
 from savgs_ident.control.linearisation import linearise, resting
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.quarter_car.catalogue import build_model, model_parameters
+from savgs_ident.plants.quarter_car.inputs import cam_excitation
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.road import cam_excitation
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, harmonics, simulate_periodic
 
 CAM = 0.0275
 FREQUENCY = np.array([0.7, 2.0, 4.5])

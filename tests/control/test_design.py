@@ -21,8 +21,7 @@ from savgs_ident.control.design import (
     read_controller,
 )
 from savgs_ident.control.linear_equivalent import AlphaMap, TwoMasses
-from savgs_ident.control.margins import Robustness
-from savgs_ident.control.synthesis import PRECISION, RATE, Synthesis, discretise
+from savgs_ident.control.synthesis import PRECISION, RATE, Robustness, Synthesis, discretise
 from savgs_ident.core.errors import InputError
 
 from ..in_one_test import over

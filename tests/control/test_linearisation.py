@@ -15,10 +15,9 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
 from savgs_ident.plants.quarter_car.kinematics import strut_length, suspension_travel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Inputs, Road
 from savgs_ident.simulate.transient import solve_rates
 
 STEPS = (1e-7, 3e-7, 1e-5, 3e-5, 1e-6, 1e-5, 1e-4, 1e-3)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from savgs_ident.control.closed_loop.laws import KINDS, NOTHING, make_failure
-from savgs_ident.control.closed_loop.metrics import RideGain, compare_rides, ride_after
+from savgs_ident.control.closed_loop.programme import RideGain, compare_rides, ride_after
 from savgs_ident.control.closed_loop.run import ClosedLoopRun, Loop
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.plant import QuarterCar

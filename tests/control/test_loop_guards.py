@@ -11,7 +11,7 @@ import pytest
 from jaxtyping import Array
 
 from savgs_ident.control.closed_loop.laws import make_failure
-from savgs_ident.control.closed_loop.metrics import compare_rides, doubted_from, measure_ride
+from savgs_ident.control.closed_loop.programme import compare_rides, doubted_from, measure_ride
 from savgs_ident.control.closed_loop.run import Loop, loop_case, run_loop, steps_within
 from savgs_ident.control.closed_loop.study import loop_around, study_loop
 from savgs_ident.control.design import DigitalController, controller_for

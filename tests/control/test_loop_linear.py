@@ -20,8 +20,8 @@ from savgs_ident.control.linearisation import INPUTS, linearise, resting
 from savgs_ident.core.values import Values
 from savgs_ident.plants.profiles import Constant
 from savgs_ident.plants.quarter_car.drive import Drive, VelocityReference
+from savgs_ident.plants.quarter_car.forces import strut_at_rest
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.strut import strut_at_rest
 
 from .loops import NO_FRICTION, cam, harmonics_of, ideal, judged, ran, with_changed
 

@@ -7,16 +7,14 @@ import pytest
 from jaxtyping import Array, Float
 
 from savgs_ident.control.closed_loop.laws import make_failure
-from savgs_ident.control.closed_loop.metrics import compare_rides, drive_use, measure_ride
+from savgs_ident.control.closed_loop.programme import compare_rides, drive_use, measure_ride
 from savgs_ident.control.closed_loop.run import ClosedLoopRun, Loop
 from savgs_ident.core.values import Values
 from savgs_ident.plants.profiles import AbstractProfile, Scalar
-from savgs_ident.plants.quarter_car.actuation import RigSource
 from savgs_ident.plants.quarter_car.drive import Drive, VelocityReference, inertia_at_motor
+from savgs_ident.plants.quarter_car.inputs import RigSource, cam_excitation
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.road import cam_excitation
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 from savgs_ident.simulate.transient import simulate_transient
 
 from .loops import CAM, NO_FRICTION, along, cam, harmonics_of, ideal, judged, passive, ran, with_changed

@@ -9,8 +9,16 @@ from hypothesis import strategies as st
 from savgs_ident.control.design import Design
 from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS, design_loop
 from savgs_ident.control.linear_equivalent import TwoMasses, quarter_car_space
-from savgs_ident.control.margins import Margins, assess_robustness, compute_margins, open_loop, sensitivity
-from savgs_ident.control.synthesis import RATE, Synthesis, sampled_plant
+from savgs_ident.control.synthesis import (
+    RATE,
+    Margins,
+    Synthesis,
+    assess_robustness,
+    compute_margins,
+    open_loop,
+    sampled_plant,
+    sensitivity,
+)
 
 S = control.tf("s")
 

@@ -9,21 +9,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from savgs_ident.control.closed_loop.metrics import (
-    Ride,
-    RideGain,
-    compare_rides,
-    drive_use,
-    measure_ride,
-    ride_after,
-)
 from savgs_ident.control.closed_loop.programme import (
     FADE,
     REST,
     LoopTest,
+    Ride,
+    RideGain,
     bump_test,
+    compare_rides,
+    drive_use,
     harmonic_test,
     iso_test,
+    measure_ride,
+    ride_after,
     sweep_test,
 )
 from savgs_ident.control.closed_loop.run import FRAME, ClosedLoopRun, Signals

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from savgs_ident.control.rigs import Rigs, rigs_from_covariance, rigs_from_posterior
+from savgs_ident.control.design import Rigs, rigs_from_covariance, rigs_from_posterior
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 

@@ -11,7 +11,7 @@ from scipy.signal import welch
 
 from savgs_ident.control.closed_loop.programme import BAND, REFERENCE, STEP, bump_road, iso_height, iso_road
 from savgs_ident.plants.profiles import Faded, Sine
-from savgs_ident.plants.quarter_car.road import RoadMotion
+from savgs_ident.plants.quarter_car.inputs import RoadMotion
 
 from ..in_one_test import over
 from .loops import along

@@ -12,7 +12,7 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from savgs_ident.control.closed_loop.stabilised import stabilised_step
+from savgs_ident.control.closed_loop.run import stabilised_step
 
 MILLISECOND = 1e-3
 FASTEST = 9_800.0

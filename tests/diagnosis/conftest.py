@@ -10,7 +10,7 @@ from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
-from savgs_ident.plants.quarter_car.damper import damper_curve
+from savgs_ident.plants.quarter_car.forces import damper_curve
 from savgs_ident.plants.quarter_car.model import FREE
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig

@@ -21,7 +21,6 @@ RAIL: Any = SimpleNamespace(name="rail", share=0.9, evidence=50.0)
 PROBLEM: Any = SimpleNamespace(
     constants=DEFAULTS,
     locations=lambda hypothesis: tuple(CATALOGUE[name].port.location for name in hypothesis.effects),
-    families=lambda hypothesis: tuple(hypothesis.effects),
 )
 
 
@@ -92,7 +91,7 @@ def test_an_effect_by_another_law_is_said_to_be_one(another_law: bool) -> None:
     told = "Its law differs from that of the catalogue, which leaves 8 % of the misfit beyond the noise"
     assert (told in verdict.sentence) is another_law
     assert ("at the same port, 'rail'" in verdict.sentence) is another_law
-    assert verdict.law_known is not another_law
+    assert verdict.another_law is another_law
     assert verdict.effects == ("rail_stribeck",)
 
 

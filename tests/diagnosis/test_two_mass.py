@@ -13,14 +13,12 @@ from savgs_ident.diagnosis.localisation import localise
 from savgs_ident.diagnosis.location_hypotheses import input_locations
 from savgs_ident.diagnosis.search import forward_selection
 from savgs_ident.diagnosis.verdict import most_probable
-from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.generic import generic_effects
+from savgs_ident.effects.effect import Effect, generic_effects
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
 from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
 
 from ..relaxed import as_users_have_it
 from .simple_laws import assert_a_law_of_one_function

@@ -15,7 +15,7 @@ from jaxtyping import Array
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import as_values
-from savgs_ident.effects import generic
+from savgs_ident.effects import effect
 from savgs_ident.effects.base import PortSignals
 from savgs_ident.export import registry
 from savgs_ident.export.exported_model import ExportedModel
@@ -25,8 +25,7 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.plants.two_mass import TwoMass
 from savgs_ident.recordings import read
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 
 from ..relaxed import as_users_have_it
 
@@ -75,8 +74,8 @@ def test_the_law_vanishes_at_its_null_brakes_and_is_found_at_ports(monkeypatch: 
     # The largest force is at the critical velocity.
     assert abs(float(velocity[int(jnp.argmin(force(typical)))]) - 0.3) < 1e-9
 
-    monkeypatch.setattr(generic, "LAWS", (*generic.LAWS, law))
-    found = generic.generic_effects(TwoMass.ports)
+    monkeypatch.setattr(effect, "LAWS", (*effect.LAWS, law))
+    found = effect.generic_effects(TwoMass.ports)
     assert {name for name in found if name.endswith("eddy_brake")} == {
         f"{port}_eddy_brake" for port in ("suspension", "guide", "tyre")
     }

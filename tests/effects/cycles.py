@@ -22,8 +22,9 @@ from savgs_ident.effects.base import (
     FrictionLimit,
     Load,
     PortSignals,
+    Presliding,
+    bristle,
 )
-from savgs_ident.effects.bristle import Presliding, bristle
 from savgs_ident.effects.composition import states_of
 from savgs_ident.effects.effect import Effect
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, build_model

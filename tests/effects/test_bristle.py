@@ -9,8 +9,15 @@ from hypothesis import strategies as st
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.effects.base import FrictionLimit, PortSignals
-from savgs_ident.effects.bristle import CREEP, Bristle, Presliding, bristle, held_within
+from savgs_ident.effects.base import (
+    CREEP,
+    Bristle,
+    FrictionLimit,
+    PortSignals,
+    Presliding,
+    bristle,
+    held_within,
+)
 
 K, C, SLIDE = 1e7, 3e4, 150.0
 """Stiffness [N/m], damping [N s/m] and the force at which it slides [N]."""

@@ -14,8 +14,7 @@ from savgs_ident.effects.base import (
     AbstractNumberLaw,
     AbstractSensorLaw,
 )
-from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.generic import LAWS
+from savgs_ident.effects.effect import LAWS, Effect
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, build_model, model_parameters
 from savgs_ident.plants.quarter_car.ports import PORTS
 from savgs_ident.plants.quarter_car.rig import Rig

@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import AbstractSeriesLaw
 from savgs_ident.effects.effect import Effect
-from savgs_ident.plants.quarter_car.actuation import RigSource, held_link
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.inputs import RigSource, cam_excitation, cam_road, held_link
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.road import cam_excitation, cam_road
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, harmonics, simulate_periodic
 from savgs_ident.simulate.transient import simulate_transient
 
 from ..relaxed import with_kept_programs

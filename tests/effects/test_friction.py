@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from jaxtyping import Array
 
 from savgs_ident.core.values import Values
-from savgs_ident.effects.base import PortSignals
-from savgs_ident.effects.bristle import Presliding, bristle
+from savgs_ident.effects.base import PortSignals, Presliding, bristle
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.kinematics import strut_length
 from savgs_ident.plants.quarter_car.rig import Rig

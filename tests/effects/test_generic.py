@@ -10,8 +10,7 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.values import as_values
 from savgs_ident.effects.base import Fundamental, InputSignal, Load, Number, Port, PortKind, PortSignals
 from savgs_ident.effects.composition import EffectsAtInstant, changed_numbers, sensor_transfer, states_of
-from savgs_ident.effects.effect import Effect, effect_at
-from savgs_ident.effects.generic import LAWS, generic_effects
+from savgs_ident.effects.effect import LAWS, Effect, effect_at, generic_effects
 from savgs_ident.effects.laws.gain import Gain
 from savgs_ident.effects.laws.viscous import Viscous
 

@@ -18,9 +18,8 @@ from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Inputs, Road
 from savgs_ident.simulate.transient import solve_rates
 
 pytestmark = pytest.mark.slow

@@ -15,10 +15,9 @@ from savgs_ident.core.values import as_values
 from savgs_ident.export.exported_model import ExportedModel, resting_inputs, resting_state
 from savgs_ident.export.linear_models import linear_models
 from savgs_ident.export.python_control_export import load_python_control, resting_point, write_python_control
-from savgs_ident.plants.quarter_car.actuation import RigSource, held_link
 from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.inputs import RigSource, cam_road, held_link
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.road import cam_road
 from savgs_ident.simulate.transient import simulate_transient
 
 LIFT, FREQUENCY, DURATION = 0.0275, 2.35, 0.6

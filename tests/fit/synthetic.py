@@ -10,10 +10,10 @@ from scipy.interpolate import PchipInterpolator
 
 from savgs_ident.core.values import as_values
 from savgs_ident.plants.quarter_car.catalogue import build_model, model_parameters
+from savgs_ident.plants.quarter_car.inputs import cam_excitation
 from savgs_ident.plants.quarter_car.plant import read_sensors
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
-from savgs_ident.plants.quarter_car.road import cam_excitation
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 

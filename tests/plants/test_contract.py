@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import PortKind
-from savgs_ident.effects.generic import generic_effects
+from savgs_ident.effects.effect import generic_effects
 from savgs_ident.plants.axis import Axis
 from savgs_ident.plants.base import (
     AbstractPlant,
@@ -29,8 +29,7 @@ from savgs_ident.plants.base import (
 )
 from savgs_ident.plants.profiles import ProfileSource, Sine
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass, closed_form
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import PeriodicSolution, resolve, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, resolve, simulate_periodic
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 from savgs_ident.simulate.transient import simulate_transient
 from savgs_ident.symbolic.translate import to_casadi

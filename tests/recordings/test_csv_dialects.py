@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.recordings.channels import ChannelMap, ChannelRule
-from savgs_ident.recordings.layout import UNITS, Header, find_unit
-from savgs_ident.recordings.recording import Campaign, classify_test
+from savgs_ident.recordings.recording import UNITS, Campaign, Header, classify_test, find_unit
 
 from ..in_one_test import over
 

@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 
 from savgs_ident.core.errors import DataWarning
-from savgs_ident.core.output import to_json
+from savgs_ident.core.files import to_json
 from savgs_ident.core.presentation import Origin
 from savgs_ident.diagnosis.result import Diagnosis
 from savgs_ident.report.diagnosis.record import diagnosis_record

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.fit.residuals import measured_points
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
-from savgs_ident.report.panels import phase_deg
+from savgs_ident.report.bode import phase_deg
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.frequency_response import model_curve
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from savgs_ident.fit.residuals import measured_points, whitened
 from savgs_ident.fit.result import Fit
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
+from savgs_ident.report.bode import bode_figure, response_figure
 from savgs_ident.report.campaigns.inspect import campaign_figure
-from savgs_ident.report.fit.bode import bode_figure, response_figure
 from savgs_ident.report.text import response_labels
 from savgs_ident.report.theme import DPI, printable, write_figure
 from savgs_ident.responses.summary import CampaignSummary, inspect

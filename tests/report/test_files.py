@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.files import write_bytes
-from savgs_ident.core.output import prepare_folder, to_json, write_json, write_table
+from savgs_ident.core.files import prepare_folder, to_json, write_bytes, write_json, write_table
 
 
 def test_a_file_where_the_folder_should_be_is_refused(tmp_path: Path) -> None:

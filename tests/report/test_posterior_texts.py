@@ -14,7 +14,7 @@ from jinja2 import UndefinedError
 from rich.console import Console
 
 from savgs_ident.core.errors import DataWarning
-from savgs_ident.core.output import to_json
+from savgs_ident.core.files import to_json
 from savgs_ident.core.presentation import Origin
 from savgs_ident.inference.result import Posterior
 from savgs_ident.plants.quarter_car.model import RigModel

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from savgs_ident.core.output import to_json, write_table
+from savgs_ident.core.files import to_json, write_table
 from savgs_ident.core.status import Status
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig

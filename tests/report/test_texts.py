@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 from rich.console import Console, RenderableType
 
 from savgs_ident.core.errors import DataWarning
-from savgs_ident.core.output import to_json
+from savgs_ident.core.files import to_json
 from savgs_ident.core.presentation import Origin
 from savgs_ident.core.status import Status
 from savgs_ident.fit.residuals import chi2_by_dwell
@@ -24,8 +24,7 @@ from savgs_ident.fit.result import Fit, Verdict
 from savgs_ident.plants.quarter_car.rig import read_rig, write_rig
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.report.campaigns.inspect import campaign_text, summary_record
-from savgs_ident.report.fit.record import fit_record
-from savgs_ident.report.fit.text import fit_text, value_with_error
+from savgs_ident.report.fit import fit_record, fit_text, value_with_error
 from savgs_ident.report.text import plain
 from savgs_ident.responses.summary import inspect
 

@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.base import Excitation
+from savgs_ident.plants.quarter_car.inputs import cam_excitation
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.road import cam_excitation
-from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.mesh import Layout
-from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, adapt
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, adapt, harmonics
 
 STROKE = 0.0275
 LINK = np.pi / 2.0

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.simulate import cyclic
+from savgs_ident.simulate import collocation
 from savgs_ident.simulate.mesh import CHUNK, Layout
 
 LAYOUTS = (
@@ -25,16 +25,16 @@ LAYOUTS = (
 
 @partial(jax.jit, static_argnums=0)
 def _solve(layout: Layout, steps: Array, right: Array) -> Array:
-    return cyclic.solve(layout, cyclic.factorise(layout, steps), right)
+    return collocation.solve_recurrence(layout, collocation.factorise_recurrence(layout, steps), right)
 
 
 @partial(jax.jit, static_argnums=0)
 def _solve_many(layout: Layout, steps: Array, rights: Array) -> Array:
-    factors = cyclic.factorise(layout, steps)
-    return jax.lax.map(lambda right: cyclic.solve(layout, factors, right), rights)
+    factors = collocation.factorise_recurrence(layout, steps)
+    return jax.lax.map(lambda right: collocation.solve_recurrence(layout, factors, right), rights)
 
 
-_solve_nodes = jax.jit(cyclic.solve_nodes)
+_solve_nodes = jax.jit(collocation.solve_nodes)
 
 
 def _dense(layout: Layout, steps: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -121,13 +121,13 @@ def test_products_are_taken_node_by_node() -> None:
     rng = np.random.default_rng(0)
     left, right, vector = (rng.standard_normal(shape) for shape in ((3, 4, 7), (4, 2, 7), (4, 7)))
     np.testing.assert_allclose(
-        np.asarray(cyclic.product(jnp.asarray(left), jnp.asarray(right))),
+        np.asarray(collocation.multiply_nodes(jnp.asarray(left), jnp.asarray(right))),
         np.einsum("ijp,jkp->ikp", left, right),
         rtol=1e-13,
         atol=1e-14,
     )
     np.testing.assert_allclose(
-        np.asarray(cyclic.apply(jnp.asarray(left), jnp.asarray(vector))),
+        np.asarray(collocation.apply_nodes(jnp.asarray(left), jnp.asarray(vector))),
         np.einsum("ijp,jp->ip", left, vector),
         rtol=1e-13,
         atol=1e-14,

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.values import as_values
-from savgs_ident.plants.quarter_car.actuation import RigSource
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
 from savgs_ident.plants.quarter_car.drive import holding_drive
+from savgs_ident.plants.quarter_car.inputs import RigSource, flat_road
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.road import flat_road
 from savgs_ident.simulate.transient import rest_state, state_rates
 
 pytestmark = pytest.mark.slow

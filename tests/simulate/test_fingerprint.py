@@ -18,13 +18,12 @@ from savgs_ident.core.values import Values
 from savgs_ident.effects.base import AbstractNumberLaw, Port, Role
 from savgs_ident.effects.effect import effect_at
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
-from savgs_ident.plants.quarter_car.damper import damper_curve
+from savgs_ident.plants.quarter_car.forces import damper_curve
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.ports import INERTIA
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.simulate.harmonics import harmonics
 from savgs_ident.simulate.mesh import Layout, uniform_mesh
-from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 from savgs_ident.simulate.program_cache import TRACED, digest_of_sources, fingerprint
 
 from ..in_one_test import over

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.forces import Inputs
 from savgs_ident.plants.quarter_car.kinematics import strut_length
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.tyre import Inputs
 from savgs_ident.simulate.excitation import inputs_at
 from savgs_ident.simulate.periodic import PeriodicSolution
 

@@ -13,11 +13,10 @@ from savgs_ident.core.values import Values
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.catalogue import build_model
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
+from savgs_ident.plants.quarter_car.inputs import cam_excitation
 from savgs_ident.plants.quarter_car.plant import QuarterCar, read_sensors
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.road import cam_excitation
-from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Inputs, Road
 from savgs_ident.responses.harmonic_response import peak_to_peak
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 

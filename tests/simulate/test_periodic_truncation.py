@@ -5,8 +5,7 @@ import pytest
 
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.simulate.harmonics import truncation_error
-from savgs_ident.simulate.periodic import PeriodicSolution
+from savgs_ident.simulate.periodic import PeriodicSolution, truncation_error
 
 from .programme import distance, finer, orders
 

@@ -27,8 +27,8 @@ from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
 from savgs_ident.core.values import as_values
 from savgs_ident.simulate.program_cache import use_persistent_cache
-from savgs_ident.plants.quarter_car.road import cam_excitation
-from savgs_ident.simulate.harmonics import harmonics
+from savgs_ident.plants.quarter_car.inputs import cam_excitation
+from savgs_ident.simulate.periodic import harmonics
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 
 if {kept}:

@@ -10,19 +10,23 @@ from jaxtyping import Array
 
 from savgs_ident.core.status import Status
 from savgs_ident.plants.base import state_sizes
-from savgs_ident.plants.quarter_car.actuation import RigSource, harmonic_link, held_link
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
 from savgs_ident.plants.quarter_car.drive import holding_drive
 from savgs_ident.plants.quarter_car.dynamics import section_curves, upright_mass
-from savgs_ident.plants.quarter_car.equilibrium import static_equilibrium
+from savgs_ident.plants.quarter_car.forces import Inputs
+from savgs_ident.plants.quarter_car.inputs import (
+    RigSource,
+    cam_excitation,
+    cam_road,
+    flat_road,
+    harmonic_link,
+    held_link,
+)
 from savgs_ident.plants.quarter_car.kinematics import Values, linkage, strut_length, suspension_travel
-from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.plant import QuarterCar, static_equilibrium
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.road import cam_excitation, cam_road, flat_road
-from savgs_ident.plants.quarter_car.tyre import Inputs
 from savgs_ident.simulate import transient
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 from savgs_ident.simulate.transient import (
     TransientSolution,
     rest_state,

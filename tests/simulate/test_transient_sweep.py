@@ -6,16 +6,21 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from savgs_ident.plants.quarter_car.actuation import RigSource, held_link, recorded_link
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.inputs import (
+    RigSource,
+    cam_excitation,
+    held_link,
+    recorded_link,
+    recorded_road,
+    sweep_road,
+)
 from savgs_ident.plants.quarter_car.kinematics import Values
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
-from savgs_ident.plants.quarter_car.road import cam_excitation, recorded_road, sweep_road
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.simulate.harmonics import harmonics
-from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 from savgs_ident.simulate.transient import simulate_transient
 
 pytestmark = pytest.mark.slow

@@ -12,18 +12,19 @@ from numpy.typing import NDArray
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.effects.generic import generic_effects
+from savgs_ident.effects.effect import generic_effects
 from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.profiles import ProfileSource, Sine
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
 from savgs_ident.simulate import transient
-from savgs_ident.simulate.harmonics import harmonics, truncation_error
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
+    harmonics,
     resolve,
     simulate_periodic,
     solve_on_mesh,
+    truncation_error,
 )
 from savgs_ident.simulate.transient import TransientSolution, simulate_transient, solve_rates, transient_loads
 

@@ -23,8 +23,9 @@ from savgs_ident.control.closed_loop.laws import (
     make_failure,
     sheet_instruments,
 )
-from savgs_ident.control.closed_loop.metrics import (
+from savgs_ident.control.closed_loop.programme import (
     DriveUse,
+    LoopTest,
     Ride,
     RideGain,
     compare_rides,
@@ -33,10 +34,8 @@ from savgs_ident.control.closed_loop.metrics import (
     measure_ride,
     ride_after,
 )
-from savgs_ident.control.closed_loop.programme import LoopTest
 from savgs_ident.control.closed_loop.run import ClosedLoopRun, Loop, run_loop
-from savgs_ident.control.design import DigitalController
-from savgs_ident.control.rigs import Rigs
+from savgs_ident.control.design import DigitalController, Rigs
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Result
 from savgs_ident.core.values import Values, as_values

@@ -3,7 +3,7 @@
     F = mu N
 
 the same both ways, with the coefficient mu [1] and the load N [N]. How the contact sticks before it slides is its own
-(:mod:`savgs_ident.effects.bristle`).
+(:func:`savgs_ident.effects.base.bristle`).
 
 Source: Yu et al. 2017, eqs. (1)-(2).
 """

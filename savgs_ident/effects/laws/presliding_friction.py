@@ -2,9 +2,9 @@
 
     F = -F_c (x + T v) / x_s held within -F_c .. F_c
 
-with x [m] the stretch of a bristle (:mod:`savgs_ident.effects.bristle`) along the port's displacement, which counts
-from the nominal state, the friction F_c [N], x_s [m] how far it gives before it slides, and T [s] its damping over
-its stiffness.
+with x [m] the stretch of a bristle (:func:`savgs_ident.effects.base.bristle`) along the port's displacement, which
+counts from the nominal state, the friction F_c [N], x_s [m] how far it gives before it slides, and T [s] its damping
+over its stiffness.
 
 Source: Dupont, Hayward, Armstrong, Altpeter 2002, IEEE Transactions on Automatic Control 47(5).
 """
@@ -19,14 +19,16 @@ from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import (
     AbstractForceLaw,
+    Bristle,
     Family,
     FrictionLimit,
     InternalState,
     Port,
     PortSignals,
+    Presliding,
     Role,
+    bristle,
 )
-from savgs_ident.effects.bristle import Bristle, Presliding, bristle
 
 
 class PreslidingFriction(AbstractForceLaw):

@@ -6,12 +6,14 @@ as it is. To add a name, add an entry to ``CATALOGUE``.
 """
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import Parameter, ParameterTable, merge_parameters
 from savgs_ident.effects.effect import Effect, effect_at
 from savgs_ident.effects.laws.asymmetry import Asymmetry
+from savgs_ident.effects.laws.attached_oscillator import AttachedOscillator
 from savgs_ident.effects.laws.backlash import Backlash
 from savgs_ident.effects.laws.compliance import Compliance
 from savgs_ident.effects.laws.coulomb import Coulomb
@@ -34,21 +36,21 @@ from savgs_ident.effects.laws.stop import LowerStop
 from savgs_ident.effects.laws.stribeck import Stribeck
 from savgs_ident.effects.laws.tilt import Tilt
 from savgs_ident.effects.laws.viscous import Viscous
-from savgs_ident.effects.learned import learned_effect
-from savgs_ident.plants.quarter_car.damper import damper_curve
+from savgs_ident.effects.learned import functions_at, learned_effect
+from savgs_ident.plants.quarter_car.forces import damper_curve
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.ports import (
     ACCEL,
     CARCASS,
     DAMPER,
     DEFLECTION,
-    FORCE_PORTS,
     FRAME,
     INERTIA,
     LINK,
     LINK_NUMBERS,
     MOUNT,
     PLATE,
+    PORTS,
     RAIL,
     ROAD,
     STRUT,
@@ -329,6 +331,17 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
         symptom="the fast tests change, the slow ones do not: wheel hop moves",
         reference="Gillespie 1992, Fundamentals of Vehicle Dynamics, ch. 5",
     ),
+    # It hangs on the sprung mass: the force acts where that of the rail does.
+    effect_at("body_oscillator", replace(RAIL, location="inertia"), AttachedOscillator(),
+        {
+            "mass": _own("body_oscillator_mass", 5.0, "kg", 0.0, 200.0, "mass that swings on the sprung mass"),
+            "frequency": _own("body_oscillator_frequency", 5.0, "Hz", 0.5, 80.0, "its natural frequency"),
+            "damping_ratio": _own("body_oscillator_damping_ratio", 0.05, "1", 5e-3, 1.0, "its damping ratio"),
+        },
+        states=("body_oscillator_height", "body_oscillator_velocity"),
+        symptom="near one frequency the body moves too much just below and too little just above it",
+        reference="Den Hartog 1956, Mechanical Vibrations, ch. 3, the dynamic vibration absorber",
+    ),
     effect_at("accel_gain", ACCEL, Gain(),
         {"error": _own("accel_gain_error", 0.05, "1", -0.9, 2.0, "relative gain error of the accelerometer")},
         symptom="the acceleration alone is too large or too small by the same share in every test and order",
@@ -362,7 +375,7 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
 # fmt: on
 """All effects by name that a diagnosis looks for."""
 
-LEARNED: Mapping[str, Effect] = _by_name(*(learned_effect(port) for port in FORCE_PORTS.values()))
+LEARNED: Mapping[str, Effect] = _by_name(*(learned_effect(port) for port in PORTS if functions_at(port)))
 """Corrections by name that a diagnosis learns where it finds none of them."""
 
 EFFECTS: Mapping[str, Effect] = MappingProxyType({**CATALOGUE, **LEARNED})

@@ -31,8 +31,8 @@ from jaxtyping import Array, Float
 
 from savgs_ident.core.values import Values
 from savgs_ident.plants.profiles import AbstractProfile, Constant
-from savgs_ident.plants.quarter_car.actuation import AbstractActuation
-from savgs_ident.plants.quarter_car.strut import Link
+from savgs_ident.plants.quarter_car.forces import Link
+from savgs_ident.plants.quarter_car.inputs import AbstractActuation
 
 Scalar = Float[Array, ""]
 

@@ -7,6 +7,9 @@ first two rows are the equations of motion, the others those of the states.
 
     simqc = QuarterCar(damper_curve(rig))
     simtr = simqc + CATALOGUE["rail_coulomb"] + CATALOGUE["tyre_friction"]
+
+Its static equilibrium is where it stands when nothing moves. Suspension deflection is counted from the equilibrium at
+the nominal link angle, as a recording counts it from its standstill.
 """
 
 from collections.abc import Mapping
@@ -31,8 +34,9 @@ from savgs_ident.plants.base import (
     Motion,
     OperatingCondition,
     Output,
+    find_rest,
+    standing,
 )
-from savgs_ident.plants.quarter_car.damper import DamperCurve
 from savgs_ident.plants.quarter_car.dynamics import (
     TRAVEL,
     Coordinates,
@@ -44,6 +48,18 @@ from savgs_ident.plants.quarter_car.dynamics import (
     section,
     section_curves,
     weight,
+)
+from savgs_ident.plants.quarter_car.forces import (
+    Contact,
+    DamperCurve,
+    Inputs,
+    Link,
+    Road,
+    Strut,
+    contact,
+    radial_force,
+    strut,
+    strut_at_rest,
 )
 from savgs_ident.plants.quarter_car.kinematics import strut_length, suspension_travel
 from savgs_ident.plants.quarter_car.ports import (
@@ -62,8 +78,6 @@ from savgs_ident.plants.quarter_car.ports import (
     TYRE_LATERAL,
     TYRE_RADIAL,
 )
-from savgs_ident.plants.quarter_car.strut import Link, Strut, strut, strut_at_rest
-from savgs_ident.plants.quarter_car.tyre import Contact, Inputs, Road, contact, radial_force
 
 RESPONSE_CHANNELS = ("sprung_accel", "susp_deflection")
 """The channels that a model predicts, in the order of :class:`Readings`."""
@@ -322,3 +336,39 @@ def _wheel(
     lateral = acting.force(TYRE_LATERAL, scrub)
     acting.carry(CARCASS, -lateral, none)
     return touch, vertical, lateral
+
+
+class Equilibrium(NamedTuple):
+    """Coordinates and internal states (s,) at rest, and the force [N] with which the strut pushes apart."""
+
+    q: Coordinates
+    s: Float[Array, " s"]
+    strut: Float[Array, ""]
+
+
+def static_equilibrium(
+    model: QuarterCar,
+    p: Values,
+    link_angle: Float[Array, ""],
+    road_height: Float[Array, ""],
+    prepared: SectionCurves | None = None,
+) -> Equilibrium:
+    """Where the rig rests at a link angle [rad] and a height of the plate [m]; NaN if it finds no rest.
+
+    ``prepared`` serves as in :meth:`QuarterCar.residual`. Differentiable in everything, exactly.
+    """
+    zero = jnp.zeros_like(link_angle)
+    u = Inputs(Road(road_height, zero), Link(link_angle, zero))
+    q, s = find_rest(model, p, u, prepared)
+    loads = model.loads(p, standing(model, q), s, jnp.zeros_like(s), u, prepared)
+    return Equilibrium(q, s, loads.strut)
+
+
+def deflection_zero(model: QuarterCar, p: Values, prepared: SectionCurves | None = None) -> Float[Array, ""]:
+    """Suspension travel from the drawing [m] at which a recorded deflection is zero.
+
+    That is at standstill with the link at its nominal angle.
+    """
+    nominal = jnp.asarray(p["psi_nominal"])
+    rest = static_equilibrium(model, p, nominal, jnp.zeros_like(nominal), prepared)
+    return suspension_travel(p, rest.q.theta_LW)

@@ -26,12 +26,18 @@ from pathlib import Path
 import numpy as np
 
 from savgs_ident.core.errors import DataWarning
-from savgs_ident.recordings.binding import Progress
-from savgs_ident.recordings.channels import ChannelMap
+from savgs_ident.recordings.channels import ChannelMap, Progress
 from savgs_ident.recordings.checks_signal import DataLocation
-from savgs_ident.recordings.layout import STANDARD_GRAVITY, ChannelSpec, JointChannels, RecordingLayout
 from savgs_ident.recordings.read import read_campaign
-from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
+from savgs_ident.recordings.recording import (
+    STANDARD_GRAVITY,
+    Campaign,
+    ChannelSpec,
+    JointChannels,
+    RecordedChannel,
+    Recording,
+    RecordingLayout,
+)
 
 _LOW_HZ = 1.25
 """Half of the lowest resonance that a rig of this kind has, about."""

@@ -14,9 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 from rich.console import Group, RenderableType
 
-from savgs_ident.core.output import warning_record
-from savgs_ident.recordings.layout import RecordingLayout
-from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
+from savgs_ident.core.files import warning_record
+from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording, RecordingLayout
 from savgs_ident.report.text import (
     ChannelLabel,
     fixed,

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.control.design import FACTORS, REGULARISATION, Design
 from savgs_ident.control.linear_equivalent import quarter_car_space
-from savgs_ident.control.margins import Robustness, open_loop, sensitivity
-from savgs_ident.control.synthesis import singular_values
+from savgs_ident.control.synthesis import Robustness, open_loop, sensitivity, singular_values
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.report.control.design_text import WEIGHT_WORDS, is_reduced
 from savgs_ident.report.text import response_labels

@@ -3,7 +3,7 @@
 import numpy as np
 
 from savgs_ident.control.design import Design
-from savgs_ident.control.margins import Margins
+from savgs_ident.control.synthesis import Margins
 from savgs_ident.core.presentation import Origin
 from savgs_ident.report.control.design_figures import (
     gamma_figure,

@@ -10,8 +10,7 @@ from rich.console import Group, RenderableType
 
 from savgs_ident.control.design import Design
 from savgs_ident.control.linear_equivalent import TwoMasses
-from savgs_ident.control.margins import Margins, Robustness
-from savgs_ident.control.synthesis import largest_gain
+from savgs_ident.control.synthesis import Margins, Robustness, largest_gain
 from savgs_ident.core.presentation import Origin
 from savgs_ident.report.text import DASH, decimal, fixed, plain, significant, table
 

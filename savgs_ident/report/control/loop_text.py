@@ -7,7 +7,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 
 from savgs_ident.control.closed_loop.laws import KINDS
-from savgs_ident.control.closed_loop.metrics import DriveUse, Ride, RideGain
+from savgs_ident.control.closed_loop.programme import DriveUse, Ride, RideGain
 from savgs_ident.control.closed_loop.study import FailedRun, LoopStudy
 from savgs_ident.core.presentation import Origin
 from savgs_ident.report.text import decimal, percentage, plain, table

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from savgs_ident.core.files import write_bytes
-from savgs_ident.core.output import write_json
+from savgs_ident.core.files import write_bytes, write_json
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.presentation import Origin
 from savgs_ident.diagnosis.result import (
@@ -26,9 +25,14 @@ from savgs_ident.diagnosis.result import (
     Shrink,
 )
 from savgs_ident.plants.quarter_car.model import RigModel
-from savgs_ident.report.diagnosis.bode import compared_channels, diagnosis_bode_figure, first_harmonic_gap
+from savgs_ident.report.diagnosis.compared import (
+    compared_channels,
+    diagnosis_bode_figure,
+    drive_figure,
+    drive_words,
+    first_harmonic_gap,
+)
 from savgs_ident.report.diagnosis.drawing import rig_figure
-from savgs_ident.report.diagnosis.drive import drive_figure, drive_words
 from savgs_ident.report.diagnosis.figures import (
     force_figure,
     gap_channels,

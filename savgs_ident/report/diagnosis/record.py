@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from savgs_ident.core.output import warning_record
+from savgs_ident.core.files import warning_record
 from savgs_ident.core.presentation import Origin
 from savgs_ident.diagnosis.result import Candidate, Diagnosis, Estimate, FurtherShrink, Learned, Shrink
 
@@ -75,7 +75,12 @@ def _provenance(origin: Origin) -> dict[str, object]:
 def _where(diagnosis: Diagnosis) -> dict[str, object]:
     return {
         "ports": [
-            {"port": each.port, "share": each.share, "reach": each.free_input_share}
+            {
+                "port": each.port,
+                "probability": each.probability,
+                "share": each.share,
+                "reach": each.free_input_share,
+            }
             for each in diagnosis.ports
         ],
         "map": [
@@ -103,6 +108,8 @@ def _where(diagnosis: Diagnosis) -> dict[str, object]:
 def _candidate(each: Candidate) -> dict[str, object]:
     return {
         "effect": str(each.hypothesis),
+        "port": each.port,
+        "family": each.family,
         "probability": each.probability,
         "score_sigma": each.score_sigma,
         "heldout_gain": each.heldout_gain,

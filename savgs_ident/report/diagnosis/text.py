@@ -71,6 +71,9 @@ def about_candidate(diagnosis: Diagnosis, candidate: Candidate) -> str:
         return " ".join(symptoms(diagnosis, candidate.effects))
     if candidate.hypothesis == NONE:
         return "The recalibrated baseline is complete."
+    if candidate.hypothesis.flexible:
+        port, family = candidate.hypothesis.flexible.split("/")
+        return f"A law of {port_words(diagnosis, port)}, {family}, that was learned from the data."
     return "An effect that is not in the catalogue."
 
 
@@ -89,9 +92,9 @@ def shown_candidates(diagnosis: Diagnosis) -> tuple[tuple[Candidate, ...], tuple
 def model_label(diagnosis: Diagnosis) -> str:
     """What the model after the diagnosis is called in a legend."""
     verdict = diagnosis.verdict
-    if verdict.effects:
+    if verdict.effects and verdict.law_known:
         return f"with {' + '.join(verdict.effects)}"
-    if verdict.kind == "unknown":
+    if verdict.kind != "none":
         where = f" at the {port_words(diagnosis, verdict.ports[0])}" if verdict.ports else ""
         return f"with the learned law{where}"
     return "after (nothing added)"
@@ -99,6 +102,8 @@ def model_label(diagnosis: Diagnosis) -> str:
 
 def law_label(diagnosis: Diagnosis, port: str) -> str:
     """What the law of the named effects at a port is called in a legend."""
+    if not diagnosis.verdict.law_known:
+        return "learned law"
     named, known = diagnosis.verdict.effects, diagnosis.given.catalogue
     there = [name for name in named if name in known and known[name].port.location == port]
     return f"law of {' + '.join(there or named)}"

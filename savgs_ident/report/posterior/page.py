@@ -9,7 +9,7 @@ from math import isfinite
 
 import numpy as np
 
-from savgs_ident.core.output import warning_record
+from savgs_ident.core.files import warning_record
 from savgs_ident.core.presentation import Origin
 from savgs_ident.inference.result import Marginal, Posterior
 from savgs_ident.report.html import Picture, embed, render_page

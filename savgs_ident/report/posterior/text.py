@@ -13,7 +13,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 
 from savgs_ident.inference.result import Marginal, Posterior
-from savgs_ident.report.fit.text import value_with_error
+from savgs_ident.report.fit import value_with_error
 from savgs_ident.report.text import DASH, count, decimal, numeral, percentage, plain, table
 
 NUISANCE_WORDS: Mapping[str, str] = MappingProxyType(

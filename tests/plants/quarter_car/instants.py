@@ -15,9 +15,8 @@ from savgs_ident.core.values import Values
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
+from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.strut import Link
-from savgs_ident.plants.quarter_car.tyre import Inputs, Road
 
 LARGEST = np.array([0.03, 0.25, 0.5, 2.0, 8.0, 40.0, 0.02, 0.5, np.pi / 2.0, 8.0])
 """Half ranges of what is drawn; the road is drawn about the wheel, the link angle about its middle."""

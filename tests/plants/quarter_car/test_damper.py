@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.integrate import simpson
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.plants.quarter_car.damper import (
+from savgs_ident.plants.quarter_car.forces import (
     REFERENCE_VELOCITY,
     DamperCurve,
     damper_curve,

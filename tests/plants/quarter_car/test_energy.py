@@ -13,10 +13,10 @@ from savgs_ident.core.values import Values
 from savgs_ident.effects.base import PortKind
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.dynamics import Coordinates, upright_mass
+from savgs_ident.plants.quarter_car.forces import Inputs
 from savgs_ident.plants.quarter_car.kinematics import linkage, strut_length
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.ports import PORTS
-from savgs_ident.plants.quarter_car.tyre import Inputs
 
 from .instants import draw_instants, inputs_of, motion_of, shifted
 

@@ -11,14 +11,17 @@ from hypothesis import strategies as st
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.plants.profiles import AbstractProfile, Constant, LinearSweep, Sine, tabulated
-from savgs_ident.plants.quarter_car.actuation import harmonic_link, held_link, recorded_link, tabulated_link
-from savgs_ident.plants.quarter_car.road import (
+from savgs_ident.plants.quarter_car.inputs import (
     RoadMotion,
     cam_road,
     flat_road,
+    harmonic_link,
+    held_link,
     read_road,
+    recorded_link,
     recorded_road,
     sweep_road,
+    tabulated_link,
     tabulated_road,
 )
 from savgs_ident.recordings.recording import RecordedChannel, Recording

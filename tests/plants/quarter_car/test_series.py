@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
 from savgs_ident.plants.quarter_car.dynamics import SectionCurves, section_curves
-from savgs_ident.plants.quarter_car.equilibrium import Equilibrium, static_equilibrium
 from savgs_ident.plants.quarter_car.kinematics import strut_length
-from savgs_ident.plants.quarter_car.plant import Loads, QuarterCar
+from savgs_ident.plants.quarter_car.plant import Equilibrium, Loads, QuarterCar, static_equilibrium
 from savgs_ident.plants.quarter_car.ports import CARCASS, DAMPER, LINK, MOUNT, PLATE
 from savgs_ident.plants.quarter_car.rig import Rig
 

@@ -11,7 +11,7 @@ from jaxtyping import Array
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.dynamics import Coordinates, section
-from savgs_ident.plants.quarter_car.tyre import Contact, Road, contact, radial_force
+from savgs_ident.plants.quarter_car.forces import Contact, Road, contact, radial_force
 
 from .instants import as_values, draw_instants, inputs_of, motion_of
 

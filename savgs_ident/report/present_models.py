@@ -1,4 +1,7 @@
-"""The presenter of linear models, controllers and the closed loop; what draws is loaded when something is drawn."""
+"""The presenters of models by themselves: simulated, exported, linearised, with a controller, in a closed loop.
+
+What draws is loaded when something is drawn.
+"""
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -6,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import RenderableType
 
-from savgs_ident.core.output import write_json, write_table
+from savgs_ident.core.files import write_json, write_table
 from savgs_ident.core.presentation import Origin, Progress, Result
 from savgs_ident.report.presenters import AbstractPresenter, Figures
 
@@ -17,6 +20,95 @@ if TYPE_CHECKING:
     from savgs_ident.control.design import Design
     from savgs_ident.control.linear_study import LinearStudy
     from savgs_ident.core.values import Values
+    from savgs_ident.export.public import Exported
+    from savgs_ident.simulate.frequency_response import SimulatedResponse, SimulatedSweep
+
+_UNSOLVED = "the simulation did not converge everywhere; see the status in the table."
+
+
+class _SimulatedResponse(AbstractPresenter["SimulatedResponse"]):
+    stem = "simulate"
+
+    def record(self, result: "SimulatedResponse") -> Mapping[str, Any]:
+        from savgs_ident.report.model import response_record
+
+        return response_record(result)
+
+    def text(self, result: "SimulatedResponse") -> RenderableType:
+        from savgs_ident.report.model import response_text
+
+        return response_text(result)
+
+    def doubts(self, result: "SimulatedResponse") -> tuple[str, ...]:
+        return () if result.trusted else (_UNSOLVED,)
+
+    def figures(self, result: "SimulatedResponse") -> Figures:
+        from savgs_ident.report.bode import response_figure
+        from savgs_ident.report.text import channel_labels
+
+        effects, labels = result.origin.effects, tuple(channel_labels(result.model).values())
+        curve = result.curve("with " + ", ".join(effects) if effects else "without effects")
+        return {"simulate": lambda: response_figure("Simulated response", [curve], labels)}
+
+    def more(self, result: "SimulatedResponse", folder: Path) -> Iterator[Path]:
+        from savgs_ident.report.model import response_columns
+
+        yield write_table(folder / "simulate.csv", response_columns(result))
+
+
+class _SimulatedSweep(AbstractPresenter["SimulatedSweep"]):
+    stem = "simulate"
+
+    def record(self, result: "SimulatedSweep") -> Mapping[str, Any]:
+        from savgs_ident.report.model import sweep_record
+
+        return sweep_record(result)
+
+    def text(self, result: "SimulatedSweep") -> RenderableType:
+        from savgs_ident.report.model import sweep_text
+
+        return sweep_text(result)
+
+    def doubts(self, result: "SimulatedSweep") -> tuple[str, ...]:
+        return () if result.trusted else (_UNSOLVED,)
+
+    def figures(self, result: "SimulatedSweep") -> Figures:
+        from savgs_ident.report.model import sweep_figure
+
+        return {"simulate": lambda: sweep_figure(result)}
+
+    def more(self, result: "SimulatedSweep", folder: Path) -> Iterator[Path]:
+        from savgs_ident.report.model import sweep_columns
+
+        yield write_table(folder / "simulate.csv", sweep_columns(result))
+
+
+class _Exported(AbstractPresenter["Exported"]):
+    stem = "export"
+
+    def record(self, result: "Exported") -> Mapping[str, Any]:
+        from savgs_ident.report.model import export_record
+
+        return export_record(result.gathered, result.written, control_origin(result))
+
+    def text(self, result: "Exported") -> RenderableType:
+        from savgs_ident.report.model import export_text
+
+        return export_text(self.record(result))
+
+    def doubts(self, result: "Exported") -> tuple[str, ...]:
+        doubts: tuple[str, ...] = result.gathered.doubts
+        return doubts
+
+    def write(self, result: "Exported", folder: Path, progress: Progress) -> Iterator[Path]:
+        del progress
+        yield write_json(folder / "export.json", self.record(result))
+
+
+SIMULATED_RESPONSE = _SimulatedResponse()
+SIMULATED_SWEEP = _SimulatedSweep()
+EXPORTED = _Exported()
+
 
 _CONTROL_PACKAGES = ("jax", "numpy", "scipy", "control", "slycot")
 """Whose version matters to linear models and controllers."""
@@ -51,7 +143,7 @@ class _LinearStudy(AbstractPresenter["LinearStudy"]):
         return linear_html(result, control_origin(result))
 
     def figures(self, result: "LinearStudy") -> Figures:
-        from savgs_ident.report.control.linear_figures import alpha_figure, described_figure, responses_figure
+        from savgs_ident.report.control.linear_page import alpha_figure, described_figure, responses_figure
 
         figures: dict[str, Callable[[], Figure]] = {
             "alpha": lambda: alpha_figure(result.equivalents),
@@ -126,16 +218,16 @@ class _LoopStudy(AbstractPresenter["LoopStudy"]):
         return loop_html(result, _values(result), control_origin(result), result.controller)
 
     def figures(self, result: "LoopStudy") -> Figures:
-        from savgs_ident.report.control import loop_figures
+        from savgs_ident.report.control import loop_page
 
         figures: dict[str, Callable[[], Figure]] = {
-            "closed-loop": lambda: loop_figures.loop_signals_figure(result, _values(result)),
-            "failures": lambda: loop_figures.failures_figure(result),
+            "closed-loop": lambda: loop_page.loop_signals_figure(result, _values(result)),
+            "failures": lambda: loop_page.failures_figure(result),
         }
         if result.on_rigs:
-            figures["rigs"] = lambda: loop_figures.rigs_figure(result)
+            figures["rigs"] = lambda: loop_page.rigs_figure(result)
         if result.causes:
-            figures["causes"] = lambda: loop_figures.causes_figure(result)
+            figures["causes"] = lambda: loop_page.causes_figure(result)
         return figures
 
     def more(self, result: "LoopStudy", folder: Path) -> Iterator[Path]:

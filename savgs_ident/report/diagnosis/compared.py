@@ -1,8 +1,13 @@
-"""Before, recalibrated, after: three models against the measured first harmonics.
+"""The models before and after a diagnosis against the measurement: over frequency, or along a driven motion.
 
-The curves of a Bode plot hide what matters where a gap is a few per cent of a resonance. So the lowest panel shows
-the gap itself, |predicted - measured| / |measured|, over the noise of the measurement: what calibration closes lies
-between the first and the second curve, what the named effect closes between the second and the third.
+Of dwells: before, recalibrated, after, three models against the measured first harmonics. The curves of a Bode plot
+hide what matters where a gap is a few per cent of a resonance. So the lowest panel shows the gap itself,
+|predicted - measured| / |measured|, over the noise of the measurement: what calibration closes lies between the
+first and the second curve, what the named effect closes between the second and the third.
+
+Of a drive: above the force over one cycle of the measured motion, below what each model leaves of it: a friction
+that is missing steps where the velocity changes its sign, an inertia where the carriage accelerates. The noise is a
+band about zero.
 """
 
 from dataclasses import dataclass
@@ -13,12 +18,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from savgs_ident.diagnosis.result import Diagnosis, Responses
+from savgs_ident.diagnosis.result import Diagnosis, DriveForces, Responses
 from savgs_ident.fit.residuals import measured_points
+from savgs_ident.report.bode import LINES, draw_magnitude, draw_phase
 from savgs_ident.report.diagnosis.text import model_label
-from savgs_ident.report.panels import LINES, draw_magnitude, draw_phase
 from savgs_ident.report.text import channel_labels
-from savgs_ident.report.theme import PALE, frequency_axis, magnitude_axis, new_figure, styled
+from savgs_ident.report.theme import GREY, INK, PALE, frequency_axis, magnitude_axis, new_figure, styled
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.frequency_response import ModelCurve, model_curve
 
@@ -90,11 +95,11 @@ def diagnosis_bode_figure(diagnosis: Diagnosis, c: int) -> Figure:
         for axes in panels:
             frequency_axis(axes, float(frequency[0]), float(frequency[-1]), labelled=axes is gap)
             axes.yaxis.set_label_coords(-0.135, 0.5)
-        _explain(figure, magnitude)
+        _explain_models(figure, magnitude)
         return figure
 
 
-def _explain(figure: Figure, axes: Axes) -> None:
+def _explain_models(figure: Figure, axes: Axes) -> None:
     """The models in the order in which they were made, then the measurement and its noise."""
     lines, _ = axes.get_legend_handles_labels()
     after, recalibrated, before, points = lines
@@ -135,3 +140,57 @@ def _draw_gap(axes: Axes, frequency: NDArray[np.float64], gap: FirstHarmonicGap)
     for values, line, marker in zip((gap.after, gap.recalibrated, gap.before), LINES, _MARKERS, strict=True):
         axes.plot(frequency, np.maximum(values, bottom), marker=marker, markersize=3.2, **line)
     axes.set_ylim(bottom, 1.6 * top)
+
+
+SHOWN_S = 7.0
+"""Longest stretch of the motion that is drawn [s]: about a cycle of a slow axis."""
+
+
+def drive_figure(diagnosis: Diagnosis) -> Figure:
+    """The force of the drive and what is left of it; the diagnosis must be one along a motion."""
+    forces = diagnosis.responses
+    assert isinstance(forces, DriveForces)
+    shown = forces.time <= forces.time[0] + SHOWN_S
+    time = forces.time[shown]
+    with styled():
+        figure = new_figure(9.2, 5.6)
+        above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(0.5, 1.0, 1.0))
+        above.plot(time, forces.velocity[shown], color=GREY, lw=1.2)
+        above.set_ylabel("velocity [m/s]")
+        middle.plot(time, forces.measured[shown], color=INK, lw=3.2, alpha=0.35, label="measured")
+        noise = diagnosis.shrink.floor * float(np.sqrt(np.mean(forces.measured**2)))
+        below.axhspan(-noise, noise, color=PALE, lw=0.0, zorder=0.5)
+        models = (
+            (model_label(diagnosis), forces.after),
+            ("recalibrated", forces.recalibrated),
+            ("before, as given", forces.before),
+        )
+        for (label, force), line in zip(models, LINES, strict=True):
+            middle.plot(time, force[shown], label=label, **line)
+            below.plot(time, (forces.measured - force)[shown], **line)
+        middle.set_ylabel("force of the drive [N]")
+        below.set_ylabel("measured less\nneeded [N]")
+        below.set_xlabel("time since the first sample [s]")
+        _explain_lines(figure, middle)
+        figure.align_ylabels()
+        return figure
+
+
+def drive_words(diagnosis: Diagnosis) -> str:
+    """What the figure shows, for those who do not see it."""
+    forces = diagnosis.responses
+    assert isinstance(forces, DriveForces)
+
+    def left(force: NDArray[np.float64]) -> str:
+        return f"{np.sqrt(np.mean((forces.measured - force) ** 2)):.3g} N"
+
+    return (
+        f"Force of the drive over time, measured and as three models need it; rms left: {left(forces.before)} before,"
+        f" {left(forces.recalibrated)} recalibrated, {left(forces.after)} after."
+    )
+
+
+def _explain_lines(figure: Figure, axes: Axes) -> None:
+    lines, _ = axes.get_legend_handles_labels()
+    noise = Patch(color=PALE, label="noise of the measurement")
+    figure.legend(handles=[*lines, noise], loc="outside upper center", ncols=5, columnspacing=1.2)

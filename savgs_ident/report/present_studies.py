@@ -1,6 +1,10 @@
-"""The presenter of studies with known truth; what draws is loaded when something is drawn."""
+"""The presenters of many campaigns, and of studies with known truth.
 
-from collections.abc import Mapping
+What draws is loaded when something is drawn.
+"""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import RenderableType
@@ -8,21 +12,61 @@ from rich.console import RenderableType
 from savgs_ident.report.presenters import AbstractPresenter, Figures
 
 if TYPE_CHECKING:
+    from savgs_ident.campaigns.study import CampaignStudy
     from savgs_ident.validation.blind import BlindStudy
     from savgs_ident.validation.calibration import CalibrationStudy
     from savgs_ident.validation.false_alarms import AlarmStudy
+
+
+class _CampaignStudy(AbstractPresenter["CampaignStudy"]):
+    stem = "campaign"
+
+    def record(self, result: "CampaignStudy") -> Mapping[str, Any]:
+        from savgs_ident.report.campaigns.record import campaigns_record
+
+        return campaigns_record(result, result.settings, result.origin.command)
+
+    def text(self, result: "CampaignStudy") -> RenderableType:
+        from savgs_ident.report.campaigns.record import campaigns_text
+
+        return campaigns_text(result)
+
+    def doubts(self, result: "CampaignStudy") -> tuple[str, ...]:
+        from savgs_ident.report.campaigns.record import alarm
+
+        found = alarm(result)
+        return (found,) if found else ()
+
+    def page(self, result: "CampaignStudy") -> str:
+        from savgs_ident.report.campaigns.page import campaigns_html
+
+        return campaigns_html(result, result.settings, result.origin.command)
+
+    def figures(self, result: "CampaignStudy") -> Figures:
+        from savgs_ident.report.campaigns.page import campaigns_figure
+
+        return {"campaign": lambda: campaigns_figure(result)} if result.units else {}
+
+    def more(self, result: "CampaignStudy", folder: Path) -> Iterator[Path]:
+        from savgs_ident.report.campaigns.page import write_campaigns
+        from savgs_ident.report.campaigns.record import campaigns_columns
+
+        yield from write_campaigns(folder, campaigns_columns(result))
+
+
+CAMPAIGN_STUDY = _CampaignStudy()
 
 
 class _BlindStudy(AbstractPresenter["BlindStudy"]):
     stem = "blind"
 
     def record(self, result: "BlindStudy") -> Mapping[str, Any]:
-        from savgs_ident.report.validation.blind import blind_record
+        from savgs_ident.report.validation import blind_record
 
         return blind_record(result.scores, result.settings, result.origin.command)
 
     def text(self, result: "BlindStudy") -> RenderableType:
-        from savgs_ident.report.validation.blind import blind_text
+        from savgs_ident.report.validation import blind_text
 
         return blind_text(result.scores)
 
@@ -30,12 +74,12 @@ class _BlindStudy(AbstractPresenter["BlindStudy"]):
         return () if result.trusted else ("the diagnosis is not right as often as it should be.",)
 
     def page(self, result: "BlindStudy") -> str:
-        from savgs_ident.report.validation.blind import blind_html
+        from savgs_ident.report.validation import blind_html
 
         return blind_html(result.scores, result.settings, result.origin.command)
 
     def figures(self, result: "BlindStudy") -> Figures:
-        from savgs_ident.report.validation.blind import confusion_figure
+        from savgs_ident.report.validation import confusion_figure
 
         return {"confusion": lambda: confusion_figure(result.scores)}
 
@@ -44,13 +88,13 @@ class _AlarmStudy(AbstractPresenter["AlarmStudy"]):
     stem = "false_alarms"
 
     def record(self, result: "AlarmStudy") -> Mapping[str, Any]:
-        from savgs_ident.report.validation.calibration import alarms_record
+        from savgs_ident.report.validation import alarms_record
 
         return alarms_record(result)
 
     def text(self, result: "AlarmStudy") -> RenderableType:
         from savgs_ident.report.text import plain
-        from savgs_ident.report.validation.calibration import alarms_text
+        from savgs_ident.report.validation import alarms_text
 
         return plain(alarms_text(self.record(result)))
 
@@ -58,7 +102,7 @@ class _AlarmStudy(AbstractPresenter["AlarmStudy"]):
         return () if result.trusted else ("there are more false alarms than there may be.",)
 
     def figures(self, result: "AlarmStudy") -> Figures:
-        from savgs_ident.report.validation.calibration import alarms_figure
+        from savgs_ident.report.validation import alarms_figure
 
         return {"false_alarms": lambda: alarms_figure(result)}
 
@@ -67,12 +111,12 @@ class _CalibrationStudy(AbstractPresenter["CalibrationStudy"]):
     stem = "calibration"
 
     def record(self, result: "CalibrationStudy") -> Mapping[str, Any]:
-        from savgs_ident.report.validation.calibration import calibration_record
+        from savgs_ident.report.validation import calibration_record
 
         return calibration_record(result)
 
     def text(self, result: "CalibrationStudy") -> RenderableType:
-        from savgs_ident.report.validation.calibration import calibration_text
+        from savgs_ident.report.validation import calibration_text
 
         return calibration_text(self.record(result))
 
@@ -80,7 +124,7 @@ class _CalibrationStudy(AbstractPresenter["CalibrationStudy"]):
         return () if result.trusted else ("coverage or ranks are not what they should be.",)
 
     def figures(self, result: "CalibrationStudy") -> Figures:
-        from savgs_ident.report.validation.calibration import calibration_figure
+        from savgs_ident.report.validation import calibration_figure
 
         return {"calibration": lambda: calibration_figure(result)}
 

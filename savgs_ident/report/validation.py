@@ -1,20 +1,26 @@
-"""Blind trials: sentences and tables, the JSON object of ``blind.json``, the confusion matrix and the page."""
+"""Reports of studies with known truth: blind trials, false alarms and the calibration of the posterior.
+
+Of each: JSON objects, sentences, tables and figures; of blind trials a page too.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
+import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from rich.console import Group, RenderableType
+from scipy.stats import binom
 
 from savgs_ident.core.presentation import package_versions
+from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.report.html import embed, render_page
-from savgs_ident.report.text import DASH, percentage, plain, table
-from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, new_figure, printable, styled
+from savgs_ident.report.text import DASH, decimal, percentage, plain, table
+from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, PALE, new_figure, printable, styled
 from savgs_ident.validation.blind_score import (
     Rate,
     Score,
@@ -24,6 +30,8 @@ from savgs_ident.validation.blind_score import (
     said_words,
     truth_words,
 )
+from savgs_ident.validation.calibration import BINS, INTERVAL, RANKED, CalibrationStudy
+from savgs_ident.validation.false_alarms import CONFIDENCE, AlarmStudy
 
 RATE_WORDS: Mapping[str, str] = {
     "named_right": "Effect named correctly",
@@ -235,3 +243,132 @@ def _held(score: Score) -> str:
         return ""
     held = sum(interval.holds for interval in score.intervals.values())
     return f"{held} of {len(score.intervals)}"
+
+
+def alarms_record(study: AlarmStudy) -> dict[str, Any]:
+    """How many of the draws were false alarms, the rate that they leave possible, and all odds.
+
+    Odds are log odds.
+    """
+    return {
+        "schema": 1,
+        "few_enough": study.trusted,
+        "drawn": len(study.solved),
+        "not_solved": len(study.draws) - len(study.solved),
+        "alarms": study.alarms,
+        "rate_at_most": study.rate_at_most,
+        "confidence": CONFIDENCE,
+        "threshold": DEFAULTS.alarm_log_odds,
+        "odds": study.odds,
+        "drawn_odds": list(study.solved),
+        "named": [list(each.named) for each in study.draws if each.alarm],
+        "command": study.origin.command_line,
+    }
+
+
+def alarms_text(record: Mapping[str, Any]) -> str:
+    """The same in two sentences."""
+    lost = f" ({record['not_solved']} more could not be solved)" if record["not_solved"] else ""
+    sentence = (
+        f"Of {record['drawn']} campaigns like this one with nothing missing{lost}, the diagnosis reported something "
+        f"missing in {record['alarms']}: the rate of false alarms is at most {percentage(record['rate_at_most'])} "
+        f"({percentage(record['confidence'], 0)} confidence)."
+    )
+    if not record["drawn_odds"]:
+        return sentence
+    return (
+        f"{sentence} Their log odds that something is missing are {decimal(min(record['drawn_odds']), 1)} to "
+        f"{decimal(max(record['drawn_odds']), 1)}, those of this campaign {decimal(record['odds'], 1)}; the "
+        f"threshold of an alarm is {decimal(record['threshold'], 0)}."
+    )
+
+
+def alarms_figure(study: AlarmStudy) -> Figure:
+    """Histogram of the log odds of the draws, with those of the campaign and the threshold."""
+    solved, odds = np.array(study.solved), study.odds
+    with styled():
+        figure = new_figure(6.4, 3.4)
+        axes = figure.subplots()
+        axes.hist(
+            solved, bins="sturges", color=BLUE, alpha=0.75, rwidth=0.9, label="campaigns with nothing missing"
+        )
+        axes.axvline(DEFAULTS.alarm_log_odds, color=INK, linestyle="--", label="threshold of an alarm")
+        # Odds of a campaign in which something is missing are in the thousands: they would leave the rest no room.
+        shown = min(odds, 2.0 * DEFAULTS.alarm_log_odds)
+        there = "this campaign" if odds <= shown else f"this campaign: {odds:.0f}, far to the right"
+        axes.axvline(shown, color=ORANGE, label=there)
+        axes.set_xlabel("log odds that something is missing [nat]")
+        axes.set_ylabel("campaigns")
+        axes.set_title(f"{solved.size} campaigns with nothing missing, diagnosed")
+        axes.legend(loc="upper center", fontsize=8)
+    return figure
+
+
+def calibration_record(study: CalibrationStudy) -> dict[str, object]:
+    """Coverage and rank statistics by parameter, how many trials failed, and whether all is as it should be."""
+    found, ranked = study.coverage, [trial for trial in study.trials if trial.solved and trial.found]
+    solved = sum(trial.solved for trial in study.trials)
+    return {
+        "schema": 1,
+        "calibrated": found.calibrated,
+        "coverage": found.overall,
+        "interval": INTERVAL,
+        "ranks_even": found.even,
+        "trials": len(study.trials),
+        "not_solved": len(study.trials) - solved,
+        "mode_not_found": solved - len(ranked),
+        "places": RANKED + 1,
+        "parameters": {
+            name: {
+                "coverage": found.inside[name],
+                "uniformity": found.uniformity[name],
+                "ranks": [trial.rank[name] for trial in ranked],
+            }
+            for name in study.names
+        },
+        "command": study.origin.command_line,
+    }
+
+
+def calibration_text(record: Mapping[str, Any]) -> RenderableType:
+    """Coverage of every parameter in a table, and the sum of it in words."""
+    rows = [
+        [name, f"{100.0 * each['coverage']:.0f}", f"{each['uniformity']:.2g}"]
+        for name, each in record["parameters"].items()
+    ]
+    counted = record["trials"] - record["not_solved"]
+    words = (
+        f"{100.0 * record['interval']:.0f} % intervals contained the truth in {100.0 * record['coverage']:.1f} % of "
+        f"{counted} campaigns times {len(rows)} parameters; {record['not_solved']} campaigns could not be "
+        f"simulated, of {record['mode_not_found']} the mode was not found (counted as missed)."
+    )
+    headers = ["parameter", "inside\n[%]", "ranks even\n(p value)"]
+    return Group(table("Calibration", headers, rows, texts=(0,)), plain(words))
+
+
+def calibration_figure(study: CalibrationStudy) -> Figure:
+    """Rank histograms of all parameters; the band holds 95 % of the bars of an even one."""
+    ranked, names = [trial for trial in study.trials if trial.found], study.names
+    columns = 6
+    rows = max(1, -(-len(names) // columns))
+    with styled():
+        figure = new_figure(11.0, 1.0 + 1.35 * rows)
+        figure.suptitle(
+            f"Ranks of true values among {RANKED} posterior draws, {len(ranked)} synthetic campaigns",
+            fontsize=11,
+        )
+        axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+        low, high = binom.ppf([0.025, 0.975], len(ranked), 1.0 / BINS)
+        for place, each in enumerate(axes.ravel()):
+            if place >= len(names):
+                each.set_visible(False)
+                continue
+            name = names[place]
+            each.axhspan(low, high, color=PALE, linewidth=0.0)
+            each.axhline(len(ranked) / BINS, color=INK, linewidth=0.8)
+            edges = np.linspace(0, RANKED + 1, BINS + 1)
+            each.hist([trial.rank[name] for trial in ranked], bins=edges, color=BLUE, alpha=0.75, rwidth=0.9)
+            each.set_title(printable(name), fontsize=8.5)
+        figure.supxlabel(f"rank of the true value [0 to {RANKED}]", fontsize=9)
+        figure.supylabel("campaigns", fontsize=9)
+    return figure

@@ -1,0 +1,365 @@
+"""A fit, and a comparison of model and measurement: as JSON objects and in the terminal.
+
+The objects of ``fit.json`` and ``bode.json`` are in SI throughout, the unit in the key or beside the value. The
+terminal shows parameters with errors, quality, identifiability; the gap between model and measurement.
+"""
+
+from math import floor, isfinite, isinf, log10
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Group, RenderableType
+
+from savgs_ident.core.files import warning_record
+from savgs_ident.fit.comparison import Comparison
+from savgs_ident.fit.residuals import (
+    Gap,
+    MeasuredPoints,
+    chi2_by_dwell,
+    entries_by_dwell,
+    gaps,
+    measured_points,
+    predicted_peak_to_peak,
+    whitened,
+)
+from savgs_ident.fit.result import Estimate, Fit
+from savgs_ident.plants.model import Model
+from savgs_ident.report.text import channel_label, fixed, per_input_key, plain, table
+
+
+def fit_record(fit: Fit) -> dict[str, object]:
+    """The contract's keys first, then how the fit went and what is identifiable.
+
+    ``gap`` holds relative rms residuals [1] before and after the fit and of the noise alone ("floor"), and
+    the same in noise standard deviations, by channel and "together".
+    """
+    return {
+        "schema": 1,
+        "parameters": {
+            each.name: {
+                "value": each.value,
+                "stderr": each.stderr,
+                "unit": each.unit,
+                "free": each.free,
+                "prior": each.prior,
+                "prior_sd": each.prior_sd,
+            }
+            for each in fit.estimates
+        },
+        "correlation": _named_matrix(fit, fit.correlation),
+        "chi2": fit.chi2,
+        "dof": fit.dof,
+        "chi2_per_dof": fit.chi2 / fit.dof if fit.dof > 0 else None,
+        "converged": fit.status.ok and all(status.ok for status in fit.dwell_status),
+        "trusted": fit.trusted,
+        "gap": gap_record(fit),
+        "dwells": _dwell_records(fit),
+        "status": fit.status.name.lower(),
+        "advice": fit.status.advice,
+        "verdict": {
+            "explained": fit.verdict.explained,
+            "identifiable": fit.verdict.identifiable,
+            "sentences": fit.verdict.sentences,
+            "confounded": fit.verdict.confounded,
+        },
+        "prior_chi2": fit.prior_chi2,
+        "effects": fit.effects,
+        "quantity": fit.quantity,
+        "orders": fit.orders,
+        "starts": [{"chi2": chi2, "status": status.name.lower()} for chi2, status in fit.starts],
+        "wall_s": fit.wall_s,
+        "warnings": [warning_record(warning) for warning in fit.origin.warnings],
+    }
+
+
+def gap_record(fit: Fit) -> dict[str, dict[str, float]]:
+    """The gap before and after the fit, by channel and together."""
+    before, after = (
+        gaps(fit.measured, fit.channels, predicted, fit.used) for predicted in (fit.as_given, fit.predicted)
+    )
+    return {name: gap_entry(before[name], after[name]) for name in after}
+
+
+def gap_entry(before: Gap, after: Gap) -> dict[str, float]:
+    """One gap before and after as JSON has it, relative [1] and in noise standard deviations."""
+    return {
+        "before": before.relative,
+        "after": after.relative,
+        "floor": after.floor,
+        "before_sigma": before.sigma,
+        "after_sigma": after.sigma,
+    }
+
+
+def _named_matrix(fit: Fit, matrix: NDArray[np.float64]) -> dict[str, dict[str, float]]:
+    names = [each.name for each in fit.estimates]
+    return {
+        name: dict(zip(names, row, strict=True)) for name, row in zip(names, matrix.tolist(), strict=True)
+    }
+
+
+def _dwell_records(fit: Fit) -> list[dict[str, object]]:
+    chi2, entries = chi2_by_dwell(fit), entries_by_dwell(fit)
+    sigma = whitened(fit.measured, fit.channels, fit.predicted, fit.used)
+    reach = predicted_peak_to_peak(fit.measured, fit.channels, fit.predicted)
+    frictionless = predicted_peak_to_peak(fit.measured, fit.channels, fit.frictionless)
+    return [
+        {
+            "test": test,
+            "frequency_hz": fit.measured.frequency[d],
+            "status": fit.dwell_status[d].name.lower(),
+            "chi2": chi2[d],
+            "entries": entries[d],
+            "channels": {
+                name: _dwell_channel(fit, d, c, sigma[d, c])
+                | {"peak_to_peak_identified": reach[d, c], "peak_to_peak_simqc": frictionless[d, c]}
+                for c, name in enumerate(fit.channels)
+                if np.any(fit.used[d, c])
+            },
+        }
+        for d, test in enumerate(fit.measured.tests)
+    ]
+
+
+def _dwell_channel(fit: Fit, d: int, c: int, sigma: NDArray[np.float64]) -> dict[str, object]:
+    """Peak to peak as measured, and the whitened residuals of the orders used."""
+    channel = fit.measured.channel(fit.channels[c])
+    orders = np.flatnonzero(fit.used[d, c])
+    return {
+        "peak_to_peak": fit.measured.peak_to_peak[d, channel],
+        "peak_to_peak_sd": fit.measured.peak_to_peak_sd[d, channel],
+        "residual_rms_sigma": np.sqrt(np.mean(sigma[orders] ** 2)),
+        "residual_sigma": {"order": orders, "re": sigma[orders, 0], "im": sigma[orders, 1]},
+    }
+
+
+def bode_record(compared: Comparison) -> dict[str, object]:
+    """The JSON object of ``bode``; first harmonics per unit of the input, phase against it, SI."""
+    given = compared.given
+    names, key = [each.name for each in given.channels], per_input_key(given)
+    points = measured_points(compared.measured, names, given.plant.inputs[0].name)
+    model, frictionless = compared.model.curve(""), compared.frictionless.curve("")
+    gap = gaps(compared.measured, names, compared.model.harmonics, compared.used)
+    return {
+        "schema": 1,
+        "effects": list(compared.effects),
+        "tests": compared.measured.tests,
+        "frequency_hz": points.frequency,
+        "status": [status.name.lower() for status in compared.model.status],
+        "converged": compared.trusted,
+        "gap": {name: _gap(entry) for name, entry in gap.items()},
+        "channels": {
+            each.name: {
+                "unit": each.unit,
+                "measured": _measured(points, c, key),
+                "identified": _transfer(model.transfer[:, c], model.peak_to_peak[:, c], key),
+                "simqc": _transfer(frictionless.transfer[:, c], frictionless.peak_to_peak[:, c], key),
+            }
+            for c, each in enumerate(given.channels)
+        },
+    }
+
+
+def _gap(gap: Gap) -> dict[str, float]:
+    return {"relative": gap.relative, "floor": gap.floor, "sigma": gap.sigma}
+
+
+def _measured(points: MeasuredPoints, c: int, key: str) -> dict[str, object]:
+    return _transfer(points.transfer[:, c], points.peak_to_peak[:, c], key) | {
+        f"{key}_sd": points.magnitude_sd[:, c],
+        "phase_sd_deg": np.degrees(points.phase_sd[:, c]),
+        "peak_to_peak_sd": points.peak_to_peak_sd[:, c],
+    }
+
+
+def _transfer(transfer: NDArray[np.complex128], reach: NDArray[np.float64], key: str) -> dict[str, object]:
+    return {
+        key: np.abs(transfer),
+        "phase_deg": np.degrees(np.angle(transfer)),
+        "peak_to_peak": reach,
+    }
+
+
+_SHOWN_DWELLS = 5
+_FAR = 2.0
+
+
+def fit_text(fit: Fit) -> RenderableType:
+    """Tables and sentences of a fit, most important first."""
+    parts = [
+        _identified(fit),
+        _quality(fit),
+        *_correlation(fit),
+        plain(""),
+        _gap_table(fit),
+        *_tolerances(fit),
+        *_far_dwells(fit),
+        plain("Verdict", "bold"),
+        *(plain(f"- {sentence}") for sentence in _verdict(fit)),
+    ]
+    return Group(*parts)
+
+
+def value_with_error(value: float, error: float) -> str:
+    """A value to the second significant digit of its error, ``0.03001 ± 0.00012``.
+
+    Both are in the same unit.
+    """
+    if isinf(error):
+        return f"{value:.3g}, not identified"
+    if not error > 0.0:
+        return f"{value:.6g}"
+    places = min(max(1 - floor(log10(error)), 0), 12)
+    return f"{value:.{places}f} ± {error:.{places}f}"
+
+
+def _identified(fit: Fit) -> RenderableType:
+    rows = [
+        (
+            each.name,
+            value_with_error(each.value, each.stderr),
+            "" if each.unit == "1" else each.unit,
+            fixed(100.0 * each.stderr / abs(each.value), 2) if each.value and isfinite(each.stderr) else "-",
+            _about(fit, each.name),
+        )
+        for each in fit.estimates
+        if each.free
+    ]
+    headers = ("parameter", "value ± 1 sd", "unit", "sd [%]", "description")
+    return table("Identified parameters", headers, rows, texts=(0, 2, 4))
+
+
+def _quality(fit: Fit) -> RenderableType:
+    ratio = f" = {fit.chi2 / fit.dof:.3f}" if fit.dof > 0 else ""
+    what = (
+        "peak-to-peak values" if fit.quantity == "peak_to_peak" else f"harmonics of orders 1 to {fit.orders}"
+    )
+    return plain(
+        f"chi2/dof = {fit.chi2:.1f}/{fit.dof}{ratio} on {what} of {len(fit.measured.tests)} dwells"
+        f" ({fit.wall_s:.1f} s)"
+    )
+
+
+def _about(fit: Fit, name: str) -> str:
+    """What a parameter is, in a few words."""
+    return fit.estimated.table[name].about.split(",")[0]
+
+
+def _correlation(fit: Fit) -> list[RenderableType]:
+    """The free parameters that trade off most against each other."""
+    names = fit.free_names
+    pairs = [(one, other) for one in range(len(names)) for other in range(one)]
+    known = [pair for pair in pairs if isfinite(fit.correlation[pair])]
+    if not known:
+        return []
+    one, other = max(known, key=lambda pair: abs(fit.correlation[pair]))
+    return [
+        plain(f"Strongest correlation: {names[other]} with {names[one]}, {fit.correlation[one, other]:+.2f}")
+    ]
+
+
+def _gap_table(fit: Fit) -> RenderableType:
+    rows = [
+        (
+            channel_label(name, fit.model).title,
+            fixed(100.0 * entry["before"], 2),
+            fixed(100.0 * entry["after"], 3),
+            fixed(100.0 * entry["floor"], 3),
+            fixed(entry["before_sigma"], 1),
+            fixed(entry["after_sigma"], 2),
+        )
+        for name, entry in gap_record(fit).items()
+    ]
+    headers = ("residual (rms)", "before\n[%]", "after\n[%]", "noise\n[%]", "before\n[sd]", "after\n[sd]")
+    return table("Gap between measurement and model", headers, rows)
+
+
+def _tolerances(fit: Fit) -> list[RenderableType]:
+    known = [each for each in fit.estimates if not each.free]
+    if not known:
+        return []
+    moved = sorted((each for each in known if _shift(each) >= 0.5), key=_shift, reverse=True)
+    rows = [
+        (
+            each.name,
+            value_with_error(each.prior, each.prior_sd),
+            value_with_error(each.value, each.stderr),
+            each.unit,
+            f"{(each.value - each.prior) / each.prior_sd:+.1f}",
+        )
+        for each in moved
+    ]
+    title = (
+        f"Known to a tolerance and estimated too: {len(known)},"
+        f" of which {len(moved)} changed by half a tolerance or more"
+    )
+    if not moved:
+        return [plain(title), plain("")]
+    headers = ("parameter", "drawing ± 1 sd", "estimate ± 1 sd", "unit", "change\n[sd]")
+    return [table(title, headers, rows, texts=(0, 3))]
+
+
+def _shift(each: Estimate) -> float:
+    return abs(each.value - each.prior) / each.prior_sd
+
+
+def _far_dwells(fit: Fit) -> list[RenderableType]:
+    """The dwells with the largest misfit, where it is large."""
+    chi2 = chi2_by_dwell(fit)
+    ratio = chi2 / entries_by_dwell(fit).clip(1)
+    bad = [
+        d
+        for d in sorted(range(len(ratio)), key=lambda d: -ratio[d])
+        if ratio[d] > _FAR or not fit.dwell_status[d].ok
+    ]
+    if not bad:
+        return []
+    rows = [
+        (
+            fit.measured.tests[d],
+            fixed(float(fit.measured.frequency[d]), 3),
+            fixed(float(ratio[d]), 2),
+            fit.dwell_status[d].name.lower().replace("_", " "),
+        )
+        for d in bad[:_SHOWN_DWELLS]
+    ]
+    title = f"Dwells with the largest misfit (chi2 per entry above {_FAR:g}, or not solved): {len(bad)}"
+    return [table(title, ("dwell", "f\n[Hz]", "chi2 per\nentry", "solution"), rows, texts=(0, 3))]
+
+
+def _verdict(fit: Fit) -> list[str]:
+    sentences = [] if fit.status.ok else [f"The fit is not to be trusted: {fit.status.advice}."]
+    failed = [
+        test for test, status in zip(fit.measured.tests, fit.dwell_status, strict=True) if not status.ok
+    ]
+    if failed:
+        sentences.append("The model's periodic motion was not found in: " + ", ".join(failed) + ".")
+    return sentences + list(fit.verdict.sentences)
+
+
+def bode_text(record: dict[str, Any], model: Model) -> RenderableType:
+    """The gap by channel, and the dwells that were not solved."""
+    rows = [
+        (
+            channel_label(name, model).title,
+            fixed(100.0 * gap["relative"], 3),
+            fixed(100.0 * gap["floor"], 3),
+            fixed(gap["sigma"], 2),
+        )
+        for name, gap in record["gap"].items()
+    ]
+    count = len(record["tests"])
+    parts = [
+        table(
+            f"Residual of the model on {count} dwells (rms)",
+            ("channel", "residual\n[%]", "noise\n[%]", "residual\n[noise sd]"),
+            rows,
+        )
+    ]
+    failed = [
+        test for test, status in zip(record["tests"], record["status"], strict=True) if status != "converged"
+    ]
+    if failed:
+        parts.append(plain("The model's periodic motion was not found in: " + ", ".join(failed)))
+    return Group(*parts)

@@ -1,0 +1,271 @@
+"""The presenters of what one campaign says: summary, fit, comparison, posterior, diagnosis.
+
+What draws is loaded when something is drawn.
+"""
+
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import RenderableType
+
+from savgs_ident.core.files import write_bytes, write_json
+from savgs_ident.core.presentation import Progress, no_progress
+from savgs_ident.report.presenters import AbstractPresenter, Figures, Shown, is_quarter_car
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from savgs_ident.diagnosis.result import Diagnosis
+    from savgs_ident.fit.comparison import Comparison
+    from savgs_ident.fit.result import Fit
+    from savgs_ident.inference.result import Posterior
+    from savgs_ident.responses.summary import CampaignSummary
+
+
+class _CampaignSummary(AbstractPresenter["CampaignSummary"]):
+    stem = "inspect"
+
+    def record(self, result: "CampaignSummary") -> Mapping[str, Any]:
+        from savgs_ident.report.campaigns.inspect import summary_record
+
+        return summary_record(result)
+
+    def text(self, result: "CampaignSummary") -> RenderableType:
+        from savgs_ident.report.campaigns.inspect import campaign_text
+
+        return campaign_text(dict(self.record(result)), result.campaign.layout)
+
+    def doubts(self, result: "CampaignSummary") -> tuple[str, ...]:
+        del result
+        return ()
+
+    def figures(self, result: "CampaignSummary") -> Figures:
+        from savgs_ident.report.campaigns.inspect import campaign_figure
+
+        return {"inspect": lambda: campaign_figure(result)}
+
+
+CAMPAIGN_SUMMARY = _CampaignSummary()
+
+
+class _Identified(AbstractPresenter[Shown]):
+    """A model drawn against a measurement: smooth curves, for which it is solved between the dwells too."""
+
+    @abstractmethod
+    def comparison(self, result: Shown) -> "Comparison":
+        """The model against the measurement."""
+
+    def figures(self, result: Shown) -> Figures:
+        return {"bode": lambda: comparison_figure(self.comparison(result))}
+
+    def write(self, result: Shown, folder: Path, progress: Progress) -> Iterator[Path]:
+        yield write_json(folder / f"{self.stem}.json", self.record(result))
+        yield from self.more(result, folder)
+        yield from draw_comparison(self.comparison(result), folder, progress)
+
+
+class _Fit(_Identified["Fit"]):
+    stem = "fit"
+
+    def record(self, result: "Fit") -> Mapping[str, Any]:
+        from savgs_ident.report.fit import fit_record
+
+        return fit_record(result)
+
+    def text(self, result: "Fit") -> RenderableType:
+        from savgs_ident.report.fit import fit_text
+
+        return fit_text(result)
+
+    def doubts(self, result: "Fit") -> tuple[str, ...]:
+        if result.trusted:
+            return ()
+        if not result.status.ok:
+            return (f"{result.status.advice}.",)
+        if not all(status.ok for status in result.dwell_status):
+            return ("the model's periodic motion was not found in every dwell.",)
+        if not result.verdict.explained:
+            return ("the model does not explain the data: look for what is missing with `diagnose`.",)
+        return ("the data do not identify every free parameter.",)
+
+    def comparison(self, result: "Fit") -> "Comparison":
+        from savgs_ident.fit.comparison import comparison_of
+
+        return comparison_of(result)
+
+    def more(self, result: "Fit", folder: Path) -> Iterator[Path]:
+        if not is_quarter_car(result.estimated):
+            return
+        from savgs_ident.plants.quarter_car.rig import write_rig
+
+        write_rig(result.model.rig, folder / "model.toml")
+        yield folder / "model.toml"
+
+
+class _Comparison(_Identified["Comparison"]):
+    stem = "bode"
+
+    def record(self, result: "Comparison") -> Mapping[str, Any]:
+        from savgs_ident.report.fit import bode_record
+
+        return bode_record(result)
+
+    def text(self, result: "Comparison") -> RenderableType:
+        from savgs_ident.report.fit import bode_text
+
+        return bode_text(dict(self.record(result)), result.given)
+
+    def doubts(self, result: "Comparison") -> tuple[str, ...]:
+        return () if result.trusted else ("the model's periodic motion was not found in every dwell.",)
+
+    def comparison(self, result: "Comparison") -> "Comparison":
+        return result
+
+
+def draw_comparison(comparison: "Comparison", folder: Path, progress: Progress) -> tuple[Path, ...]:
+    """Write bode.png and bode.pdf of a model against a measurement."""
+    figure = comparison_figure(comparison, progress)
+    from savgs_ident.report.theme import write_figure
+
+    return write_figure(folder, "bode", figure)
+
+
+def comparison_figure(comparison: "Comparison", progress: Progress = no_progress) -> "Figure":
+    """The Bode figure of a model against a measurement, with the model solved between the dwells."""
+    progress("solving the model between the dwells")
+    # Loading what draws takes as long as solving, which leaves Python free.
+    with ThreadPoolExecutor(1) as pool:
+        solving = pool.submit(comparison.between)
+        from savgs_ident.fit.residuals import measured_points, whitened
+        from savgs_ident.report.bode import bode_figure
+        from savgs_ident.report.text import channel_labels
+    model, frictionless = solving.result()
+    given, measured = comparison.given, comparison.measured
+    curves = [model.curve("model as drawn" if given.is_drawing else "identified model")]
+    if comparison.effects:
+        curves.append(frictionless.curve("the same without effects"))
+    progress("drawing")
+    labels, driven = channel_labels(given), given.plant.inputs[0].name
+    points = measured_points(measured, tuple(labels), driven)
+    residuals = whitened(measured, tuple(labels), comparison.model.harmonics, comparison.used)
+    title = f"Model and measurement: {Path(comparison.origin.data).name or given.plant_name}"
+    return bode_figure(title, points, curves, residuals, tuple(labels.values()))
+
+
+FIT = _Fit()
+COMPARISON = _Comparison()
+
+
+class _Posterior(AbstractPresenter["Posterior"]):
+    stem = "posterior"
+    packages = ("jax", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
+    """Whose version matters to a chain."""
+
+    def record(self, result: "Posterior") -> Mapping[str, Any]:
+        from savgs_ident.report.posterior.page import posterior_record
+
+        return posterior_record(result, result.origin.with_versions(self.packages))
+
+    def text(self, result: "Posterior") -> RenderableType:
+        from savgs_ident.report.posterior.text import posterior_text
+
+        return posterior_text(result)
+
+    def doubts(self, result: "Posterior") -> tuple[str, ...]:
+        return () if result.trusted else (f"{'; '.join(result.convergence.reasons)}.",)
+
+    def page(self, result: "Posterior") -> str | None:
+        from savgs_ident.report.posterior.page import posterior_html
+
+        return posterior_html(result, result.origin.with_versions(self.packages))
+
+    def figures(self, result: "Posterior") -> Figures:
+        from savgs_ident.report.posterior.bode import predictive_figure
+        from savgs_ident.report.posterior.figures import corner_figure, profile_figure, trace_figure
+
+        identified = result.of_role("identified")
+        return {
+            "corner": lambda: corner_figure(result),
+            **{f"trace {each.name}": partial(trace_figure, result, each) for each in identified},
+            **{
+                f"profile {each.name}": partial(profile_figure, result, each, each.profile)
+                for each in identified
+                if each.profile is not None
+            },
+            **{
+                f"predicted {each.name}": partial(predictive_figure, result, c)
+                for c, each in enumerate(result.model.channels)
+            },
+        }
+
+    def write(self, result: "Posterior", folder: Path, progress: Progress) -> Iterator[Path]:
+        from savgs_ident.inference.draws import write_inference_data
+
+        progress("writing")
+        yield write_inference_data(result, folder / "posterior.nc")
+        yield write_json(folder / "posterior.json", self.record(result))
+        page = self.page(result)
+        if page is not None:
+            yield write_bytes(folder / "posterior.html", page.encode())
+
+
+POSTERIOR = _Posterior()
+
+
+class _Diagnosis(AbstractPresenter["Diagnosis"]):
+    stem = "diagnosis"
+    packages = ("jax", "numpy", "scipy")
+    """Whose version matters to a diagnosis."""
+
+    def record(self, result: "Diagnosis") -> Mapping[str, Any]:
+        from savgs_ident.report.diagnosis.record import diagnosis_record
+
+        return diagnosis_record(result, result.origin.with_versions(self.packages))
+
+    def text(self, result: "Diagnosis") -> RenderableType:
+        from savgs_ident.report.diagnosis.text import diagnosis_text
+
+        return diagnosis_text(result)
+
+    def doubts(self, result: "Diagnosis") -> tuple[str, ...]:
+        return () if result.trusted else result.warnings
+
+    def page(self, result: "Diagnosis") -> str | None:
+        from savgs_ident.report.diagnosis.page import diagnosis_html
+
+        return diagnosis_html(result, result.origin.with_versions(self.packages))
+
+    def figures(self, result: "Diagnosis") -> Figures:
+        from savgs_ident.report.diagnosis.compared import diagnosis_bode_figure, drive_figure
+        from savgs_ident.report.diagnosis.drawing import rig_figure
+        from savgs_ident.report.diagnosis.figures import force_figure, gap_map_figure, shrink_figure
+
+        shrink: Figures = {"shrink": lambda: shrink_figure(result)}
+        loops: Figures = {
+            f"force {number}": partial(force_figure, result, loop) for number, loop in enumerate(result.loops)
+        }
+        if result.measured is None:
+            return {"drive": lambda: drive_figure(result), **shrink, **loops}
+        names = [each.name for each in result.given.channels]
+        drawing: Figures = {"ports": lambda: rig_figure(result)} if is_quarter_car(result.given) else {}
+        return {
+            **{f"gap {name}": partial(gap_map_figure, result, name) for name in names},
+            **drawing,
+            **shrink,
+            **{f"bode {name}": partial(diagnosis_bode_figure, result, c) for c, name in enumerate(names)},
+            **loops,
+        }
+
+    def write(self, result: "Diagnosis", folder: Path, progress: Progress) -> Iterator[Path]:
+        progress("writing")
+        page = self.page(result)
+        yield write_json(folder / "diagnosis.json", self.record(result))
+        if page is not None:
+            yield write_bytes(folder / "diagnosis.html", page.encode())
+
+
+DIAGNOSIS = _Diagnosis()

@@ -1,1 +1,0 @@
-"""Reports of blind trials, false alarms and calibration."""
