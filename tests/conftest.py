@@ -33,7 +33,7 @@ os.environ["JAX_NUMPY_DTYPE_PROMOTION"] = "strict"
 settings.register_profile(
     "fast", max_examples=12, deadline=None, database=None, print_blob=True, derandomize=True
 )
-settings.register_profile("thorough", max_examples=100, deadline=None, database=None, print_blob=True)
+settings.register_profile("thorough", max_examples=50, deadline=None, database=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fast"))
 
 # A shell that runs the tests in its background ignores Ctrl-C, and so would the programs that the tests interrupt.
@@ -47,8 +47,16 @@ SHARED = REPOSITORY.parent / "shared" / "data"
 SCRATCH = ("SAVGS_IDENT_CACHE", "XDG_CACHE_HOME", "MPLCONFIGDIR", "HYPOTHESIS_STORAGE_DIRECTORY")
 """Variables that name folders of caches; all processes of a run share one that is removed in the end."""
 
-SHARING = ("control", "diagnosis", "export", "fit", "inference", "simulate")
-"""Folders whose tests share expensive fixtures and compiled programs: one process takes all of a folder."""
+SHARING = {
+    **{folder: folder for folder in ("control", "diagnosis", "export", "fit", "inference", "simulate")},
+    **dict.fromkeys(("effects", "symbolic"), "laws"),
+}
+"""Folders whose tests share expensive fixtures and compiled programs, and their room: one process takes all of it."""
+
+
+UNOPTIMISED = "--xla_backend_optimization_level=0"
+"""The compiler takes half the time with it. The fast tests compile more than they compute; `make test-all` compiles
+everything as in use."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -57,6 +65,9 @@ def pytest_configure(config: pytest.Config) -> None:
         folder = Path(tempfile.mkdtemp(prefix="savgs-ident-tests-"))
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
         os.environ.update({name: str(folder / name.lower()) for name in SCRATCH})
+        flags = os.environ.get("XLA_FLAGS", "")
+        if config.getoption("markexpr") == "not slow" and "optimization_level" not in flags:
+            os.environ["XLA_FLAGS"] = f"{flags} {UNOPTIMISED}".strip()
     from savgs_ident.simulate.program_cache import spare_the_compiler
 
     spare_the_compiler()
@@ -67,7 +78,7 @@ class _Rooms(LoadScopeScheduling):
 
     def _split_scope(self, nodeid: str) -> str:
         path = Path(nodeid.partition("::")[0])
-        return path.parts[1] if path.parts[0] == "tests" and path.parts[1] in SHARING else str(path)
+        return SHARING.get(path.parts[1], str(path)) if path.parts[0] == "tests" else str(path)
 
 
 @pytest.hookimpl(optionalhook=True)

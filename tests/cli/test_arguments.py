@@ -8,12 +8,14 @@ from hypothesis import strategies as st
 
 from savgs_ident.cli.options import spread_values
 
+from ..in_one_test import over
+
 WORDS = st.lists(
     st.sampled_from(["--free", "--quiet", "mu_r", "c_sd", "run.csv", "2.5", "--frequency", "-h"])
 )
 
 
-@pytest.mark.parametrize(
+@over(
     ("line", "expected"),
     [
         ("fit run.csv --free mu_r c_sd", "fit run.csv --free mu_r --free c_sd"),

@@ -13,6 +13,7 @@ import pytest
 
 from savgs_ident.campaigns.store import FILES, LONGEST_NAME, find_campaigns, safe_name
 from savgs_ident.cli.console import BAD_INPUT, NOT_TRUSTED, OK
+from savgs_ident.core import executor
 from savgs_ident.core.errors import InputError
 
 from .campaign_fakes import MONDAY, STDERR, TALKING, campaign_file, never, record_of, rows_of, run
@@ -223,8 +224,9 @@ def test_one_campaign_has_neither_trend_nor_order(start: float | None, tmp_path:
     ],
 )  # fmt: skip
 def test_bad_arguments_are_code_2_with_a_reason(
-    invoke: Any, tmp_path: Path, words: tuple[str, ...], said: str
+    invoke: Any, tmp_path: Path, words: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(executor, "ANSWER_S", 0.5)
     (tmp_path / "empty").mkdir()
     campaign_file(tmp_path / "data" / "a.csv", 1.0)
     began = time.monotonic()

@@ -29,12 +29,8 @@ def _slow_but(name: str) -> tuple[pytest.MarkDecorator, ...]:
     [
         ("inspect", (), 2_000, "inspect.json", []),
         ("inspect", (), 30_000, "inspect.png", ["inspect.json"]),
-        ("export", (), 2_000, "model.json", []),
-        ("simulate", ("--frequency", "2"), 500, "simulate.json", []),
         ("simulate", ("--frequency", "2"), 20_000, "simulate.png", ["simulate.csv", "simulate.json"]),
-        ("fit", QUICK, 3_000, "fit.json", []),
         ("fit", QUICK, 30_000, "bode.png", ["fit.json", "model.toml"]),
-        ("linearise", (), 3_000, "linearise.json", []),
         ("design", ("--rigs", "1"), 6_000, "design.json", ["controller.json"]),
         ("campaign", (*QUICK, "--workers", "1"), 1_000, "o/short", []),
     ],

@@ -21,6 +21,8 @@ from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import RigModel, model_of
 from savgs_ident.plants.quarter_car.rig import default_campaign_path, default_rig_path, read_rig, write_rig
 
+from ..in_one_test import over
+
 TRUTH = {"mu_r": 0.03, "mu_t": 0.25, "ydot_Hth": 0.05, "c_sd": 0.93 * 5792.0}
 CONTRACT = {"median", "sd", "q025", "q975", "unit", "ess_bulk", "ess_tail", "r_hat"}
 
@@ -158,7 +160,7 @@ def test_priors_are_those_from_before_the_fit() -> None:
     assert values == {"mu_r": 0.04, "k_sd": 1.5e5}
 
 
-@pytest.mark.parametrize(
+@over(
     "broken",
     [
         {"before": 3},

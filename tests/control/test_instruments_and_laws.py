@@ -30,6 +30,8 @@ from savgs_ident.control.linear_equivalent import AlphaMap, equivalents
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 
+from ..in_one_test import over
+
 GEAR = 40.0
 SAMPLE = 1e-3
 FASTEST = 100.0 * np.pi / GEAR * SAMPLE
@@ -115,7 +117,7 @@ def test_ideal_instruments_show_the_truth(
     assert np.asarray(read).tolist() == list(truth)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@over("kind", KINDS)
 def test_a_failure_changes_nothing_before_its_time_and_what_it_is_named_for_after(kind: str) -> None:
     failure, readings = make_failure(kind, 2.0), jnp.array([1.0, 2.0, 3.0])
     before, after = jnp.asarray(1.999), jnp.asarray(2.0)

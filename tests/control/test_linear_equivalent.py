@@ -35,6 +35,7 @@ from savgs_ident.plants.quarter_car.kinematics import linkage, strut_length
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 
+from ..in_one_test import over
 from .by_hand import length, slope, travel, wishbone_at_length, wishbone_at_travel
 
 wishbones = st.floats(-0.15, 0.15)
@@ -260,11 +261,13 @@ def test_distributed_masses_weigh_in_heave_what_the_lumped_ones_do(
     assert distributed.mass.sum() == pytest.approx(total, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_distributed_masses_are_positive_and_symmetric(distributed: TwoMasses) -> None:
     assert distributed.mass == pytest.approx(distributed.mass.T, rel=1e-12)
     assert np.min(np.linalg.eigvalsh(distributed.mass)) > 0.0
 
 
+@pytest.mark.slow
 def test_distributed_masses_hold_the_kinetic_energy_of_the_bodies(
     distributed: TwoMasses, numbers: Values
 ) -> None:
@@ -383,7 +386,7 @@ _force = jax.jit(jax.grad(_energy, argnums=1))
 _stiffness = jax.jit(jax.hessian(_energy, argnums=1))
 
 
-@pytest.mark.parametrize("link", LINKS)
+@over("link", LINKS)
 def test_the_energy_is_least_at_rest(frictionless: QuarterCar, numbers: Values, link: float) -> None:
     at = resting(frictionless, numbers, link)
     q = np.array([float(part) for part in at.q])

@@ -1,4 +1,7 @@
-"""The linear models against the nonlinear rig, and approximations over the link angle."""
+"""The linear models against the nonlinear rig, and approximations over the link angle.
+
+Of the exact linearisation the fast tests of the exports see that a mount softens it as in series.
+"""
 
 import jax.numpy as jnp
 import numpy as np
@@ -18,12 +21,14 @@ from savgs_ident.simulate.periodic import harmonics, simulate_periodic, solve_on
 from .by_hand import slope, travel
 
 
+@pytest.mark.slow
 def test_the_exact_linearisation_is_the_nonlinear_rig(small: SmallMotions) -> None:
     """From 0.5 to 10 Hz, both channels, amplitude and phase."""
     assert (small.frequency.min(), small.frequency.max()) == pytest.approx((0.5, 10.0))
     assert small.error("exact linearisation") < 0.002
 
 
+@pytest.mark.slow
 def test_every_simplification_that_is_undone_brings_the_model_nearer(small: SmallMotions) -> None:
     errors = [small.error(name) for name in small.models]
     assert next(iter(small.models)) == "equation (8)"
@@ -31,6 +36,7 @@ def test_every_simplification_that_is_undone_brings_the_model_nearer(small: Smal
     assert np.all(np.diff(errors) < 0.0)
 
 
+@pytest.mark.slow
 def test_at_another_link_angle_the_exact_linearisation_is_the_nonlinear_rig(
     frictionless: QuarterCar, numbers: Values
 ) -> None:
@@ -51,6 +57,7 @@ def test_at_another_link_angle_the_exact_linearisation_is_the_nonlinear_rig(
     assert np.max(np.abs(away)) > 0.01
 
 
+@pytest.mark.slow
 def test_a_slow_link_lifts_the_exact_rig_as_its_rests_say(
     small: SmallMotions, frictionless: QuarterCar, numbers: Values
 ) -> None:
@@ -66,6 +73,7 @@ def test_a_slow_link_lifts_the_exact_rig_as_its_rests_say(
     assert 0.9 < small.slow_link < 1.0
 
 
+@pytest.mark.slow
 def test_the_linear_models_have_the_numbers_that_they_are_named_for(small: SmallMotions) -> None:
     iw = 2j * np.pi * small.frequency
     for name, numbers in small.masses.items():

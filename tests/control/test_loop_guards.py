@@ -25,6 +25,7 @@ from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.report.control.loop_text import alarm, saturation_words
 
+from ..in_one_test import over
 from .loops import cam, ideal, passive, ran, with_changed
 
 TEST = cam(2.0)
@@ -34,7 +35,7 @@ def _nominal(alpha: AlphaMap) -> Array:
     return alpha.nominal
 
 
-@pytest.mark.parametrize(
+@over(
     ("period", "effect", "steps"),
     [(1e-3, None, 1), (1e-4, None, 1), (2e-3, None, 2), (5e-2, None, 50), (1e-3, "plate_compliance", 6)],
 )

@@ -29,6 +29,7 @@ from savgs_ident.control.synthesis import RATE
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values
 
+from ..in_one_test import over
 from .loops import along
 
 CAM = 0.0275
@@ -66,7 +67,7 @@ def while_driven(test: LoopTest, wave: Callable[[Array], Array]) -> Array:
     return np.where(time < test.end + FADE, wave(time), 0.0)
 
 
-@pytest.mark.parametrize("test", TESTS, ids=lambda test: test.title)
+@over("test", TESTS, ids=lambda test: test.title)
 def test_every_test_lasts_whole_frames_and_ends_with_a_road_that_stands_still(test: LoopTest) -> None:
     frames = test.duration * RATE / FRAME
     assert frames == pytest.approx(round(frames), abs=1e-6)
@@ -77,7 +78,7 @@ def test_every_test_lasts_whole_frames_and_ends_with_a_road_that_stands_still(te
     assert np.ptp(moving) > 0.01
 
 
-@pytest.mark.parametrize("test", TESTS, ids=lambda test: test.title)
+@over("test", TESTS, ids=lambda test: test.title)
 def test_something_fails_while_the_test_is_judged_and_the_road_moves(test: LoopTest) -> None:
     assert test.start < test.fails_at < test.end
     later, _ = along(test.road, np.linspace(test.fails_at, test.end, 300))

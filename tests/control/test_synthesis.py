@@ -21,6 +21,7 @@ from savgs_ident.control.synthesis import (
 )
 from savgs_ident.core.errors import InputError
 
+from ..in_one_test import over
 from .glover_doyle import exists
 
 Plant = Callable[..., control.StateSpace]
@@ -156,7 +157,7 @@ def test_a_controller_of_its_full_order_stays_as_it_is(synthesis: Synthesis) -> 
     assert np.abs(same(iw) - full(iw)).max() < 1e-8 * np.abs(full(iw)).max()
 
 
-@pytest.mark.parametrize("order", [1, 4, 6, 8, 9])
+@over("order", [1, 4, 6, 8, 9])
 def test_a_reduced_controller_keeps_its_static_gain_and_loses_no_more_than_the_hankel_tail(
     synthesis: Synthesis, order: int
 ) -> None:

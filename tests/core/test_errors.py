@@ -5,6 +5,8 @@ import pytest
 from savgs_ident.core.errors import DataWarning, InputError, SavgsIdentError, blamed_on
 from savgs_ident.core.status import Status
 
+from ..in_one_test import over
+
 
 def test_an_error_says_place_fault_and_remedy() -> None:
     error = InputError(
@@ -18,9 +20,7 @@ def test_an_error_says_place_fault_and_remedy() -> None:
     assert str(InputError("no file given.")) == "no file given."
 
 
-@pytest.mark.parametrize(
-    "bad", ["two\nlines", "\x1b[31mred", "nul\x00", "\u2028", "\u202eleft", "\ud800", "x" * 10**6]
-)
+@over("bad", ["two\nlines", "\x1b[31mred", "nul\x00", "\u2028", "\u202eleft", "\ud800", "x" * 10**6])
 def test_whatever_a_file_holds_a_message_is_one_line_that_can_be_read(bad: str) -> None:
     error = InputError(f"'{bad}' is odd", source="a.csv", test=bad, channel=bad, remedy=f"rename {bad}")
     assert str(error).isprintable()
@@ -47,7 +47,7 @@ def test_a_warning_begins_with_its_code() -> None:
     assert str(warning) == "[clipped_sensor] channel 'sprung_accel': stands at its limit."
 
 
-@pytest.mark.parametrize("status", Status)
+@over("status", Status)
 def test_only_a_converged_result_is_trusted(status: Status) -> None:
     assert status.ok == (status is Status.CONVERGED)
     assert status.advice.strip()

@@ -69,7 +69,7 @@ def test_what_is_no_such_record_is_refused(change: dict[str, Any], said: str) ->
         record_of(Outer, FIELDS | change)
 
 
-@pytest.mark.parametrize("found", [None, [], 3, "text", [FIELDS]])
+@over("found", [None, [], 3, "text", [FIELDS]])
 def test_what_is_no_table_is_refused(found: object) -> None:
     with pytest.raises(ValueError, match="not a table"):
         record_of(Outer, found)

@@ -25,6 +25,9 @@ from ..relaxed import with_kept_programs
 
 DWELLS = (0.8, 1.85, 2.35, 2.85, 4.0, 5.5)
 
+FEW = (0.5, 1.1, 1.85, 2.15, 2.35, 2.55, 3.0, 4.0, 6.0)
+"""Dwells that are enough for a whole diagnosis [Hz]: all of a campaign take three times as long."""
+
 Measure = Callable[[str], HarmonicResponse]
 
 
@@ -43,6 +46,17 @@ def measure(shared_rig: Path) -> Measure:
         if not file.exists():
             pytest.skip(f"{file} is not here")
         return estimate_response(load_campaign(file).only(recorded_names(QuarterCar)), 9)
+
+    return measured
+
+
+@pytest.fixture(scope="session")
+def measure_few(measure: Measure) -> Measure:
+    """Their responses in few dwells."""
+
+    def measured(name: str) -> HarmonicResponse:
+        response = measure(name)
+        return only(response, np.isin(np.round(response.frequency, 2), FEW))
 
     return measured
 

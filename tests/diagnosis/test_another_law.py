@@ -117,9 +117,9 @@ def _recorded(response: HarmonicResponse, rig: Rig, effect: Effect) -> HarmonicR
     ],
 )
 def test_an_effect_by_another_law_is_named(
-    measure: Measure, rig: Rig, effect: Effect, name: str, port: str
+    measure_few: Measure, rig: Rig, effect: Effect, name: str, port: str
 ) -> None:
-    diagnosis = diagnose_response(_recorded(measure("nominal"), rig, effect), rig)
+    diagnosis = diagnose_response(_recorded(measure_few("nominal"), rig, effect), rig)
     assert diagnosis.verdict.kind == "effect"
     assert diagnosis.verdict.effects == (name,)
     assert diagnosis.verdict.ports == (port,)
@@ -130,8 +130,10 @@ def test_an_effect_by_another_law_is_named(
 
 
 @pytest.mark.slow
-def test_a_wave_that_no_cam_of_the_catalogue_has_is_a_shape_of_the_road(measure: Measure, rig: Rig) -> None:
-    diagnosis = diagnose_response(_recorded(measure("nominal"), rig, WAVY), rig)
+def test_a_wave_that_no_cam_of_the_catalogue_has_is_a_shape_of_the_road(
+    measure_few: Measure, rig: Rig
+) -> None:
+    diagnosis = diagnose_response(_recorded(measure_few("nominal"), rig, WAVY), rig)
     assert diagnosis.verdict.kind == "effect"
     assert diagnosis.verdict.ports == ("road",)
     assert diagnosis.verdict.families == ("road/shape",)

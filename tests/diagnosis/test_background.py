@@ -19,6 +19,9 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.simulate.excitation import measured_response
 
+from ..fit.bench import only
+from .conftest import FEW
+
 
 def _data(tests: int = 5, rows: int = 40) -> Data:
     random = np.random.default_rng(0)
@@ -68,12 +71,13 @@ def _with_damper_off(rig: Rig, share: float, seed: int) -> Rig:
 def _selected(rig: Rig, campaign: Path) -> DiagnosisEvidence:
     model = RigModel(rig, ("rail_coulomb", "tyre_friction"))
     response = measured_response(load_campaign(campaign), model.plant, 9)
+    response = only(response, np.isin(np.round(response.frequency, 2), FEW))
     plant, data = quarter_car_problem(response, *baseline_of(model)[:2])
     return select_model(recalibrate(plant, data, {}, no_progress), no_progress)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("share", "seed"), [(0.005, 1), (0.005, 2), (0.02, 1), (0.02, 2)])
+@pytest.mark.parametrize(("share", "seed"), [(0.005, 1), (0.02, 2)])
 def test_a_damper_table_that_is_slightly_off_is_no_gap(
     rig: Rig, nominal_campaign: Path, share: float, seed: int
 ) -> None:

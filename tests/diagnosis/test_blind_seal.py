@@ -52,7 +52,7 @@ def test_every_part_of_the_answer_is_sealed(field: str) -> None:
         opened(SEAL, replace(ENVELOPE, answer=changed), DATA)
 
 
-@pytest.mark.parametrize(
+@over(
     ("open_it", "said"),
     [
         (lambda: opened(SEAL, replace(ENVELOPE, salt="00fe"), DATA), "answer is not the one"),

@@ -15,6 +15,7 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.periodic import PeriodicSolution
 
 from .conftest import DWELLS
+from .simple_laws import assert_a_law_of_one_function
 
 Case = tuple[DwellProblem, Data]
 
@@ -172,6 +173,7 @@ def test_every_port_is_a_place_and_explains_what_acts_there(
         assert left(elsewhere) > 0.5, effect
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "port"),
     [
@@ -184,13 +186,9 @@ def test_every_port_is_a_place_and_explains_what_acts_there(
 def test_what_is_simple_has_a_law_of_one_function_at_its_port(
     plant_and_data: Case, start: PeriodicSolution, effect: str, port: str
 ) -> None:
+    """The fast tests have the same on the plant of two masses."""
     plant, data = plant_and_data
-    (place,) = (each for each in input_locations(plant, (), plant.values({}), start) if each.name == port)
-    (columns,) = plant.columns((), {}, start, [_term(plant, effect)])
-    change = columns[0][:, 0] / data.discrepancy_scale
-    laws = [each.columns[:, 0] / data.discrepancy_scale for each in place.laws if each.columns.shape[1] == 1]
-    alike = [abs(law @ change) / np.linalg.norm(law) for law in laws if np.any(law)]
-    assert max(alike) > 0.9999 * np.linalg.norm(change)
+    assert_a_law_of_one_function(plant, data, {}, start, effect, port)
 
 
 def test_a_free_signal_is_the_sum_of_its_harmonics(start: PeriodicSolution) -> None:

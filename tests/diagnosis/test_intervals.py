@@ -14,9 +14,7 @@ from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import AbstractCoordinate
 from savgs_ident.plants.quarter_car.rig import Rig
 
-from ..fit.bench import only
 from .conftest import Measure
-from .test_diagnose import FEW
 
 FIXED = 1e-7
 """Width of the prior of a parameter that is held, of its prior as it was."""
@@ -60,11 +58,9 @@ def _drop(problem: DiagnosisProblem, mode: LaplaceFit, term: Term, place: int, x
     ],
 )
 def test_the_profile_falls_at_the_ends_of_an_interval_as_it_should(
-    measure: Measure, rig: Rig, recording: str, effect: str
+    measure_few: Measure, rig: Rig, recording: str, effect: str
 ) -> None:
-    response = measure(recording)
-    few = only(response, np.isin(np.round(response.frequency, 2), FEW))
-    problem = recalibrate(*quarter_car_problem(few, rig, SIMTR), {}, lambda _: None)
+    problem = recalibrate(*quarter_car_problem(measure_few(recording), rig, SIMTR), {}, lambda _: None)
     (term,) = (each for each in problem.plant.candidates if each.name == effect)
     own = {each.name for each in term.coordinates}
     start = problem.base.values | {each.name: each.centre + 0.5 * each.scale for each in term.amplitudes}

@@ -21,6 +21,7 @@ from savgs_ident.inference.noise_scales import noise_scales
 from savgs_ident.inference.observations import Prediction, Term
 from savgs_ident.inference.prior import Linear
 
+from ..in_one_test import over
 from .toy import TERMS, ToyPlant, draw
 
 PLANT = ToyPlant()
@@ -42,7 +43,6 @@ def _names(findings: Findings) -> tuple[str, ...]:
     return best.terms if best.evidence > findings.base.evidence + 5.0 else ()
 
 
-@pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize(
     ("values", "names"),
     [
@@ -52,12 +52,13 @@ def _names(findings: Findings) -> tuple[str, ...]:
         ({"a": 1.0, "t": -0.8}, ("twist",)),
     ],
 )
+@over("seed", range(10))
 def test_what_is_missing_is_named(values: dict[str, float], names: tuple[str, ...], seed: int) -> None:
     _, findings = _found(values, seed)
     assert _names(findings) == names
 
 
-@pytest.mark.parametrize("seed", range(5))
+@over("seed", range(5))
 def test_two_that_are_missing_are_both_named(seed: int) -> None:
     search, findings = _found({"a": 0.9, "c": 0.3, "s": 0.15, "w": 8.0}, seed)
     assert set(_names(findings)) == {"bend", "ripple"}
@@ -65,7 +66,7 @@ def test_two_that_are_missing_are_both_named(seed: int) -> None:
     assert excess(search, findings.best) < 0.5
 
 
-@pytest.mark.parametrize("seed", range(5))
+@over("seed", range(5))
 def test_a_small_one_beside_a_large_one_is_named_too(seed: int) -> None:
     """Though the large one alone explains all but a thousandth of the excess."""
     search, findings = _found({"a": 0.9, "c": 1.5, "s": 0.03, "w": 6.5}, seed)
@@ -261,7 +262,7 @@ SHAPES = tuple(
 )
 
 
-@pytest.mark.parametrize("seed", range(5))
+@over("seed", range(5))
 def test_a_stand_in_for_two_does_not_keep_its_place_beside_one_of_them(seed: int) -> None:
     """Alone it is nearest, so that the two are never tried together but by exchanging it."""
     plant = _Shapes()
@@ -271,7 +272,7 @@ def test_a_stand_in_for_two_does_not_keep_its_place_beside_one_of_them(seed: int
     assert set(findings.best.terms) == {"round", "wavy"}
 
 
-@pytest.mark.parametrize("seed", range(5))
+@over("seed", range(5))
 def test_what_strains_a_tolerance_is_tried_with_an_effect_that_spares_it(seed: int) -> None:
     plant = _Shapes()
     search = search_of(plant, draw(plant, {"a": 1.8, "b": 0.3}, NOISE, seed))
@@ -279,7 +280,7 @@ def test_what_strains_a_tolerance_is_tried_with_an_effect_that_spares_it(seed: i
     assert set(findings.best.terms) == {"round", "line"}
 
 
-@pytest.mark.parametrize("seed", range(5))
+@over("seed", range(5))
 def test_a_double_of_one_of_two_is_not_named_in_its_place(seed: int) -> None:
     """It is nearest as long as the other is not there, and beside it leaves no more than half the noise."""
     plant = _Shapes()

@@ -36,6 +36,17 @@ OF_ALL_KINDS = (
 """One of each kind at least."""
 
 
+AT_EACH_PLACE = {
+    (effect.port.name, type(effect.law).__bases__[0], bool(effect.states)): effect
+    for effect in effects_of()
+    if effect.name not in OF_ALL_KINDS
+}
+"""Of the others one for each place in the equations: a port, a kind of law there, with or without states of its own.
+
+What a law computes is compared for every one in :mod:`.test_contract_laws`.
+"""
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _as_users_have_it() -> Iterator[None]:
     with with_kept_programs():
@@ -96,8 +107,18 @@ def test_effects_of_all_kinds_together_end_in_the_periodic_motion(rig: Rig) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effect", effects_of(), ids=lambda effect: effect.name)
-def test_each_effect_ends_in_its_periodic_motion(effect: Effect, rig: Rig) -> None:
+def test_effects_without_states_at_all_places_together_end_in_the_periodic_motion(rig: Rig) -> None:
+    model, p = _bench(rig, [effect.name for effect in AT_EACH_PLACE.values() if not effect.states])
+    assert _differ(_transient(model, p), _periodic(model, p)[1]) < 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "effect",
+    [effect for effect in AT_EACH_PLACE.values() if effect.states],
+    ids=lambda effect: effect.name,
+)
+def test_an_effect_with_states_ends_in_its_periodic_motion(effect: Effect, rig: Rig) -> None:
     model, p = _bench(rig, [effect.name])
     assert _differ(_transient(model, p), _periodic(model, p)[1]) < 1e-3
 

@@ -9,6 +9,7 @@ from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.kinematics import linkage
 from savgs_ident.plants.quarter_car.rig import Rig
 
+from ..in_one_test import over
 from ..plants.quarter_car.instants import as_values, draw_instants
 from .laws import in_the_rig, instant
 
@@ -80,8 +81,8 @@ def test_the_load_grows_with_the_rate_of_compression(
 # sprung_mass: a payload: its inertia and its weight on the body, nothing else.
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("change", [-60.0, 15.0])
+@over("seed", range(3))
+@over("change", [-60.0, 15.0])
 def test_it_adds_its_inertia_and_its_weight_to_the_body(
     rig: Rig, numbers: dict[str, float], seed: int, change: float
 ) -> None:
@@ -120,8 +121,8 @@ def test_it_is_a_point_mass_that_the_upright_carries(rig: Rig, numbers: dict[str
 # link_offset: an encoder that reads too little: the link stands where it would at a greater reading.
 
 
-@pytest.mark.parametrize("reading", [0.3, np.pi / 2.0, 2.5])
-@pytest.mark.parametrize("offset", [-0.3, 0.2])
+@over("reading", [0.3, np.pi / 2.0, 2.5])
+@over("offset", [-0.3, 0.2])
 def test_it_is_the_rig_at_the_true_angle(
     rig: Rig, numbers: dict[str, float], reading: float, offset: float
 ) -> None:

@@ -13,6 +13,7 @@ from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.kinematics import strut_length
 from savgs_ident.plants.quarter_car.rig import Rig
 
+from ..in_one_test import over
 from ..plants.quarter_car.instants import as_values
 from .laws import balance_of, fundamental, give_way, in_the_rig, instant, typical
 
@@ -110,7 +111,7 @@ BACKLASH_P = typical(BACKLASH_GEAR)
 BACKLASH_PLAY = float(BACKLASH_P["gear_backlash"])
 
 
-@pytest.mark.parametrize(("torque", "way"), [(-40.0, 0.0), (-5.0, 0.0), (0.0, 0.5), (5.0, 1.0), (40.0, 1.0)])
+@over(("torque", "way"), [(-40.0, 0.0), (-5.0, 0.0), (0.0, 0.5), (5.0, 1.0), (40.0, 1.0)])
 def test_it_lies_against_the_flank_that_the_torque_says(torque: float, way: float) -> None:
     """Counted from the one that carries at rest."""
     assert (

@@ -37,7 +37,7 @@ def test_a_vector_takes_one_line() -> None:
     assert json_text({"a": list(range(1000))}).count("\n") == 3
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, date(2020, 1, 1), b"x", {1, 2}])
+@over("value", [math.nan, math.inf, date(2020, 1, 1), b"x", {1, 2}])
 def test_what_json_cannot_say_is_named_by_its_place(value: object) -> None:
     with pytest.raises(InputError, match=r"x\.a\[1\] is .*, which JSON cannot say"):
         as_plain({"a": [0, value]}, "x")

@@ -245,7 +245,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@over("fault", FAULTS)
 def test_a_diagnosis_of_another_model_is_refused(identified: Rig, fault: str) -> None:
     document, said = FAULTS[fault]
     with pytest.raises(InputError, match=said):

@@ -26,6 +26,8 @@ from savgs_ident.plants.quarter_car.catalogue import EFFECTS, LEARNED, MODELS, b
 from savgs_ident.plants.quarter_car.ports import RAIL
 from savgs_ident.plants.quarter_car.rig import Rig
 
+from ..in_one_test import over
+
 DRY = {
     "rail_coulomb", "rail_preload", "rail_stribeck", "rail_asymmetry", "joint_friction", "strut_friction",
     "tyre_friction",
@@ -91,7 +93,7 @@ def _steepness(model: ExportedModel, effect: Effect, p: Values) -> float:
     return abs(float(jax.grad(force)(jnp.zeros(()))))
 
 
-@pytest.mark.parametrize("name", [name for name in LEARNED if isinstance(LEARNED[name].law, LearnedForce)])
+@over("name", [name for name in LEARNED if isinstance(LEARNED[name].law, LearnedForce)])
 def test_what_turns_round_in_a_learned_force_is_left_out(rig: Rig, name: str) -> None:
     """Of coefficients of 100 N over 0.5 m/s, the dampings among them make 1e3 N s/m at most, the frictions 1e4."""
     effect = LEARNED[name]

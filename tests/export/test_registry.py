@@ -13,6 +13,8 @@ from savgs_ident.export.registry import EXPORTS
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.rig import Rig
 
+from ..in_one_test import over
+
 HERE = Path(__file__).parent
 
 
@@ -50,12 +52,12 @@ def test_a_folder_that_is_not_there_is_an_input_error(
         EXPORTS[name].write(model, tmp_path / "none")
 
 
-@pytest.mark.parametrize("name", EXPORTS)
+@over("name", EXPORTS)
 def test_every_format_has_a_test_of_its_own_numbers(name: str) -> None:
     assert (HERE / f"test_{name.replace('-', '_')}_export.py").is_file()
 
 
-@pytest.mark.parametrize("name", EXPORTS)
+@over("name", EXPORTS)
 def test_every_format_says_what_it_is(name: str) -> None:
     assert EXPORTS[name].about
 

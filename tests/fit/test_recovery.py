@@ -1,4 +1,7 @@
-"""The shipped campaign: recorded on a rig that other code simulated, whose truth is known."""
+"""The shipped campaign: recorded on a rig that other code simulated, whose truth is known.
+
+The fast tests fit few dwells of it (``tests/cli/test_identify.py``), and the plant of two masses.
+"""
 
 import numpy as np
 import pytest
@@ -11,6 +14,8 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
 
 from .bench import FEW, TRUTH, Bench
+
+pytestmark = pytest.mark.slow
 
 
 def pulls(fit: Fit) -> dict[str, float]:
@@ -108,7 +113,6 @@ def test_it_is_far_better_than_what_it_started_from(nominal: Fit, measured: Harm
     assert after < 1e-3 * before < 1e-3 * without
 
 
-@pytest.mark.slow
 def test_fixed_tolerances_on_a_rig_that_is_as_drawn(bench: Bench, few: HarmonicResponse) -> None:
     """With spring and tyre as they truly are and all else exact, few dwells identify the four parameters."""
     problem = bench.task.problem

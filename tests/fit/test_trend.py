@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 from savgs_ident.campaigns.trends import CONFIDENCE, Line, follow
 from savgs_ident.core.errors import InputError
 
+from ..in_one_test import over
+
 DRAWS = 2000
 X = np.array([0.0, 0.3, 1.0, 1.1, 2.0, 3.5, 3.6, 5.0, 6.0, 7.0])
 ERRORS = np.array([1.0, 2.0, 1.0, 0.5, 1.0, 3.0, 1.0, 1.0, 0.7, 1.0])
@@ -113,7 +115,7 @@ def test_times_since_1970_and_tiny_numbers_lose_no_digits() -> None:
     assert shifted.slope_stderr == pytest.approx(plain.slope_stderr, rel=1e-6)
 
 
-@pytest.mark.parametrize(
+@over(
     "bad",
     [
         ([], [], []),

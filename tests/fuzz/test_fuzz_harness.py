@@ -9,6 +9,7 @@ from types import FrameType
 import pytest
 
 from fuzz import __main__ as command
+from fuzz import trial
 from fuzz.loader import Form, Loader, Original
 from fuzz.outcome import Kind, Outcome
 from fuzz.pool import Batch, run_side_by_side
@@ -74,7 +75,7 @@ def _refuses_without_the_file(path: Path) -> object:
 
 
 def _takes_memory(path: Path) -> object:
-    return bytearray(5 << 28) and None
+    return bytearray(5 << 25) and None
 
 
 def _warns(path: Path) -> object:
@@ -95,7 +96,10 @@ def _warns(path: Path) -> object:
         (_warns, "warns: RuntimeWarning"),
     ],
 )
-def test_a_planted_fault_is_found(read: Callable[[Path], object], said: str, tmp_path: Path) -> None:
+def test_a_planted_fault_is_found(
+    read: Callable[[Path], object], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(trial, "MEMORY", 1 << 27)
     if read is _takes_memory and not Path("/proc/self/clear_refs").exists():
         pytest.skip("the system does not tell the memory of a process")
     outcome = run_trial(_planted(read), SEED, 0, tmp_path)

@@ -111,10 +111,11 @@ def test_nothing_is_lost_between_two_runs(name: str, partly: Toy, rough: Stand, 
     )
 
 
-def test_a_new_checkpoint_begins_anew(partly: Toy, rough: Stand, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", EACH)
+def test_a_new_checkpoint_begins_anew(name: str, partly: Toy, rough: Stand, tmp_path: Path) -> None:
     path = tmp_path / "chain.h5"
-    _grown("nuts", partly, rough, new_checkpoint(path, "another"), 2)
-    again = _grown("nuts", partly, rough, new_checkpoint(path, "case"), 1)
+    _grown(name, partly, rough, new_checkpoint(path, "another"), 2)
+    again = _grown(name, partly, rough, new_checkpoint(path, "case"), 1)
     assert open_checkpoint(path, "case").counts[0] == again.evaluations
     assert [each.name for each in tmp_path.iterdir()] == ["chain.h5"]
 

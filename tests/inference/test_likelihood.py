@@ -10,6 +10,7 @@ from savgs_ident.inference.prior import Scales
 from savgs_ident.inference.problem import HarmonicTarget
 from savgs_ident.plants.quarter_car.plant import CHANNELS
 
+from ..in_one_test import over
 from .toy import covariances
 
 SHAPE = (3, 2, 4)
@@ -51,8 +52,8 @@ def _by_scipy(predicted: np.ndarray, noise: float, miss: float) -> float:
     return total
 
 
-@pytest.mark.parametrize("a", [-1.0, 0.0, 2.0])
-@pytest.mark.parametrize("b", [0.0, -0.7, 3.0])
+@over("a", [-1.0, 0.0, 2.0])
+@over("b", [0.0, -0.7, 3.0])
 def test_the_density_is_that_of_correlated_phasors(likelihood: Likelihood, a: float, b: float) -> None:
     predicted = MEASURED + 0.1 * _complex()
     found = likelihood(likelihood.rows(jnp.asarray(predicted)), jnp.array([0.0, a, b]))

@@ -188,7 +188,7 @@ def test_names_tell_kind_and_frequency(name: str, kind: str, frequency: float | 
     assert classify_test(name) == (kind, frequency)
 
 
-@pytest.mark.parametrize(
+@over(
     ("text", "header"),
     [
         ("a [m/s^2]", Header("a", "m/s^2")), ("accel_z (g)", Header("accel_z", "g")),

@@ -18,6 +18,8 @@ from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.cdr import find_layout, parse_definition
 from savgs_ident.recordings.mcap_timing import choose_clock, irregularity
 
+from ..in_one_test import over
+
 START = 1_763_715_600_000_000_000
 IMU = (
     b"std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
@@ -237,7 +239,7 @@ def test_ros2_campaign_has_its_own_clocks(shared_rig: Path) -> None:
     assert np.abs(dwells).max() < 0.05
 
 
-@pytest.mark.parametrize(
+@over(
     "name",
     ["none", "zstd", "imu_lz4_chunks32k", "imu_unchunked", "imu_noindex_nosummary", "imu_lz4_truncated60pct"],
 )

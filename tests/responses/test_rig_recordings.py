@@ -11,6 +11,8 @@ from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.sweeps import estimate_sweep_response
 
+from ..in_one_test import over
+
 
 @pytest.fixture(scope="module")
 def from_csv(shared_rig: Path) -> HarmonicResponse:
@@ -43,7 +45,7 @@ def test_noise_is_that_of_the_sensors(
     assert 0.4 * percent < float(np.sqrt(np.mean(relative**2))) < 2.0 * percent
 
 
-@pytest.mark.parametrize(
+@over(
     "channel",
     ["road_height", "sprung_accel", "susp_deflection", "link_angle", "link_velocity", "motor_current"],
 )

@@ -10,7 +10,6 @@ from typing import ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-import pytest
 from jaxtyping import Array
 
 import savgs_ident
@@ -26,6 +25,8 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.mesh import Layout, uniform_mesh
 from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 from savgs_ident.simulate.program_cache import TRACED, digest_of_sources, fingerprint
+
+from ..in_one_test import over
 
 PACKAGE = Path(savgs_ident.__file__).parent
 
@@ -127,7 +128,7 @@ class _ForeignLaw(AbstractNumberLaw):
 _FOREIGN = effect_at("foreign", INERTIA, _ForeignLaw(), {"number": "m_s"})
 
 
-@pytest.mark.parametrize(
+@over(
     "unknown",
     [_Foreign(1.0), _FOREIGN, object(), {1, 2}, eqx.nn.Identity(), abs, Rig],
     ids=["dataclass", "effect", "object", "set", "module", "function", "class"],

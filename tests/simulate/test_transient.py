@@ -36,10 +36,6 @@ from savgs_ident.simulate.transient import (
 
 LIFT = 0.0275
 NOMINAL = np.pi / 2.0
-DWELLS = (
-    0.5, 0.8, 1.1, 1.4, 1.6, 1.75, 1.85, 1.95, 2.0, 2.05, 2.15, 2.25, 2.3, 2.35,
-    2.4, 2.45, 2.55, 2.65, 2.75, 2.85, 3.0, 3.25, 3.5, 4.0, 4.5, 5.0, 5.5, 6.0,
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -98,13 +94,8 @@ def largest_difference(bench: Bench, frequencies: tuple[float, ...]) -> np.ndarr
 
 @pytest.mark.slow
 def test_transients_end_in_the_periodic_motion(simtr: Bench) -> None:
-    assert np.max(largest_difference(simtr, (1.4, 2.35, 6.0))) < 1e-3
-
-
-@pytest.mark.slow
-def test_transients_end_in_the_periodic_motion_at_every_dwell(simtr: Bench) -> None:
-    difference = largest_difference(simtr, DWELLS)
-    assert np.max(difference) < 1e-3, dict(zip(DWELLS, difference.max(axis=1).round(6).tolist(), strict=True))
+    """A dwell that sticks for long, one below the resonance, one at it, and a fast one."""
+    assert np.max(largest_difference(simtr, (0.5, 1.4, 2.35, 6.0))) < 1e-3
 
 
 def _energy(p: Values, motion: transient.Motion, road: Array, angle: Array) -> Array:

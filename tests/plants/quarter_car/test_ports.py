@@ -20,6 +20,7 @@ from savgs_ident.plants.quarter_car.dynamics import SectionCurves, section_curve
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.ports import FORCE_PORTS, STRUT, TYRE_LATERAL
 
+from ...in_one_test import over
 from .instants import NOMINAL, as_values, draw_instants, inputs_of, motion_of
 from .series import SERIES_PORTS, yielding
 
@@ -115,7 +116,7 @@ def test_a_force_from_outside_is_one_of_an_effect(simqc: QuarterCar, numbers: di
         np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("port", SERIES_PORTS, ids=lambda port: port.name)
+@over("port", SERIES_PORTS, ids=lambda port: port.name)
 def test_a_way_from_outside_is_one_of_an_effect(
     simtr: QuarterCar, numbers: dict[str, float], port: Port
 ) -> None:
