@@ -296,41 +296,6 @@ def _attached_states(port: Port) -> tuple[InternalState, ...]:
     )
 
 
-class AttachedOscillator(AbstractForceLaw):
-    """A mass on a spring and a damper, carried along: a pendulum, a battery on its mounts, an arm.
-
-        F = -m ydd,        ydd = w^2 (x - y) + 2 zeta w (v - yd),        w = 2 pi f
-
-    with the port's displacement x [m] from the nominal state and velocity v [m/s], the mass's displacement y [m], its
-    mass m [kg], natural frequency f [Hz] and damping ratio zeta [1]. Its weight is part of the rig's.
-
-    Source: Den Hartog 1956, Mechanical Vibrations, ch. 3, the dynamic vibration absorber.
-    """
-
-    name: ClassVar[str] = "attached_oscillator"
-    family: ClassVar[Family] = Family.OSCILLATOR
-    roles: ClassVar[tuple[Role, ...]] = (Role("mass", 0.0), Role("frequency"), Role("damping_ratio"))
-
-    def typical(self, port: Port) -> Mapping[str, Parameter | float]:
-        """A small mass on a mount of 8 Hz."""
-        return _attached_mass(port)
-
-    def states(self, port: Port) -> tuple[InternalState, ...]:
-        """Displacement and velocity of the mass."""
-        return _attached_states(port)
-
-    def force(self, v: Values, signals: PortSignals, state: State) -> Scalar:
-        """The force of the mount on the port [N]."""
-        return -v["mass"] * self.rate(v, signals, state)[1]
-
-    def rate(self, v: Values, signals: PortSignals, state: State) -> State:
-        """Velocity [m/s] and acceleration [m/s^2] of the mass."""
-        omega = 2.0 * pi * v["frequency"]
-        stretch = signals.displacement - signals.rest - state[0]
-        drag = 2.0 * v["damping_ratio"] * omega * (signals.velocity - state[1])
-        return jnp.stack([state[1], omega**2 * stretch + drag])
-
-
 class HardeningOscillator(AbstractForceLaw):
     """A mass on rubber mounts that harden as they are strained.
 

@@ -28,7 +28,6 @@ from savgs_ident.plants.quarter_car.ports import (
     TYRE_RADIAL,
 )
 from savgs_ident.validation.foreign_forces import (
-    AttachedOscillator,
     Clearance,
     CubicStiffness,
     DigressiveDamping,
@@ -99,7 +98,6 @@ _ENTRIES = (
     _foreign("rail_smooth", SmoothFriction(), RAIL),
     _foreign("rail_directional", DirectionalFriction(), RAIL),
     _foreign("rail_drag", QuadraticDrag(), RAIL),
-    _foreign("body_oscillator", AttachedOscillator(), RAIL, ports=_BODY),
     _foreign("body_hardening_oscillator", HardeningOscillator(), RAIL, ports=_BODY),
     _foreign("joint_dahl", Dahl(), SUSPENSION),
     _foreign("joint_lugre", LuGre(), SUSPENSION),

@@ -143,7 +143,7 @@ def test_a_learned_input_moves_as_its_rate_says() -> None:
 def test_a_learned_transfer_function_has_a_gain_at_rest_and_what_it_is_made_of() -> None:
     effect = LEARNED["learned_accel"]
     p = as_values(
-        dict(effect.null) | {"learned_accel_1": 0.05, "learned_accel_2": -0.02, "learned_accel_4": 0.3}
+        dict(effect.null) | {"learned_accel_1": 0.05, "learned_accel_2": -0.02, "learned_accel_6": 0.3}
     )
     frequency = jnp.asarray([0.0, 3.0])
     s = 2j * np.pi * 3.0
@@ -175,7 +175,7 @@ def test_its_frictions_are_those_that_are_steeper_at_rest_than_any_damping(effec
         if "slider" in words or (LAWS[words](0.7, 1e-4, 0.6) - LAWS[words](0.7, -1e-4, 0.6)) / 2e-4 > 2.0
     ]
     assert list(frictions_at(effect.port)) == steep
-    assert len(steep) in (7, 8)
+    assert len(steep) in (7, 10)
 
 
 @each_force

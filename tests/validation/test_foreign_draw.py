@@ -135,7 +135,7 @@ def test_draws_can_be_repeated_and_change_the_response_by_what_was_drawn(bench: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["joint_bouc_wen", "damper_end_play", "body_oscillator"])
+@pytest.mark.parametrize("name", ["joint_bouc_wen", "damper_end_play", "body_hardening_oscillator"])
 def test_the_fixed_step_comes_to_the_periodic_motion(bench: Bench, name: str) -> None:
     """Laws with states of their own, by the integration that is recorded and by collocation."""
     with with_kept_programs():

@@ -116,9 +116,15 @@ def test_filters_are_those_of_the_books() -> None:
 
 
 def test_an_attached_mass_pulls_by_its_mount() -> None:
-    effect = FOREIGN_EFFECTS["body_oscillator"]
+    """In small motions as a spring does, and by twice that where the mount is strained so far."""
+    effect = FOREIGN_EFFECTS["body_hardening_oscillator"]
     p = as_values({each.name: each.value for each in effect.parameters})
-    still, stretch = jnp.zeros(()), 1e-3
-    force = effect.force(p, PortSignals(jnp.asarray(stretch), still, still, still), jnp.zeros(2))
-    stiffness = p["body_oscillator_mass"] * (2.0 * np.pi * p["body_oscillator_frequency"]) ** 2
-    assert float(force) == pytest.approx(float(-stiffness * stretch), rel=1e-12)
+    still, mass, frequency = (
+        jnp.zeros(()), p["body_hardening_oscillator_mass"], p["body_hardening_oscillator_frequency"],
+    )  # fmt: skip
+    strain = 1.5 * effect.port.displacement
+    for stretch, harder in ((1e-6, 1.0), (strain, 2.0)):
+        force = effect.force(p, PortSignals(jnp.asarray(stretch), still, still, still), jnp.zeros(2))
+        assert float(force) == pytest.approx(
+            float(-harder * mass * (2.0 * np.pi * frequency) ** 2 * stretch), rel=1e-6
+        )

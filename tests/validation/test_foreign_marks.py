@@ -90,7 +90,7 @@ def test_a_right_port_may_be_listed_beside_the_one_that_is_named() -> None:
 
 
 def test_what_swings_on_the_body_may_be_put_at_the_masses() -> None:
-    truth = foreign("body_oscillator")
+    truth = foreign("body_hardening_oscillator")
     assert score_of(truth, said("effect", "inertia/oscillator")).family_right is True
     mass = score_of(truth, said("effect", "inertia/number"))
     assert (mass.port_right, mass.family_right) == (True, False)
