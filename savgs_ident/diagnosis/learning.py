@@ -29,7 +29,7 @@ from savgs_ident.inference.noise_scales import linearised_optimum
 from savgs_ident.inference.observations import Data, Term
 from savgs_ident.inference.prior import Linear, bounds_of
 
-STEPS = 12
+STEPS = 20
 """Most steps of the fit."""
 
 

@@ -30,7 +30,7 @@ from savgs_ident.core.presentation import Progress
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.problem import AbstractProblem
-from savgs_ident.diagnosis.result import NONE, Hypothesis, Kind
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Kind
 from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.search import (
     Findings,
@@ -369,14 +369,17 @@ def _flexible_members(
 ) -> list[FlexibleMember]:
     """Learned laws on the nonlinear plant at the ports that explain most, the most probable first.
 
-    None where a single effect explains all, or where nothing seems to be missing.
+    None where a single effect explains all, and more than a law to first order would, or where nothing seems to be
+    missing.
     """
     constants, base = problem.constants, problem.base
-    best = most_probable(findings, constants)
-    most = max(best.evidence, *(each.evidence for each in localisations))
-    if most < base.evidence + constants.alarm_log_odds or left_over(
-        problem.search, base, best, constants
-    ) <= (constants.explained_share):
+    best, linear = most_probable(findings, constants), anywhere(localisations)
+    if max(best.evidence, linear) < base.evidence + constants.alarm_log_odds:
+        return []
+    count = len(findings.scores)
+    weight = best.evidence + log_prior(hypothesis_of(best), count, constants)
+    explained = left_over(problem.search, base, best, constants) <= constants.explained_share
+    if explained and weight >= linear + log_prior(UNKNOWN, count, constants):
         return []
 
     def fitted(port: Port) -> LearnedLaw | None:

@@ -160,7 +160,7 @@ class EffectsAtInstant:
 
     def _at(self, port: Port, kind: type) -> Iterator[_Part]:
         for part in self._parts:
-            if isinstance(part.effect.law, kind) and part.effect.port == port:
+            if isinstance(part.effect.law, kind) and part.effect.port.name == port.name:
                 yield part
 
     def deflection(self, port: Port) -> SeriesDeflection:

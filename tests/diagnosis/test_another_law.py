@@ -124,17 +124,18 @@ def test_an_effect_by_another_law_is_named(
     assert diagnosis.verdict.effects == (name,)
     assert diagnosis.verdict.ports == (port,)
     assert not diagnosis.verdict.law_known
-    assert "Its law differs from that of the catalogue" in diagnosis.verdict.sentence
-    assert diagnosis.candidates[0].effects == (name,)
-    assert diagnosis.shrink.share_closed > 0.9
+    assert diagnosis.verdict.families == (f"{port}/{effect.law.family.value}",)
+    assert "by a law that the catalogue does not have" in diagnosis.verdict.sentence
+    assert diagnosis.shrink.closed_by_effect > 0.9
 
 
 @pytest.mark.slow
-def test_a_wave_that_no_cam_of_the_catalogue_has_is_unknown_at_the_road(
+def test_a_wave_that_no_cam_of_the_catalogue_has_is_a_shape_of_the_road(
     measure_few: Measure, rig: Rig
 ) -> None:
     diagnosis = diagnose_response(_recorded(measure_few("nominal"), rig, WAVY), rig)
-    assert diagnosis.verdict.kind == "unknown"
+    assert diagnosis.verdict.kind == "effect"
     assert diagnosis.verdict.ports == ("road",)
+    assert diagnosis.verdict.families == ("road/shape",)
     assert not diagnosis.verdict.law_known
-    assert diagnosis.shrink.share_closed > 0.9
+    assert diagnosis.shrink.closed_by_effect > 0.9

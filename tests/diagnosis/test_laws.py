@@ -6,6 +6,7 @@ import pytest
 from savgs_ident.diagnosis.localisation import InputLocation, Law, localise
 from savgs_ident.diagnosis.location_hypotheses import laws_of_functions, sensor_filters
 from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.effects.base import Family
 from savgs_ident.inference.find_map import find_map, search_of
 
 from .toy import ToyPlant, draw
@@ -25,19 +26,29 @@ def test_a_simple_cause_is_found_at_its_place_and_not_where_few_functions_imitat
         (found,) = localise(search, base, [InputLocation("spring", laws, many)])
         return found.evidence
 
-    imitation = evidence(laws_of_functions(few))
+    imitation = evidence(laws_of_functions(few, (Family.NUMBER,) * 2))
     assert evidence((Law(many),)) < imitation
-    assert evidence(laws_of_functions(many)) > imitation + 5.0
+    assert evidence(laws_of_functions(many, (Family.STIFFNESS,) * 17)) > imitation + 5.0
 
 
 @pytest.mark.parametrize("plain", [(), (0, 2)])
 def test_simple_laws_are_so_probable_together(plain: tuple[int, ...]) -> None:
     columns = np.arange(12.0).reshape(3, 4)
-    whole, *few = laws_of_functions(columns, plain)
+    whole, *few = laws_of_functions(columns, (Family.FRICTION,) * 4, plain)
     assert whole.columns is columns
     assert sum(each.prior for each in few) == pytest.approx(DEFAULTS.simple_law_prior * whole.prior)
     assert [each.columns.shape[1] for each in few] == [1, 1, 1, 1, *([2] if plain else [])]
     np.testing.assert_array_equal(np.concatenate([each.columns for each in few[:4]], axis=1), columns)
+
+
+def test_every_family_of_several_functions_has_a_law_of_its_own() -> None:
+    families = (Family.FRICTION, Family.DAMPING, Family.FRICTION, Family.STOP)
+    whole, friction, *alone = laws_of_functions(np.arange(12.0).reshape(3, 4), families, (), "rail")
+    assert whole.family is None
+    assert friction.family is Family.FRICTION
+    assert friction.columns.shape[1] == 2
+    assert [each.family for each in alone] == list(families)
+    assert {each.port for each in (whole, friction, *alone)} == {"rail"}
 
 
 def test_the_second_filter_of_a_reading_is_a_small_delay() -> None:

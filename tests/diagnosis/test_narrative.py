@@ -7,13 +7,15 @@ from typing import Any
 import pytest
 
 from savgs_ident.core.status import Status
-from savgs_ident.diagnosis.model_selection import DiagnosisEvidence, weights_of
+from savgs_ident.diagnosis import narrative
+from savgs_ident.diagnosis.model_selection import DiagnosisEvidence, FlexibleMember
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Shrink
 from savgs_ident.diagnosis.score_test import PriorConflict
 from savgs_ident.diagnosis.search import Findings, LostHypothesis
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.diagnosis.verdict import BrokenTolerance, Reason, UnknownEvidence, WeighedHypothesis
+from savgs_ident.effects.base import Family
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 
 GAP = Shrink(0.3, 0.04, 0.002, 0.0015, 0.99, (0.98, 1.0))
@@ -21,6 +23,9 @@ RAIL: Any = SimpleNamespace(name="rail", share=0.9, evidence=50.0)
 PROBLEM: Any = SimpleNamespace(
     constants=DEFAULTS,
     locations=lambda hypothesis: tuple(CATALOGUE[name].port.location for name in hypothesis.effects),
+    families=lambda hypothesis: tuple(
+        f"{CATALOGUE[name].port.location}/{CATALOGUE[name].law.family.value}" for name in hypothesis.effects
+    ),
 )
 
 
@@ -44,7 +49,7 @@ def _evidence(kind: Any, reason: Reason, weights: dict[str, float], **more: Any)
     return DiagnosisEvidence(
         findings=Findings(_mode(weights["none"]), (), modes, more.get("lost", ())),
         localisations=(RAIL,),
-        location_weights=weights_of((RAIL,)),
+        flexible=more.get("flexible", ()),
         weighed=ranked,
         unknown=UnknownEvidence(weights["unknown"], reason),
         broken=BrokenTolerance(
@@ -53,7 +58,7 @@ def _evidence(kind: Any, reason: Reason, weights: dict[str, float], **more: Any)
         kind=kind,
         chosen=next(each for each in ranked if str(each.hypothesis) == kind),
         left=0.08,
-        another_law=more.get("another_law", False),
+        named_law=more.get("named_law"),
         refit_failed=more.get("refit_failed", False),
     )
 
@@ -83,16 +88,33 @@ def test_a_tolerance_that_does_not_hold_is_named(weights: dict[str, float], star
     assert verdict.ports == ("tyre_radial",)
 
 
-@pytest.mark.parametrize("another_law", [False, True])
-def test_an_effect_by_another_law_is_said_to_be_one(another_law: bool) -> None:
+def test_a_law_that_the_catalogue_does_not_have_is_told_with_the_nearest_formula() -> None:
     weights = {"none": 0.0, "unknown": 100.0, "rail_stribeck": 900.0}
-    evidence = _evidence("rail_stribeck", "law", weights, another_law=another_law)
-    verdict = write_verdict(PROBLEM, replace(evidence, kind="effect"), (), GAP)
-    told = "Its law differs from that of the catalogue, which leaves 8 % of the misfit beyond the noise"
-    assert (told in verdict.sentence) is another_law
-    assert ("at the same port, 'rail'" in verdict.sentence) is another_law
-    assert verdict.another_law is another_law
+    hypothesis = Hypothesis(flexible="rail/friction")
+    mode = _mode(990.0, "learned_rail")
+    law: Any = SimpleNamespace(mode=mode, port=CATALOGUE["rail_stribeck"].port, family=Family.FRICTION)
+    member = FlexibleMember(law, 980.0, 0.004)
+    evidence = _evidence("rail_stribeck", "law", weights, flexible=(member,), named_law=member)
+    mine = WeighedHypothesis(hypothesis, 980.0, mode)
+    evidence = replace(evidence, kind="effect", chosen=mine, weighed=(mine, *evidence.weighed))
+    problem: Any = SimpleNamespace(
+        **vars(PROBLEM),
+        search=None,
+        base=None,
+        location=lambda name: CATALOGUE[name].port.location,
+        plant=SimpleNamespace(catalogue=CATALOGUE),
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(narrative, "left_over", lambda *args: 0.04)
+        verdict = write_verdict(problem, evidence, (), GAP)
     assert verdict.effects == ("rail_stribeck",)
+    assert verdict.families == ("rail/friction",)
+    assert not verdict.law_known
+    assert verdict.probability == pytest.approx(1.0)
+    assert "lacks a friction at the port 'rail' by a law that the catalogue does not have" in verdict.sentence
+    assert verdict.sentence.endswith(
+        "rail_stribeck, leaves 4 % of the misfit beyond the noise, the learned law 0.4 %."
+    )
 
 
 @pytest.mark.parametrize(

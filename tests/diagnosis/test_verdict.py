@@ -23,7 +23,6 @@ from savgs_ident.diagnosis.verdict import (
     indistinguishable,
     most_probable,
     probabilities,
-    reweighed,
     unknown_evidence,
     weigh,
     without_immaterial_members,
@@ -262,19 +261,3 @@ def test_an_effect_whose_fit_was_lost_is_not_judged_by_its_score() -> None:
     ]
     # What was only scored cannot be named, and does not speak for something missing either.
     assert alarm_odds(weighed) == pytest.approx(300.0 - np.log(3.0))
-
-
-def test_a_hypothesis_that_is_weighed_anew_takes_its_place_and_leaves_the_others() -> None:
-    first = _weighed({"none": 0.0, "unknown": 600.0, "rail_viscous": 500.0, "spring_rate": 300.0})
-    mine: Any = SimpleNamespace(noise_scales=SimpleNamespace(value=-np.inf))
-    marked = [
-        replace(each, mode=mine) if each.hypothesis.effects == ("rail_viscous",) else each for each in first
-    ]
-    again = reweighed(marked, mine, 590.0, 400.0)
-    assert [(str(each.hypothesis), each.weight) for each in again] == [
-        ("rail_viscous", 590.0),
-        ("unknown", 400.0),
-        ("spring_rate", 300.0),
-        ("none", 0.0),
-    ]
-    assert decide(again, Change(0.05, 0.05), DEFAULTS.unexplained_share / 2.0)[0] == "effect"

@@ -11,9 +11,16 @@ from hypothesis import strategies as st
 from jaxtyping import Array
 
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.effects.base import PortSignals
+from savgs_ident.effects.base import Fundamental, InputSignal, Load, PortSignals
 from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.learned import coefficients_at, frictions_at
+from savgs_ident.effects.learned import (
+    SLIDER_LAG,
+    LearnedForce,
+    coefficients_at,
+    coefficients_of,
+    frictions_at,
+    functions_at,
+)
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, EFFECTS, LEARNED
 from savgs_ident.plants.quarter_car.ports import FORCE_PORTS
 from savgs_ident.plants.quarter_car.rig_toml import KNOWN_UNITS
@@ -33,6 +40,11 @@ LAWS: dict[str, Callable[[float, float, float], float]] = {
     "x^2 v": lambda x, v, n: x * x * v,
     "tanh(v/0.01) exp(-(v/0.05)^2)": lambda x, v, n: np.tanh(v / 0.01) * np.exp(-v * v / 0.0025),
     "tanh(v/0.01) exp(-(v/0.2)^2)": lambda x, v, n: np.tanh(v / 0.01) * np.exp(-v * v / 0.04),
+    "|v|": lambda x, v, n: abs(v),
+    "max(x - 0.4, 0)": lambda x, v, n: max(x - 0.4, 0.0),
+    "max(-x - 0.4, 0)": lambda x, v, n: max(-x - 0.4, 0.0),
+    "max(x - 0.8, 0)": lambda x, v, n: max(x - 0.8, 0.0),
+    "max(-x - 0.8, 0)": lambda x, v, n: max(-x - 0.8, 0.0),
     "n tanh(v/0.01)": lambda x, v, n: n * np.tanh(v / 0.01),
     "n v": lambda x, v, n: n * v,
     "n": lambda x, v, n: n,
@@ -41,7 +53,10 @@ LAWS: dict[str, Callable[[float, float, float], float]] = {
 
 SPANS = {"middle": 0.4, "stroke": 0.03, "speed": 0.5, "carried": 8e3}
 
+FORCES = {name: effect for name, effect in LEARNED.items() if isinstance(effect.law, LearnedForce)}
+
 each_learned = pytest.mark.parametrize("effect", LEARNED.values(), ids=LEARNED)
+each_force = pytest.mark.parametrize("effect", FORCES.values(), ids=FORCES)
 
 
 def _given(effect: Effect, coefficient: float) -> dict[str, float]:
@@ -55,16 +70,24 @@ def _given(effect: Effect, coefficient: float) -> dict[str, float]:
 def _words(effect: Effect) -> dict[str, str]:
     """What is told of each coefficient, after the words that all have in common."""
     told = {each.name: each.about for each in effect.parameters if each.name in effect.null}
-    return {name: about.removeprefix("learned force in proportion to ") for name, about in told.items()}
+    return {name: about.removeprefix("learned in proportion to ") for name, about in told.items()}
 
 
 def _force(effect: Effect, p: Values, displacement: float, velocity: float, load: float) -> float:
+    """With the spring-sliders anchored in the nominal state."""
     signals = PortSignals(*(jnp.asarray(each) for each in (displacement, velocity, load, 0.0)))
-    return float(effect.force(p, signals, jnp.zeros(0)))
+    return float(effect.force(p, signals, jnp.zeros(2)))
 
 
-def test_there_is_one_for_every_port_of_a_force_and_none_is_looked_for() -> None:
-    assert {effect.port for effect in LEARNED.values()} == set(FORCE_PORTS.values())
+def _carried(effect: Effect, words: str, displacement: float, velocity: float) -> float:
+    """What a spring-slider of these words carries, anchored in the nominal state."""
+    width = float(words.split()[-3]) * effect.port.displacement
+    return float(np.clip((displacement + SLIDER_LAG * velocity) / width, -1.0, 1.0))
+
+
+def test_there_is_one_for_every_port_that_can_have_one_and_none_is_looked_for() -> None:
+    assert set(FORCE_PORTS.values()) < {effect.port for effect in LEARNED.values()}
+    assert all(functions_at(effect.port) for effect in LEARNED.values())
     assert not set(LEARNED) & set(CATALOGUE)
     assert set(EFFECTS) == {*LEARNED, *CATALOGUE}
     names = [each.name for effect in LEARNED.values() for each in effect.parameters]
@@ -73,37 +96,87 @@ def test_there_is_one_for_every_port_of_a_force_and_none_is_looked_for() -> None
 
 
 @each_learned
+def test_every_function_is_of_a_family(effect: Effect) -> None:
+    port = effect.port
+    families = dict.fromkeys(each.family for each in functions_at(port))
+    of_families = [name for family in families for name in coefficients_of(port, family)]
+    assert sorted(of_families) == sorted(coefficients_at(port))
+    assert set(effect.null) == set(coefficients_at(port))
+
+
+@each_force
 def test_it_is_nothing_at_its_null(effect: Effect) -> None:
     p = as_values(_given(effect, 7.0) | dict(effect.null))
-    assert set(effect.null) == set(coefficients_at(effect.port))
     assert _force(effect, p, 0.41, 0.2, 3e3) == 0.0
 
 
-@each_learned
+def test_what_gives_way_returns_to_rest_and_follows_the_load() -> None:
+    effect = LEARNED["learned_mount"]
+    spans = {"learned_mount_carried": 1e3, "learned_mount_lag": 1e-3}
+    p = as_values(dict(effect.null) | spans | {"learned_mount_1": 2e-3, "learned_mount_3": 1e-3})
+    load = Load(jnp.asarray(3500.0), jnp.asarray(3000.0))
+    given = 2e-3 * 0.5 + 1e-3 * 0.5**2
+    still, zero = jnp.asarray([given]), jnp.zeros(1)
+    assert float(effect.balance(p, load, still, zero)[0]) == pytest.approx(0.0, abs=1e-12)
+    at_rest = Load(load.rest, load.rest)
+    every = as_values(dict.fromkeys(effect.null, 1e-3) | spans)
+    assert float(effect.balance(every, at_rest, zero, zero)[0]) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_learned_input_moves_as_its_rate_says() -> None:
+    effect = LEARNED["learned_road"]
+    random = np.random.default_rng(2)
+    p = as_values(
+        {name: float(random.uniform(-1e-4, 1e-4)) for name in effect.null} | {"learned_road_fastest": 40.0}
+    )
+    nothing = InputSignal(jnp.zeros(()), jnp.zeros(()))
+
+    def value(time: Array) -> Array:
+        return effect.shift(p, nothing, Fundamental(0.3 + 25.0 * time, jnp.asarray(25.0))).value
+
+    rate = effect.shift(p, nothing, Fundamental(jnp.asarray(0.3), jnp.asarray(25.0))).rate
+    assert float(rate) == pytest.approx(float(jax.grad(value)(jnp.zeros(()))), rel=1e-12)
+
+
+def test_a_learned_transfer_function_has_a_gain_at_rest_and_what_it_is_made_of() -> None:
+    effect = LEARNED["learned_accel"]
+    p = as_values(
+        dict(effect.null) | {"learned_accel_1": 0.05, "learned_accel_2": -0.02, "learned_accel_4": 0.3}
+    )
+    frequency = jnp.asarray([0.0, 3.0])
+    s = 2j * np.pi * 3.0
+    expected = [1.05, 1.05 - 0.02 * s / 20.0 + 0.3 * (1.0 / (1.0 + s / 20.0) - 1.0)]
+    np.testing.assert_allclose(np.asarray(effect.transfer(p, frequency)), expected, rtol=1e-12)
+
+
+@each_force
 def test_each_of_its_numbers_weighs_the_function_that_its_words_say(effect: Effect) -> None:
     own = f"learned_{effect.port.name}_"
     loaded = {"rail", "strut", "tyre_lateral"}
     known = [words for words in LAWS if words[0] != "n" or effect.port.name in loaded]
-    assert sorted(_words(effect).values()) == sorted(known)
+    sliders = [words for words in _words(effect).values() if "slider" in words]
+    assert len(sliders) == 2
+    assert sorted(_words(effect).values()) == sorted([*known, *sliders])
     x, v, n = 0.7, -0.013, 0.6
     at = (SPANS["middle"] + SPANS["stroke"] * x, SPANS["speed"] * v, SPANS["carried"] * n)
     for name, words in _words(effect).items():
         alone = {f"{own}{span}": value for span, value in SPANS.items()} | dict(effect.null) | {name: 1.0}
-        assert _force(effect, as_values(alone), *at) == pytest.approx(LAWS[words](x, v, n), rel=1e-9), words
+        expected = _carried(effect, words, *at[:2]) if "slider" in words else LAWS[words](x, v, n)
+        assert _force(effect, as_values(alone), *at) == pytest.approx(expected, rel=1e-9), words
 
 
-@each_learned
+@each_force
 def test_its_frictions_are_those_that_are_steeper_at_rest_than_any_damping(effect: Effect) -> None:
     steep = [
         name
         for name, words in _words(effect).items()
-        if (LAWS[words](0.7, 1e-4, 0.6) - LAWS[words](0.7, -1e-4, 0.6)) / 2e-4 > 2.0
+        if "slider" in words or (LAWS[words](0.7, 1e-4, 0.6) - LAWS[words](0.7, -1e-4, 0.6)) / 2e-4 > 2.0
     ]
     assert list(frictions_at(effect.port)) == steep
-    assert len(steep) in (5, 6)
+    assert len(steep) in (7, 8)
 
 
-@each_learned
+@each_force
 @given(
     x=st.floats(-0.99, 0.99), v=st.floats(-0.99, 0.99), n=st.floats(0.0, 0.99), beyond=st.floats(1.0, 50.0)
 )
@@ -111,15 +184,18 @@ def test_within_what_was_seen_it_is_the_sum_and_beyond_it_is_held(
     effect: Effect, x: float, v: float, n: float, beyond: float
 ) -> None:
     given_, p = _given(effect, 7.0), as_values(_given(effect, 7.0))
-    expected = sum(given_[name] * LAWS[words](x, v, n) for name, words in _words(effect).items())
     at = (SPANS["middle"] + SPANS["stroke"] * x, SPANS["speed"] * v, SPANS["carried"] * n)
+    expected = sum(
+        given_[name] * (_carried(effect, words, *at[:2]) if "slider" in words else LAWS[words](x, v, n))
+        for name, words in _words(effect).items()
+    )
     assert _force(effect, p, *at) == pytest.approx(expected, rel=1e-7, abs=1e-7)
     edge = _force(effect, p, SPANS["middle"] + SPANS["stroke"], SPANS["speed"], SPANS["carried"])
     outside = (SPANS["middle"] + SPANS["stroke"] * beyond, SPANS["speed"] * beyond, SPANS["carried"] * beyond)
     assert _force(effect, p, *outside) == pytest.approx(edge, rel=1e-12)
 
 
-@each_learned
+@each_force
 def test_its_derivatives_are_those_of_differences(effect: Effect) -> None:
     numbers = _given(effect, 7.0)
     names = [each.name for each in effect.parameters]
@@ -127,7 +203,7 @@ def test_its_derivatives_are_those_of_differences(effect: Effect) -> None:
     def at(values: Array) -> Array:
         p = dict(zip(names, jnp.unstack(values), strict=True))
         signals = PortSignals(jnp.asarray(0.413), jnp.asarray(-0.021), jnp.asarray(2.5e3), jnp.zeros(()))
-        return effect.force(p, signals, jnp.zeros(0))
+        return effect.force(p, signals, jnp.zeros(2))
 
     start = jnp.asarray([numbers[name] for name in names])
     slopes = np.asarray(jax.grad(at)(start))
@@ -137,14 +213,14 @@ def test_its_derivatives_are_those_of_differences(effect: Effect) -> None:
         assert slopes[place] == pytest.approx((moved[0] - moved[1]) / (2.0 * step), rel=1e-5, abs=1e-6)
 
 
-@each_learned
+@each_force
 def test_casadi_computes_the_same(effect: Effect) -> None:
     numbers = _given(effect, 7.0)
     names, values = list(numbers), np.array(list(numbers.values()))
 
     def force(signals: Array, p: Array) -> Array:
         seen = PortSignals(*jnp.unstack(signals), jnp.zeros(()))
-        return effect.force(dict(zip(names, jnp.unstack(p), strict=True)), seen, jnp.zeros(0))[None]
+        return effect.force(dict(zip(names, jnp.unstack(p), strict=True)), seen, jnp.zeros(2))[None]
 
     told = to_casadi("force", force, {"signals": np.zeros(3), "p": values}, ["force"])
     for signals in np.random.default_rng(3).uniform([0.36, -0.6, 0.0], [0.44, 0.6, 9e3], (40, 3)):

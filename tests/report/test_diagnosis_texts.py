@@ -69,7 +69,7 @@ def test_the_terminal_tells_the_numbers(diagnosis: Diagnosis) -> None:
     assert "This campaign cannot distinguish it from: rail_preload." in text
     assert "rail 94 %, wishbone joints 41 %, strut 30 %" in " ".join(text.split())
     assert "unless its bump_stop_stiffness is at least 32 000 N/m" in text
-    assert "Hypotheses (5 of 33)" in text
+    assert f"Hypotheses (5 of {len(diagnosis.candidates)})" in text
 
 
 def test_none_and_unknown_are_told_however_unlikely_and_so_is_all_that_has_a_chance(
