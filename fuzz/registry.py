@@ -10,7 +10,7 @@ _CSV = (
     "recordings.csv.read_csv", "recordings.csv_table.CsvTable._parse", "recordings.csv_table._cells",
 )  # fmt: skip
 _JSON_MCAP = (
-    "recordings.json_messages.JsonDecoder._parse", "recordings.json_messages._schema_units",
+    "recordings.mcap_records.JsonDecoder._parse", "recordings.mcap_records._schema_units",
     "recordings.mcap_timing._from_json", "recordings.mcap_records.McapRecords._decompress",
 )  # fmt: skip
 _CDR_MCAP = (
@@ -36,7 +36,7 @@ _LOADERS = (
     Loader("channels", "channels.toml, and the campaign that it maps", "channels.toml", Form.toml,
            recordings.channel_map, recordings.read_map, ("recordings.channels.read_channel_map",)),
     Loader("road", "road as a table", "road.csv", Form.table, recordings.road, recordings.read_road_file,
-           ("plants.quarter_car.road.read_road",)),
+           ("plants.quarter_car.inputs.read_road",)),
     Loader("axis", "recording of a servo axis", "run.mat", Form.matlab, recordings.axis,
            recordings.read_axis_file, _MATLAB),
     Loader("rig", "drawing of a rig", "rig.toml", Form.toml, models.drawing, models.read_drawing,

@@ -36,17 +36,26 @@ def blind(
         typer.Option("--rig", metavar="RIG", help="Drawing of the rig; the shipped one by default."),
     ] = None,
     shares: Annotated[
-        tuple[float, float, float, float],
+        tuple[float, float, float, float] | None,
         typer.Option(
             "--shares",
             metavar="NONE ONE TWO UNKNOWN",
-            help="How often nothing, one effect, two, or one that is removed from the catalogue.",
+            help="How often nothing, one effect, two, or one that is removed from the catalogue;"
+            " 20 50 15 15 by default, with --foreign 30 70 0 0.",
+            show_default=False,
         ),
-    ] = (20.0, 50.0, 15.0, 15.0),
+    ] = None,
     every: Annotated[
         int, typer.Option("--every", min=1, help="Record every so many dwells only: quicker, harder.")
     ] = 1,
     sweep: Annotated[bool, typer.Option("--sweep", help="Record a sweep of a minute, too.")] = False,
+    foreign: Annotated[
+        bool,
+        typer.Option(
+            "--foreign",
+            help="Effects follow laws that the diagnosis does not have, on rigs with small errors.",
+        ),
+    ] = False,
     again: Annotated[
         bool,
         typer.Option("--again", help="Diagnose the recordings in --out DIR anew; keep none of the marks."),
@@ -61,12 +70,19 @@ def blind(
     that is removed from the catalogue. Its campaign is simulated in time, with noise; the answer is sealed; the
     diagnosis gets the recordings; then the seal is opened. Takes minutes a trial.
 
-    Writes blind.json, blind.html, confusion.png, confusion.pdf, trials.jsonl, and a folder a trial. A run that was
+    With --foreign nothing is missing, or one effect by a law that the diagnosis does not have (LuGre, Bouc-Wen, cubic
+    stiffness, digressive damping, filters of second order and others). Every rig is off its sheet, its damper's table
+    is off point by point, its friction drifts, noise is coloured, and the road's phase is slightly wrong.
+
+    Writes blind.json, blind.html, confusion.png, confusion.pdf, reliability.png, reliability.pdf, trials.jsonl, and a
+    folder a trial. A run that was
     stopped goes on where it was when it is started again.
 
     Exit code 1 if the diagnosis is not right as often as it should be.
 
     Example: savgs-ident blind --trials 60 --seed 1
+
+    Example: savgs-ident blind --foreign --trials 60 --seed 1
     """
     # Checks that call back into Python from a compiled program would keep it from being kept for the next run; a
     # failed one gives NaN then, which is looked for. Has to be said before the libraries are loaded.
@@ -83,6 +99,7 @@ def blind(
             shares=shares,
             every=every,
             sweep=sweep,
+            foreign=foreign,
             again=again,
             jobs=jobs,
             scheduler=scheduler,

@@ -49,6 +49,7 @@ from savgs_ident.diagnosis.verdict import (
     WeighedHypothesis,
     broken_tolerance,
     decide,
+    log_prior,
     most_probable,
     unknown_evidence,
     weigh,

@@ -102,6 +102,8 @@ OF_THE_LOAD = (
     Function("n tanh(v/0.01)", Family.FRICTION),
     Function("n v", Family.DAMPING),
     Function("n", Family.DAMPING),
+    Function("n tanh(v/0.01) exp(-|v|/0.05)", Family.FRICTION),
+    Function("n tanh(v/0.01) exp(-|v|/0.2)", Family.FRICTION),
 )
 """Functions with n = load/carried, at a port with a load."""
 
@@ -132,8 +134,11 @@ OF_THE_ANGLE = (
 )
 """Functions of the angle a of the fundamental and of its speed w, in units of the largest, at an input."""
 
-CORNERS = (20.0, 60.0, 180.0)
-"""Corner frequencies [rad/s] of the lags of a learned transfer function."""
+CORNERS = (2.0, 6.0, 20.0, 60.0, 180.0)
+"""Corner frequencies [rad/s] of the lags of first order of a learned transfer function."""
+
+SECOND_CORNERS = (20.0, 60.0, 120.0, 240.0, 480.0)
+"""Those of its lags of second order, which are damped by 0.7."""
 
 RATE = 20.0
 """Angular frequency [rad/s] in units of which it has rates."""
@@ -143,6 +148,10 @@ OF_THE_FREQUENCY = (
     Function("s/20", Family.DYNAMICS),
     Function("(s/20)^2", Family.DYNAMICS),
     *(Function(f"1/(1 + s/{corner:g}) - 1", Family.DYNAMICS) for corner in CORNERS),
+    *(
+        Function(f"1/(1 + 1.4 s/{corner:g} + (s/{corner:g})^2) - 1", Family.DYNAMICS)
+        for corner in SECOND_CORNERS
+    ),
 )
 """Functions of s = j 2 pi f [rad/s] at a sensor."""
 
@@ -158,7 +167,8 @@ def functions(
     falling = [sharp * jnp.exp(-((v / width) ** 2)) for width in FALLING]
     smooth = [v, v * jnp.abs(v), v**2, x, x**2, x**3, x * sharp, x * v, x**2 * v]
     stops = [jnp.maximum(side * x - gap, 0.0) for gap in GAPS for side in (1.0, -1.0)]
-    return [sharp, blunt, *smooth, *falling, jnp.abs(v), *stops, n * sharp, n * v, n]
+    loaded = [n * sharp * jnp.exp(-jnp.abs(v) / width) for width in FALLING]
+    return [sharp, blunt, *smooth, *falling, jnp.abs(v), *stops, n * sharp, n * v, n, *loaded]
 
 
 def functions_at(port: Port) -> tuple[Function, ...]:
@@ -356,7 +366,9 @@ def what_gives(
 def filters(s: Complex[Array, "*f"]) -> list[Complex[Array, "*f"]]:
     """The functions of a sensor at s [rad/s]."""
     rate = s / RATE
-    return [jnp.ones_like(s), rate, rate**2, *(1.0 / (1.0 + s / corner) - 1.0 for corner in CORNERS)]
+    first = [1.0 / (1.0 + s / corner) - 1.0 for corner in CORNERS]
+    second = [1.0 / (1.0 + 1.4 * s / corner + (s / corner) ** 2) - 1.0 for corner in SECOND_CORNERS]
+    return [jnp.ones_like(s), rate, rate**2, *first, *second]
 
 
 _Law = LearnedForce | LearnedCompliance | LearnedInput | LearnedTransfer

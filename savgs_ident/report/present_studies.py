@@ -79,9 +79,13 @@ class _BlindStudy(AbstractPresenter["BlindStudy"]):
         return blind_html(result.scores, result.settings, result.origin.command)
 
     def figures(self, result: "BlindStudy") -> Figures:
-        from savgs_ident.report.validation import confusion_figure
+        from savgs_ident.report.validation import confusion_figure, reliability_figure
 
-        return {"confusion": lambda: confusion_figure(result.scores)}
+        scores = result.scores
+        return {
+            "confusion": lambda: confusion_figure(scores),
+            "reliability": lambda: reliability_figure(scores),
+        }
 
 
 class _AlarmStudy(AbstractPresenter["AlarmStudy"]):

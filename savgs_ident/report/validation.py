@@ -21,17 +21,18 @@ from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.report.html import embed, render_page
 from savgs_ident.report.text import DASH, decimal, percentage, plain, table
 from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, PALE, new_figure, printable, styled
-from savgs_ident.validation.blind_score import (
+from savgs_ident.validation.blind_rates import (
     Rate,
-    Score,
+    Reliability,
     confusion_of,
-    is_right,
+    median_closed,
     rates_of,
-    said_words,
-    truth_words,
+    reliability_of,
 )
+from savgs_ident.validation.blind_score import Score, is_right, said_words, truth_words
 from savgs_ident.validation.calibration import BINS, INTERVAL, RANKED, CalibrationStudy
 from savgs_ident.validation.false_alarms import CONFIDENCE, AlarmStudy
+from savgs_ident.validation.foreign_laws import FOREIGN
 
 RATE_WORDS: Mapping[str, str] = {
     "named_right": "Effect named correctly",
@@ -43,6 +44,10 @@ RATE_WORDS: Mapping[str, str] = {
     "share_closed_90": "Nine tenths of the gap closed, where all effects are named",
     "named_exactly": "Effect named strictly, without indistinguishable ones",
     "located_exactly": "Located strictly, without indistinguishable ports",
+    "port_right": "Foreign effect put at a right port",
+    "port_listed": "The same, or a right port listed as not distinguishable",
+    "family_right": "Foreign effect given a right family",
+    "closed_by_effect_90": "Nine tenths of the recalibrated gap closed",
 }
 """What each rate counts."""
 
@@ -70,8 +75,8 @@ def change_words(score: Score) -> str:
 
 
 def closed_words(score: Score) -> str:
-    """The share of the gap that was closed."""
-    share = score.share_closed
+    """The share of the gap that was closed; of a foreign trial, by what was named alone."""
+    share = score.closed_by_effect if score.foreign else score.share_closed
     return DASH if share is None or not isfinite(share) or score.verdict == "none" else percentage(share)
 
 
@@ -95,10 +100,45 @@ def blind_text(scores: Sequence[Score]) -> RenderableType:
     ]
     parts: list[RenderableType] = [plain(summary(scores), "bold"), plain("")]
     parts.append(table("Blind trials", headers, rates))
+    parts += [plain(""), _reliability_text(reliability_of(scores))]
     if wrong:
         heads = ("trial", "truth", "change", "verdict")
         parts.append(table("Wrong verdicts", heads, wrong, texts=(1, 3)))
     return Group(*parts)
+
+
+def probability_words(probability: float | None) -> str:
+    """A stated probability in per cent."""
+    return DASH if probability is None else percentage(probability)
+
+
+def error_words(reliability: Reliability) -> str:
+    """The expected calibration error in a sentence."""
+    if reliability.error is None:
+        return "No verdict states a probability."
+    return f"Expected calibration error of the stated probabilities: {decimal(reliability.error, 3)}."
+
+
+def reliability_rows(reliability: Reliability) -> list[tuple[str, str, str, str, str]]:
+    """Bins as stated probabilities, their mean, verdicts, share that is true, and its interval."""
+    return [
+        (
+            f"{decimal(each.low, 2)} to {decimal(each.high, 2)}",
+            probability_words(each.stated),
+            *rate_words(each.rate)[:3],
+        )
+        for each in reliability.bins
+    ]
+
+
+RELIABILITY_HEADS = ("stated probability", "mean", "true", "share", "95 % interval")
+
+
+def _reliability_text(reliability: Reliability) -> RenderableType:
+    rows = reliability_rows(reliability)
+    return Group(
+        table("Stated probabilities", RELIABILITY_HEADS, rows, texts=(0,)), plain(error_words(reliability))
+    )
 
 
 PACKAGES = ("jax", "numpy", "scipy")
@@ -111,14 +151,18 @@ def blind_record(
 
     ``trusted`` says that every rate keeps its bounds. Shares and changes are relative, parameters in SI.
     """
-    rates, confusion = rates_of(scores), confusion_of(scores, tuple(CATALOGUE))
+    rates, confusion = rates_of(scores), confusion_of(scores, ORDER)
     return {
         "schema": 1,
         "trusted": all(rate.met is not False for rate in rates.values()),
         "trials": len(scores),
         "kinds": {
-            kind: sum(score.kind == kind for score in scores) for kind in ("none", "effect", "two", "unknown")
+            kind: sum(score.kind == kind for score in scores)
+            for kind in ("none", "effect", "two", "unknown", "foreign")
         },
+        "median_closed_by_effect": median_closed(scores),
+        "reliability": _reliability(reliability_of(scores)),
+        "code": sorted({score.version for score in scores} - {""}),
         "rates": {name: _rate(rate) for name, rate in rates.items()},
         "confusion": {
             "truths": confusion.truths,
@@ -134,6 +178,22 @@ def blind_record(
         "command": " ".join(command),
         "versions": package_versions(PACKAGES),
     }
+
+
+def _reliability(reliability: Reliability) -> dict[str, Any]:
+    bins = [
+        {
+            "low": each.low,
+            "high": each.high,
+            "stated": each.stated,
+            "true": each.rate.count,
+            "of": each.rate.total,
+            "share": each.rate.rate,
+            "interval": [each.rate.low, each.rate.high],
+        }
+        for each in reliability.bins
+    ]
+    return {"bins": bins, "calibration_error": reliability.error}
 
 
 def _rate(rate: Rate) -> dict[str, Any]:
@@ -153,10 +213,13 @@ _WRONG = LinearSegmentedColormap.from_list("wrong", ["#fbe3d3", ORANGE])
 _CELL = 0.27
 """Size of a cell [inch]."""
 
+ORDER = (*CATALOGUE, *FOREIGN)
+"""Effects in the order in which the confusion matrix has them."""
+
 
 def confusion_figure(scores: Sequence[Score]) -> Figure:
     """Truths down, verdicts across; blue is right, orange is not, the number says how many trials."""
-    confusion = confusion_of(scores, tuple(CATALOGUE))
+    confusion = confusion_of(scores, ORDER)
     truths, verdicts, counts = confusion.truths, confusion.verdicts, confusion.counts
     most = max(int(counts.max(initial=1)), 1)
     with styled():
@@ -186,12 +249,69 @@ def confusion_figure(scores: Sequence[Score]) -> Figure:
     return figure
 
 
+def reliability_figure(scores: Sequence[Score]) -> Figure:
+    """Stated probabilities across, how often what was said is true up, with 95 % intervals; the diagonal is ideal."""
+    reliability = reliability_of(scores)
+    with styled():
+        figure = new_figure(3.8, 3.6)
+        axes = figure.subplots()
+        axes.plot([0.0, 1.0], [0.0, 1.0], color=INK, linestyle="--", linewidth=0.8, label="ideal")
+        for each in reliability.bins:
+            if each.stated is None or each.rate.rate is None:
+                continue
+            share, ends = (
+                each.rate.rate,
+                [[each.rate.rate - each.rate.low], [each.rate.high - each.rate.rate]],
+            )
+            axes.errorbar(
+                each.stated, share, yerr=ends, color=BLUE, marker="o", capsize=2.5, linestyle="none"
+            )
+            axes.annotate(
+                str(each.rate.total),
+                (each.stated, share),
+                (-5.0, 5.0),
+                textcoords="offset points",
+                ha="right",
+            )
+        axes.set_xlim(0.0, 1.03)
+        axes.set_ylim(0.0, 1.03)
+        axes.set_aspect("equal")
+        axes.set_xlabel("stated probability [1]")
+        axes.set_ylabel("share of verdicts that are true [1]")
+        error = "" if reliability.error is None else f", calibration error {decimal(reliability.error, 3)}"
+        stated = sum(each.rate.total for each in reliability.bins)
+        axes.set_title(f"{stated} verdicts{error}", loc="left")
+        axes.legend(loc="upper left")
+    return figure
+
+
 _FACTS = ("named_right", "located_right", "false_alarms", "unknown_recognised", "both_named")
+_FOREIGN_FACTS = ("port_right", "family_right", "false_alarms", "intervals_hold")
+
+
+_OWN_RIGS = (
+    "Rigs drawn at random within their tolerances, with effects that change the response by 3 to 25 %; campaigns"
+    " simulated in time, with noise; the answers were opened after the diagnosis."
+)
+_FOREIGN_RIGS = (
+    "Rigs drawn at random within their tolerances, each with small errors, most with an effect by a law that the"
+    " diagnosis does not have and that changes the response by 3 to 25 %; campaigns simulated in time with another"
+    " method, with coloured noise, filters and converters; the answers were opened after the diagnosis."
+)
+_OWN_NOTE = (
+    "Wilson intervals. Located: the ports of the verdict are those at which the effects act. The rates with"
+    " “strictly” do not count effects and ports that the verdict lists as indistinguishable from the ones named."
+)
+_FOREIGN_NOTE = (
+    "Wilson intervals. A port is right where an engineer would rightly put the effect, a family where it would"
+    " rightly be called that. “Unknown” at a right port has the port, not the family."
+)
 
 
 def blind_html(scores: Sequence[Score], settings: Mapping[str, Any], command: Sequence[str]) -> str:
     """The page: one file, no network, nothing executed; the same trials give the same bytes."""
-    rates = rates_of(scores)
+    rates, reliability, median = rates_of(scores), reliability_of(scores), median_closed(scores)
+    foreign = any(score.foreign for score in scores)
     missed = [RATE_WORDS[name].lower() for name, rate in rates.items() if rate.met is False]
     words = (
         f"Confusion matrix of {len(scores)} trials: {sum(map(is_right, scores))} on its diagonal are right."
@@ -201,7 +321,16 @@ def blind_html(scores: Sequence[Score], settings: Mapping[str, Any], command: Se
         {
             "sentence": summary(scores),
             "alarm": f"Required rate missed: {', '.join(missed)}." if missed else "",
-            "facts": [_fact(name, rates[name]) for name in _FACTS],
+            "facts": [_fact(name, rates[name]) for name in (_FOREIGN_FACTS if foreign else _FACTS)],
+            "about": _FOREIGN_RIGS if foreign else _OWN_RIGS,
+            "note": _FOREIGN_NOTE if foreign else _OWN_NOTE,
+            "median": f"Median share of the recalibrated gap that is closed: {percentage(median)}."
+            if foreign and median is not None
+            else "",
+            "reliability": reliability_rows(reliability),
+            "reliability_heads": [head.capitalize() for head in RELIABILITY_HEADS],
+            "reliability_words": error_words(reliability),
+            "reliability_picture": embed(reliability_figure(scores), error_words(reliability)),
             "rates": [(RATE_WORDS[name], *rate_words(rate), _met(rate)) for name, rate in rates.items()],
             "picture": embed(confusion_figure(scores), words),
             "scores": [
@@ -211,8 +340,10 @@ def blind_html(scores: Sequence[Score], settings: Mapping[str, Any], command: Se
                     change_words(score),
                     said_words(score),
                     "right" if is_right(score) else "wrong",
+                    probability_words(score.probability),
                     closed_words(score),
                     _held(score),
+                    score.version,
                 )
                 for score in scores
             ],

@@ -14,12 +14,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import prepare_folder
 from savgs_ident.core.presentation import Origin, Progress, Result, no_progress
 from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig, rig_content
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.validation.blind_draw import Shares
-from savgs_ident.validation.blind_score import Score, rates_of, score_from
+from savgs_ident.validation.blind_rates import rates_of
+from savgs_ident.validation.blind_score import Score, score_from
 from savgs_ident.validation.blind_trial import (
     Diagnose,
     Draw,
@@ -27,6 +29,7 @@ from savgs_ident.validation.blind_trial import (
     check_trial_folder,
     diagnose_folder,
     draw_and_record,
+    record_trial,
     run_trial,
 )
 from savgs_ident.validation.trials import begin_trials, keep_trial, known_trials, marks_in, side_by_side
@@ -36,6 +39,9 @@ FILE = "trials.jsonl"
 
 SHARES = (20.0, 50.0, 15.0, 15.0)
 """How often nothing is missing, one effect, two, or one that is removed from the catalogue."""
+
+FOREIGN_SHARES = (30.0, 70.0, 0.0, 0.0)
+"""The same of foreign trials, whose one effect follows a foreign law."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +73,7 @@ class Job:
     again: bool
     command: tuple[str, ...] = ()
     scheduler: str | None = None
+    foreign: bool = False
 
 
 def blind(
@@ -75,9 +82,10 @@ def blind(
     *,
     seed: int | None = None,
     rig: str | Path | None = None,
-    shares: tuple[float, float, float, float] = SHARES,
+    shares: tuple[float, float, float, float] | None = None,
     every: int = 1,
     sweep: bool = False,
+    foreign: bool = False,
     again: bool = False,
     jobs: int | None = None,
     scheduler: str | None = None,
@@ -89,14 +97,19 @@ def blind(
     that is removed from the catalogue. Its campaign is simulated in time, with noise; the answer is sealed; the
     diagnosis gets the recordings; then the seal is opened. Takes minutes a trial.
 
+    In ``foreign`` trials nothing is missing, or one effect that follows a law which the diagnosis does not have.
+    Every rig has small errors then: its damper's table, drifting friction, coloured noise, the phase of the road.
+
     Args:
         folder: where recordings and marks are kept; a run that was stopped goes on from there.
         trials: how many campaigns are drawn.
         seed: of all that is drawn; a secret one, or that of the folder, if left out.
         rig: drawing of the rig; the shipped one if left out.
-        shares: how often nothing is missing, one effect, two, or one that is removed from the catalogue.
+        shares: how often nothing is missing, one effect, two, or one that is removed from the catalogue; 20, 50,
+            15, 15 if left out, in foreign trials 30, 70, 0, 0.
         every: record every so many dwells only: quicker, harder.
         sweep: record a sweep of a minute, too.
+        foreign: effects follow laws that the diagnosis does not have, on rigs with small errors.
         again: diagnose the recordings in the folder anew; keep none of the marks.
         jobs: trials at a time on this machine; one for each core if left out.
         scheduler: address of a Dask cluster to work on instead, whose workers see the folder under the same path.
@@ -105,7 +118,8 @@ def blind(
     Raises :class:`InputError` for a rig that cannot be read, and for a folder with trials of something else.
     """
     sheet = None if rig is None else Path(rig)
-    asked = Job(trials, seed, jobs, sheet, shares, every, sweep, again, (), scheduler)
+    given = shares or (FOREIGN_SHARES if foreign else SHARES)
+    asked = Job(trials, seed, jobs, sheet, given, every, sweep, again, (), scheduler, foreign)
     return run_blind(asked, draw_and_record, diagnose_folder, Path(folder), progress)
 
 
@@ -113,7 +127,7 @@ def run_blind(
     job: Job, draw: Draw, diagnose: Diagnose, out: Path, progress: Progress = no_progress
 ) -> BlindStudy:
     """Run the trials that are not in the folder ``out`` yet; ``draw`` makes their rigs, ``diagnose`` is tried."""
-    Shares(*job.shares)
+    check_shares(job)
     rig = job.rig or default_rig_path()
     sheet = rig_content(rig)
     parse_rig(sheet, rig)
@@ -135,6 +149,36 @@ def run_blind(
     return BlindStudy(tuple(scores), plan.marks(), origin=origin)
 
 
+def check_shares(job: Job) -> None:
+    """Raise :class:`InputError` for shares that are none, or that ask for what foreign trials do not have."""
+    shares = Shares(*job.shares)
+    if job.foreign and shares.two + shares.unknown > 0.0:
+        raise InputError(
+            "foreign trials have nothing or one effect",
+            source="--shares",
+            remedy="give 0 for two and for unknown, such as: --shares 30 70 0 0",
+        )
+
+
+def record_trials(job: Job, draw: Draw, out: Path, progress: Progress = no_progress) -> list[Path]:
+    """Draw and record the trials that are not in the folder ``out`` yet, without a diagnosis; their folders.
+
+    :func:`run_blind` with the same job diagnoses them.
+    """
+    check_shares(job)
+    use_persistent_cache()
+    prepare_folder(out)
+    plan = plan_of(job, rig_content(job.rig or default_rig_path()), out / FILE)
+    if not marks_in(out / FILE):
+        begin_trials(out / FILE, plan.marks())
+    found = {}
+    work = partial(record_trial, plan, draw, out)
+    for each in side_by_side(work, range(1, job.trials + 1), job.jobs, job.scheduler):
+        found[each.number] = each.folder
+        progress(f"{len(found)} of {job.trials} trials recorded")
+    return [found[number] for number in sorted(found)]
+
+
 def plan_of(job: Job, sheet: bytes, kept: Path) -> Plan:
     """What the trials are, with the seed of an earlier run or a secret one if none was given.
 
@@ -144,7 +188,7 @@ def plan_of(job: Job, sheet: bytes, kept: Path) -> Plan:
     if seed is None:
         kept_seed = marks_in(kept).get("seed")
         seed = kept_seed if type(kept_seed) is int and kept_seed >= 0 else secrets.randbits(32)
-    return Plan(job.rig or default_rig_path(), sheet, seed, job.shares, job.every, job.sweep)
+    return Plan(job.rig or default_rig_path(), sheet, seed, job.shares, job.every, job.sweep, job.foreign)
 
 
 def _missing(job: Job, done: Sequence[Score]) -> list[int]:

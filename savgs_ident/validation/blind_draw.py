@@ -129,14 +129,14 @@ class Drawing:
         return None if solution is None else self.bench.response(names, given, solution)
 
     def _motions(self, names: Sequence[str], given: Mapping[str, float]) -> PeriodicSolution | None:
-        model = tuple(sorted(name for name in names if CATALOGUE[name].states))
+        model = tuple(sorted(name for name in names if self.bench.catalogue[name].states))
         if model not in self.starts:
             self.starts[model] = self.bench.solve(model, self.rig)
         return self.bench.solve(names, given, self.starts[model])
 
     def present(self, name: str, random: np.random.Generator) -> Present | None:
         """An effect of a size drawn; None where no size within its bounds does that much."""
-        form = draw_form(CATALOGUE[name], random)
+        form = draw_form(self.bench.catalogue[name], random)
         target = float(np.exp(random.uniform(np.log(SMALLEST), np.log(LARGEST))))
         found: dict[float, NDArray[np.complex128]] = {}
 

@@ -41,10 +41,29 @@ from savgs_ident.plants.quarter_car.inputs import nominal_test
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.recordings.recording import RecordedChannel, Recording, TestKind
-from savgs_ident.validation.virtual_rig import Bench, Sensors, Steady, steady_dwells, sweep_readings
+from savgs_ident.validation.sensor_chain import Sensors
+from savgs_ident.validation.virtual_rig import Bench, Steady, steady_dwells, sweep_readings
 
-Drawn = Literal["none", "effect", "two", "unknown"]
-"""What a trial's rig has beyond its model: nothing, an effect, two, or one that the catalogue then lacks."""
+Drawn = Literal["none", "effect", "two", "unknown", "foreign"]
+"""What a trial's rig has beyond its model: nothing, an effect, two, one that the catalogue then lacks, or one whose
+law no catalogue has."""
+
+
+@dataclass(frozen=True)
+class SmallErrors:
+    """What no real rig is without, and no diagnosis is to take for an effect.
+
+    Attributes:
+        damper: relative errors of the damper's table, point by point [1].
+        drift: relative change of the rail's friction over the campaign, about its mean [1].
+        colour: correlation of the sensors' noise from one sample to the next [1].
+        phase: angle by which the road's signal leads the road [rad].
+    """
+
+    damper: tuple[float, ...]
+    drift: float
+    colour: float
+    phase: float
 
 
 @dataclass(frozen=True)
@@ -64,6 +83,9 @@ class Answer:
         parameters: true values of the effects' parameters, SI.
         rig: true values of the rig's own parameters that are not those of the sheet, SI.
         without: effects that are removed from the catalogue for this trial.
+        accepted: of a foreign effect, the ports that are right.
+        families: of a foreign effect, the families that are right.
+        small_errors: of a foreign trial; None in a trial of the catalogue's own effects, which has none.
     """
 
     number: int
@@ -76,6 +98,9 @@ class Answer:
     parameters: Mapping[str, float]
     rig: Mapping[str, float]
     without: tuple[str, ...]
+    accepted: tuple[str, ...] = ()
+    families: tuple[str, ...] = ()
+    small_errors: SmallErrors | None = None
 
 
 STAMP = 1e-5
@@ -89,10 +114,10 @@ def record_campaign(bench: Bench, answer: Answer, random: np.random.Generator) -
 
     Raises :class:`InputError` for a rig that does not come to a steady motion.
     """
-    model, p = bench.model(answer.effects), bench.values({**answer.rig, **answer.parameters})
-    lift, angle = nominal_test(p)
+    model, during = bench.model(answer.effects), bench.values_during({**answer.rig, **answer.parameters})
+    lift, angle = nominal_test(during[0])
     tests = []
-    for dwell in steady_dwells(model, p, bench.programme.dwells):
+    for dwell in steady_dwells(model, during, bench.programme.dwells, bench.step):
         if not dwell.settled:
             raise InputError(
                 "the motion does not become steady",
@@ -101,7 +126,7 @@ def record_campaign(bench: Bench, answer: Answer, random: np.random.Generator) -
             )
         tests.append(_dwell(bench, dwell, lift, angle, random))
     if bench.programme.sweep > 0.0:
-        tests.append(_sweep(bench, model, p, lift, angle, random))
+        tests.append(_sweep(bench, model, during[-1], lift, angle, random))
     still = _stamps(bench.programme.standstill, bench.sensors, random)
     nothing = np.zeros((3, still.size))
     tests.append(_test("standstill", "standstill", None, still, nothing, angle, bench.sensors, random))
@@ -117,24 +142,41 @@ def _stamps(duration: float, sensors: Sensors, random: np.random.Generator) -> R
 
 def _dwell(bench: Bench, dwell: Steady, lift: float, angle: float, random: np.random.Generator) -> Recording:
     """The record begins at an arbitrary angle of the cam."""
-    frequency = dwell.frequency
+    frequency, sensors = dwell.frequency, bench.sensors
     stamps = _stamps(bench.programme.periods_at(frequency) / frequency, bench.sensors, random)
     turns = np.mod(frequency * stamps + random.uniform(), 1.0)
     knots = np.linspace(0.0, 1.0, dwell.readings.shape[1] + 1)
-    closed = np.concatenate([dwell.readings, dwell.readings[:, :1]], axis=1)
+    period = dwell.readings if sensors.corner == 0.0 else _filtered_period(sensors, frequency, dwell.readings)
+    closed = np.concatenate([period, period[:, :1]], axis=1)
     readings = CubicSpline(knots, closed, axis=1, bc_type="periodic")(turns)
-    road = lift / 2.0 * np.cos(2.0 * np.pi * turns)
+    passed = sensors.filtered(np.array([frequency]))[0]
+    lead = sensors.phase + float(np.angle(passed))
+    road = float(np.abs(passed)) * lift / 2.0 * np.cos(2.0 * np.pi * turns + lead)
     truth = np.stack([road, *readings])
     return _test(f"dwell_{frequency:.2f}Hz", "dwell", frequency, stamps, truth, angle, bench.sensors, random)
+
+
+def _filtered_period(sensors: Sensors, frequency: float, readings: Real) -> Real:
+    """A period of readings after the logger's filters."""
+    count = readings.shape[1]
+    passed = sensors.filtered(frequency * np.arange(count // 2 + 1))
+    return np.fft.irfft(np.fft.rfft(readings, axis=1) * passed, count, axis=1)
 
 
 def _sweep(
     bench: Bench, model: QuarterCar, p: Values, lift: float, angle: float, random: np.random.Generator
 ) -> Recording:
-    programme = bench.programme
-    stamps = _stamps(programme.sweep, bench.sensors, random)
-    times, readings = sweep_readings(model, p, programme.sweep, programme.sweep_end, bench.sensors.rate)
-    turns = 0.5 * programme.sweep_end / programme.sweep * stamps**2
+    programme, sensors = bench.programme, bench.sensors
+    stamps = _stamps(programme.sweep, sensors, random)
+    rate = programme.sweep_end / programme.sweep
+    times, readings = sweep_readings(model, p, programme.sweep, programme.sweep_end, sensors.rate, bench.step)
+    if sensors.corner > 0.0:
+        # Far below its corner the filter is a delay, the same in the road and in what answers to it.
+        late = float(-np.angle(sensors.filtered(np.array([1.0]))[0])) / (2.0 * np.pi)
+        times = times + late
+    else:
+        late = 0.0
+    turns = 0.5 * rate * (stamps - late) ** 2 + sensors.phase / (2.0 * np.pi)
     truth = np.stack(
         [lift / 2.0 * np.sin(2.0 * np.pi * turns), *CubicSpline(times, readings, axis=1)(stamps)]
     )
@@ -154,7 +196,7 @@ def _test(
 ) -> Recording:
     """A test with the sensors' noise on the true road, acceleration and deflection, (3, n)."""
     noise = np.array([sensors.road, sensors.accel, sensors.deflection])[:, None]
-    shown = truth + noise * random.standard_normal(truth.shape)
+    shown = sensors.converted(truth + noise * sensors.noise(truth.shape, random))
     count = 2.0 * np.pi / sensors.counts
     link = count * np.round((angle + sensors.hunting * random.standard_normal(stamps.size)) / count)
     names = ("road_height", "sprung_accel", "susp_deflection", "link_angle")
@@ -195,6 +237,8 @@ def write_campaign(recordings: Sequence[Recording], folder: Path) -> Path:
     return write_bytes(folder / FILE, packed)
 
 
+_FOREIGN_ONLY = ("accepted", "families", "small_errors")
+
 _REMEDY = "record the trial again: remove its folder"
 
 
@@ -234,5 +278,8 @@ def envelope_of(record: Mapping[str, Any]) -> Envelope:
 
 
 def _digest(envelope: Envelope) -> str:
-    text = json.dumps(asdict(envelope.answer), sort_keys=True, ensure_ascii=False)
+    # What only foreign trials have is left out of the others: seals of earlier versions hold.
+    answer = asdict(envelope.answer)
+    given = {name: value for name, value in answer.items() if name not in _FOREIGN_ONLY or value}
+    text = json.dumps(given, sort_keys=True, ensure_ascii=False)
     return hashlib.sha256(f"{envelope.salt}\n{text}".encode("utf-8", "surrogatepass")).hexdigest()

@@ -5,20 +5,22 @@ so that nothing shows which it is, naming that one counts too, if the verdict sa
 The port of something unknown counts as found, too, where the verdict says that it cannot distinguish it from the one
 that it names. Marks that do not apply to a kind of trial are None.
 
-What many trials say together: rates with their intervals, and who is taken for whom. Pure functions.
+In a foreign trial no name can be right, for no catalogue has the law. A port is right where an engineer would rightly
+put the effect, a family where it would rightly be called that, at such a port
+(:mod:`savgs_ident.validation.foreign_laws`). "Unknown" at a right port has the port, not the family.
+
+What many trials say together is in :mod:`savgs_ident.validation.blind_rates`.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import isfinite
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from savgs_ident.core.files import record_of
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.validation.blind_record import Answer, Drawn
+from savgs_ident.validation.foreign_laws import FOREIGN
 
 FAILED = "failed"
 """The verdict of a diagnosis that ended with an error."""
@@ -62,8 +64,18 @@ class Score:
         both_named: both drawn effects and no other are named; of trials with two.
         share_closed: share of the explainable gap that the diagnosis closed, on tests held out; None if there
             is none or the diagnosis does not say.
-        intervals: of the effects' parameters, where the verdict names all of them and no other.
+        intervals: of the effects' parameters, where the verdict names all of them and no other; in a foreign trial,
+            of those of the rig's own that mean something.
         wall_s: how long the diagnosis took [s].
+        foreign: whether it is a foreign trial.
+        families: what the verdict says is missing, each as port/family.
+        sigmas: by how many standard deviations each effect stands out, in the order of ``effects``.
+        port_right: something is named or unknown, at ports that are right alone; of foreign trials with an effect.
+        port_listed: the same, or a right port is listed as indistinguishable from them; of the same.
+        family_right: a family is named, with ports and families that are right alone; of the same.
+        probability: that the verdict states; None if it states none.
+        closed_by_effect: share of the recalibrated gap that what is named closes, on tests held out; None as above.
+        version: of the code that made the diagnosis.
     """
 
     number: int
@@ -82,6 +94,15 @@ class Score:
     share_closed: float | None
     intervals: Mapping[str, Interval]
     wall_s: float
+    foreign: bool = False
+    families: tuple[str, ...] = ()
+    sigmas: tuple[float, ...] = ()
+    port_right: bool | None = None
+    port_listed: bool | None = None
+    family_right: bool | None = None
+    probability: float | None = None
+    closed_by_effect: float | None = None
+    version: str = ""
 
     def __str__(self) -> str:
         right = "right" if is_right(self) else "wrong"
@@ -94,29 +115,43 @@ _KIND_WORDS = {"none": "nothing", "unknown": "unknown", FAILED: "failed"}
 def truth_words(score: Score) -> str:
     """The effects that were in the rig."""
     names = " + ".join(score.effects)
-    return {"none": "nothing", "unknown": f"{names} (not in the catalogue)"}.get(score.kind, names)
+    foreign = f"{names} (foreign law)"
+    return {"none": "nothing", "unknown": f"{names} (not in the catalogue)", "foreign": foreign}.get(
+        score.kind, names
+    )
 
 
 def said_words(score: Score) -> str:
     """The verdict as names of effects."""
-    return _KIND_WORDS.get(score.verdict, " + ".join(score.said))
+    said = _KIND_WORDS.get(score.verdict, " + ".join(score.said))
+    return f"{said} ({', '.join(score.families)})" if score.foreign and score.families else said
 
 
 def is_right(score: Score) -> bool:
     """Whether the verdict is right altogether."""
-    marks = (score.named_right, score.unknown_recognised, score.both_named)
+    marks = (score.named_right, score.unknown_recognised, score.both_named, score.family_right)
     return any(marks) or (score.kind == "none" and score.verdict == "none")
 
 
-def score_of(answer: Answer, diagnosis: Mapping[str, Any]) -> Score:
-    """The marks of a diagnosis, given as the object of its ``diagnosis.json``."""
+def said_right(score: Score) -> bool:
+    """Whether what the verdict says is true: what its stated probability is to be compared with.
+
+    That a foreign effect is unknown, at its port, is true.
+    """
+    return is_right(score) or (score.verdict == "unknown" and score.port_right is True)
+
+
+def score_of(answer: Answer, diagnosis: Mapping[str, Any], version: str = "") -> Score:
+    """The marks of a diagnosis, given as the object of its ``diagnosis.json``; ``version`` is that of the code."""
     verdict = diagnosis["verdict"]
     said, true = tuple(verdict["effects"]), set(answer.effects)
     right = set(said) == true and len(said) == len(true)
     alike = len(said) == 1 and said[0] in answer.imitators and true <= {*verdict["confusable_with"]}
     here = set(verdict["ports"]) == set(answer.ports) and verdict["kind"] != "none"
     beside = verdict["kind"] == "unknown" and set(answer.ports) <= {*verdict["confusable_ports"]}
-    kind = answer.kind
+    kind, families = answer.kind, tuple(verdict.get("families", ()))
+    cataloguing, foreign = kind not in ("none", "foreign"), answer.small_errors is not None
+    own = _intervals(answer, diagnosis) if right else {}
     return Score(
         number=answer.number,
         kind=kind,
@@ -126,23 +161,83 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any]) -> Score:
         said=said,
         named_right=right or alike if kind == "effect" else None,
         named_exactly=right if kind == "effect" else None,
-        located_right=here or alike or beside if kind != "none" else None,
-        located_exactly=here if kind != "none" else None,
+        located_right=here or alike or beside if cataloguing else None,
+        located_exactly=here if cataloguing else None,
         false_alarm=verdict["kind"] not in ("none", FAILED) if kind == "none" else None,
         unknown_recognised=verdict["kind"] == "unknown" if kind == "unknown" else None,
         both_named=right if kind == "two" else None,
         share_closed=diagnosis["shrink"]["share_closed"],
-        intervals=_intervals(answer, diagnosis) if right else {},
+        intervals=_rig_intervals(answer, diagnosis) if foreign else own,
         wall_s=float(diagnosis["wall_s"]),
+        foreign=foreign,
+        families=families,
+        sigmas=tuple(answer.sigmas[name] for name in answer.effects if name in answer.sigmas),
+        port_right=_port_right(answer, verdict) if kind == "foreign" else None,
+        port_listed=_port_listed(answer, verdict) if kind == "foreign" else None,
+        family_right=_family_right(answer, verdict, families) if kind == "foreign" else None,
+        probability=_number_or_none(verdict.get("probability")),
+        closed_by_effect=_number_or_none(diagnosis["shrink"].get("closed_by_effect")),
+        version=version,
     )
+
+
+def _port_right(answer: Answer, verdict: Mapping[str, Any]) -> bool:
+    """Whether something is said to be missing, at ports that are right alone."""
+    ports = set(verdict["ports"])
+    return verdict["kind"] not in ("none", FAILED) and bool(ports) and ports <= {*answer.accepted}
+
+
+def _port_listed(answer: Answer, verdict: Mapping[str, Any]) -> bool:
+    """Whether the ports are right, or one that is right is listed as indistinguishable from them."""
+    listed = verdict["kind"] not in ("none", FAILED) and bool(
+        {*verdict["confusable_ports"]} & {*answer.accepted}
+    )
+    return listed or _port_right(answer, verdict)
+
+
+def _family_right(answer: Answer, verdict: Mapping[str, Any], families: Sequence[str]) -> bool:
+    """Whether a family is named, and all that are named are right at their ports."""
+    right = {f"{port}/{family}" for port in answer.accepted for family in answer.families}
+    named = verdict["kind"] in ("effect", "several") and bool(families)
+    return named and set(families) <= right and _port_right(answer, verdict)
+
+
+def _number_or_none(found: object) -> float | None:
+    """A finite number, or None."""
+    return float(found) if isinstance(found, int | float) and isfinite(found) else None
+
+
+MEANINGFUL: Mapping[str, tuple[str, ...]] = {
+    "mu_r": ("rail/friction",),
+    "c_sd": ("strut/damping", "strut/friction", "strut/play", "suspension/damping", "suspension/friction"),
+}
+"""Parameters of the rig whose true values mean something whatever is missing, but for what acts as they do."""
+
+
+def _rig_intervals(answer: Answer, diagnosis: Mapping[str, Any]) -> dict[str, Interval]:
+    """Intervals of the rig's own parameters in a foreign trial, where the diagnosis gives them.
+
+    Rail friction that drifts has its mean as the true value.
+    """
+    there = {f"{port}/{family}" for port in answer.ports for family in answer.families}
+    given = diagnosis.get("intervals", {})
+    return {
+        name: Interval(answer.rig[name], given[name]["lo"], given[name]["hi"])
+        for name, alike in MEANINGFUL.items()
+        if name in answer.rig and name in given and not there & {*alike}
+        if None not in (given[name]["lo"], given[name]["hi"])
+    }
 
 
 def score_from(record: Mapping[str, Any]) -> Score:
     """The marks that ``dataclasses.asdict`` and JSON made ``record`` of; ``ValueError`` for others."""
     score = record_of(Score, record)
-    if score.verdict not in _VERDICTS or not {*score.effects, *score.said} <= {*CATALOGUE}:
+    known = {*CATALOGUE, *FOREIGN} if score.kind == "foreign" else {*CATALOGUE}
+    if score.verdict not in _VERDICTS or not ({*score.effects} <= known and {*score.said} <= {*CATALOGUE}):
         raise ValueError(f"trial {score.number} is about something unknown")
-    if (score.kind == "effect" and len(score.effects) != 1) or (score.verdict == "effect" and not score.said):
+    if (score.kind in ("effect", "foreign") and len(score.effects) != 1) or (
+        score.verdict == "effect" and not (score.said or score.families)
+    ):
         raise ValueError(f"trial {score.number} names no effect")
     return score
 
@@ -171,114 +266,3 @@ def _intervals(answer: Answer, diagnosis: Mapping[str, Any]) -> dict[str, Interv
                 if name in answer.parameters and None not in (found["lo"], found["hi"])
             }
     return {}
-
-
-Z = 1.959964
-"""Standard deviations of a 95 % interval."""
-
-NOTHING, TWO, OTHERS, UNKNOWN = "nothing", "both of two", "other effects", "unknown"
-
-
-@dataclass(frozen=True)
-class Rate:
-    """So many of so many, and the bounds that the rate should keep [1].
-
-    ``low`` and ``high`` are its 95 % interval after Wilson (1927); 0 and 1 if there is nothing to count.
-    """
-
-    count: int
-    total: int
-    least: float = 0.0
-    most: float = 1.0
-
-    @property
-    def rate(self) -> float | None:
-        """The rate [1]; None if there is nothing to count."""
-        return self.count / self.total if self.total else None
-
-    @property
-    def met(self) -> bool | None:
-        """Whether it keeps its bounds; None if it has none, or there is nothing to count.
-
-        A rate that should be high, but not too high, is too high only if chance does not explain it: all of
-        twenty intervals hold the truth often enough where 95 % should.
-        """
-        if self.rate is None or (self.least <= 0.0 and self.most >= 1.0):
-            return None
-        highest = self.low if self.least > 0.0 else self.rate
-        return self.least <= self.rate and highest <= self.most
-
-    @property
-    def low(self) -> float:
-        """Lower end of the interval [1]."""
-        return self._ends()[0]
-
-    @property
-    def high(self) -> float:
-        """Upper end of the interval [1]."""
-        return self._ends()[1]
-
-    def _ends(self) -> tuple[float, float]:
-        n = self.total
-        if n == 0:
-            return 0.0, 1.0
-        share = self.count / n
-        middle = (share + Z**2 / (2 * n)) / (1.0 + Z**2 / n)
-        half = Z * sqrt(share * (1.0 - share) / n + Z**2 / (4 * n**2)) / (1.0 + Z**2 / n)
-        return max(middle - half, 0.0), min(middle + half, 1.0)
-
-
-def rates_of(scores: Sequence[Score]) -> dict[str, Rate]:
-    """All rates by name, in the order in which they are reported."""
-    held = [interval.holds for score in scores for interval in score.intervals.values()]
-    closed = [score.share_closed for score in scores if score.named_right or score.both_named]
-    return {
-        "named_right": _rate([score.named_right for score in scores], least=0.90),
-        "located_right": _rate([score.located_right for score in scores], least=0.95),
-        "false_alarms": _rate([score.false_alarm for score in scores], most=0.02),
-        "unknown_recognised": _rate([score.unknown_recognised for score in scores], least=0.80),
-        "both_named": _rate([score.both_named for score in scores], least=0.70),
-        "intervals_hold": _rate(held, least=0.90, most=0.99),
-        "share_closed_90": _rate([share is not None and share >= 0.9 for share in closed]),
-        "named_exactly": _rate([score.named_exactly for score in scores]),
-        "located_exactly": _rate([score.located_exactly for score in scores]),
-    }
-
-
-def _rate(marks: Iterable[bool | None], least: float = 0.0, most: float = 1.0) -> Rate:
-    counted = [mark for mark in marks if mark is not None]
-    return Rate(sum(counted), len(counted), least, most)
-
-
-@dataclass(frozen=True)
-class Confusion:
-    """Trials by what there was (rows) and what was said (columns), (r, c)."""
-
-    truths: tuple[str, ...]
-    verdicts: tuple[str, ...]
-    counts: NDArray[np.int64]
-
-
-def truth_of(score: Score) -> str:
-    """The row of a trial."""
-    return {"none": NOTHING, "two": TWO, "unknown": UNKNOWN, "effect": "".join(score.effects[:1])}[score.kind]
-
-
-def verdict_of(score: Score) -> str:
-    """Its column: what was named, or that more was named than there is, or not the right ones."""
-    several = TWO if score.both_named else OTHERS
-    words = {"none": NOTHING, "several": several, "effect": "".join(score.said[:1])}
-    return words.get(score.verdict, score.verdict)
-
-
-def confusion_of(scores: Sequence[Score], order: Sequence[str]) -> Confusion:
-    """The confusion matrix, effects in the given order, those that appear nowhere left out."""
-    truths, verdicts = ({name_of(score) for score in scores} for name_of in (truth_of, verdict_of))
-    effects = [name for name in order if name in truths | verdicts]
-    rows = [name for name in (NOTHING, *effects, TWO, UNKNOWN) if name in truths]
-    ends = (TWO, OTHERS, UNKNOWN, FAILED)
-    columns = [name for name in (NOTHING, *effects, *ends) if name in truths | verdicts]
-    counts = np.zeros((len(rows), len(columns)), dtype=np.int64)
-    for score in scores:
-        counts[rows.index(truth_of(score)), columns.index(verdict_of(score))] += 1
-    return Confusion(tuple(rows), tuple(columns), counts)

@@ -42,7 +42,8 @@ from savgs_ident.validation.blind_record import (
     write_campaign,
 )
 from savgs_ident.validation.blind_score import Score, failed, score_of
-from savgs_ident.validation.trials import rig_marks
+from savgs_ident.validation.foreign_draw import draw_foreign, true_bench
+from savgs_ident.validation.trials import code_version, rig_marks
 from savgs_ident.validation.virtual_rig import Bench, Programme
 
 DRAWS = 5
@@ -65,6 +66,7 @@ class Plan:
         shares: how often which kind of trial is drawn.
         every: so many dwells of the programme are left out between two.
         sweep: whether a sweep is recorded.
+        foreign: whether effects follow laws that the diagnosis does not have, on rigs with small errors.
     """
 
     rig: Path
@@ -73,10 +75,11 @@ class Plan:
     shares: tuple[float, float, float, float]
     every: int
     sweep: bool
+    foreign: bool = False
 
     def marks(self) -> dict[str, Any]:
         """What trials must have in common to be counted together, as JSON has it."""
-        return {
+        marks = {
             "rig": str(self.rig),
             **rig_marks(self.sheet),
             "seed": self.seed,
@@ -84,6 +87,7 @@ class Plan:
             "every": self.every,
             "sweep": self.sweep,
         }
+        return marks | {"foreign": True} if self.foreign else marks
 
     def bench(self) -> Bench:
         """The rig and what it is put through."""
@@ -100,6 +104,14 @@ class Drawn:
     answer: Answer
     salt: str
     recordings: tuple[Recording, ...]
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A trial that is recorded, and where."""
+
+    number: int
+    folder: Path
 
 
 @dataclass(frozen=True)
@@ -135,22 +147,28 @@ def check_trial_folder(plan: Plan, out: Path, number: int) -> None:
         )
 
 
-def run_trial(plan: Plan, draw: Draw, diagnose: Diagnose, out: Path, number: int) -> Score:
-    """The marks of a trial: drawn and recorded unless its folder holds that already, diagnosed, opened."""
+def record_trial(plan: Plan, draw: Draw, out: Path, number: int) -> Recorded:
+    """Draw a trial and record it, unless its folder holds that already."""
     folder = prepare_folder(_folder(out, number))
-    bench = plan.bench()
     if not _is_recorded(folder, plan, number):
-        drawn = draw(plan, bench, number)
+        drawn = draw(plan, plan.bench(), number)
         check_trial_folder(plan, out, number)
         _record(folder, plan, drawn, number)
+    return Recorded(number, folder)
+
+
+def run_trial(plan: Plan, draw: Draw, diagnose: Diagnose, out: Path, number: int) -> Score:
+    """The marks of a trial: drawn and recorded unless its folder holds that already, diagnosed, opened."""
+    folder = record_trial(plan, draw, out, number).folder
     campaign = folder / "campaign"
-    found = _diagnosed(diagnose, campaign, bench.rig, _handed_over(folder).without)
+    rig = parse_rig(plan.sheet, plan.rig)
+    found = _diagnosed(diagnose, campaign, rig, _handed_over(folder).without)
     write_json(folder / "diagnosis.json", found)
     seal = _handed_over(folder).seal
     envelope = _read(folder / "answer.json", envelope_of)
     with blamed_on(campaign / "seal.json"):
         answer = opened(seal, envelope, load_campaign(campaign).sha256)
-    return score_of(answer, found)
+    return score_of(answer, found, code_version())
 
 
 def diagnose_folder(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
@@ -182,9 +200,12 @@ def draw_and_record(plan: Plan, bench: Bench, number: int) -> Drawn:
     """
     for attempt in range(DRAWS):
         random = np.random.default_rng((plan.seed, number, attempt))
-        answer = draw_answer(bench, Shares(*plan.shares), number, random)
+        if plan.foreign:
+            answer = draw_foreign(bench, Shares(*plan.shares), number, random)
+        else:
+            answer = draw_answer(bench, Shares(*plan.shares), number, random)
         try:
-            recordings = record_campaign(bench, answer, random)
+            recordings = record_campaign(true_bench(bench, answer), answer, random)
         except InputError:
             continue
         return Drawn(answer, random.bytes(16).hex(), recordings)

@@ -7,12 +7,14 @@ together.
 
 import hashlib
 import json
+import subprocess
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from savgs_ident import __version__
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import Lost, cores, run_tasks
 from savgs_ident.core.files import write_bytes
@@ -79,6 +81,25 @@ def campaign_marks(path: Path, channels: Path | None) -> dict[str, object]:
             source=error.filename or path,
             remedy="check the path and its permissions",
         ) from error
+
+
+@cache
+def code_version() -> str:
+    """The commit of the checkout that this package is in, as git describes it; else the version of the package."""
+    package = Path(__file__).resolve().parents[1]
+    try:
+        top = _git(package, "rev-parse", "--show-toplevel")
+        if Path(top).resolve() == package.parent:
+            return _git(package, "describe", "--always", "--dirty")
+    except (OSError, subprocess.SubprocessError):
+        pass
+    return __version__
+
+
+def _git(folder: Path, *words: str) -> str:
+    """What git says of a folder, in a line; raises where it says nothing."""
+    command = ["git", "-C", str(folder), *words]
+    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10.0).stdout.strip()
 
 
 def marks_in(kept: Path) -> dict[str, Any]:

@@ -3,7 +3,8 @@
 Effects without states are in every model, those that were not drawn at their null, so that one compiled program
 serves nearly all trials; an effect with states of its own asks for another.
 
-What is recorded in a trial: the programme of dwells, and the sensors of the rig's sheet.
+What is recorded in a trial: the programme of dwells, seen by the rig's sensors
+(:mod:`savgs_ident.validation.sensor_chain`).
 
 A steady cam by time integration: one period of the motion that a dwell comes to.
 
@@ -17,7 +18,7 @@ A sweep of the cam from rest, by time integration.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from math import ceil
 
 import equinox as eqx
@@ -31,8 +32,10 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import AbstractSensorLaw
+from savgs_ident.effects.effect import Effect
 from savgs_ident.plants.base import Excitation, state_sizes
-from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, build_model
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.plants.quarter_car.forces import damper_curve
 from savgs_ident.plants.quarter_car.inputs import (
     ImposedLink,
     RigSource,
@@ -55,7 +58,15 @@ from savgs_ident.simulate.periodic import (
 )
 from savgs_ident.simulate.program_cache import placed
 from savgs_ident.simulate.public import DWELLS
-from savgs_ident.simulate.transient import pack_state, rest_state, simulate_transient, unpack_state
+from savgs_ident.simulate.transient import (
+    pack_state,
+    rest_state,
+    simulate_transient,
+    through_sensors,
+    unpack_state,
+)
+from savgs_ident.validation.fixed_step import integrate_fixed
+from savgs_ident.validation.sensor_chain import Sensors
 
 
 @dataclass(frozen=True)
@@ -83,29 +94,6 @@ class Programme:
         return max(self.periods, ceil(self.least * frequency - 1e-9))
 
 
-@dataclass(frozen=True)
-class Sensors:
-    """What the sensors add to the truth, as the rig's sheet says.
-
-    Attributes:
-        rate: sampling rate [Hz].
-        jitter: rms error of the sampling instants [s]; the stamps give the true ones.
-        accel: rms noise of the acceleration [m/s^2].
-        deflection: of the deflection [m].
-        road: of the road's height [m].
-        hunting: rms by which a drive that holds the link moves it to and fro [rad].
-        counts: of the link's encoder per turn of the link [1].
-    """
-
-    rate: float = 500.0
-    jitter: float = 4e-5
-    accel: float = 0.05
-    deflection: float = 1e-4
-    road: float = 1e-5
-    hunting: float = 2.5e-6
-    counts: float = 65536.0 * 40.0
-
-
 ORDERS = 9
 """Highest order of the harmonics in which changes are measured."""
 
@@ -124,6 +112,9 @@ class Bench:
         programme: the tests.
         sensors: what the sensors add.
         settings: how finely periodic motions are solved.
+        catalogue: the effects that it may have, by name, those of the baseline among them.
+        drift: by how much parameters change from the first test to the last, relative, about their mean; by name.
+        step: of a fixed-step integration of what is recorded [s]; 0 for one that controls its error.
     """
 
     rig: Rig
@@ -132,13 +123,16 @@ class Bench:
     programme: Programme = field(default_factory=Programme)
     sensors: Sensors = field(default_factory=Sensors)
     settings: PeriodicSettings = field(default_factory=PeriodicSettings)
+    catalogue: Mapping[str, Effect] = field(default_factory=lambda: CATALOGUE)
+    drift: Mapping[str, float] = field(default_factory=dict)
+    step: float = 0.0
 
     @cached_property
     def table(self) -> ParameterTable:
         """All parameters of rig and catalogue, effects that the baseline does not have at their null."""
-        brought = (ParameterTable(effect.parameters) for effect in CATALOGUE.values())
+        brought = (ParameterTable(effect.parameters) for effect in self.catalogue.values())
         table = merge_parameters(self.rig.parameters, *brought)
-        absent = [each for name, each in CATALOGUE.items() if name not in self.baseline]
+        absent = [each for name, each in self.catalogue.items() if name not in self.baseline]
         return table.with_values({name: null for each in absent for name, null in each.null.items()})
 
     @cached_property
@@ -154,14 +148,30 @@ class Bench:
 
     def model(self, effects: Sequence[str]) -> QuarterCar:
         """The baseline with ``effects``, and with all that have no states."""
-        plain = [name for name, each in CATALOGUE.items() if name in self.baseline or not each.states]
-        added = [name for name in CATALOGUE if name in effects and name not in plain]
-        return build_model(self.rig, (*plain, *added))
+        known = self.catalogue
+        plain = [name for name, each in known.items() if name in self.baseline or not each.states]
+        added = [name for name in known if name in effects and name not in plain]
+        model = QuarterCar(damper_curve(self.rig))
+        for name in (*plain, *added):
+            model = model + known[name]
+        return model
 
     def values(self, given: Mapping[str, float]) -> Values:
         """All parameters, SI, with the given ones."""
         values: Values = placed(as_values(self.table.as_dict() | dict(given)))
         return values
+
+    def values_during(self, given: Mapping[str, float]) -> tuple[Values, ...]:
+        """All parameters, SI, in each dwell of the programme, drift included; the last are those of the sweep."""
+        count = len(self.programme.dwells)
+        if not self.drift:
+            return (self.values(given),) * count
+        shares = np.linspace(-0.5, 0.5, count) if count > 1 else np.zeros(1)
+        before = self.table.as_dict() | dict(given)
+        return tuple(
+            self.values({**given, **{n: before[n] * (1.0 + d * share) for n, d in self.drift.items()}})
+            for share in shares.tolist()
+        )
 
     def solve(
         self, effects: Sequence[str], given: Mapping[str, float], near: PeriodicSolution | None = None
@@ -238,22 +248,26 @@ def without_sensor_faults(model: QuarterCar) -> QuarterCar:
     )
 
 
-def steady_dwells(model: QuarterCar, p: Values, frequencies: tuple[float, ...]) -> Iterator[Steady]:
-    """The steady motions of the rig in one dwell after the other [Hz], with a link held at its nominal angle."""
+def steady_dwells(
+    model: QuarterCar, during: Sequence[Values], frequencies: tuple[float, ...], step: float = 0.0
+) -> Iterator[Steady]:
+    """The steady motions of the rig in one dwell after the other [Hz], with a link held at its nominal angle.
+
+    ``during`` are the parameters [SI] in each; ``step`` [s] is that of a fixed-step integration, 0 for one that
+    controls its error.
+    """
     mechanics = without_sensor_faults(model)
-    _, angle = nominal_test(p)
-    state, rise = _at_rest(mechanics, p, placed(held_link(angle))), STRETCH
-    for frequency in frequencies:
+    _, angle = nominal_test(during[0])
+    state, rise = _at_rest(mechanics, during[0], placed(held_link(angle))), STRETCH
+    for frequency, p in zip(frequencies, during, strict=True):
         apart = np.inf
         for _ in range(ceil(PATIENCE / STRETCH)):
-            before, state = (
-                state,
-                _stretch(mechanics, p, state, frequency, ceil(STRETCH * frequency), rise)[0],
-            )
+            periods = ceil(STRETCH * frequency)
+            before, state = state, _stretch(mechanics, p, state, frequency, periods, rise, step)[0]
             apart, rise = _apart(mechanics, before, state), 0.0
             if apart < CLOSED or np.isnan(apart):
                 break
-        state, truth = _stretch(mechanics, p, state, frequency, 1, rise)
+        state, truth = _stretch(mechanics, p, state, frequency, 1, rise, step)
         yield Steady(frequency, _shown(model, p, frequency, truth), bool(apart < CLOSED))
 
 
@@ -264,13 +278,17 @@ def _apart(model: QuarterCar, before: Array, after: Array) -> float:
 
 
 def _stretch(
-    model: QuarterCar, p: Values, start: Array, frequency: float, periods: int, rise: float
+    model: QuarterCar, p: Values, start: Array, frequency: float, periods: int, rise: float, step: float
 ) -> tuple[Array, NDArray[np.float64]]:
     """The packed state after so many periods, and what was read on the way, (2, SAMPLES).
 
     The cam's lift grows to its height during the first ``rise`` [s].
     """
     lift, angle = nominal_test(p)
+    if step > 0.0:
+        source = placed(RigSource(cam_road(lift, frequency, rise), held_link(angle)))
+        found = integrate_fixed(model, p, start, source, periods / frequency, SAMPLES, step)
+        return found[0], np.asarray(found[1])
     times = np.linspace(0.0, periods / frequency, SAMPLES + 1)
     drive = (cam_road(lift, frequency, rise), held_link(angle), jnp.asarray(times))
     end, readings = _integrated(model, p, start, *placed(drive))
@@ -304,19 +322,32 @@ def _shown(model: QuarterCar, p: Values, frequency: float, truth: NDArray[np.flo
 
 
 def sweep_readings(
-    model: QuarterCar, p: Values, duration: float, end: float, rate: float
+    model: QuarterCar, p: Values, duration: float, end: float, rate: float, step: float = 0.0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Instants [s], (n,), and what the sensors show then, (2, n), from 0 to ``end`` [Hz] in ``duration`` [s].
 
+    ``step`` [s] is that of a fixed-step integration, 0 for one that controls its error.
     Raises :class:`InputError` if the integration does not end well.
     """
     times = np.arange(round(duration * rate) + 1) / rate
     lift, angle = nominal_test(p)
     road, link = sweep_road(lift, 0.0, end, duration), held_link(angle)
-    shown, ended = _swept(model, p, *placed((road, link, jnp.asarray(times))))
+    if step > 0.0:
+        shown, ended = _swept_fixed(model, p, RigSource(road, link), times, step), jnp.asarray(True)
+    else:
+        shown, ended = _swept(model, p, *placed((road, link, jnp.asarray(times))))
     if not np.isfinite(shown).all() or not bool(ended):
         raise InputError("the sweep cannot be simulated", source="sweep", remedy="draw another rig")
     return times, np.asarray(shown)
+
+
+def _swept_fixed(
+    model: QuarterCar, p: Values, source: RigSource, times: NDArray[np.float64], step: float
+) -> Array:
+    """Readings (2, n) at evenly spaced instants [s]."""
+    start, lasts = _at_rest(model, p, placed(source.link)), float(times[-1]) * times.size / (times.size - 1)
+    readings = integrate_fixed(model, p, start, placed(source), lasts, times.size, step)[1]
+    return through_sensors(partial(model.transfers, p), jnp.asarray(times), readings)
 
 
 @eqx.filter_jit

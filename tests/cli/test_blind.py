@@ -70,14 +70,21 @@ def test_what_is_told_is_what_was_found(tmp_path: Path, capsys: pytest.CaptureFi
     assert concluded(job(trials=8), draw, always_right, Reporter(True, False), tmp_path) == OK
     printed = json.loads(capsys.readouterr().out)
     assert printed == _record(tmp_path)
-    assert printed["kinds"] == {"none": 2, "effect": 2, "two": 2, "unknown": 2}
+    assert printed["kinds"] == {"none": 2, "effect": 2, "two": 2, "unknown": 2, "foreign": 0}
     rates = {name: (each["count"], each["of"]) for name, each in printed["rates"].items()}
     assert rates["named_right"] == rates["both_named"] == rates["unknown_recognised"] == (2, 2)
     assert rates["located_right"] == (6, 6)
     assert rates["false_alarms"] == (0, 2)
     assert rates["intervals_hold"] == (6, 6)
     assert printed["trusted"] is True
-    for name in ("confusion.png", "confusion.pdf", "blind.html", "trials.jsonl"):
+    for name in (
+        "confusion.png",
+        "confusion.pdf",
+        "reliability.png",
+        "reliability.pdf",
+        "blind.html",
+        "trials.jsonl",
+    ):
         assert (tmp_path / name).stat().st_size > 300
 
 
@@ -198,6 +205,7 @@ def test_a_seed_that_nobody_gave_is_another_one_each_time(tmp_path: Path) -> Non
         (("--shares", "1", "2", "3"), "Option '--shares' requires 4 arguments"),
         (("--shares", "0", "0", "0", "0"), "the shares are 0, 0, 0, 0. Remedy: give four numbers"),
         (("--shares", "1", "-1", "0", "0"), "the shares are 1, -1, 0, 0"),
+        (("--foreign", "--shares", "1", "1", "1", "0"), "foreign trials have nothing or one effect"),
         (("--rig", "none.toml"), "none.toml: cannot be read"),
         (("--out", "taken"), "taken: cannot be written"),
         (("--out", "strange"), "trials.jsonl: is no list of trials"),
@@ -220,7 +228,16 @@ def test_bad_arguments_are_code_2_with_a_reason(
 def test_the_help_says_what_it_writes(invoke) -> None:
     done = invoke("blind", "--help")
     assert done.exit_code == 0
-    for word in ("Example: savgs-ident blind", "Writes", "--trials", "--seed", "--jobs", "--out", "--json"):
+    for word in (
+        "Example: savgs-ident blind",
+        "Writes",
+        "--foreign",
+        "--trials",
+        "--seed",
+        "--jobs",
+        "--out",
+        "--json",
+    ):
         assert word in done.output
 
 

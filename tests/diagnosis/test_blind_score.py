@@ -9,19 +9,16 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.validation.blind_score import (
+from savgs_ident.validation.blind_rates import (
     NOTHING,
     OTHERS,
     TWO,
     UNKNOWN,
     Rate,
-    Score,
     confusion_of,
-    failed,
     rates_of,
-    score_from,
-    score_of,
 )
+from savgs_ident.validation.blind_score import Score, failed, score_from, score_of
 
 from .blind_answers import answer, diagnosis
 

@@ -8,7 +8,15 @@ from typing import Any
 import pytest
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.validation.blind_record import Answer, Envelope, Seal, envelope_of, opened, sealed
+from savgs_ident.validation.blind_record import (
+    Answer,
+    Envelope,
+    Seal,
+    SmallErrors,
+    envelope_of,
+    opened,
+    sealed,
+)
 
 from ..in_one_test import over
 from .blind_answers import answer
@@ -25,6 +33,8 @@ def _other(value: Any) -> Any:
         return value + 1
     if isinstance(value, str):
         return "two"
+    if value is None:
+        return SmallErrors((), 0.0, 0.0, 0.0)
     if isinstance(value, dict):
         return {name: each * (1.0 + 1e-15) for name, each in value.items()} | {"more": 1.0}
     return (*value, "cam_scale")

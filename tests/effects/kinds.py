@@ -34,6 +34,7 @@ from savgs_ident.effects.base import (
 )
 from savgs_ident.effects.effect import Effect
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.validation.foreign_laws import FOREIGN
 
 from .cycles import Cycle, along_a_cycle
 
@@ -49,6 +50,10 @@ KINDS = (
 
 MECHANISMS = (AbstractForceLaw, AbstractFrictionLimitLaw, AbstractSeriesLaw)
 """Kinds that take energy or store it; the others are errors of numbers, of the plate and of the sensors."""
+
+
+FOREIGN_EFFECTS = {name: each.effect for name, each in FOREIGN.items()}
+"""Effects that no catalogue has, by name."""
 
 
 def effects_of(*kinds: type) -> list[Effect]:
@@ -103,7 +108,7 @@ def seen_along(effect: Effect, cycle: Cycle) -> NDArray[np.float64]:
 
 @cache
 def _compiled(name: str) -> Callable[[Values, Array], Array]:
-    effect = CATALOGUE[name]
+    effect = {**CATALOGUE, **FOREIGN_EFFECTS}[name]
     return jax.jit(jax.vmap(lambda p, one: outcome(effect, p, one), in_axes=(None, 0)))
 
 
