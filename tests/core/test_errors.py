@@ -20,7 +20,11 @@ def test_an_error_says_place_fault_and_remedy() -> None:
     assert str(InputError("no file given.")) == "no file given."
 
 
-@over("bad", ["two\nlines", "\x1b[31mred", "nul\x00", "\u2028", "\u202eleft", "\ud800", "x" * 10**6])
+@over(
+    "bad",
+    ["two\nlines", "\x1b[31mred", "nul\x00", "\u2028", "\u202eleft", "\ud800", "x" * 10**6],
+    ids=("two lines", "an escape", "a nul", "a separator", "a turn", "half a letter", "a million letters"),
+)
 def test_whatever_a_file_holds_a_message_is_one_line_that_can_be_read(bad: str) -> None:
     error = InputError(f"'{bad}' is odd", source="a.csv", test=bad, channel=bad, remedy=f"rename {bad}")
     assert str(error).isprintable()
