@@ -191,7 +191,8 @@ def _diagnose(
         lambda: {**_held_out(refitted, fits, progress), **_held_out_by_member(member, progress, settings)},
         lambda: _predict_further(refitted, evidence, law, values, further),
     )
-    held = {**held, **last, UNKNOWN: _held_out_unknown(refitted, evidence, held[NONE])}
+    held = {**held, **last}
+    held = {**held, UNKNOWN: _held_out_unknown(refitted, evidence, held[NONE])}
     if evidence.kind == "unknown" and member is not None and held[member.hypothesis].mean <= held[NONE].mean:
         law = None
 

@@ -189,7 +189,7 @@ def sensor_filters(omega: Signal) -> list[NDArray[np.complex128]]:
 
     Filters and angular frequencies ``omega`` [rad/s] are (dwells, orders) each.
     """
-    return [np.asarray(each, np.complex128) for each in filters(jnp.asarray(1j * omega))]
+    return [np.asarray(each, np.complex128) for each in filters(jnp.asarray(omega))]
 
 
 def sensor_functions(reading: NDArray[np.complex128], omega: Signal) -> list[NDArray[np.complex128]]:

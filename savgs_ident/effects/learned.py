@@ -21,6 +21,7 @@ from typing import ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
+from jax import lax
 from jaxtyping import Array, Complex, Float
 
 from savgs_ident.core.parameter import Parameter
@@ -352,7 +353,9 @@ class LearnedTransfer(AbstractSensorLaw):
 
     def transfer(self, v: Values, frequency: Float[Array, "*f"]) -> Complex[Array, "*f"]:
         """Reading over truth at frequencies [Hz]."""
-        return 1.0 + _sum(v, filters(2j * jnp.pi * frequency))
+        found = filters(2.0 * jnp.pi * frequency)
+        real, imaginary = (_sum(v, [part(each) for each in found]) for part in (jnp.real, jnp.imag))
+        return lax.complex(1.0 + real, imaginary)
 
 
 def what_gives(
@@ -363,8 +366,9 @@ def what_gives(
     return [n, n * jnp.abs(n), n**2, n**3, *plays]
 
 
-def filters(s: Complex[Array, "*f"]) -> list[Complex[Array, "*f"]]:
-    """The functions of a sensor at s [rad/s]."""
+def filters(omega: Float[Array, "*f"]) -> list[Complex[Array, "*f"]]:
+    """The functions of a sensor at angular frequencies [rad/s]."""
+    s = lax.complex(jnp.zeros_like(omega), omega)
     rate = s / RATE
     first = [1.0 / (1.0 + s / corner) - 1.0 for corner in CORNERS]
     second = [1.0 / (1.0 + 1.4 * s / corner + (s / corner) ** 2) - 1.0 for corner in SECOND_CORNERS]
