@@ -215,6 +215,7 @@ def _diagnose(
         given=given,
         parameters=base.values,
         identified=model.fit.values,
+        intervals=estimates_among(model.fit, plant.free),
         verdict=verdict,
         ports=_port_shares(evidence, candidates),
         map=plant.gap_map(data, base.prediction.rows),

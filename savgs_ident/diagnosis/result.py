@@ -355,6 +355,7 @@ class Diagnosis(Result):
         given: the model as known before any fit.
         parameters: parameters of the recalibrated baseline, SI, by name.
         identified: parameters of the plant with the named effects, SI, by name.
+        intervals: those that the baseline identifies, with the named effects beside them and their 95 % intervals.
         verdict: the verdict.
         ports: shares of all ports, largest first.
         map: the gap by channel, frequency and order.
@@ -383,6 +384,7 @@ class Diagnosis(Result):
     given: Model
     parameters: Mapping[str, float]
     identified: Mapping[str, float]
+    intervals: tuple[Estimate, ...]
     verdict: Verdict
     ports: tuple[PortShare, ...]
     map: tuple[MapCell, ...]

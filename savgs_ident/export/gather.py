@@ -34,8 +34,8 @@ from savgs_ident.inference.draws import (
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, EFFECTS, LEARNED, model_parameters
 from savgs_ident.plants.quarter_car.rig import Rig
 
-DIAGNOSIS_SCHEMA = 1
-"""The schema of the diagnoses that can be read."""
+DIAGNOSIS_SCHEMAS = (1, 2)
+"""The schemas of the diagnoses that can be read: the second one adds to the first."""
 VERDICT_KINDS = ("none", "effect", "several", "unknown")
 """The kinds of verdicts."""
 DIAGNOSIS_REMEDY = "give the diagnosis.json that `savgs-ident diagnose` wrote"
@@ -300,8 +300,8 @@ def parse_diagnosis(place: JsonValue) -> dict[str, object]:
     """The document at a place. Raises :class:`InputError` for what is no diagnosis."""
     fields = place.table(_DIAGNOSIS_KEYS, free=True)
     schema = fields["schema"]
-    if schema.value != DIAGNOSIS_SCHEMA or isinstance(schema.value, bool):
-        raise schema.wrong(f"the schema {DIAGNOSIS_SCHEMA}")
+    if schema.value not in DIAGNOSIS_SCHEMAS or isinstance(schema.value, bool):
+        raise schema.wrong(f"one of the schemas {', '.join(map(str, DIAGNOSIS_SCHEMAS))}")
     baseline = fields["baseline"].table(("model", "parameters"), free=True)
     baseline["model"].text()
     _numbers(baseline["parameters"])

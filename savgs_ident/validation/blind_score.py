@@ -60,7 +60,8 @@ class Score:
             of trials with any effect.
         located_exactly: the verdict's ports are those of the drawn effects; of the same.
         false_alarm: something is named, or said to be unknown; of trials with nothing.
-        unknown_recognised: the verdict is unknown; of trials whose effect is not in the catalogue.
+        unknown_recognised: the verdict is unknown, or a law that the catalogue does not have; of trials whose effect
+            is not in the catalogue.
         both_named: both drawn effects and no other are named; of trials with two.
         share_closed: share of the explainable gap that the diagnosis closed, on tests held out; None if there
             is none or the diagnosis does not say.
@@ -151,7 +152,7 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any], version: str = "") ->
     beside = verdict["kind"] == "unknown" and set(answer.ports) <= {*verdict["confusable_ports"]}
     kind, families = answer.kind, tuple(verdict.get("families", ()))
     cataloguing, foreign = kind not in ("none", "foreign"), answer.small_errors is not None
-    own = _intervals(answer, diagnosis) if right else {}
+    own = _intervals(answer, diagnosis) if right and verdict.get("law_known", True) else {}
     return Score(
         number=answer.number,
         kind=kind,
@@ -164,7 +165,7 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any], version: str = "") ->
         located_right=here or alike or beside if cataloguing else None,
         located_exactly=here if cataloguing else None,
         false_alarm=verdict["kind"] not in ("none", FAILED) if kind == "none" else None,
-        unknown_recognised=verdict["kind"] == "unknown" if kind == "unknown" else None,
+        unknown_recognised=_no_known_law(verdict) if kind == "unknown" else None,
         both_named=right if kind == "two" else None,
         share_closed=diagnosis["shrink"]["share_closed"],
         intervals=_rig_intervals(answer, diagnosis) if foreign else own,
@@ -179,6 +180,12 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any], version: str = "") ->
         closed_by_effect=_number_or_none(diagnosis["shrink"].get("closed_by_effect")),
         version=version,
     )
+
+
+def _no_known_law(verdict: Mapping[str, Any]) -> bool:
+    """Whether something is said to be missing that follows no formula of the catalogue."""
+    learned = verdict["kind"] == "effect" and not verdict.get("law_known", True)
+    return learned or verdict["kind"] == "unknown"
 
 
 def _port_right(answer: Answer, verdict: Mapping[str, Any]) -> bool:

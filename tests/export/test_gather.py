@@ -265,7 +265,7 @@ def test_a_diagnosis_is_read_whole(tmp_path: Path, document: dict[str, Any]) -> 
 
 DOCUMENT_FAULTS: dict[str, tuple[object, str]] = {
     "a list": ([], "the document is [], not a table"),
-    "another schema": (MOUNT | {"schema": 2}, "schema is 2"),
+    "another schema": (MOUNT | {"schema": 3}, "schema is 3"),
     "a model.json": ({"schema": 1, "kind": "savgs_ident model"}, "baseline is missing"),
     "no verdict": ({k: v for k, v in MOUNT.items() if k != "verdict"}, "verdict is missing"),
     "no kind": (MOUNT | {"verdict": {"effects": []}}, "verdict.kind is missing"),

@@ -100,6 +100,7 @@ def synthetic_diagnosis(measured: HarmonicResponse, kind: Kind = "effect") -> Di
         identified=rig.parameters.as_dict()
         | {"c_sd": 5386.1, "k_t": 264_100.0, "mu_r": 0.0300}
         | {each.name: each.value for each in _parameters(verdict.effects)},
+        intervals=(Estimate("mu_r", 0.0300, 0.0297, 0.0303, "1"),),
         verdict=verdict,
         ports=tuple(
             PortShare(port, *((0.0, 0.04) if kind == "none" else shares)) for port, shares in SHARES.items()

@@ -40,10 +40,13 @@ CONTRACT: dict[str, object] = {
         "confusable_with": [str],
         "sentence": str,
         "confusable_ports": [str],
+        "families": [str],
+        "law_known": bool,
+        "probability": NUMBER,
         "another_law": bool,
     },
     "where": {
-        "ports": [{"port": str, "share": NUMBER}],
+        "ports": [{"port": str, "probability": NUMBER, "share": NUMBER, "reach": NUMBER}],
         "map": [
             {"channel": str, "frequency_hz": NUMBER, "order": int, "gap_percent": NUMBER, "gap_sigma": NUMBER}
         ],
@@ -51,6 +54,8 @@ CONTRACT: dict[str, object] = {
     "which": [
         {
             "effect": str,
+            "port": (str, type(None)),
+            "family": (str, type(None)),
             "probability": NUMBER,
             "score_sigma": NUMBER,
             "heldout_gain": NUMBER,
@@ -62,6 +67,8 @@ CONTRACT: dict[str, object] = {
         "recalibrated": NUMBER,
         "after": NUMBER,
         "floor": NUMBER,
+        "closed_by_calibration": MAYBE,
+        "closed_by_effect": MAYBE,
         "share_closed": MAYBE,
         "interval": [MAYBE],
         "by_channel": {"sprung_accel": {"before": NUMBER}, "susp_deflection": {"before": NUMBER}},
@@ -76,7 +83,7 @@ def test_the_record_is_the_object_of_the_contract(by_kind: dict[str, Diagnosis])
         record = record_of(by_kind[kind])
         assert list(record)[: len(CONTRACT)] == list(CONTRACT)
         assert has_form(record, CONTRACT)
-        assert record["schema"] == 1
+        assert record["schema"] == 2
         assert record["verdict"]["kind"] == kind
         assert {"none", "unknown"} <= {entry["effect"] for entry in record["which"]}
         assert sum(entry["probability"] for entry in record["which"]) == pytest.approx(1.0, abs=1e-12)
@@ -96,6 +103,7 @@ def test_the_record_holds_the_numbers_of_the_diagnosis(diagnosis: Diagnosis) -> 
     record = record_of(diagnosis)
     assert record["baseline"]["parameters"]["c_sd"] == 5391.2
     assert record["identified"]["c_sd"] == 5386.1
+    assert record["intervals"] == {"mu_r": {"value": 0.03, "lo": 0.0297, "hi": 0.0303, "unit": "1"}}
     assert record["verdict"]["effects"] == ["rail_stribeck"]
     assert record["verdict"]["confusable_with"] == ["rail_preload"]
     assert {entry["port"]: (entry["share"], entry["reach"]) for entry in record["where"]["ports"]} == SHARES

@@ -14,7 +14,7 @@ def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
     ``score_sigma`` are in standard deviations, ``heldout_gain`` is in nats per datum.
     """
     return {
-        "schema": 1,
+        "schema": 2,
         "baseline": {
             "model": diagnosis.model,
             "parameters": dict(diagnosis.parameters),
@@ -53,6 +53,7 @@ def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
         "sweep": _further(diagnosis.further) if diagnosis.further and diagnosis.measured else None,
         "further": diagnosis.further and {"recording": diagnosis.further.name} | _further(diagnosis.further),
         "identified": dict(diagnosis.identified),
+        "intervals": _parameters(diagnosis.intervals),
         "learned": diagnosis.learned and _learned(diagnosis.learned),
         "converged": diagnosis.converged,
         "warnings": diagnosis.warnings,
