@@ -44,6 +44,7 @@ from savgs_ident.diagnosis.result import (
     Candidate,
     Diagnosis,
     DiagnosisSettings,
+    Estimate,
     ForceLoop,
     FurtherShrink,
     Hypothesis,
@@ -350,8 +351,9 @@ def _held_out(
 
 
 def _offered(law: LearnedLaw) -> Learned:
-    coefficients = coefficients_at(law.port)
-    return Learned(law.name, law.port.location, estimates_among(law.mode, coefficients), law.values)
+    every = {name: Estimate(name, 0.0, 0.0, 0.0, unit) for name, unit in law.units.items()}
+    fitted = {each.name: each for each in estimates_among(law.mode, coefficients_at(law.port))}
+    return Learned(law.name, law.port.location, tuple((every | fitted).values()), law.values)
 
 
 def _predict_further(

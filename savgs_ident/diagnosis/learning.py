@@ -6,7 +6,8 @@ parameters, as those of any effect: with a prior, a null and an evidence. So the
 catalogue's formulas, solved, simulated and exported.
 
 Which family the law is of follows from the fit: its functions of all other families are taken away, to first order
-about the fit, and what remains is weighed.
+about the fit, and what remains is weighed. The best family is fitted again by itself; where its functions alone are
+more probable than all together, the law is made of them.
 """
 
 from collections.abc import Mapping
@@ -63,6 +64,12 @@ class LearnedLaw:
         return self.problem.catalogue[self.name]
 
     @property
+    def units(self) -> dict[str, str]:
+        """The coefficients of all its functions, those that it does not have among them, with their units."""
+        coefficients = coefficients_at(self.port)
+        return {each.name: each.unit for each in self.effect.parameters if each.name in coefficients}
+
+    @property
     def values(self) -> dict[str, float]:
         """All its numbers, and those of the plant that were fitted beside it, SI."""
         return self.mode.values | dict(self.spans)
@@ -112,8 +119,21 @@ def learn(
     shapes = tuple(each for each in term_of(effect, constants).shapes if each.name not in spans)
     term = Term(effect.name, port.location, amplitudes, shapes)
     mode = find_map(search, (term,), base.values, there_now.warm_start, STEPS)
-    families = _families(search, mode, port) if mode.solved else {}
-    return LearnedLaw(effect.name, port, term, mine, search, mode, spans, families)
+    law = LearnedLaw(effect.name, port, term, mine, search, mode, spans, {})
+    return _of_one_family(replace(law, families=_families(search, mode, port))) if mode.solved else law
+
+
+def _of_one_family(law: LearnedLaw) -> LearnedLaw:
+    """The law with the functions of its best family alone, where that is more probable than with all."""
+    kept = set(coefficients_of(law.port, law.family))
+    term = replace(law.term, amplitudes=tuple(each for each in law.term.amplitudes if each.name in kept))
+    dropped = {each.name for each in law.term.amplitudes} - kept
+    start = {name: value for name, value in law.mode.values.items() if name not in dropped}
+    alone = find_map(law.search, (term,), start, law.mode.prediction.warm_start, STEPS)
+    if not alone.solved or alone.evidence <= law.mode.evidence:
+        return law
+    families = {**law.families, law.family: alone.evidence}
+    return replace(law, term=term, mode=alone, families=families)
 
 
 def _families(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, float]:
