@@ -72,7 +72,7 @@ class LearnedLaw:
     @property
     def values(self) -> dict[str, float]:
         """All its numbers, and those of the plant that were fitted beside it, SI."""
-        return self.mode.values | dict(self.spans)
+        return dict.fromkeys(self.units, 0.0) | self.mode.values | dict(self.spans)
 
     @property
     def family(self) -> Family:
