@@ -90,6 +90,7 @@ OF_THE_MOTION = (
     Function("max(-x - 0.4, 0)", Family.STOP),
     Function("max(x - 0.8, 0)", Family.STOP),
     Function("max(-x - 0.8, 0)", Family.STOP),
+    Function("x^4", Family.STIFFNESS),
 )
 """Functions of x = (displacement - middle)/stroke and v = velocity/speed."""
 
@@ -169,7 +170,7 @@ def functions(
     smooth = [v, v * jnp.abs(v), v**2, x, x**2, x**3, x * sharp, x * v, x**2 * v]
     stops = [jnp.maximum(side * x - gap, 0.0) for gap in GAPS for side in (1.0, -1.0)]
     loaded = [n * sharp * jnp.exp(-jnp.abs(v) / width) for width in FALLING]
-    return [sharp, blunt, *smooth, *falling, jnp.abs(v), *stops, n * sharp, n * v, n, *loaded]
+    return [sharp, blunt, *smooth, *falling, jnp.abs(v), *stops, x**4, n * sharp, n * v, n, *loaded]
 
 
 def functions_at(port: Port) -> tuple[Function, ...]:

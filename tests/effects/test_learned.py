@@ -45,6 +45,7 @@ LAWS: dict[str, Callable[[float, float, float], float]] = {
     "max(-x - 0.4, 0)": lambda x, v, n: max(-x - 0.4, 0.0),
     "max(x - 0.8, 0)": lambda x, v, n: max(x - 0.8, 0.0),
     "max(-x - 0.8, 0)": lambda x, v, n: max(-x - 0.8, 0.0),
+    "x^4": lambda x, v, n: x**4,
     "n tanh(v/0.01)": lambda x, v, n: n * np.tanh(v / 0.01),
     "n tanh(v/0.01) exp(-|v|/0.05)": lambda x, v, n: n * np.tanh(v / 0.01) * np.exp(-abs(v) / 0.05),
     "n tanh(v/0.01) exp(-|v|/0.2)": lambda x, v, n: n * np.tanh(v / 0.01) * np.exp(-abs(v) / 0.2),
