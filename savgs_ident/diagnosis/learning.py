@@ -12,6 +12,7 @@ more probable than all together, the law is made of them.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,24 +112,46 @@ def learn(
     there_now = mine.predict((effect.name,), base.values, names, start)
     if not there_now.solved:
         return None
-    widths = widths_of(search, base, there_now.slopes, constants)
-    units = {each.name: each.unit for each in effect.parameters}
-    amplitudes = tuple(
-        Linear(name, units[name], 0.0, float(width)) for name, width in zip(names, widths, strict=True)
-    )
     shapes = tuple(each for each in term_of(effect, constants).shapes if each.name not in spans)
-    term = Term(effect.name, port.location, amplitudes, shapes)
+    blank = Term(effect.name, port.location, (), shapes)
+    columns = dict(zip(names, there_now.slopes.T, strict=True))
+    term = _with_amplitudes(blank, effect, search, base, columns, constants)
     mode = find_map(search, (term,), base.values, there_now.warm_start, STEPS)
     law = LearnedLaw(effect.name, port, term, mine, search, mode, spans, {})
-    return _of_one_family(replace(law, families=_families(search, mode, port))) if mode.solved else law
+    if not mode.solved:
+        return law
+    found = _families(search, mode, port)
+    law = replace(law, families={family: each.evidence for family, each in found.items()})
+    kept = {name: columns[name] for name in coefficients_of(port, law.family)}
+    alone = _with_amplitudes(blank, effect, search, base, kept, constants)
+    return _of_one_family(law, alone, found[law.family].start)
 
 
-def _of_one_family(law: LearnedLaw) -> LearnedLaw:
-    """The law with the functions of its best family alone, where that is more probable than with all."""
-    kept = set(coefficients_of(law.port, law.family))
-    term = replace(law.term, amplitudes=tuple(each for each in law.term.amplitudes if each.name in kept))
-    dropped = {each.name for each in law.term.amplitudes} - kept
-    start = {name: value for name, value in law.mode.values.items() if name not in dropped}
+def _with_amplitudes(
+    term: Term,
+    effect: Effect,
+    search: Search,
+    base: LaplaceFit,
+    columns: Mapping[str, NDArray[np.float64]],
+    constants: DecisionConstants,
+) -> Term:
+    """The term with coefficients whose prior is as wide as to first order about the baseline explains most.
+
+    ``columns`` are the change of the rows (m,) per unit of each, by name.
+    """
+    widths = widths_of(search, base, np.stack(list(columns.values()), axis=1), constants)
+    units = {each.name: each.unit for each in effect.parameters}
+    amplitudes = tuple(
+        Linear(name, units[name], 0.0, float(width)) for name, width in zip(columns, widths, strict=True)
+    )
+    return replace(term, amplitudes=amplitudes)
+
+
+def _of_one_family(law: LearnedLaw, term: Term, start: Mapping[str, float]) -> LearnedLaw:
+    """The law with the functions of its best family alone, those of ``term``, where that is more probable.
+
+    It is looked for from ``start`` [SI], by name.
+    """
     alone = find_map(law.search, (term,), start, law.mode.prediction.warm_start, STEPS)
     if not alone.solved or alone.evidence <= law.mode.evidence:
         return law
@@ -136,28 +159,30 @@ def _of_one_family(law: LearnedLaw) -> LearnedLaw:
     return replace(law, term=term, mode=alone, families=families)
 
 
-def _families(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, float]:
-    """Log evidence of each family's functions without those of the others, to first order about the fit."""
-    missed, slopes = search.missed(mode.prediction), search.turned(mode.slopes)
+class _FamilyAlone(NamedTuple):
+    """The functions of one family without those of the others: log evidence, and the best point [SI], by name."""
+
+    evidence: float
+    start: Mapping[str, float]
+
+
+def _families(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, _FamilyAlone]:
+    """Each family's functions without those of the others, to first order about the fit."""
     names = [each.name for each in mode.coordinates]
     of_all = set(coefficients_at(port))
     found = {}
     for family in dict.fromkeys(each.family for each in functions_at(port)):
         mine = set(coefficients_of(port, family))
         kept = np.array([name in mine or name not in of_all for name in names])
-        found[family] = _evidence_without(search, mode, missed, slopes, kept)
+        found[family] = _alone(search, mode, kept)
     return found
 
 
-def _evidence_without(
-    search: Search,
-    mode: LaplaceFit,
-    missed: NDArray[np.float64],
-    slopes: NDArray[np.float64],
-    kept: NDArray[np.bool_],
-) -> float:
-    """Log evidence with the coordinates that are not ``kept`` (n,) at zero, to first order."""
+def _alone(search: Search, mode: LaplaceFit, kept: NDArray[np.bool_]) -> _FamilyAlone:
+    """The fit with the coordinates that are not ``kept`` (n,) at zero, to first order."""
+    missed, slopes = search.missed(mode.prediction), search.turned(mode.slopes)
     coordinates = tuple(each for each, keep in zip(mode.coordinates, kept, strict=True) if keep)
     without = missed + slopes[:, ~kept] @ mode.x[~kept]
     top = linearised_optimum(search.rows, without, slopes[:, kept], mode.x[kept], bounds_of(coordinates))
-    return log_evidence(top.value, top.precision, coordinates)
+    start = {each.name: each.value(float(x)) for each, x in zip(coordinates, top.x, strict=True)}
+    return _FamilyAlone(log_evidence(top.value, top.precision, coordinates), start)

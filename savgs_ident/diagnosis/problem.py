@@ -56,7 +56,7 @@ def term_of(effect: Effect, constants: DecisionConstants = DEFAULTS) -> Term:
     return Term(effect.name, effect.port.location, amplitudes, shapes, effect.tried)
 
 
-MARGIN = 1.1
+MARGIN = 1.5
 """By how much a learned law reaches beyond the baseline's motion, for that of the plant with it is another."""
 
 

@@ -62,7 +62,7 @@ SHARP = (0.01, 0.1)
 FALLING = (0.05, 0.2)
 """Velocities over which a friction falls, as shares of the largest [1]."""
 
-GAPS = (0.4, 0.8)
+GAPS = (0.3, 0.55)
 """Where stops begin, as shares of the stroke [1]."""
 
 STRETCHES = (0.01, 0.1)
@@ -86,10 +86,10 @@ OF_THE_MOTION = (
     Function("tanh(v/0.01) exp(-(v/0.05)^2)", Family.FRICTION),
     Function("tanh(v/0.01) exp(-(v/0.2)^2)", Family.FRICTION),
     Function("|v|", Family.DAMPING),
-    Function("max(x - 0.4, 0)", Family.STOP),
-    Function("max(-x - 0.4, 0)", Family.STOP),
-    Function("max(x - 0.8, 0)", Family.STOP),
-    Function("max(-x - 0.8, 0)", Family.STOP),
+    Function("max(x - 0.3, 0)", Family.STOP),
+    Function("max(-x - 0.3, 0)", Family.STOP),
+    Function("max(x - 0.55, 0)", Family.STOP),
+    Function("max(-x - 0.55, 0)", Family.STOP),
     Function("x^4", Family.STIFFNESS),
 )
 """Functions of x = (displacement - middle)/stroke and v = velocity/speed."""
