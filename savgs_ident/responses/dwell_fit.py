@@ -183,8 +183,8 @@ class ChannelFit:
 
     ``density`` [unit^2] and ``dof`` describe the noise; ``variance`` and ``pseudo_variance`` are E|dX|^2 and
     E(dX^2), ``folded`` the part of the former that comes from orders folded by the sampling; ``drift_hz`` is
-    how far this channel's own fundamental lies above the dwell's, ``drift_variance`` its variance [Hz^2]; ``residual``
-    is what the fit of orders 0..``highest`` leaves of each sample [unit], (N,).
+    how far this channel's own fundamental lies above the dwell's, ``drift_variance`` its variance [Hz^2];
+    ``residual`` is what the fit of orders 0..``highest`` leaves of each sample [unit], (N,).
     """
 
     amplitude: NDArray[np.complex128]

@@ -3,10 +3,10 @@
     >>> response = estimate_response(campaign, orders=9)           # doctest: +SKIP
     >>> accel = response.harmonics[:, response.channel("sprung_accel"), 1]   # doctest: +SKIP
 
-Every dwell is fitted on its actual stamps, channel by channel as far as the sampling carries, spikes and dropouts left
-out; the noise is what does not repeat from period to period; then the time origin is moved to the instant, within half a period of mid-record,
-at which the road's fundamental is real and positive. The checks of a dwell and of its fit follow at the end; their
-findings are warnings of the response.
+Every dwell is fitted on its actual stamps, channel by channel as far as the sampling carries, spikes and dropouts
+left out; the noise is what does not repeat from period to period; then the time origin is moved to the instant,
+within half a period of mid-record, at which the road's fundamental is real and positive. The checks of a dwell and of
+its fit follow at the end; their findings are warnings of the response.
 """
 
 from collections.abc import Mapping

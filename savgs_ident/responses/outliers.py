@@ -4,11 +4,11 @@ A harmonic fit spreads the error of one sample over the record, so that a few wr
 like noise. The samples farthest off the fit are therefore left out first, the fit is repeated without them, and so
 on until no sample is left that is an outlier (:func:`find_outliers`). A sample is one where the residual r of the fit
 
-- exceeds 8 robust standard deviations, s = 1.4826 median |r - median r|, but no less than the sensor's quantisation
-  and 1e-4 of the waveform's standard deviation,
-- stands alone: a run of at most five such samples, or of samples with one and the same value (a sensor that sticks
-  or drops to zero), beside which |r| falls below half of its peak at once,
-- does not recur: at the same phase of most other periods |r| is several times smaller.
+- exceeds 8 robust standard deviations, s = 1.4826 median |r - median r|, or 6 once the channel has an outlier; s is
+  taken no smaller than the sensor's quantisation and 1e-4 of the waveform's standard deviation,
+- stands alone: |r| exceeds a fifth of its peak, and half of the distance above, in a run of at most five samples, or
+  of samples with one and the same value (a sensor that sticks or drops to zero),
+- does not recur: at the same phase of most other periods |r| is a third or less.
 
 Gaussian noise exceeds 8 s once in 1e15 samples. What a mechanism does, such as a step of the friction that comes
 a little early or late or has orders beyond those fitted, recurs at its phase; a transient or a rattle lasts.
@@ -16,31 +16,34 @@ a little early or late or has orders beyond those fitted, recurs at its phase; a
 Reference: P. J. Huber, E. M. Ronchetti, Robust Statistics (2009), sections 5.1 and 7.9.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.responses.periodic_fit import fit_periodic, plan_basis, signals
-
 FARTHEST = 8.0
 """Distance from the fit [robust standard deviations] beyond which a sample may be an outlier."""
+
+FARTHEST_AGAIN = 6.0
+"""The same in a channel in which outliers were found."""
 
 MOST_LEFT_OUT = 0.2
 """Share of the samples up to which outliers are left out; with more, which samples are wrong is not known."""
 
 _NORMAL = 1.4826
+"""Standard deviation of a normal variable over its median absolute deviation."""
 _LEAST_SHARE = 1e-4
-_LONGEST_RUN = 5
-_BRIDGED = 2
-_BESIDE = 2
-_FALL = 0.5
-_PHASE_SAMPLES = 2.5
-_RECURRING = 0.8
-_ABOVE_RECURRING = 3.0
-_GHOST = 0.6
-_PEAK_ABOVE = 5.0
-_LEVEL_RATIO = 0.6
+"""Least standard deviation of a sample, as a share of the waveform's: deviations below matter to no estimate."""
+_LONGEST_RUN, _BRIDGED = 5, 2
+"""Samples of an isolated run, and those of a gap that belongs to it."""
+_EDGE = 0.5
+"""Share of the distance from which on neighbours of an outlier are left out with it."""
+_PHASE_SAMPLES, _RECURRING, _ABOVE_RECURRING, _ECHO = 2.5, 0.6, 3.0, 0.6
+"""Reach [samples] of a phase; quantile of the other periods; how far an outlier exceeds it, less in few periods."""
+_PEAK_ABOVE, _LEVEL_RATIO = 5.0, 0.6
+"""Peak of a run over the level that bounds it, and the ratio of one level to the next."""
 _MOST_ROUNDS = 40
 
 
@@ -48,22 +51,25 @@ _MOST_ROUNDS = 40
 class PeriodicSamples:
     """One channel: ``time`` [s] and ``values`` [unit], (N,), on a fundamental ``frequency`` [Hz].
 
-    Orders up to ``highest`` are fitted; ``floor`` [unit] is the least standard deviation of a sample.
+    ``floor`` [unit] is the least standard deviation of a sample.
     """
 
     time: NDArray[np.float64]
     values: NDArray[np.float64]
     frequency: float
-    highest: int
     floor: float
 
 
+Refit = Callable[[NDArray[np.bool_]], NDArray[np.float64]]
+"""From the samples to leave out, (N,), to the residual of all samples [unit], (N,)."""
+
+
 def find_outliers(
-    samples: PeriodicSamples, residual: NDArray[np.float64], out: NDArray[np.bool_]
+    samples: PeriodicSamples, residual: NDArray[np.float64], out: NDArray[np.bool_], refit: Refit
 ) -> NDArray[np.bool_]:
     """Which samples are outliers, (N,); ``residual`` [unit], (N,), is that of a fit without those in ``out`` (N,).
 
-    Raises :class:`numpy.linalg.LinAlgError` when the samples left do not determine the harmonics.
+    Raises :class:`numpy.linalg.LinAlgError` when the samples left do not determine the fit.
     """
     out = out.copy()
     for _ in range(_MOST_ROUNDS):
@@ -73,23 +79,8 @@ def find_outliers(
         out |= found
         if np.mean(out) > MOST_LEFT_OUT:
             return out
-        residual = residual_without(samples, out)
-    return out & (np.abs(residual) > FARTHEST * _scale(samples, residual[~out]))
-
-
-def residual_without(samples: PeriodicSamples, out: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Residual of all samples, (N,) [unit], from a fit to those that are not ``out`` (N,).
-
-    Raises :class:`numpy.linalg.LinAlgError` when they do not determine the harmonics.
-    """
-    used, highest, frequency = ~out, samples.highest, samples.frequency
-    fit = fit_periodic(
-        plan_basis(samples.time[used], frequency, highest), samples.values[used][None], highest, 0
-    )
-    everywhere = plan_basis(samples.time, frequency, highest)
-    fitted = signals(everywhere.plan, fit.amplitude)[0] + fit.slope[0] * samples.time
-    residual: NDArray[np.float64] = samples.values - fitted
-    return residual
+        residual = refit(out)
+    return out & (np.abs(residual) > _EDGE * FARTHEST_AGAIN * _scale(samples, residual[~out]))
 
 
 def largest_outliers(
@@ -97,44 +88,43 @@ def largest_outliers(
 ) -> NDArray[np.bool_]:
     """The outliers of about the largest size among those not yet ``out``, (N,).
 
-    A run is what exceeds a fifth of its peak, because the fit leaves a share of a large outlier beside it.
+    A run is what exceeds a fifth of its peak, because the fit leaves a share of a large outlier beside it, and half
+    of the distance from which on a sample counts.
     """
     size = np.where(out, 0.0, np.abs(residual))
-    lowest = FARTHEST * _scale(samples, residual[~out])
+    smallest = (FARTHEST_AGAIN if np.any(out) else FARTHEST) * _scale(samples, residual[~out])
+    lowest = _EDGE * smallest
     found = np.zeros_like(out)
-    for level in _levels(float(np.max(size)), lowest):
+    for level in _levels(float(np.max(size)), smallest, lowest):
         clean = level / _PEAK_ABOVE if level > lowest else 0.0
-        smallest = _PEAK_ABOVE * level * _LEVEL_RATIO if level > lowest else level
         for run in _runs(size, level, clean):
             peak = float(np.max(size[run]))
-            if smallest < peak <= _PEAK_ABOVE * level and _is_outlier(samples, size, out, run, clean):
+            counts = peak > smallest and peak / _PEAK_ABOVE <= level
+            if counts and _is_outlier(samples, size, out, run):
                 found[run] = size[run] > level
         if np.any(found):
             break
     return found
 
 
-def _levels(largest: float, lowest: float) -> list[float]:
-    """Levels [unit] from a fifth of the ``largest`` residual down to the ``lowest`` that counts; none below it."""
-    if largest <= lowest:
+def _levels(largest: float, smallest: float, lowest: float) -> list[float]:
+    """Levels [unit] from a fifth of the ``largest`` residual to the ``lowest``; none if it is below ``smallest``."""
+    if largest <= smallest:
         return []
-    count = max(int(np.ceil(np.log(_PEAK_ABOVE * lowest / largest) / np.log(_LEVEL_RATIO))), 0)
-    levels = [largest / _PEAK_ABOVE * _LEVEL_RATIO**k for k in range(count)]
-    return [*(level for level in levels if level > lowest), lowest]
+    levels = [largest / _PEAK_ABOVE]
+    while levels[-1] > lowest:
+        levels.append(levels[-1] * _LEVEL_RATIO)
+    return [*levels[:-1], lowest]
 
 
 def _is_outlier(
-    samples: PeriodicSamples, size: NDArray[np.float64], out: NDArray[np.bool_], run: slice, clean: float
+    samples: PeriodicSamples, size: NDArray[np.float64], out: NDArray[np.bool_], run: slice
 ) -> bool:
-    """Whether a run is short or constant, stands alone, and does not recur."""
-    start, stop, peak = run.start, run.stop, float(np.max(size[run]))
-    for beside in (size[max(start - _BESIDE, 0) : start][::-1], size[stop : stop + _BESIDE]):
-        if np.any(beside >= _FALL * peak) and beside[0] >= clean:
-            return False
-    left_out_nearby = np.count_nonzero(out[max(start - _LONGEST_RUN, 0) : stop + _LONGEST_RUN])
-    length = stop - start
+    """Whether a run is short or constant, and does not recur."""
+    left_out_nearby = np.count_nonzero(out[max(run.start - _LONGEST_RUN, 0) : run.stop + _LONGEST_RUN])
+    length = run.stop - run.start
     short = length <= _LONGEST_RUN and length + left_out_nearby <= 2 * _LONGEST_RUN
-    constant = bool(np.all(samples.values[run] == samples.values[start]))
+    constant = bool(np.all(samples.values[run] == samples.values[run.start]))
     return (short or constant) and not _recurs(samples, size, run)
 
 
@@ -153,11 +143,11 @@ def _runs(size: NDArray[np.float64], level: float, clean: float) -> list[slice]:
         return []
     breaks = [
         i + 1
-        for i, (a, b) in enumerate(zip(places[:-1], places[1:], strict=True))
+        for i, (a, b) in enumerate(pairwise(places))
         if b - a > _BRIDGED + 1 or (b - a > 1 and np.all(size[a + 1 : b] < clean))
     ]
     edges = [0, *breaks, places.size]
-    return [slice(int(places[a]), int(places[b - 1]) + 1) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [slice(int(places[a]), int(places[b - 1]) + 1) for a, b in pairwise(edges)]
 
 
 def _recurs(samples: PeriodicSamples, size: NDArray[np.float64], run: slice) -> bool:
@@ -179,4 +169,4 @@ def _recurs(samples: PeriodicSamples, size: NDArray[np.float64], run: slice) -> 
     if not largest:
         return True
     usual = float(np.quantile(largest, _RECURRING, method="lower"))
-    return bool(size[peak] < min(_ABOVE_RECURRING, _GHOST * shifts.size) * usual)
+    return bool(size[peak] < min(_ABOVE_RECURRING, _ECHO * shifts.size) * usual)

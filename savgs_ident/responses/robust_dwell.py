@@ -1,7 +1,7 @@
 """One dwell without its spikes and dropouts, and the warnings about them.
 
-The outliers of every channel (:mod:`outliers`) are found in the residual of the plain fit and left out of another fit,
-until the same samples stand out of two fits in turn: outliers of the driven channel move the fundamental, which
+The outliers of every channel (:mod:`outliers`) are found in the residual of the plain fit and left out of another
+fit, until the same samples stand out of two fits in turn: outliers of the driven channel move the fundamental, which
 moves the residuals of all channels. A dwell in which no sample stands out keeps the plain fit, number for number.
 """
 
@@ -16,12 +16,11 @@ from savgs_ident.recordings.recording import RecordedChannel, Recording
 from savgs_ident.responses.dwell_fit import DwellFit, fit_dwell, smallest_density
 from savgs_ident.responses.fundamental import ClockGroup
 from savgs_ident.responses.outliers import (
-    FARTHEST,
     MOST_LEFT_OUT,
     PeriodicSamples,
     find_outliers,
-    residual_without,
 )
+from savgs_ident.responses.periodic_fit import fit_periodic, plan_basis, signals
 
 _MOST_REFITS = 4
 _MANY = 0.05
@@ -66,10 +65,9 @@ def fit_robust_dwell(groups: tuple[ClockGroup, ...], road: str, start: float, or
 def _first_outliers(groups: tuple[ClockGroup, ...], fit: DwellFit) -> Outliers:
     found = {}
     for group in groups:
-        for i, name in enumerate(group.names):
-            if name in fit.channels:
-                none = np.zeros(group.time.size, dtype=np.bool_)
-                found[name] = _outliers(_samples(group, i, fit), fit.channels[name].residual, none)
+        for name in (name for name in group.names if name in fit.channels):
+            none = np.zeros(group.time.size, dtype=np.bool_)
+            found[name] = _outliers(group, name, fit, fit.channels[name].residual, none)
     return {name: mask for name, mask in found.items() if np.any(mask)}
 
 
@@ -77,30 +75,43 @@ def _further_outliers(groups: tuple[ClockGroup, ...], fit: DwellFit, outliers: O
     """The outliers at the fundamental of ``fit``, found from ``outliers`` on."""
     found = {}
     for group in groups:
-        for i, name in enumerate(group.names):
-            if name in fit.channels:
-                out = outliers.get(name, np.zeros(group.time.size, dtype=np.bool_))
-                samples = _samples(group, i, fit)
-                if np.mean(out) <= MOST_LEFT_OUT:
-                    out = _outliers(samples, residual_without(samples, out), out)
-                found[name] = out
+        for name in (name for name in group.names if name in fit.channels):
+            out = outliers.get(name, np.zeros(group.time.size, dtype=np.bool_))
+            if _can_leave_out(out):
+                out = _outliers(group, name, fit, residual_without(group, name, fit, out), out)
+            found[name] = out
     return {name: mask for name, mask in found.items() if np.any(mask)}
 
 
-def _samples(group: ClockGroup, i: int, fit: DwellFit) -> PeriodicSamples:
-    floor = float(np.sqrt(smallest_density(group.values[i : i + 1])[0]))
-    highest = fit.channels[group.names[i]].highest
-    return PeriodicSamples(group.time, group.values[i], fit.frequency, highest, floor)
-
-
 def _outliers(
-    samples: PeriodicSamples, residual: NDArray[np.float64], out: NDArray[np.bool_]
+    group: ClockGroup, name: str, fit: DwellFit, residual: NDArray[np.float64], out: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """As :func:`find_outliers`; none where the samples left would not determine the harmonics."""
+    i = group.names.index(name)
+    floor = float(np.sqrt(smallest_density(group.values[i : i + 1])[0]))
+    samples = PeriodicSamples(group.time, group.values[i], fit.frequency, floor)
     try:
-        return find_outliers(samples, residual, out)
+        return find_outliers(samples, residual, out, lambda mask: residual_without(group, name, fit, mask))
     except np.linalg.LinAlgError:
         return np.zeros_like(out)
+
+
+def residual_without(
+    group: ClockGroup, name: str, fit: DwellFit, out: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Residual of all samples of a channel, (N,) [unit], from a fit to those that are not ``out`` (N,).
+
+    The fundamental and the orders are those of ``fit``. Raises :class:`numpy.linalg.LinAlgError` when the samples
+    left do not determine the harmonics.
+    """
+    highest, values = fit.channels[name].highest, group.values[group.names.index(name)]
+    some = fit_periodic(
+        plan_basis(group.time[~out], fit.frequency, highest), values[None, ~out], highest, gains_to=0
+    )
+    everywhere = plan_basis(group.time, fit.frequency, highest)
+    fitted = signals(everywhere.plan, some.amplitude)[0] + some.slope[0] * group.time
+    residual: NDArray[np.float64] = values - fitted
+    return residual
 
 
 def _same(one: Outliers, other: Outliers) -> bool:
@@ -139,7 +150,7 @@ def _mended(groups: tuple[ClockGroup, ...], fit: DwellFit, outliers: Outliers) -
         for i, name in enumerate(group.names):
             if name in outliers and name in fit.channels and _can_leave_out(outliers[name]):
                 out = outliers[name]
-                values[i, out] -= residual_without(_samples(group, i, fit), out)[out]
+                values[i, out] -= residual_without(group, name, fit, out)[out]
         mended.append(replace(group, values=values))
     return tuple(mended)
 
@@ -154,8 +165,8 @@ def check_outliers(source: str, recording: Recording, outliers: Outliers) -> tup
 def _warning(source: str, test: str, channel: RecordedChannel, out: NDArray[np.bool_]) -> DataWarning:
     count, share = int(np.count_nonzero(out)), float(np.mean(out))
     what = (
-        f"{count} of {out.size} samples ({100 * share:.2g} %) are spikes or dropouts, more than {FARTHEST:g} robust"
-        " standard deviations off the periodic waveform;"
+        f"{count} of {out.size} samples ({100 * share:.2g} %) are spikes or dropouts, alone and far off the periodic"
+        " waveform;"
     )
     if share > MOST_LEFT_OUT:
         what += " too many to leave out: the sensor cannot be trusted in this test"
