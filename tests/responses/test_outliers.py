@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import savgs_ident.responses.dwells as dwells
 import savgs_ident.responses.outliers as outliers
+from savgs_ident.plants.quarter_car.model import load_model
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
@@ -18,6 +19,8 @@ from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.outliers import PeriodicSamples
 from savgs_ident.responses.robust_dwell import RobustDwell, check_outliers, fit_dwell
+from savgs_ident.responses.summary import inspect
+from savgs_ident.simulate.excitation import campaign_of, measured_response
 
 NAMES = ("road_height", "sprung_accel", "susp_deflection")
 WARNED = {"outlying_samples", "unreliable_sensor"}
@@ -160,6 +163,16 @@ def test_a_warning_says_where_how_many_and_what_it_means(shipped: Campaign) -> N
     assert "left out: harmonics and noise are those of the other samples" in found[0].what
     assert found[0].time == channel.time[40]
     assert found[0].remedy == "check the sensor's cable and the logger"
+
+
+def test_the_warnings_reach_the_summary_and_the_origin_of_results(shipped: Campaign) -> None:
+    rng = np.random.default_rng(2)
+    campaign = corrupted(shipped, ("sprung_accel",), lambda values: spike(values, 0.002, rng))
+    response = measured_response(campaign, load_model().plant, 9)
+    found = [each for each in response.warnings if each.code in WARNED]
+    assert len(found) == len(campaign.of_kind("dwell"))
+    assert set(found) <= set(load_model().origin(campaign_of(campaign), response.warnings).warnings)
+    assert set(found) <= set(inspect(campaign, orders=9).warnings)
 
 
 def test_a_sensor_with_many_outliers_is_not_trusted(synthetic: Any) -> None:
