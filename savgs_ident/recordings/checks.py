@@ -11,6 +11,7 @@ from dataclasses import replace
 from math import inf
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.checks_signal import (
@@ -28,6 +29,8 @@ from savgs_ident.recordings.recording import RecordedChannel, Recording, Recordi
 _FEWEST_PERIODS, _FEW_PERIODS = 3.0, 6.0
 """Periods below which the noise (what does not repeat) cannot be estimated, or is estimated poorly."""
 _FREQUENCY_OFF = 0.05
+_SPIKE_FILTER = 11
+"""Samples of the median that passes no spike and no dropout of five samples."""
 _LEAST_RATE = 4.0
 """Samples a period below which even the first harmonic is doubtful."""
 _STUCK_SHARE = 0.20
@@ -150,8 +153,8 @@ def check_test(recording: Recording, layout: RecordingLayout, place: DataLocatio
         return _check_still(recording, layout, place)
     if recording.kind != "dwell":
         return ()
-    measured = measure_frequency(recording.channels[layout.driven])
     nominal = recording.frequency_hz
+    measured = _frequency_near(recording.channels[layout.driven], nominal)
     frequency = nominal or measured
     periods = recording.duration_s * frequency
     if periods < _FEWEST_PERIODS:
@@ -179,6 +182,16 @@ def measure_frequency(road: RecordedChannel) -> float:
     if up.size < 2:
         return 0.0
     return float((up.size - 1) / (road.time[up[-1]] - road.time[up[0]]))
+
+
+def _frequency_near(road: RecordedChannel, nominal: float | None) -> float:
+    """Frequency [Hz] of the driven channel; without its spikes where only so it is ``nominal`` [Hz]."""
+    measured = measure_frequency(road)
+    if nominal is not None and abs(measured / nominal - 1.0) > _FREQUENCY_OFF:
+        smooth = measure_frequency(replace(road, values=median_filter(road.values, _SPIKE_FILTER)))
+        if abs(smooth / nominal - 1.0) <= _FREQUENCY_OFF:
+            return smooth
+    return measured
 
 
 def _few_periods(periods: float, place: DataLocation) -> tuple[DataWarning, ...]:

@@ -21,6 +21,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from savgs_ident.core.errors import DataWarning
+
 if TYPE_CHECKING:
     from savgs_ident.plants.model import Model
     from savgs_ident.recordings.recording import RecordingLayout
@@ -120,6 +122,20 @@ def plain(text: object, style: str = "") -> Text:
         for char in str(text).replace("\u202f", " ")
     )
     return Text(shown, style=style)
+
+
+def data_warnings(warnings: Sequence[DataWarning]) -> list[Text]:
+    """What the checks of the data found, with a heading: the first of each kind and channel, and how many more."""
+    if not warnings:
+        return []
+    kinds: dict[tuple[str, str], list[DataWarning]] = {}
+    for warning in warnings:
+        kinds.setdefault((warning.code, warning.channel), []).append(warning)
+    shown = [plain("Warnings about the data", "bold")]
+    for first, *others in kinds.values():
+        more = f" ({len(others)} more of this kind in this channel)" if others else ""
+        shown.append(plain(f"- {first}{more}"))
+    return shown
 
 
 def table(

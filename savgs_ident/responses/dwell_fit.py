@@ -65,15 +65,21 @@ class NoiseDensity:
 
 
 def estimate_noise_density(
-    time: NDArray[np.float64], residual: NDArray[np.float64], frequency: float, highest: int, orders: int
+    time: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    frequency: float,
+    highest: int,
+    orders: int,
+    left_out: int = 0,
 ) -> NoiseDensity:
     """Noise density at orders 0..``orders`` of ``residual`` (C, N), left by a fit of orders 0..``highest``.
 
-    ``time`` [s] of shape (N,), ``frequency`` [Hz] the fundamental. Beyond the last frequency that the data
-    resolve, the density is that of the last one.
+    ``time`` [s] of shape (N,), ``frequency`` [Hz] the fundamental; ``left_out`` samples of the record are not among
+    them. Beyond the last frequency that the data resolve, the density is that of the last one.
     """
-    span = float(time[-1] - time[0]) * time.size / (time.size - 1)
-    lines, kept = _lines_between(span * frequency, time.size, highest, orders)
+    count = time.size + left_out
+    span = float(time[-1] - time[0]) * count / (count - 1)
+    lines, kept = _lines_between(span * frequency, count, highest, orders)
     power = _line_power(time, residual, span, int(lines[-1]))[:, lines] / kept
     level = np.maximum(np.mean(power, axis=1, keepdims=True), np.finfo(np.float64).tiny)
     wanted = np.minimum(np.arange(orders + 1) * span * frequency, lines[-1])
@@ -177,7 +183,8 @@ class ChannelFit:
 
     ``density`` [unit^2] and ``dof`` describe the noise; ``variance`` and ``pseudo_variance`` are E|dX|^2 and
     E(dX^2), ``folded`` the part of the former that comes from orders folded by the sampling; ``drift_hz`` is
-    how far this channel's own fundamental lies above the dwell's, ``drift_variance`` its variance [Hz^2].
+    how far this channel's own fundamental lies above the dwell's, ``drift_variance`` its variance [Hz^2];
+    ``residual`` is what the fit of orders 0..``highest`` leaves of each sample [unit], (N,).
     """
 
     amplitude: NDArray[np.complex128]
@@ -189,6 +196,8 @@ class ChannelFit:
     noise_sd: float
     drift_hz: float
     drift_variance: float
+    residual: NDArray[np.float64]
+    highest: int
 
 
 @dataclass(frozen=True)
@@ -245,8 +254,8 @@ def _fit_group(group: ClockGroup, frequency: float, orders: int) -> dict[str, Ch
     highest = highest_fitted_order(group, frequency)
     basis = plan_basis(group.time, frequency, highest)
     fit = fit_periodic(basis, group.values, highest, last)
-    noise = estimate_noise_density(group.time, fit.residual, frequency, highest, last)
-    floor = _smallest_density(group.values)[:, None]
+    noise = estimate_noise_density(group.time, fit.residual, frequency, highest, last, group.left_out)
+    floor = smallest_density(group.values)[:, None]
     density = np.maximum(noise.density, floor)
     folded = _folded_power(fit.amplitude, density, fit.gain, shared_line(group, frequency), last)
     kept = fit.amplitude[:, : last + 1]
@@ -265,6 +274,8 @@ def _fit_group(group: ClockGroup, frequency: float, orders: int) -> dict[str, Ch
             float(noise_sd[i]),
             float(step[i]),
             float(variance[i]),
+            fit.residual[i],
+            highest,
         )
         for i, name in enumerate(group.names)
     }
@@ -298,7 +309,7 @@ def _folded_power(
     return folded
 
 
-def _smallest_density(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def smallest_density(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Variance that rounding alone leaves, (C,): of the sensor's quantisation where visible, else of the arithmetic.
 
     Rounding error repeats with the signal where the period is a whole number of samples, so the

@@ -3,10 +3,10 @@
     >>> response = estimate_response(campaign, orders=9)           # doctest: +SKIP
     >>> accel = response.harmonics[:, response.channel("sprung_accel"), 1]   # doctest: +SKIP
 
-Every dwell is fitted on its actual stamps, channel by channel as far as the sampling carries; the noise is what does
-not repeat from period to period; then the time origin is moved to the instant, within half a period of mid-record,
-at which the road's fundamental is real and positive. The checks of a dwell and of its fit follow at the end; their
-findings are warnings of the response.
+Every dwell is fitted on its actual stamps, channel by channel as far as the sampling carries, spikes and dropouts
+left out; the noise is what does not repeat from period to period; then the time origin is moved to the instant,
+within half a period of mid-record, at which the road's fundamental is real and positive. The checks of a dwell and of
+its fit follow at the end; their findings are warnings of the response.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.recording import Campaign, Recording
-from savgs_ident.responses.dwell_fit import ChannelFit, DwellFit, fit_dwell
+from savgs_ident.responses.dwell_fit import ChannelFit, DwellFit
 from savgs_ident.responses.fundamental import (
     ClockGroup,
     coarse_frequency,
@@ -24,6 +24,7 @@ from savgs_ident.responses.fundamental import (
     highest_valid_order,
 )
 from savgs_ident.responses.harmonic_response import HarmonicResponse, unbiased_peak_to_peak
+from savgs_ident.responses.robust_dwell import check_outliers, fit_robust_dwell
 
 FEWEST_PERIODS = 3
 _FREQUENCY_MISS = 0.02
@@ -45,8 +46,9 @@ def estimate_response(campaign: Campaign, orders: int = 15, driven: str = "") ->
     seen in periodic data: stamps are taken as true up to their rate, which is checked.
 
     Dwells that cannot be used are left out with a warning: ``no_road_motion``, ``too_few_periods`` (3 are
-    needed to separate noise from signal), ``not_determined``. Further warnings: ``frequency_differs``,
-    ``not_steady``, ``clock_rate_differs``, ``noise_above_standstill``, ``folded_orders``.
+    needed to separate noise from signal), ``not_determined``. Further warnings: ``outlying_samples``,
+    ``unreliable_sensor``, ``frequency_differs``, ``not_steady``, ``clock_rate_differs``, ``noise_above_standstill``,
+    ``folded_orders``.
 
     Raises :class:`InputError` when ``orders`` is below 1 or no dwell can be used.
     """
@@ -77,7 +79,7 @@ def _fit_all(
         start, refusal = _start_frequency(campaign.source, recording, groups, driven)
         if refusal is None:
             try:
-                fit = fit_dwell(groups, driven, start, orders)
+                dwell = fit_robust_dwell(groups, driven, start, orders)
             except np.linalg.LinAlgError:
                 what = "the time stamps do not determine the harmonics"
                 remedy = "look for repeated or clustered time stamps"
@@ -87,8 +89,9 @@ def _fit_all(
         if refusal is not None:
             warnings += (refusal,)
             continue
-        fits[recording.name], kept[recording.name] = fit, groups
-        warnings += check_frequency(campaign.source, recording, fit.frequency, driven)
+        fits[recording.name], kept[recording.name] = dwell.fit, dwell.groups
+        warnings += check_outliers(campaign.source, recording, dwell.outliers)
+        warnings += check_frequency(campaign.source, recording, dwell.fit.frequency, driven)
     return fits, kept, warnings
 
 

@@ -45,11 +45,15 @@ _FEWEST_SAMPLES = 16
 
 @dataclass(frozen=True)
 class ClockGroup:
-    """Channels that share their stamps: ``time`` [s], (N,), and ``values`` [unit], (C, N), all finite."""
+    """Channels that share their stamps: ``time`` [s], (N,), and ``values`` [unit], (C, N), all finite.
+
+    ``left_out`` is how many samples of the record were left out as outliers.
+    """
 
     names: tuple[str, ...]
     time: NDArray[np.float64]
     values: NDArray[np.float64]
+    left_out: int = 0
 
     @cached_property
     def rate_hz(self) -> float:

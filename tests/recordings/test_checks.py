@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
-from savgs_ident.recordings.checks import measure_frequency
-from savgs_ident.recordings.checks_signal import check_clipping
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
+from savgs_ident.recordings.checks import check_test, measure_frequency
+from savgs_ident.recordings.checks_signal import DataLocation, check_clipping
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 
 Signals = dict[str, NDArray[np.float64]]
@@ -270,6 +270,18 @@ def test_the_frequency_of_the_road_is_measured(frequency: float, phase: float) -
         "road_height", "m", time, 0.014 * np.sin(2 * np.pi * frequency * time + phase) + 0.002
     )
     assert measure_frequency(road) == pytest.approx(frequency, rel=0.02)
+
+
+def test_spikes_of_the_road_are_no_other_frequency() -> None:
+    time = np.arange(4000) / 250.0
+    values = 0.014 * np.sin(2 * np.pi * 1.5 * time)
+    values[[200, 700, 1300, 1301, 2100, 3000]] += 0.04
+    values[[500, 900, 2500, 3500]] -= 0.04
+    road = RecordedChannel("road_height", "m", time, values)
+    for said, codes in ((1.5, []), (1.8, ["frequency_mismatch"])):
+        recording = Recording("dwell", "dwell", said, {"road_height": road})
+        found = check_test(recording, RIG_LAYOUT, DataLocation("a.csv", "dwell"))
+        assert [warning.code for warning in found] == codes
 
 
 @pytest.mark.parametrize("condition", ["nominal", "stribeck_rail", "mount_compliance", "accel_lag"])

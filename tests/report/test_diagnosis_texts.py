@@ -217,3 +217,9 @@ def test_both_files_are_written_and_the_same_diagnosis_gives_the_same_page(
     assert [file.name for file in files] == ["diagnosis.json", "diagnosis.html"]
     assert json.loads(files[0].read_text()) == record_of(diagnosis)
     assert files[1].read_text(encoding="utf-8") == source
+
+
+def test_the_text_shows_the_warnings_about_the_data(diagnosis: Diagnosis) -> None:
+    assert "Warnings about the data" not in rendered(replace(diagnosis, origin=Origin()))
+    text = rendered(replace(diagnosis, origin=ORIGIN))
+    assert text.index("Warnings about the data") < text.index("[odd] test 'dwell_2': something")

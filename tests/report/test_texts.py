@@ -85,6 +85,21 @@ def test_dwells_that_were_not_solved_are_named(fit: Fit) -> None:
     assert "was not found in: dwell_6.00Hz" in text.replace("\n", " ")
 
 
+def test_the_text_of_a_fit_shows_the_warnings_about_the_data(fit: Fit) -> None:
+    assert "Warnings about the data" not in rendered(fit_text(replace(fit, origin=Origin())))
+    tests = [
+        DataWarning("outlying_samples", "9 of 800 samples", "a.csv", f"dwell_{i}Hz", "accel")
+        for i in (1, 2, 3)
+    ]
+    other = DataWarning("clipped_sensor", "stands at its end", "a.csv", "dwell_2Hz", "road")
+    text = " ".join(rendered(fit_text(replace(fit, origin=Origin(warnings=(*tests, other))))).split())
+    assert text.index("Verdict") < text.index("Warnings about the data")
+    assert "[outlying_samples] a.csv, test 'dwell_1Hz', channel 'accel'" in text
+    assert "(2 more of this kind in this channel)" in text
+    assert "dwell_3Hz" not in text
+    assert "[clipped_sensor]" in text
+
+
 def test_the_record_of_a_fit_has_the_keys_of_the_contract(fit: Fit) -> None:
     record = as_json(fit_record(fit))
     assert {"parameters", "correlation", "chi2", "dof", "converged", "gap", "dwells"} <= set(record)

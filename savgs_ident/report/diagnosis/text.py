@@ -21,6 +21,7 @@ from savgs_ident.diagnosis.result import (
 from savgs_ident.report.text import (
     DASH,
     channel_label,
+    data_warnings,
     decimal,
     interval,
     numeral,
@@ -207,6 +208,7 @@ def diagnosis_text(diagnosis: Diagnosis) -> RenderableType:
         *_next_tests(diagnosis),
         *_not_judgeable(diagnosis),
         *_warnings(diagnosis),
+        *data_warnings(diagnosis.origin.warnings),
     )
 
 

@@ -1,0 +1,172 @@
+"""Spikes and dropouts of a periodic record: samples that lie far off the waveform that all others follow.
+
+A harmonic fit spreads the error of one sample over the record, so that a few wrong samples hide each other and look
+like noise. The samples farthest off the fit are therefore left out first, the fit is repeated without them, and so
+on until no sample is left that is an outlier (:func:`find_outliers`). A sample is one where the residual r of the fit
+
+- exceeds 8 robust standard deviations, s = 1.4826 median |r - median r|, or 6 once the channel has an outlier; s is
+  taken no smaller than the sensor's quantisation and 1e-4 of the waveform's standard deviation,
+- stands alone: |r| exceeds a fifth of its peak, and half of the distance above, in a run of at most five samples, or
+  of samples with one and the same value (a sensor that sticks or drops to zero),
+- does not recur: at the same phase of most other periods |r| is a third or less.
+
+Gaussian noise exceeds 8 s once in 1e15 samples. What a mechanism does, such as a step of the friction that comes
+a little early or late or has orders beyond those fitted, recurs at its phase; a transient or a rattle lasts.
+
+Reference: P. J. Huber, E. M. Ronchetti, Robust Statistics (2009), sections 5.1 and 7.9.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+FARTHEST = 8.0
+"""Distance from the fit [robust standard deviations] beyond which a sample may be an outlier."""
+
+FARTHEST_AGAIN = 6.0
+"""The same in a channel in which outliers were found."""
+
+MOST_LEFT_OUT = 0.2
+"""Share of the samples up to which outliers are left out; with more, which samples are wrong is not known."""
+
+_NORMAL = 1.4826
+"""Standard deviation of a normal variable over its median absolute deviation."""
+_LEAST_SHARE = 1e-4
+"""Least standard deviation of a sample, as a share of the waveform's: deviations below matter to no estimate."""
+_LONGEST_RUN, _BRIDGED = 5, 2
+"""Samples of an isolated run, and those of a gap that belongs to it."""
+_EDGE = 0.5
+"""Share of the distance from which on neighbours of an outlier are left out with it."""
+_PHASE_SAMPLES, _RECURRING, _ABOVE_RECURRING, _ECHO = 2.5, 0.6, 3.0, 0.6
+"""Reach [samples] of a phase; quantile of the other periods; how far an outlier exceeds it, less in few periods."""
+_PEAK_ABOVE, _LEVEL_RATIO = 5.0, 0.6
+"""Peak of a run over the level that bounds it, and the ratio of one level to the next."""
+_MOST_ROUNDS = 40
+
+
+@dataclass(frozen=True)
+class PeriodicSamples:
+    """One channel: ``time`` [s] and ``values`` [unit], (N,), on a fundamental ``frequency`` [Hz].
+
+    ``floor`` [unit] is the least standard deviation of a sample.
+    """
+
+    time: NDArray[np.float64]
+    values: NDArray[np.float64]
+    frequency: float
+    floor: float
+
+
+Refit = Callable[[NDArray[np.bool_]], NDArray[np.float64]]
+"""From the samples to leave out, (N,), to the residual of all samples [unit], (N,)."""
+
+
+def find_outliers(
+    samples: PeriodicSamples, residual: NDArray[np.float64], out: NDArray[np.bool_], refit: Refit
+) -> NDArray[np.bool_]:
+    """Which samples are outliers, (N,); ``residual`` [unit], (N,), is that of a fit without those in ``out`` (N,).
+
+    Raises :class:`numpy.linalg.LinAlgError` when the samples left do not determine the fit.
+    """
+    out = out.copy()
+    for _ in range(_MOST_ROUNDS):
+        found = largest_outliers(samples, residual, out)
+        if not np.any(found):
+            break
+        out |= found
+        if np.mean(out) > MOST_LEFT_OUT:
+            return out
+        residual = refit(out)
+    return out & (np.abs(residual) > _EDGE * FARTHEST_AGAIN * _scale(samples, residual[~out]))
+
+
+def largest_outliers(
+    samples: PeriodicSamples, residual: NDArray[np.float64], out: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """The outliers of about the largest size among those not yet ``out``, (N,).
+
+    A run is what exceeds a fifth of its peak, because the fit leaves a share of a large outlier beside it, and half
+    of the distance from which on a sample counts.
+    """
+    size = np.where(out, 0.0, np.abs(residual))
+    smallest = (FARTHEST_AGAIN if np.any(out) else FARTHEST) * _scale(samples, residual[~out])
+    lowest = _EDGE * smallest
+    found = np.zeros_like(out)
+    for level in _levels(float(np.max(size)), smallest, lowest):
+        clean = level / _PEAK_ABOVE if level > lowest else 0.0
+        for run in _runs(size, level, clean):
+            peak = float(np.max(size[run]))
+            counts = peak > smallest and peak / _PEAK_ABOVE <= level
+            if counts and _is_outlier(samples, size, out, run):
+                found[run] = size[run] > level
+        if np.any(found):
+            break
+    return found
+
+
+def _levels(largest: float, smallest: float, lowest: float) -> list[float]:
+    """Levels [unit] from a fifth of the ``largest`` residual to the ``lowest``; none if it is below ``smallest``."""
+    if largest <= smallest:
+        return []
+    levels = [largest / _PEAK_ABOVE]
+    while levels[-1] > lowest:
+        levels.append(levels[-1] * _LEVEL_RATIO)
+    return [*levels[:-1], lowest]
+
+
+def _is_outlier(
+    samples: PeriodicSamples, size: NDArray[np.float64], out: NDArray[np.bool_], run: slice
+) -> bool:
+    """Whether a run is short or constant, and does not recur."""
+    left_out_nearby = np.count_nonzero(out[max(run.start - _LONGEST_RUN, 0) : run.stop + _LONGEST_RUN])
+    length = run.stop - run.start
+    short = length <= _LONGEST_RUN and length + left_out_nearby <= 2 * _LONGEST_RUN
+    constant = bool(np.all(samples.values[run] == samples.values[run.start]))
+    return (short or constant) and not _recurs(samples, size, run)
+
+
+def _scale(samples: PeriodicSamples, residual: NDArray[np.float64]) -> float:
+    """Robust standard deviation [unit] of a sample."""
+    spread = _NORMAL * float(np.median(np.abs(residual - np.median(residual))))
+    middle = np.median(samples.values)
+    waveform = _NORMAL * float(np.median(np.abs(samples.values - middle)))
+    return max(spread, samples.floor, _LEAST_SHARE * waveform)
+
+
+def _runs(size: NDArray[np.float64], level: float, clean: float) -> list[slice]:
+    """Runs of samples whose ``size`` exceeds ``level``; gaps of two are bridged unless all in them is ``clean``."""
+    places = np.flatnonzero(size > level)
+    if places.size == 0:
+        return []
+    breaks = [
+        i + 1
+        for i, (a, b) in enumerate(pairwise(places))
+        if b - a > _BRIDGED + 1 or (b - a > 1 and np.all(size[a + 1 : b] < clean))
+    ]
+    edges = [0, *breaks, places.size]
+    return [slice(int(places[a]), int(places[b - 1]) + 1) for a, b in pairwise(edges)]
+
+
+def _recurs(samples: PeriodicSamples, size: NDArray[np.float64], run: slice) -> bool:
+    """Whether residuals like that of the run are found at its phase in other periods.
+
+    The residual that an outlier leaves in the n other periods of a fit is 1 / n of its own at most: where n is small,
+    the factor is.
+    """
+    time = samples.time
+    peak = run.start + int(np.argmax(size[run]))
+    period, reach = 1.0 / samples.frequency, _PHASE_SAMPLES * float(np.median(np.diff(time)))
+    before = int((time[peak] - time[0]) / period)
+    after = int((time[-1] - time[peak]) / period)
+    shifts = np.concatenate([np.arange(-before, 0), np.arange(1, after + 1)])
+    if shifts.size == 0:
+        return True
+    edges = np.searchsorted(time, time[peak] + shifts[:, None] * period + np.array([-reach, reach]))
+    largest = [float(np.max(size[a:b])) for a, b in edges if b > a]
+    if not largest:
+        return True
+    usual = float(np.quantile(largest, _RECURRING, method="lower"))
+    return bool(size[peak] < min(_ABOVE_RECURRING, _ECHO * shifts.size) * usual)
