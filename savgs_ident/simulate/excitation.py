@@ -123,11 +123,11 @@ def every_so_many(response: HarmonicResponse, step: int) -> HarmonicResponse:
 
 
 def _only(response: HarmonicResponse, kept: NDArray[np.int64]) -> HarmonicResponse:
-    dof = None if response.covariance_dof is None else response.covariance_dof[kept]
+    optional = {name: getattr(response, name) for name in ("covariance_dof", "recorded")}
     return replace(
         response,
         tests=tuple(response.tests[d] for d in kept),
-        covariance_dof=dof,
+        **{name: None if value is None else value[kept] for name, value in optional.items()},
         **{name: getattr(response, name)[kept] for name in _FIELDS},
     )
 

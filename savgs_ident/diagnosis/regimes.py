@@ -1,0 +1,288 @@
+"""In which regimes the recalibrated baseline fails: speed, stroke, load, direction, kind of test, time.
+
+A regime is a part of what was recorded. Within the cycle it is a third of the instants of every test, by the speed,
+the displacement or the load at a port, or the half in which the port moves in one direction; among tests it is a
+third of them, by frequency or by the size of the response. For a regime R of a residual waveform w (test d, channel
+c, instant i) the statistic is
+
+    T = log mean_R(w^2 / s^2) - log mean_elsewhere(w^2 / s^2),      s^2 (d, c): what is expected of w^2 there
+
+and its p-value the share of residuals drawn from the fitted error model that are as concentrated. Such a residual is
+
+    r = y - J P^-1 J' S^-1 y,      y = e + J x,
+
+e drawn with the noise scale and the discrepancy of the fit, x from the prior: what the parameters would take up is
+taken out of a draw as it is out of the residual (J slopes, P precision of the fit, S spread of the rows).
+
+The last regime is a drift: in every test the residual is projected on the slope in each identified parameter, and the
+coefficients are regressed on the time at which the tests were recorded. The statistic is the largest |t| of these
+slopes, held against the same draws.
+
+Regimes of which nine tenths coincide in a campaign cannot be told apart by it and are one: where the port moves like
+a sine, the instants of high speed are those of small stroke. All p-values are corrected together by Holm's method.
+
+Source: Holm 1979, A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6(2).
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.diagnosis.result import Regime
+from savgs_ident.effects.base import PortKind
+from savgs_ident.inference.find_map import LaplaceFit
+from savgs_ident.inference.observations import Data
+
+if TYPE_CHECKING:
+    from savgs_ident.diagnosis.dwell_problem import DwellProblem
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+DRAWS = 999
+"""Residuals drawn from the error model: p-values are multiples of a thousandth."""
+
+FLOOR_DRAWS = 200
+"""Draws of the noise alone, for the floor of a gap."""
+
+SEED = 11
+
+INSTANTS = 64
+"""Instants of a cycle: six to a period of the tenth order."""
+
+ALIKE = 0.9
+"""Share of their union from which two regimes are one; correlation from which time and frequency are."""
+
+FEWEST_TESTS = 4
+"""A trend over fewer tests has no scatter to be compared with."""
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """The waveforms of D tests in C channels at I instants, and what regimes are told apart by.
+
+    Attributes:
+        waves: turns rows (S, m) [unit of the reading] into waveforms (S, D, C, I); zero where nothing is compared.
+        velocity: at the port that is looked at, (D, I).
+        displacement: there, (D, I).
+        load: of the port that carries most, (D, I); None where none carries anything.
+        frequency: of the tests [Hz], (D,).
+        recorded: when each test of the data was recorded, in any unit of time, (t,).
+    """
+
+    waves: Callable[[Array], Array]
+    velocity: Array
+    displacement: Array
+    frequency: Array
+    recorded: Array
+    load: Array | None = field(default=None)
+
+
+def find_regimes(
+    cycles: Cycles, data: Data, fit: LaplaceFit, free: Sequence[str] = (), draws: int = DRAWS
+) -> tuple[Regime, ...]:
+    """The regimes of a campaign with the gap in each, the most significant first.
+
+    ``fit`` is that of the recalibrated baseline to ``data``, ``free`` names the parameters that it identifies; where
+    there are none, a drift is looked for in all of them. The time is that of ``cycles.recorded``.
+    """
+    residual = data.measured - fit.prediction.rows
+    stacked = np.concatenate([residual[None], drawn_residuals(data, fit, draws)])
+    waves = cycles.waves(stacked)
+    named = _joined(dict(_masks(cycles, data)))
+    gaps = [_gap(cycles, data, waves[0] ** 2, mask) for mask in named.values()]
+    p_values = [_p_value(each) for each in concentrations(waves, list(named.values()))]
+    names = list(named)
+    columns = [n for n, each in enumerate(fit.coordinates) if each.name in free or not free]
+    trend = _trend(data, fit, stacked, fit.slopes[:, columns], cycles.recorded)
+    if trend is not None:
+        largest, rows = trend
+        names.append(_drift_name(cycles))
+        p_values.append(_p_value(largest))
+        gaps.append(_gap_of_trend(cycles, data, rows))
+    found = zip(names, gaps, holm(np.array(p_values)), strict=True)
+    return tuple(sorted((Regime(*each) for each in found), key=lambda each: each.p_value))
+
+
+def drawn_residuals(data: Data, fit: LaplaceFit, draws: int, seed: int = SEED) -> Array:
+    """Residuals (S, m) [unit of each row] of data drawn from the fitted error model, after a fit like ``fit``."""
+    random, scales = np.random.default_rng(seed), fit.noise_scales
+    errors = np.stack(
+        [data.draw_errors(scales.noise, scales.discrepancy, random) for _ in range(draws)], axis=1
+    )
+    errors += fit.slopes @ random.standard_normal((fit.slopes.shape[1], draws))
+    weighted = data.turned(fit.slopes) / scales.spread[:, None]
+    taken_up = np.linalg.solve(fit.precision, weighted.T @ data.turned(errors))
+    return np.asarray((errors - fit.slopes @ taken_up).T)
+
+
+def concentrations(waves: Array, regimes: Sequence[Mask]) -> Array:
+    """T of waveforms (S, D, C, I) in each regime, masks (D, I); (R, S). The first is not among those expected."""
+    squares = waves**2
+    expected = squares[1:].mean(axis=(0, 3))
+    present = expected > 0.0
+    counted = np.divide(1.0, expected, out=np.zeros_like(expected), where=present)
+    tests, instants = present.sum(axis=1).astype(float), squares.shape[3]
+    by_instant = np.einsum("sdci,dc->sdi", squares, counted).reshape(len(squares), -1)
+    size = np.repeat(tests, instants)
+    inside = np.stack([mask.ravel() for mask in regimes]).astype(float) if regimes else np.zeros((0, size.size))
+    within, beside = inside @ by_instant.T, (1.0 - inside) @ by_instant.T
+    ratio = within / beside * ((1.0 - inside) @ size / np.maximum(inside @ size, 1.0))[:, None]
+    return np.asarray(np.log(np.maximum(ratio, np.finfo(float).tiny)))
+
+
+def holm(p_values: Array) -> tuple[float, ...]:
+    """P-values (k,) corrected for all of them by Holm's method."""
+    order = np.argsort(p_values)
+    factors = p_values.size - np.arange(p_values.size)
+    corrected = np.empty(p_values.size)
+    corrected[order] = np.minimum(np.maximum.accumulate(factors * p_values[order]), 1.0)
+    return tuple(float(each) for each in corrected)
+
+
+def _p_value(statistic: Array) -> float:
+    """Share of the statistics (S,) that are at least the first."""
+    return float(np.mean(statistic >= statistic[0]))
+
+
+def _masks(cycles: Cycles, data: Data) -> Iterator[tuple[str, Mask]]:
+    """Regimes by name, (D, I)."""
+    middle = cycles.displacement.mean(axis=1, keepdims=True)
+    yield from _thirds("low speed", "high speed", np.abs(cycles.velocity))
+    yield from _thirds("small stroke", "large stroke", np.abs(cycles.displacement - middle))
+    if cycles.load is not None:
+        yield from _thirds("low load", "high load", cycles.load)
+    if np.any(cycles.velocity):
+        yield "positive direction", cycles.velocity > 0.0
+        yield "negative direction", cycles.velocity < 0.0
+    waves = cycles.waves(data.measured[None])[0]
+    size = waves.std(axis=2)
+    largest = size.max(axis=0)
+    relative = np.mean(size[:, largest > 0.0] / largest[largest > 0.0], axis=1)
+    shape = cycles.velocity.shape
+    for names, values in (
+        (("slow tests", "fast tests"), cycles.frequency),
+        (("small response", "large response"), relative),
+    ):
+        for name, mask in _thirds(*names, values[None]):
+            yield name, np.broadcast_to(mask.T, shape)
+
+
+def _thirds(low: str, high: str, values: Array) -> Iterator[tuple[str, Mask]]:
+    """The lowest and the highest third of values (D, n) in each row; none of fewer than three, or of equal ones."""
+    count = values.shape[1]
+    if count < 3 or not np.all(np.ptp(values, axis=1) > 1e-9 * np.abs(values).max(axis=1)):
+        return
+    rank = np.argsort(np.argsort(values, axis=1, kind="stable"), axis=1, kind="stable")
+    yield low, rank < count // 3
+    yield high, rank >= count - count // 3
+
+
+def _joined(masks: Mapping[str, Mask]) -> dict[str, Mask]:
+    """The same with those that coincide as one, under both names."""
+    found: list[tuple[list[str], Mask]] = []
+    for name, mask in masks.items():
+        for names, other in found:
+            if np.sum(mask & other) >= ALIKE * np.sum(mask | other):
+                names.append(name)
+                break
+        else:
+            found.append(([name], mask))
+    return {" or ".join(names): mask for names, mask in found}
+
+
+def _gap(cycles: Cycles, data: Data, squares: Array, mask: Mask) -> float:
+    """Relative rms [%] of a residual with ``squares`` (D, C, I) in a regime, beyond the noise."""
+    random = np.random.default_rng(SEED)
+    noise = np.sqrt(data.variance) * random.standard_normal((FLOOR_DRAWS, data.variance.size))
+    floor = np.mean(cycles.waves(noise) ** 2, axis=(0, 3))
+    counts = mask.sum(axis=1)[:, None]
+    there = np.einsum("dci,di->dc", squares, mask.astype(float)) / np.maximum(counts, 1)
+    return _percent(cycles, data, there - floor, np.broadcast_to(counts > 0, floor.shape))
+
+
+def _percent(cycles: Cycles, data: Data, squares: Array, mask: Mask) -> float:
+    """Mean ``squares`` (D, C) as a relative rms [%]; every test and channel in ``mask`` (D, C) counts alike."""
+    power = np.var(cycles.waves(data.measured[None])[0], axis=2)
+    counted = mask & (power > 0.0)
+    if not np.any(counted):
+        return 0.0
+    return float(100.0 * np.sqrt(max(float(np.mean(squares[counted] / power[counted])), 0.0)))
+
+
+def _trend(
+    data: Data, fit: LaplaceFit, rows: Array, slopes: Array, recorded: Array
+) -> tuple[Array, Array] | None:
+    """The largest |t| (S,) of a linear trend over time in residuals ``rows`` (S, m), and the trend as rows (S, m).
+
+    ``slopes`` (m, q) [unit of each row] are the directions whose coefficients are regressed. None where there are too
+    few tests.
+    """
+    if data.tests < FEWEST_TESTS or np.ptp(recorded) == 0.0:
+        return None
+    weighted = slopes / data.marginal(fit.noise_scales.noise, fit.noise_scales.discrepancy)[:, None]
+    mine = [data.test == test for test in range(data.tests)]
+    known = np.stack([np.sum(weighted[each] * slopes[each], axis=0) for each in mine])
+    seen = np.all(known > 1e-12 * known.max(axis=0), axis=0) & (known.max(axis=0) > 0.0)
+    if not np.any(seen):
+        return None
+    known, slopes, weighted = known[:, seen], slopes[:, seen], weighted[:, seen]
+    coefficients = np.stack([rows[:, each] @ weighted[each] for each in mine], axis=1) / known
+    late = recorded[:, None] - np.sum(known * recorded[:, None], axis=0) / known.sum(axis=0)
+    about = coefficients - np.sum(known * coefficients, axis=1, keepdims=True) / known.sum(axis=0)
+    spread = np.sum(known * late**2, axis=0)
+    trend = np.sum(known * late * about, axis=1) / spread
+    left = np.sum(known * (about - trend[:, None] * late) ** 2, axis=1) / (data.tests - 2)
+    t = np.abs(trend) * np.sqrt(spread / np.maximum(left, np.finfo(float).tiny))
+    best = np.argmax(t, axis=1)
+    steepest = np.take_along_axis(trend, best[:, None], axis=1)
+    return np.max(t, axis=1), steepest * (late[data.test] * slopes).T[best]
+
+
+def _gap_of_trend(cycles: Cycles, data: Data, rows: Array) -> float:
+    """What the first of the trends (S, m) changes [%], beyond what the others do on average."""
+    squares = np.mean(cycles.waves(rows) ** 2, axis=3)
+    beyond = squares[0] - squares[1:].mean(axis=0)
+    return _percent(cycles, data, beyond, np.ones(beyond.shape, bool))
+
+
+def _drift_name(cycles: Cycles) -> str:
+    """A drift; with a warning where the tests were recorded in the order of their frequencies."""
+    if cycles.frequency.size < 3:
+        return "drift over time"
+    both = np.stack([np.argsort(np.argsort(each)) for each in (cycles.recorded, cycles.frequency)])
+    alike = abs(float(np.corrcoef(both)[0, 1])) >= ALIKE
+    return "drift over time or frequency" if alike else "drift over time"
+
+
+def dwell_cycles(problem: "DwellProblem", fit: LaplaceFit) -> Cycles:
+    """The cycles of dwells about the motion of ``fit``.
+
+    Speed, stroke and direction are those at the plant's first force port; the load is that of the loaded port that
+    carries most.
+    """
+    phase = 2.0 * np.pi * np.arange(INSTANTS) / INSTANTS
+    turns = np.exp(1j * np.arange(problem.shape[2])[:, None] * phase)
+    solution = fit.prediction.warm_start
+    nodes, at = solution.mesh.layout.dwell, np.asarray(solution.mesh.phase)
+
+    def over_cycle(signal: object) -> Array:
+        values = np.asarray(signal, np.float64)
+        tests = [nodes == test for test in range(problem.shape[0])]
+        return np.stack([np.interp(phase, at[each], values[each], period=2.0 * np.pi) for each in tests])
+
+    seen = problem.port_signals(fit.values, solution)
+    forces = [each for each in problem.plant.ports if each.kind is PortKind.FORCE]
+    loads = [np.asarray(seen[each.name].load) for each in forces if each.loaded]
+    motion = seen[forces[0].name]
+    return Cycles(
+        waves=lambda rows: np.real(problem.likelihood.harmonics(rows, problem.shape) @ turns),
+        velocity=over_cycle(motion.velocity),
+        displacement=over_cycle(motion.displacement),
+        load=over_cycle(max(loads, key=lambda each: float(np.abs(each).mean()))) if loads else None,
+        frequency=np.asarray(problem.excitation.frequency),
+        recorded=np.array(problem.recorded or range(problem.shape[0]), np.float64),
+    )
