@@ -12,7 +12,9 @@ and its p-value the share of residuals drawn from the fitted error model that ar
     r = y - J P^-1 J' S^-1 y,      y = e + J x,
 
 e drawn with the noise scale and the discrepancy of the fit, x from the prior: what the parameters would take up is
-taken out of a draw as it is out of the residual (J slopes, P precision of the fit, S spread of the rows).
+taken out of a draw as it is out of the residual (J slopes, P precision of the fit, S spread of the rows). A
+discrepancy that is beyond what its prior allows for small errors is a misfit, and no reference to hold it against:
+errors are drawn with no more than the prior's 95 % quantile.
 
 The last regime is a drift: in every test the residual is projected on the slope in each identified parameter, and the
 coefficients are regressed on the time at which the tests were recorded. The statistic is the largest |t| of these
@@ -49,6 +51,9 @@ FLOOR_DRAWS = 200
 """Draws of the noise alone, for the floor of a gap."""
 
 SEED = 11
+
+SMALL = 1.96
+"""The 95 % quantile of a half-normal prior, in its width."""
 
 INSTANTS = 64
 """Instants of a cycle: six to a period of the tenth order."""
@@ -91,18 +96,19 @@ def find_regimes(
     """
     residual = data.measured - fit.prediction.rows
     stacked = np.concatenate([residual[None], drawn_residuals(data, fit, draws)])
-    waves = cycles.waves(stacked)
+    noise = drawn_noise(data)
+    waves, floor = cycles.waves(stacked), np.mean(cycles.waves(noise) ** 2, axis=(0, 3))
     named = _joined(dict(_masks(cycles, data)))
-    gaps = [_gap(cycles, data, waves[0] ** 2, mask) for mask in named.values()]
-    p_values = [_p_value(each) for each in concentrations(waves, list(named.values()))]
-    names = list(named)
+    names, masks = list(named), list(named.values())
+    p_values = [_p_value(each) for each in concentrations(waves, masks)]
+    gaps = [_gap(cycles, data, waves[0] ** 2, floor, mask) for mask in masks]
     columns = [n for n, each in enumerate(fit.coordinates) if each.name in free or not free]
-    trend = _trend(data, fit, stacked, fit.slopes[:, columns], cycles.recorded)
+    trend = _trend(data, fit, np.concatenate([stacked, noise]), fit.slopes[:, columns], cycles.recorded)
     if trend is not None:
-        largest, rows = trend
+        largest, trends = trend
         names.append(_drift_name(cycles))
-        p_values.append(_p_value(largest))
-        gaps.append(_gap_of_trend(cycles, data, rows))
+        p_values.append(_p_value(largest[: len(stacked)]))
+        gaps.append(_gap_of_trend(cycles, data, trends[:1], trends[len(stacked) :]))
     found = zip(names, gaps, holm(np.array(p_values)), strict=True)
     return tuple(sorted((Regime(*each) for each in found), key=lambda each: each.p_value))
 
@@ -110,13 +116,18 @@ def find_regimes(
 def drawn_residuals(data: Data, fit: LaplaceFit, draws: int, seed: int = SEED) -> Array:
     """Residuals (S, m) [unit of each row] of data drawn from the fitted error model, after a fit like ``fit``."""
     random, scales = np.random.default_rng(seed), fit.noise_scales
-    errors = np.stack(
-        [data.draw_errors(scales.noise, scales.discrepancy, random) for _ in range(draws)], axis=1
-    )
+    discrepancy = min(scales.discrepancy, SMALL * data.scales.discrepancy)
+    errors = np.stack([data.draw_errors(scales.noise, discrepancy, random) for _ in range(draws)], axis=1)
     errors += fit.slopes @ random.standard_normal((fit.slopes.shape[1], draws))
     weighted = data.turned(fit.slopes) / scales.spread[:, None]
     taken_up = np.linalg.solve(fit.precision, weighted.T @ data.turned(errors))
     return np.asarray((errors - fit.slopes @ taken_up).T)
+
+
+def drawn_noise(data: Data) -> Array:
+    """The noise of the rows alone (S, m) [unit of each row], at the scale that was measured."""
+    random = np.random.default_rng(SEED)
+    return np.sqrt(data.variance) * random.standard_normal((FLOOR_DRAWS, data.variance.size))
 
 
 def concentrations(waves: Array, regimes: Sequence[Mask]) -> Array:
@@ -194,11 +205,8 @@ def _joined(masks: Mapping[str, Mask]) -> dict[str, Mask]:
     return {" or ".join(names): mask for names, mask in found}
 
 
-def _gap(cycles: Cycles, data: Data, squares: Array, mask: Mask) -> float:
-    """Relative rms [%] of a residual with ``squares`` (D, C, I) in a regime, beyond the noise."""
-    random = np.random.default_rng(SEED)
-    noise = np.sqrt(data.variance) * random.standard_normal((FLOOR_DRAWS, data.variance.size))
-    floor = np.mean(cycles.waves(noise) ** 2, axis=(0, 3))
+def _gap(cycles: Cycles, data: Data, squares: Array, floor: Array, mask: Mask) -> float:
+    """Relative rms [%] of a residual with ``squares`` (D, C, I) in a regime, beyond the noise's ``floor`` (D, C)."""
     counts = mask.sum(axis=1)[:, None]
     there = np.einsum("dci,di->dc", squares, mask.astype(float)) / np.maximum(counts, 1)
     return _percent(cycles, data, there - floor, np.broadcast_to(counts > 0, floor.shape))
@@ -242,11 +250,10 @@ def _trend(
     return np.max(t, axis=1), steepest * (late[data.test] * slopes).T[best]
 
 
-def _gap_of_trend(cycles: Cycles, data: Data, rows: Array) -> float:
-    """What the first of the trends (S, m) changes [%], beyond what the others do on average."""
-    squares = np.mean(cycles.waves(rows) ** 2, axis=3)
-    beyond = squares[0] - squares[1:].mean(axis=0)
-    return _percent(cycles, data, beyond, np.ones(beyond.shape, bool))
+def _gap_of_trend(cycles: Cycles, data: Data, trend: Array, noise: Array) -> float:
+    """What a trend (1, m) changes [%], beyond what those in the ``noise`` (S, m) do on average."""
+    found, floor = (np.mean(cycles.waves(rows) ** 2, axis=(0, 3)) for rows in (trend, noise))
+    return _percent(cycles, data, found - floor, np.ones(floor.shape, bool))
 
 
 def _drift_name(cycles: Cycles) -> str:
