@@ -139,7 +139,9 @@ def concentrations(waves: Array, regimes: Sequence[Mask]) -> Array:
     tests, instants = present.sum(axis=1).astype(float), squares.shape[3]
     by_instant = np.einsum("sdci,dc->sdi", squares, counted).reshape(len(squares), -1)
     size = np.repeat(tests, instants)
-    inside = np.stack([mask.ravel() for mask in regimes]).astype(float) if regimes else np.zeros((0, size.size))
+    inside = (
+        np.stack([mask.ravel() for mask in regimes]).astype(float) if regimes else np.zeros((0, size.size))
+    )
     within, beside = inside @ by_instant.T, (1.0 - inside) @ by_instant.T
     ratio = within / beside * ((1.0 - inside) @ size / np.maximum(inside @ size, 1.0))[:, None]
     return np.asarray(np.log(np.maximum(ratio, np.finfo(float).tiny)))
@@ -261,7 +263,7 @@ def _drift_name(cycles: Cycles) -> str:
     if cycles.frequency.size < 3:
         return "drift over time"
     both = np.stack([np.argsort(np.argsort(each)) for each in (cycles.recorded, cycles.frequency)])
-    alike = abs(float(np.corrcoef(both)[0, 1])) >= ALIKE
+    alike = abs(float(np.asarray(np.corrcoef(both))[0, 1])) >= ALIKE
     return "drift over time or frequency" if alike else "drift over time"
 
 

@@ -192,7 +192,7 @@ def _assemble(
 
 
 def _recorded(campaign: Campaign, tests: tuple[str, ...]) -> NDArray[np.float64]:
-    """When each test was recorded: its start [s since 1970] where all have one, otherwise its place in the campaign."""
+    """When each test was recorded: its start [s since 1970] where all have one, otherwise its place among them."""
     listed = [each for each in campaign.recordings if each.name in tests]
     starts = [each.start for each in listed if each.start is not None]
     known = starts if len(starts) == len(listed) else range(len(listed))

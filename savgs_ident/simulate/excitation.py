@@ -123,11 +123,12 @@ def every_so_many(response: HarmonicResponse, step: int) -> HarmonicResponse:
 
 
 def _only(response: HarmonicResponse, kept: NDArray[np.int64]) -> HarmonicResponse:
-    optional = {name: getattr(response, name) for name in ("covariance_dof", "recorded")}
+    dof, recorded = response.covariance_dof, response.recorded
     return replace(
         response,
         tests=tuple(response.tests[d] for d in kept),
-        **{name: None if value is None else value[kept] for name, value in optional.items()},
+        covariance_dof=None if dof is None else dof[kept],
+        recorded=None if recorded is None else recorded[kept],
         **{name: getattr(response, name)[kept] for name in _FIELDS},
     )
 

@@ -65,7 +65,9 @@ def test_a_misfit_at_high_speed_is_found_there_and_nowhere_else() -> None:
 
 def test_a_misfit_in_the_fast_tests_is_found_there() -> None:
     random = np.random.default_rng(4)
-    there = np.where(np.arange(PLANT.x.size) >= 4 * PLANT.points, 0.05 * random.standard_normal(PLANT.x.size), 0.0)
+    there = np.where(
+        np.arange(PLANT.x.size) >= 4 * PLANT.points, 0.05 * random.standard_normal(PLANT.x.size), 0.0
+    )
     data = _with(draw(PLANT, {}, NOISE, seed=2), there)
     assert "fast tests" in _significant(find_regimes(_cycles(), data, _fitted(data)))
 
@@ -75,13 +77,13 @@ def test_a_slope_that_fades_is_found_as_a_drift() -> None:
     data = _with(draw(PLANT, {}, NOISE, seed=3), -0.02 * late * PLANT.x)
     fit = _fitted(data)
     found = find_regimes(_cycles(), data, fit)
-    assert _significant(found)["drift over time"] == pytest.approx(
-        100.0 * 0.02 * np.std(RECORDED), rel=0.15
-    )
+    assert _significant(found)["drift over time"] == pytest.approx(100.0 * 0.02 * np.std(RECORDED), rel=0.15)
     # In another order it would not be one; in that of the frequencies it could as well be something else.
     shuffled = find_regimes(_cycles([0.0, 1.0, 4.0, 5.0, 3.0, 2.0]), data, fit)
     assert "drift over time" not in _significant(shuffled)
-    assert "drift over time or frequency" in [each.name for each in find_regimes(_cycles(range(6)), data, fit)]
+    assert "drift over time or frequency" in [
+        each.name for each in find_regimes(_cycles(range(6)), data, fit)
+    ]
 
 
 def test_data_of_the_error_model_have_no_regime_more_often_than_the_level_says() -> None:
@@ -129,7 +131,12 @@ def test_instants_that_coincide_are_one_regime() -> None:
     phase = 2.0 * np.pi * (np.arange(PLANT.points) + 0.5) / PLANT.points
     angle = np.tile(phase, (PLANT.tests, 1))
     same = Cycles(
-        _cycles().waves, np.cos(angle), np.sin(angle), _cycles().frequency, RECORDED, load=np.abs(np.cos(angle))
+        _cycles().waves,
+        np.cos(angle),
+        np.sin(angle),
+        _cycles().frequency,
+        RECORDED,
+        load=np.abs(np.cos(angle)),
     )
     data = draw(PLANT, {}, NOISE, seed=7)
     names = {each.name for each in find_regimes(same, data, _fitted(data), draws=19)}

@@ -1,6 +1,7 @@
 """Figures of a diagnosis draw what it says: gaps over the noise, loops, maps."""
 
 from dataclasses import replace
+from itertools import pairwise
 from math import isfinite
 
 import numpy as np
@@ -221,7 +222,9 @@ def test_regimes_are_bars_at_their_per_cent_and_the_significant_ones_stand_out(d
     assert axes.get_xlabel() == "gap there [% of the response]"
     names = [each.get_text().replace("\n", " ") for each in axes.get_yticklabels()]
     assert names == [each.name for each in diagnosis.regimes]
-    assert_allclose([bar.get_width() for bar in axes.patches], [each.gap_percent for each in diagnosis.regimes])
+    assert_allclose(
+        [bar.get_width() for bar in axes.patches], [each.gap_percent for each in diagnosis.regimes]
+    )
     assert len({bar.get_facecolor() for bar in axes.patches[:2]}) == 1
     assert axes.patches[0].get_facecolor() not in {bar.get_facecolor() for bar in axes.patches[2:]}
     assert [each.get_text() for each in axes.texts] == ["p = 0.012", "p = 0.041"]
@@ -235,14 +238,16 @@ def test_regimes_are_readable_on_a_narrow_screen(diagnosis: Diagnosis) -> None:
     pixels = 400.0 / figure.bbox.width
     boxes = [each.get_window_extent(canvas.get_renderer()) for each in figure.axes[0].get_yticklabels()]
     assert min(box.x0 for box in boxes) >= 0.0
-    assert all(below.y1 <= above.y0 for above, below in zip(boxes, boxes[1:], strict=False))
+    assert all(below.y1 <= above.y0 for above, below in pairwise(boxes))
     lines = [each.get_text().count("\n") + 1 for each in figure.axes[0].get_yticklabels()]
     assert min(pixels * box.height / count for box, count in zip(boxes, lines, strict=True)) >= 9.0
     shown = [each.get_window_extent(canvas.get_renderer()).x1 for each in figure.axes[0].texts]
     assert max(shown) <= figure.bbox.width
 
 
-def test_without_regimes_there_is_no_picture_and_none_significant_says_so(by_kind: dict[str, Diagnosis]) -> None:
+def test_without_regimes_there_is_no_picture_and_none_significant_says_so(
+    by_kind: dict[str, Diagnosis],
+) -> None:
     assert regime_picture(replace(by_kind["effect"], regimes=())) is None
     quiet = regime_picture(by_kind["none"])
     assert quiet is not None
