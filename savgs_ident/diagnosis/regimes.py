@@ -22,8 +22,9 @@ own: a drift of the friction is greatest in slow tests. So there are two referen
 p-value is the larger one of both.
 
 The last regime is a drift: in every test the residual is projected on the slope in each identified parameter, and the
-coefficients are regressed on the time at which the tests were recorded. The statistic is the largest |t| of these
-slopes, held against the same draws.
+coefficients are regressed on the time at which the tests were recorded. It must be a trend, and more than is
+tolerated: the largest |t| of the regressions is held against the draws without shared errors, the largest trend in
+standard deviations of the rows against those with them, which have the tolerated drifts.
 
 Regimes of which nine tenths coincide in a campaign cannot be told apart by it and are one: where the port moves like
 a sine, the instants of high speed are those of small stroke. All p-values are corrected together by Holm's method.
@@ -33,7 +34,7 @@ Source: Holm 1979, A simple sequentially rejective multiple test procedure, Scan
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,15 +107,17 @@ def find_regimes(
     named = _joined(dict(_masks(cycles, data)))
     names, masks = list(named), list(named.values())
     spread = _spread(cycles, data, fit, floor)
-    p_values = [_p_value(each, len(drawn)) for each in concentrations(waves, spread, masks)]
+    p_values = [max(_p_values(each, len(drawn))) for each in concentrations(waves, spread, masks)]
     gaps = [_gap(cycles, data, waves[0] ** 2, floor, mask) for mask in masks]
     columns = [n for n, each in enumerate(fit.coordinates) if each.name in free or not free]
     trend = _trend(data, fit, np.concatenate([stacked, noise]), fit.slopes[:, columns], cycles.recorded)
     if trend is not None:
-        largest, trends = trend
+        some, rows = len(stacked), trend.rows
         names.append(_drift_name(cycles))
-        p_values.append(_p_value(largest[: len(stacked)], len(drawn)))
-        gaps.append(_gap_of_trend(cycles, data, trends[:1], trends[len(stacked) :]))
+        p_values.append(
+            max(_p_values(trend.size[:some], len(drawn))[0], _p_values(trend.t[:some], len(drawn))[-1])
+        )
+        gaps.append(_gap_of_trend(cycles, data, rows[:1], rows[some:]))
     found = zip(names, gaps, holm(np.array(p_values)), strict=True)
     return tuple(sorted((Regime(*each) for each in found), key=lambda each: each.p_value))
 
@@ -174,10 +177,10 @@ def holm(p_values: Array) -> tuple[float, ...]:
     return tuple(float(each) for each in corrected)
 
 
-def _p_value(statistic: Array, references: int) -> float:
-    """Share of statistics that are at least the first of (S,), itself among them; the largest of the references."""
+def _p_values(statistic: Array, references: int) -> list[float]:
+    """Shares of statistics that are at least the first of (S,), by reference; the first is among each."""
     beyond = (statistic[1:] >= statistic[0]).reshape(references, -1)
-    return float(np.max((1.0 + beyond.sum(axis=1)) / (1.0 + beyond.shape[1])))
+    return [float(each) for each in (1.0 + beyond.sum(axis=1)) / (1.0 + beyond.shape[1])]
 
 
 def _masks(cycles: Cycles, data: Data) -> Iterator[tuple[str, Mask]]:
@@ -242,10 +245,22 @@ def _percent(cycles: Cycles, data: Data, squares: Array, mask: Mask) -> float:
     return float(100.0 * np.sqrt(max(float(np.mean(squares[counted] / power[counted])), 0.0)))
 
 
-def _trend(
-    data: Data, fit: LaplaceFit, rows: Array, slopes: Array, recorded: Array
-) -> tuple[Array, Array] | None:
-    """The largest |t| (S,) of a linear trend over time in residuals ``rows`` (S, m), and the trend as rows (S, m).
+class _Trend(NamedTuple):
+    """The largest trend over time of residuals.
+
+    Attributes:
+        t: largest |t| of a regression [1], (S,).
+        size: largest trend in standard deviations of independent rows [1], (S,).
+        rows: the trend with the largest |t| [unit of each row], (S, m).
+    """
+
+    t: Array
+    size: Array
+    rows: Array
+
+
+def _trend(data: Data, fit: LaplaceFit, rows: Array, slopes: Array, recorded: Array) -> _Trend | None:
+    """Linear trends over time in residuals ``rows`` (S, m) [unit of each row].
 
     ``slopes`` (m, q) [unit of each row] are the directions whose coefficients are regressed. None where there are too
     few tests.
@@ -265,10 +280,11 @@ def _trend(
     spread = np.sum(known * late**2, axis=0)
     trend = np.sum(known * late * about, axis=1) / spread
     left = np.sum(known * (about - trend[:, None] * late) ** 2, axis=1) / (data.tests - 2)
-    t = np.abs(trend) * np.sqrt(spread / np.maximum(left, np.finfo(float).tiny))
+    size = np.abs(trend) * np.sqrt(spread)
+    t = size / np.sqrt(np.maximum(left, np.finfo(float).tiny))
     best = np.argmax(t, axis=1)
     steepest = np.take_along_axis(trend, best[:, None], axis=1)
-    return np.max(t, axis=1), steepest * (late[data.test] * slopes).T[best]
+    return _Trend(t.max(axis=1), size.max(axis=1), steepest * (late[data.test] * slopes).T[best])
 
 
 def _gap_of_trend(cycles: Cycles, data: Data, trend: Array, noise: Array) -> float:

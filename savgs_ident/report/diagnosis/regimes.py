@@ -83,6 +83,7 @@ def regime_note(diagnosis: Diagnosis) -> str:
     return (
         f"Gap of the recalibrated model beyond the noise. Speed, stroke and direction are those{where}; low and high"
         " are thirds of the instants of each test, slow and fast thirds of the tests; the gap of a drift is what a"
-        " linear trend over time changes. Coloured, with its p-value: the misfit is more concentrated there than the errors"
-        f" of a good model would be (below {100.0 * LEVEL:.0f} %, corrected for all regimes by Holm's method)."
+        " linear trend over time changes. Coloured, with its p-value: the misfit is more concentrated there than the"
+        " errors of a good model would be"
+        f" (below {100.0 * LEVEL:.0f} %, corrected for all regimes by Holm's method)."
     )
