@@ -221,6 +221,7 @@ def _diagnose(
         ports=_port_shares(evidence, candidates),
         map=plant.gap_map(data, base.prediction.rows),
         cycle=plant.cycle_positions(data, base.prediction.rows),
+        regimes=plant.regimes(problem.search.data, base),
         candidates=candidates,
         shrink=together,
         by_channel=by_channel,

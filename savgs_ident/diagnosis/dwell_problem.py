@@ -29,7 +29,8 @@ from savgs_ident.diagnosis.location_hypotheses import input_locations
 from savgs_ident.diagnosis.loops import force_loops
 from savgs_ident.diagnosis.next_test import next_tests
 from savgs_ident.diagnosis.problem import AbstractProblem, largest_with_margin, spans_of_force
-from savgs_ident.diagnosis.result import CyclePosition, ForceLoop, MapCell, NextTest, Responses
+from savgs_ident.diagnosis.regimes import dwell_cycles, find_regimes
+from savgs_ident.diagnosis.result import CyclePosition, ForceLoop, MapCell, NextTest, Regime, Responses
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Port, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
@@ -99,6 +100,7 @@ class DwellProblem(AbstractProblem):
         settings: how finely to solve.
         corrections: by terms, what is added to the rows [unit of each], (m,), for the motions that are
             found on finitely many nodes.
+        recorded: when each test was recorded, in any unit of time; the tests are in that order where empty.
     """
 
     excitation: Excitation = field(kw_only=True)
@@ -106,6 +108,7 @@ class DwellProblem(AbstractProblem):
     shape: tuple[int, int, int] = field(kw_only=True)
     settings: PeriodicSettings = field(kw_only=True)
     corrections: Mapping[tuple[str, ...], NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
+    recorded: tuple[float, ...] = field(default=(), kw_only=True)
 
     @cached_property
     def layout(self) -> Layout:
@@ -315,6 +318,10 @@ class DwellProblem(AbstractProblem):
         """The gap of the waveforms at reversal, in mid-stroke and between."""
         return cycle_positions(self, data, rows)
 
+    def regimes(self, data: Data, fit: LaplaceFit) -> tuple[Regime, ...]:
+        """In which regimes the baseline misses: of the cycle, of the tests, and over time."""
+        return find_regimes(dwell_cycles(self, fit), data, fit, self.free)
+
     def loops(
         self,
         values: Mapping[str, float],
@@ -377,6 +384,7 @@ def dwell_problem(
         settings=settings or PeriodicSettings(),
         models=tuple(models),
         constants=constants,
+        recorded=() if measured.recorded is None else tuple(measured.recorded.tolist()),
     )
     test = np.repeat(np.arange(tests), 2 * channels * kept)[likelihood.place]
     data = Data(

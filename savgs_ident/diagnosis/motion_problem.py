@@ -29,7 +29,15 @@ from savgs_ident.diagnosis.location_hypotheses import (
     prandtl_element,
 )
 from savgs_ident.diagnosis.problem import AbstractProblem, spans_of_force
-from savgs_ident.diagnosis.result import CyclePosition, DriveForces, ForceLoop, FurtherShrink, NextTest
+from savgs_ident.diagnosis.regimes import Cycles, find_regimes
+from savgs_ident.diagnosis.result import (
+    CyclePosition,
+    DriveForces,
+    ForceLoop,
+    FurtherShrink,
+    NextTest,
+    Regime,
+)
 from savgs_ident.effects.base import Family, Port, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned import STRETCHES
@@ -254,6 +262,18 @@ class MotionProblem(AbstractProblem):
             float(square[some].sum() / square.sum()) for some in (speed < REVERSAL, speed > MID_STROKE)
         )
         return (CyclePosition(self.channels[0], at_reversal, at_middle, 1.0 - at_reversal - at_middle),)
+
+    def regimes(self, data: Data, fit: LaplaceFit) -> tuple[Regime, ...]:
+        """In which regimes the baseline misses: of the motion, and over time."""
+        rows = self.motion.rows
+        cycles = Cycles(
+            waves=lambda forces: forces[:, None, None, :],
+            velocity=rows(self.motion.velocity)[None],
+            displacement=rows(self.motion.position)[None],
+            frequency=np.array([1.0 / self.motion.period]),
+            recorded=np.arange(data.tests, dtype=np.float64),
+        )
+        return find_regimes(cycles, data, fit, self.free)
 
     def loops(
         self, values: Mapping[str, float], warm_start: Any, found: Localisation, effect: Effect | None

@@ -32,6 +32,7 @@ from savgs_ident.diagnosis.result import (
     ForceLoop,
     MapCell,
     NextTest,
+    Regime,
     Responses,
 )
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
@@ -268,6 +269,10 @@ class AbstractProblem(ABC):
     @abstractmethod
     def cycle_positions(self, data: Data, rows: NDArray[np.float64]) -> tuple[CyclePosition, ...]:
         """Where in the cycle of the motion a prediction (m,) [units of the rows] misses."""
+
+    @abstractmethod
+    def regimes(self, data: Data, fit: LaplaceFit) -> tuple[Regime, ...]:
+        """In which regimes the baseline misses, by its ``fit`` to ``data``, the most significant first."""
 
     @abstractmethod
     def loops(

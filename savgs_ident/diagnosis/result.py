@@ -139,6 +139,21 @@ class CyclePosition:
 
 
 @dataclass(frozen=True)
+class Regime:
+    """The gap of the recalibrated baseline in a part of what was recorded.
+
+    Attributes:
+        name: what distinguishes that part; several joined by "or" where this campaign cannot tell them apart.
+        gap_percent: relative rms of the residual there, beyond the noise [%].
+        p_value: probability of a misfit as concentrated there by chance, corrected for all regimes looked at.
+    """
+
+    name: str
+    gap_percent: float
+    p_value: float
+
+
+@dataclass(frozen=True)
 class Estimate:
     """A parameter of an effect with its 95 % interval, SI."""
 
@@ -375,6 +390,7 @@ class Diagnosis(Result):
         warnings: what a reader must know, a sentence each.
         wall_s: how long it took [s].
         learned: the correction for something unknown, where it is a force and could be fitted.
+        regimes: where in speed, stroke, load, direction, tests and time it lies, the most significant first.
     """
 
     presenter: ClassVar[str] = "DIAGNOSIS"
@@ -403,6 +419,7 @@ class Diagnosis(Result):
     warnings: tuple[str, ...]
     wall_s: float
     learned: Learned | None = None
+    regimes: tuple[Regime, ...] = ()
 
     @property
     def trusted(self) -> bool:

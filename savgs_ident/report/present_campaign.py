@@ -243,8 +243,11 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
         from savgs_ident.report.diagnosis.compared import diagnosis_bode_figure, drive_figure
         from savgs_ident.report.diagnosis.drawing import rig_figure
         from savgs_ident.report.diagnosis.figures import force_figure, gap_map_figure, shrink_figure
+        from savgs_ident.report.diagnosis.regimes import regime_figure
 
         shrink: Figures = {"shrink": lambda: shrink_figure(result)}
+        if result.regimes:
+            shrink = {**shrink, "regimes": lambda: regime_figure(result)}
         loops: Figures = {
             f"force {number}": partial(force_figure, result, loop) for number, loop in enumerate(result.loops)
         }

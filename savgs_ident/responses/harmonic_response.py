@@ -40,6 +40,8 @@ class HarmonicResponse:
             relative variance is 2 / dof. None where the covariance is known rather than estimated. A
             quadratic form weighted with the inverse of an estimated covariance is too large by
             dof / (dof - 2) on average.
+        recorded: when each dwell was recorded, (D,): its start [s since 1970] where all dwells have one, otherwise
+            its place among them in the campaign [1]; None where neither is known.
     """
 
     tests: tuple[str, ...]
@@ -55,6 +57,7 @@ class HarmonicResponse:
     periods: NDArray[np.int64]
     warnings: tuple[DataWarning, ...] = ()
     covariance_dof: NDArray[np.float64] | None = None
+    recorded: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         for value in vars(self).values():

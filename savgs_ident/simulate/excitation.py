@@ -123,11 +123,12 @@ def every_so_many(response: HarmonicResponse, step: int) -> HarmonicResponse:
 
 
 def _only(response: HarmonicResponse, kept: NDArray[np.int64]) -> HarmonicResponse:
-    dof = None if response.covariance_dof is None else response.covariance_dof[kept]
+    dof, recorded = response.covariance_dof, response.recorded
     return replace(
         response,
         tests=tuple(response.tests[d] for d in kept),
-        covariance_dof=dof,
+        covariance_dof=None if dof is None else dof[kept],
+        recorded=None if recorded is None else recorded[kept],
         **{name: getattr(response, name)[kept] for name in _FIELDS},
     )
 

@@ -16,7 +16,7 @@ from .test_posterior_page import OPEN_ALL, OVERFLOWING, SIZES, SMALLEST_PICTURE_
 
 pytestmark = pytest.mark.slow
 
-PICTURES = 10
+PICTURES = 11
 PAGES = ["found", "nothing", "attacked"]
 
 

@@ -110,6 +110,21 @@ def test_a_fit_along_a_motion_finds_the_truth() -> None:
     assert found.values["drive_offset_force"] == pytest.approx(-4.0, rel=0.02)
 
 
+def test_the_regimes_of_a_motion_are_those_of_its_speed_and_stroke_and_time() -> None:
+    problem, data = _problem(_held({"coulomb": 12.0}, 2), "guide_saturating_friction")
+    fit = find_map(search_of(problem, data), (), {}, None)
+    known = {each.name: each for each in problem.regimes(data, fit)}
+    assert set(known) == {
+        "low speed", "high speed", "small stroke", "large stroke", "positive direction", "negative direction",
+        "drift over time",
+    }  # fmt: skip
+    assert min(each.p_value for each in known.values()) > 0.05
+    without, data = _problem(_held({"coulomb": 12.0}, 2))
+    missed = without.regimes(data, find_map(search_of(without, data), (), {}, None))
+    assert missed[0].name == "low speed"
+    assert missed[0].p_value < 0.05
+
+
 def test_errors_of_the_sensor_are_no_candidates_where_the_motion_is_taken_as_measured() -> None:
     problem, _ = _problem(_held({}, 3))
     kinds = {effect.port.kind for effect in problem.catalogue.values()}

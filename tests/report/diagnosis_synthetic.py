@@ -26,6 +26,7 @@ from savgs_ident.diagnosis.result import (
     NextTest,
     NotJudgeable,
     PortShare,
+    Regime,
     Responses,
     Shrink,
     Verdict,
@@ -86,6 +87,20 @@ BY_CHANNEL = {
 NO_SHRINK = Shrink(0.0035, 0.0022, 0.0022, 0.0021, float("nan"), (float("nan"), float("nan")))
 
 
+REGIMES = (
+    Regime("low speed or large stroke", 9.2, 0.012),
+    Regime("drift over time", 1.3, 0.041),
+    Regime("slow tests or small response", 8.8, 0.34),
+    Regime("high speed or small stroke", 3.1, 1.0),
+    Regime("positive direction", 6.9, 1.0),
+    Regime("negative direction", 6.4, 1.0),
+    Regime("high load", 6.2, 1.0),
+    Regime("low load", 6.6, 1.0),
+    Regime("fast tests or large response", 2.0, 1.0),
+)
+NO_REGIMES = tuple(Regime(each.name, 0.02, 1.0) for each in REGIMES)
+
+
 def synthetic_diagnosis(measured: HarmonicResponse, kind: Kind = "effect") -> Diagnosis:
     """A converged diagnosis of this kind."""
     rig = read_rig(default_rig_path())
@@ -110,6 +125,7 @@ def synthetic_diagnosis(measured: HarmonicResponse, kind: Kind = "effect") -> Di
             CyclePosition("sprung_accel", 0.71, 0.11, 0.18),
             CyclePosition("susp_deflection", 0.42, 0.23, 0.35),
         ),
+        regimes=NO_REGIMES if kind == "none" else REGIMES,
         candidates=_candidates(named),
         shrink=NO_SHRINK if kind == "none" else SHRINK,
         by_channel={name: NO_SHRINK if kind == "none" else each for name, each in BY_CHANNEL.items()},
@@ -162,6 +178,7 @@ def hostile(diagnosis: Diagnosis, text: str) -> Diagnosis:
         ports=(*diagnosis.ports, PortShare(text, 0.3, 0.4)),
         map=(*diagnosis.map, MapCell(text, 2.0, 1, 3.0, 4.0)),
         cycle=(*diagnosis.cycle, CyclePosition(text, 0.1, 0.2, 0.7)),
+        regimes=(*diagnosis.regimes, Regime(text, 3.0, 0.02)),
         candidates=(
             replace(first, hypothesis=Hypothesis((text,)), parameters=(Estimate(text, 1.0, 0.9, 1.1, text),)),
             *others,

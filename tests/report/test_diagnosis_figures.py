@@ -1,6 +1,7 @@
 """Figures of a diagnosis draw what it says: gaps over the noise, loops, maps."""
 
 from dataclasses import replace
+from itertools import pairwise
 from math import isfinite
 
 import numpy as np
@@ -25,6 +26,7 @@ from savgs_ident.report.diagnosis.figures import (
     shrink_rows,
     spread_loops,
 )
+from savgs_ident.report.diagnosis.regimes import regime_figure, regime_picture
 from savgs_ident.report.diagnosis.text import law_label
 from savgs_ident.report.html import embed
 
@@ -215,6 +217,43 @@ def test_gaps_are_drawn_at_their_per_cent(diagnosis: Diagnosis) -> None:
     assert drawn["|", 3.0] == pytest.approx(0.21)
 
 
+def test_regimes_are_bars_at_their_per_cent_and_the_significant_ones_stand_out(diagnosis: Diagnosis) -> None:
+    axes = regime_figure(diagnosis).axes[0]
+    assert axes.get_xlabel() == "gap there [% of the response]"
+    names = [each.get_text().replace("\n", " ") for each in axes.get_yticklabels()]
+    assert names == [each.name for each in diagnosis.regimes]
+    assert_allclose(
+        [bar.get_width() for bar in axes.patches], [each.gap_percent for each in diagnosis.regimes]
+    )
+    assert len({bar.get_facecolor() for bar in axes.patches[:2]}) == 1
+    assert axes.patches[0].get_facecolor() not in {bar.get_facecolor() for bar in axes.patches[2:]}
+    assert [each.get_text() for each in axes.texts] == ["p = 0.012", "p = 0.041"]
+
+
+def test_regimes_are_readable_on_a_narrow_screen(diagnosis: Diagnosis) -> None:
+    """At 400 px no name leaves the picture, none overlaps another, and letters are at least 9 px high."""
+    figure = regime_figure(diagnosis)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = 400.0 / figure.bbox.width
+    boxes = [each.get_window_extent(canvas.get_renderer()) for each in figure.axes[0].get_yticklabels()]
+    assert min(box.x0 for box in boxes) >= 0.0
+    assert all(below.y1 <= above.y0 for above, below in pairwise(boxes))
+    lines = [each.get_text().count("\n") + 1 for each in figure.axes[0].get_yticklabels()]
+    assert min(pixels * box.height / count for box, count in zip(boxes, lines, strict=True)) >= 9.0
+    shown = [each.get_window_extent(canvas.get_renderer()).x1 for each in figure.axes[0].texts]
+    assert max(shown) <= figure.bbox.width
+
+
+def test_without_regimes_there_is_no_picture_and_none_significant_says_so(
+    by_kind: dict[str, Diagnosis],
+) -> None:
+    assert regime_picture(replace(by_kind["effect"], regimes=())) is None
+    quiet = regime_picture(by_kind["none"])
+    assert quiet is not None
+    assert "in no regime" in quiet.alt
+
+
 def test_names_in_figures_are_neither_formulas_nor_missing_glyphs(diagnosis: Diagnosis) -> None:
     attacked = hostile(diagnosis, HOSTILE)
     figures = [
@@ -223,6 +262,7 @@ def test_names_in_figures_are_neither_formulas_nor_missing_glyphs(diagnosis: Dia
         diagnosis_bode_figure(attacked, 0),
         gap_map_figure(attacked, HOSTILE),
         force_figure(attacked, attacked.loops[0]),
+        regime_figure(attacked),
     ]
     for figure in figures:
         assert embed(figure, "hostile").width > 300

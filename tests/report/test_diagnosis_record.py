@@ -50,6 +50,7 @@ CONTRACT: dict[str, object] = {
         "map": [
             {"channel": str, "frequency_hz": NUMBER, "order": int, "gap_percent": NUMBER, "gap_sigma": NUMBER}
         ],
+        "regimes": [{"regime": str, "gap_percent": NUMBER, "p_value": NUMBER}],
     },
     "which": [
         {
@@ -109,6 +110,10 @@ def test_the_record_holds_the_numbers_of_the_diagnosis(diagnosis: Diagnosis) -> 
     assert {entry["port"]: (entry["share"], entry["reach"]) for entry in record["where"]["ports"]} == SHARES
     # 28 dwells, two channels, nine orders: none is left out where all were measured.
     assert len(record["where"]["map"]) == len(diagnosis.map) == 504
+    assert record["where"]["regimes"][0] == {
+        "regime": "low speed or large stroke", "gap_percent": 9.2, "p_value": 0.012
+    }  # fmt: skip
+    assert len(record["where"]["regimes"]) == len(diagnosis.regimes)
     assert record["which"][0]["parameters"]["stribeck_velocity"] == {
         "value": 0.1012, "lo": 0.0957, "hi": 0.1066, "unit": "m/s"
     }  # fmt: skip

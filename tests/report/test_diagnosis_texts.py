@@ -25,6 +25,7 @@ from savgs_ident.report.text import DASH
 from .diagnosis_reading import ORIGIN, SHOWN, record_of, rendered
 from .diagnosis_synthetic import (
     KINDS,
+    NO_REGIMES,
     NO_SHRINK,
     SENTENCES,
     hostile,
@@ -68,6 +69,12 @@ def test_the_terminal_tells_the_numbers(diagnosis: Diagnosis) -> None:
     assert "- stribeck_velocity: 0.1012 (0.0957 to 0.1066) m/s" in text
     assert "This campaign cannot distinguish it from: rail_preload." in text
     assert "rail 94 %, wishbone joints 41 %, strut 30 %" in " ".join(text.split())
+    assert (
+        "concentrated: low speed or large stroke (9.2 % of the response, p = 0.012); drift over time (1.3 % of the"
+        " response, p = 0.041)." in " ".join(text.split())
+    )
+    assert "slow tests" not in text
+    assert "concentrated" not in rendered(replace(diagnosis, regimes=NO_REGIMES))
     assert "unless its bump_stop_stiffness is at least 32 000 N/m" in text
     assert f"Hypotheses (5 of {len(diagnosis.candidates)})" in text
 
@@ -96,8 +103,8 @@ def test_the_page_has_its_sections_in_order_and_the_verdict_on_top(
 
 
 def test_pictures_are_drawings_that_execute_nothing(page: Reader) -> None:
-    # The rig, two of the response, four loops, the gaps, two maps.
-    assert len(page.pictures) == 10
+    # The rig, two of the response, four loops, the gaps, two maps, the regimes.
+    assert len(page.pictures) == 11
     for attributes in page.pictures:
         drawing = base64.b64decode(
             (attributes["src"] or "").removeprefix("data:image/svg+xml;base64,")
@@ -120,6 +127,7 @@ def test_the_page_tells_numbers_and_origin(page: Reader) -> None:
         "bump_stop_stiffness",
         "The dwell at 6 Hz was left out: the wheel lifts off.",
         "71 %",
+        "Speed, stroke and direction are those of the rail",
         "runs/a<b>.csv",
         "ab" * 32,
         "m & m.toml",
@@ -136,7 +144,7 @@ def test_the_page_says_what_there_is_and_what_there_is_not(by_kind: dict[str, Di
         page = Reader(diagnosis_html(by_kind[kind], ORIGIN))
         text = " ".join(page.texts)
         assert SENTENCES[kind] in text
-        assert len(page.pictures) == (6 if kind == "none" else 10)
+        assert len(page.pictures) == (7 if kind == "none" else 11)
         assert ("No signal was inferred: nothing is missing." in text) is (kind == "none")
         assert ("Sources of the named laws" in text) is (kind == "several")
         assert ("Dashed: the force of the named effect" in text) is (kind == "several")
@@ -166,7 +174,7 @@ def test_a_diagnosis_that_did_not_converge_says_so_first_and_hostile_names_stay_
 def test_a_diagnosis_with_nothing_beside_its_verdict_has_a_page(diagnosis: Diagnosis) -> None:
     bare = replace(
         diagnosis, ports=(), map=(), cycle=(), loops=(), by_channel={}, further=None, next_tests=(),
-        not_judgeable=(), confusable=(), warnings=(), candidates=diagnosis.candidates[:1],
+        not_judgeable=(), confusable=(), warnings=(), candidates=diagnosis.candidates[:1], regimes=(),
         parameters=diagnosis.given.table.as_dict(), identified=diagnosis.given.table.as_dict(),
     )  # fmt: skip
     page = Reader(diagnosis_html(bare, replace(ORIGIN, warnings=())))

@@ -89,6 +89,18 @@ def test_orders_above_the_nyquist_frequency_that_have_lines_of_their_own_do_no_h
     assert low < total < high
 
 
+def test_the_time_of_each_dwell_is_its_start_or_its_place_in_the_campaign(synthetic: Any, bus: Any) -> None:
+    """Dwells are sorted by frequency, but not their times."""
+    rng = np.random.default_rng(21)
+    dwells = [synthetic.dwell(rng, bus, f, 6.4, name=f"dwell_{f}Hz") for f in (3.0, 2.0, 4.0)]
+    undated = [replace(each, start=None) for each in dwells]
+    dated = [replace(each, start=start) for each, start in zip(dwells, (60.0, 200.0, 20.0), strict=True)]
+    assert estimate_response(synthetic.campaign(*undated)).recorded == pytest.approx([1.0, 0.0, 2.0])
+    assert estimate_response(synthetic.campaign(*dated)).recorded == pytest.approx([200.0, 60.0, 20.0])
+    partly = estimate_response(synthetic.campaign(dated[0], *undated[1:]))
+    assert partly.recorded == pytest.approx([1.0, 0.0, 2.0])
+
+
 def test_what_cannot_be_unfolded_is_in_the_covariance(synthetic: Any) -> None:
     """At 5 Hz and 100 Hz, order 20 - k folds onto order k, exactly: the error is covered, and said."""
     harmonics = synthetic.stepped(10.0, 40)

@@ -42,6 +42,7 @@ from savgs_ident.report.diagnosis.figures import (
     spread_loops,
 )
 from savgs_ident.report.diagnosis.record import diagnosis_record
+from savgs_ident.report.diagnosis.regimes import regime_note, regime_picture
 from savgs_ident.report.diagnosis.text import (
     KIND_WORDS,
     about_candidate,
@@ -294,6 +295,8 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
                 (each.name, each.reversal, each.between, each.mid_stroke)
                 for each in (cycle_row(one, diagnosis) for one in diagnosis.cycle)
             ],
+            "regimes": regime_picture(diagnosis),
+            "regime_note": regime_note(diagnosis),
             "next_tests": [
                 (each.test, " from ".join(each.separates), decimal(each.expected_sigma, 1))
                 for each in diagnosis.next_tests

@@ -103,6 +103,10 @@ def _where(diagnosis: Diagnosis) -> dict[str, object]:
             }
             for each in diagnosis.cycle
         ],
+        "regimes": [
+            {"regime": each.name, "gap_percent": each.gap_percent, "p_value": each.p_value}
+            for each in diagnosis.regimes
+        ],
     }
 
 

@@ -18,6 +18,7 @@ from savgs_ident.diagnosis.result import (
     NotJudgeable,
     Shrink,
 )
+from savgs_ident.effects.base import PortKind
 from savgs_ident.report.text import (
     DASH,
     channel_label,
@@ -36,6 +37,9 @@ KIND_WORDS: Mapping[str, str] = MappingProxyType(
     {"none": "nothing", "effect": "one effect", "several": "several effects", "unknown": "unknown"}
 )
 """The kinds of verdict: what is missing."""
+
+LEVEL = 0.05
+"""P-values below are significant: a regime is named."""
 
 _SMALL = 0.001
 _SHOWN = 5
@@ -189,6 +193,28 @@ def _error(each: Estimate) -> float:
     return 0.25 * (each.hi - each.lo)
 
 
+def p_value_words(p_value: float) -> str:
+    """A p-value with two significant digits where it is small."""
+    return decimal(p_value, 2 if p_value >= 0.1 else 3)
+
+
+def regimes_sentence(diagnosis: Diagnosis) -> str:
+    """The regimes in which the misfit is concentrated; empty where there is none."""
+    found = [
+        f"{each.name} ({percentage(each.gap_percent / 100.0)} of the response, p = {p_value_words(each.p_value)})"
+        for each in diagnosis.regimes
+        if each.p_value < LEVEL
+    ]
+    return f"Regimes in which the recalibrated gap is concentrated: {'; '.join(found)}." if found else ""
+
+
+def motion_words(diagnosis: Diagnosis) -> str:
+    """The port whose speed, stroke and direction regimes are distinguished by, in words."""
+    ports = (each for each in diagnosis.given.plant.ports if each.kind is PortKind.FORCE)
+    first = next(ports, None)
+    return "" if first is None else port_words(diagnosis, first.location)
+
+
 _SHOWN_PORTS = 3
 
 
@@ -202,6 +228,7 @@ def diagnosis_text(diagnosis: Diagnosis) -> RenderableType:
         plain(""),
         _gap(diagnosis),
         *_ports(diagnosis),
+        *_regimes(diagnosis),
         _candidates(diagnosis),
         *_parameters(diagnosis),
         *_confusable(diagnosis),
@@ -237,6 +264,11 @@ def _ports(diagnosis: Diagnosis) -> list[RenderableType]:
     ]
     text = "Share of the recalibrated gap explained by a law at one port: "
     return [plain(f"{text}{', '.join(shown)}."), plain("")] if shown else []
+
+
+def _regimes(diagnosis: Diagnosis) -> list[RenderableType]:
+    sentence = regimes_sentence(diagnosis)
+    return [plain(sentence), plain("")] if sentence else []
 
 
 def _candidates(diagnosis: Diagnosis) -> RenderableType:
