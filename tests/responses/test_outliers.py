@@ -15,10 +15,11 @@ from savgs_ident.plants.quarter_car.model import load_model
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
+from savgs_ident.responses.dwell_fit import fit_dwell
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.outliers import PeriodicSamples
-from savgs_ident.responses.robust_dwell import RobustDwell, check_outliers, fit_dwell
+from savgs_ident.responses.robust_dwell import RobustDwell, check_outliers
 from savgs_ident.responses.summary import inspect
 from savgs_ident.simulate.excitation import campaign_of, measured_response
 
