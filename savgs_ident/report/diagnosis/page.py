@@ -313,6 +313,8 @@ def _facts(diagnosis: Diagnosis) -> tuple[dict[str, object], ...]:
     """Four numbers for a first look."""
     verdict, shrink = diagnosis.verdict, diagnosis.shrink
     said = verdict.effects or (verdict.kind,)
+    if verdict.kind == "effect" and not verdict.law_known:
+        said = verdict.families
     named = next(
         (each for each in diagnosis.candidates if (each.effects or (str(each.hypothesis),)) == said), None
     )

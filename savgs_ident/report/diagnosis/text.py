@@ -78,7 +78,7 @@ def about_candidate(diagnosis: Diagnosis, candidate: Candidate) -> str:
         return "The recalibrated baseline is complete."
     if candidate.hypothesis.flexible:
         port, family = candidate.hypothesis.flexible.split("/")
-        return f"A law of {port_words(diagnosis, port)}, {family}, that was learned from the data."
+        return f"{family.capitalize()} at {port_words(diagnosis, port)}, by a law that was learned from the data."
     return "An effect that is not in the catalogue."
 
 
@@ -100,8 +100,7 @@ def model_label(diagnosis: Diagnosis) -> str:
     if verdict.effects and verdict.law_known:
         return f"with {' + '.join(verdict.effects)}"
     if verdict.kind != "none":
-        where = f" at the {port_words(diagnosis, verdict.ports[0])}" if verdict.ports else ""
-        return f"with the learned law{where}"
+        return "with the learned law"
     return "after (nothing added)"
 
 
