@@ -205,6 +205,8 @@ class DiagnosisEvidence:
     @property
     def port(self) -> str:
         """Where something unknown acts: the port of a broken tolerance, if that is it, or that of the law."""
+        if self.named_law is not None:
+            return self.named_law.location
         broken = self.broken.port if self.unknown.reason == "tolerance" else None
         return self.localisation.name if broken is None else broken
 

@@ -188,9 +188,10 @@ def coefficients_at(port: Port) -> tuple[str, ...]:
 
 
 def coefficients_of(port: Port, family: Family) -> tuple[str, ...]:
-    """Names of the coefficients of a family's functions at a port."""
+    """Names of the coefficients of a family's functions at a port; dynamics have a gain, too."""
+    mine = {family, Family.GAIN} if family is Family.DYNAMICS else {family}
     both = zip(coefficients_at(port), functions_at(port), strict=True)
-    return tuple(name for name, function in both if function.family is family)
+    return tuple(name for name, function in both if function.family in mine)
 
 
 def frictions_at(port: Port) -> tuple[str, ...]:
