@@ -93,11 +93,13 @@ def test_both_frictions_are_found_from_the_frictionless_baseline(measure_few: Me
 
 
 @pytest.mark.slow
-def test_what_the_catalogue_lacks_is_called_unknown(measure: Measure, rig: Rig) -> None:
+def test_what_the_catalogue_lacks_is_named_by_port_and_family(measure: Measure, rig: Rig) -> None:
     diagnosis = diagnose_response(measure("stribeck_rail"), rig, replace(SIMTR, without=("rail_stribeck",)))
-    assert diagnosis.verdict.kind == "unknown"
+    assert diagnosis.verdict.kind == "effect"
     assert diagnosis.verdict.ports == ("rail",)
-    assert diagnosis.shrink.share_closed > 0.9
+    assert diagnosis.verdict.families == ("rail/friction",)
+    assert not diagnosis.verdict.law_known
+    assert diagnosis.shrink.closed_by_effect > 0.9
     assert diagnosis.learned is not None
     assert diagnosis.learned.effect == "learned_rail"
     assert diagnosis.shrink.after < 2.0 * diagnosis.shrink.floor

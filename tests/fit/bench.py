@@ -44,6 +44,7 @@ def only(response: HarmonicResponse, dwells: NDArray[np.bool_]) -> HarmonicRespo
         response,
         tests=tuple(response.tests[place] for place in kept),
         covariance_dof=known,
+        recorded=None if response.recorded is None else response.recorded[kept],
         **{name: getattr(response, name)[kept] for name in _BY_DWELL},
     )
 
