@@ -24,13 +24,11 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.diagnosis.candidates import candidates_of, confusable_of, estimates_among, not_judgeable_of
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
+from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.gap import Rows, shrinks
 from savgs_ident.diagnosis.held_out import HeldOut, held_out_by_law, hold_out
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.model_selection import (
-    DiagnosisEvidence,
-    DiagnosisProblem,
-    FlexibleMember,
     recalibrate,
     refit_named,
     select_model,

@@ -16,10 +16,8 @@ evidence says where, its functions say of which family, and the effect that come
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from math import log
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +25,11 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
+from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.problem import AbstractProblem
-from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Kind
+from savgs_ident.diagnosis.result import NONE, UNKNOWN
 from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.search import (
     Findings,
@@ -45,7 +44,6 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
     BrokenTolerance,
     Change,
-    UnknownEvidence,
     WeighedHypothesis,
     broken_tolerance,
     decide,
@@ -55,168 +53,9 @@ from savgs_ident.diagnosis.verdict import (
     weigh,
     without_immaterial_members,
 )
-from savgs_ident.effects.base import Family, Port
-from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, refine, search_of
-from savgs_ident.inference.observations import Data, Term
-
-
-@dataclass(frozen=True)
-class DiagnosisProblem:
-    """A plant, what it is compared with, and its baseline as given and recalibrated.
-
-    Attributes:
-        plant: the plant with its catalogue and what drives it.
-        data: what it is compared with.
-        search: both, as a search for parameters takes them.
-        given: rows of the baseline as given [unit of each reading], (m,).
-        base: the baseline recalibrated.
-        constants: what the verdict is decided by.
-    """
-
-    plant: AbstractProblem
-    data: Data
-    search: Search
-    given: NDArray[np.float64]
-    base: LaplaceFit
-    constants: DecisionConstants = DEFAULTS
-
-    def location(self, effect: str) -> str:
-        """Where an effect of the catalogue acts."""
-        return self.plant.catalogue[effect].port.location
-
-    def locations(self, hypothesis: Hypothesis) -> tuple[str, ...]:
-        """Where the effects of a hypothesis act, each location once."""
-        return tuple(dict.fromkeys(self.location(name) for name in hypothesis.effects))
-
-    def families(self, hypothesis: Hypothesis) -> tuple[str, ...]:
-        """Where a hypothesis acts and of which kind it is, as location/family, each once."""
-        if hypothesis.flexible:
-            return (hypothesis.flexible,)
-        effects = (self.plant.catalogue[name] for name in hypothesis.effects)
-        return tuple(dict.fromkeys(f"{each.port.location}/{each.law.family.value}" for each in effects))
-
-    def parameter_port(self, parameter: str) -> str | None:
-        """The location at which a parameter of the plant acts; None for one that no port has (hardpoints)."""
-        return self._parameter_ports.get(parameter)
-
-    def port(self, name: str) -> Port:
-        """The port of a name."""
-        return next(each for each in self.plant.plant.ports if each.name == name)
-
-    def terms(self, hypothesis: Hypothesis) -> tuple[Term, ...]:
-        """The candidates that a hypothesis consists of."""
-        return tuple(self._candidates[name] for name in hypothesis.effects)
-
-    @cached_property
-    def _parameter_ports(self) -> Mapping[str, str]:
-        return {number.name: port.location for port in self.plant.model(()).ports for number in port.numbers}
-
-    @cached_property
-    def _candidates(self) -> Mapping[str, Term]:
-        return {term.name: term for term in self.plant.candidates}
-
-
-class FlexibleMember(NamedTuple):
-    """A learned law at a port as a hypothesis.
-
-    Attributes:
-        law: the law at its best.
-        weight: log evidence plus log prior.
-        left: share of the baseline's misfit that it leaves.
-    """
-
-    law: LearnedLaw
-    weight: float
-    left: float
-
-    @property
-    def location(self) -> str:
-        """Where it acts."""
-        return self.law.port.location
-
-    @property
-    def family(self) -> Family:
-        """The kind of thing that it is."""
-        return self.law.family
-
-    @property
-    def hypothesis(self) -> Hypothesis:
-        """As a hypothesis among others."""
-        return Hypothesis(flexible=f"{self.location}/{self.family.value}")
-
-
-@dataclass(frozen=True)
-class DiagnosisEvidence:
-    """What speaks for every hypothesis, and what may be said.
-
-    Attributes:
-        findings: all hypotheses that were scored and fitted.
-        localisations: what a law at each location would explain.
-        flexible: learned laws that were fitted on the nonlinear plant, the most probable first.
-        weighed: hypotheses by falling weight.
-        unknown: what speaks most for something that the catalogue lacks.
-        broken: the tolerance that most probably does not hold.
-        kind: what may be said.
-        chosen: the hypothesis that it rests on.
-        left: share of the baseline's misfit that the most probable hypothesis leaves.
-        named_law: the learned law that is named, where no formula of the catalogue explains the data.
-        refit_failed: whether what is named could not be found again on a finer mesh.
-        unsupported: whether what would be named predicts tests that were held out no better than the baseline.
-    """
-
-    findings: Findings
-    localisations: tuple[Localisation, ...]
-    flexible: tuple[FlexibleMember, ...]
-    weighed: tuple[WeighedHypothesis, ...]
-    unknown: UnknownEvidence
-    broken: BrokenTolerance
-    kind: Kind
-    chosen: WeighedHypothesis
-    left: float
-    named_law: FlexibleMember | None = None
-    refit_failed: bool = False
-    unsupported: bool = False
-
-    @property
-    def localisation(self) -> Localisation:
-        """The location at which a law of something unknown is most probable."""
-        first = next(iter(self.weight_by_location))
-        return next(each for each in self.localisations if each.name == first)
-
-    @property
-    def offered(self) -> FlexibleMember | None:
-        """The learned law that explains most, where it acts at the most probable location."""
-        there = [each for each in self.flexible if each.location == self.localisation.name]
-        return max(there, key=lambda each: each.weight, default=None)
-
-    @property
-    def weight_by_location(self) -> Mapping[str, float]:
-        """Log weight of a law at every location, the most probable first.
-
-        A law that was fitted on the nonlinear plant counts instead of its linear estimate.
-        """
-        found = {each.name: each.evidence for each in self.localisations}
-        solved: dict[str, float] = {}
-        for each in self.flexible:
-            evidence = each.law.mode.evidence
-            solved[each.location] = max(evidence, solved.get(each.location, -np.inf))
-        return dict(sorted((found | solved).items(), key=lambda item: -item[1]))
-
-    @property
-    def port(self) -> str:
-        """Where something unknown acts: the port of a broken tolerance, if that is it, or that of the law."""
-        if self.named_law is not None:
-            return self.named_law.location
-        broken = self.broken.port if self.unknown.reason == "tolerance" else None
-        return self.localisation.name if broken is None else broken
-
-    def indistinguishable_ports(self, constants: DecisionConstants = DEFAULTS) -> tuple[str, ...]:
-        """Other ports at which a law of something unknown is nearly as probable, the most probable first."""
-        (first, most), *others = self.weight_by_location.items()
-        if self.port != first:
-            return ()
-        least = most - constants.indistinguishable_log_odds
-        return tuple(name for name, weight in others if weight > least)
+from savgs_ident.effects.base import Port
+from savgs_ident.inference.find_map import LaplaceFit, find_map, refine, search_of
+from savgs_ident.inference.observations import Data
 
 
 def recalibrate(

@@ -2,12 +2,8 @@
 
 from collections.abc import Sequence
 
-from savgs_ident.diagnosis.model_selection import (
-    DiagnosisEvidence,
-    DiagnosisProblem,
-    FlexibleMember,
-    nearest_effect,
-)
+from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
+from savgs_ident.diagnosis.model_selection import nearest_effect
 from savgs_ident.diagnosis.result import Shrink, Verdict
 from savgs_ident.diagnosis.search import hypothesis_of, left_over
 from savgs_ident.diagnosis.thresholds import DecisionConstants

@@ -21,7 +21,8 @@ from threadpoolctl import threadpool_limits
 
 from savgs_ident.core.files import prepare_folder, record_of
 from savgs_ident.core.presentation import Progress, Result, no_progress
-from savgs_ident.diagnosis.model_selection import DiagnosisProblem, recalibrate, select_model
+from savgs_ident.diagnosis.evidence import DiagnosisProblem
+from savgs_ident.diagnosis.model_selection import recalibrate, select_model
 from savgs_ident.diagnosis.public import baseline_of
 from savgs_ident.diagnosis.quarter_car import quarter_car_problem
 from savgs_ident.diagnosis.result import DiagnosisSettings

@@ -8,8 +8,9 @@ import pytest
 
 from savgs_ident.core.presentation import no_progress
 from savgs_ident.diagnosis.background import pieces_of_curve, relative_change, with_background
+from savgs_ident.diagnosis.evidence import DiagnosisEvidence
 from savgs_ident.diagnosis.localisation import InputLocation, Law
-from savgs_ident.diagnosis.model_selection import DiagnosisEvidence, recalibrate, select_model
+from savgs_ident.diagnosis.model_selection import recalibrate, select_model
 from savgs_ident.diagnosis.public import baseline_of
 from savgs_ident.diagnosis.quarter_car import quarter_car_problem
 from savgs_ident.diagnosis.thresholds import DEFAULTS

@@ -8,7 +8,7 @@ import pytest
 
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis import narrative
-from savgs_ident.diagnosis.model_selection import DiagnosisEvidence, FlexibleMember
+from savgs_ident.diagnosis.evidence import DiagnosisEvidence, FlexibleMember
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Shrink
 from savgs_ident.diagnosis.score_test import PriorConflict
