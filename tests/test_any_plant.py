@@ -156,7 +156,7 @@ def test_the_example_of_a_plant_of_ones_own_is_sampled_and_diagnosed(
 ) -> None:
     runpy.run_path(str(PENDULUM), run_name="__main__")
     printed = capsys.readouterr().out
-    assert printed.startswith("pivot_friction at the port pivot is missing in the model")
+    assert printed.startswith("The model lacks something at the pivot: ")
     assert "emcee: converged" in printed
     for name in ("c", "pivot_friction_force"):
         median, sd = re.search(rf"^{name} +([\d.]+) ± ([\d.]+) ", printed, re.M).groups()

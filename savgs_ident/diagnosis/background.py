@@ -38,6 +38,7 @@ def with_background(
     inputs: Matrix,
     curves: Matrix,
     drifts: Matrix,
+    recorded: NDArray[np.float64],
     constants: DecisionConstants = DEFAULTS,
 ) -> Data:
     """The data with the errors that their rows share.
@@ -45,7 +46,7 @@ def with_background(
     ``channel`` (m,) is that of each row; ``locations`` say what laws there can do; ``inputs`` (m, i) is what the
     inputs' relative errors of one do to the rows [unit of the row], in all tests, ``curves`` (m, t) what relative
     errors of one do to them at points of curves of the sheet, ``drifts`` (m, n) what relative changes of one of what
-    is identified do.
+    is identified do; ``recorded`` (t,) is when each test was recorded, in any unit of time.
     """
     columns = []
     for location in locations:
@@ -63,11 +64,18 @@ def with_background(
         tolerated=np.concatenate(
             [
                 constants.curve_tolerance * curves,
-                constants.drift_tolerance * drifts * _time_of(data)[:, None],
+                constants.drift_tolerance * drifts * _time_of(recorded)[data.test, None],
             ],
             axis=1,
         ),
     )
+
+
+def without_drifts(data: Data, count: int) -> Data:
+    """The data of :func:`with_background` less the tolerated drifts, ``count`` of them."""
+    if data.tolerated is None:
+        return data
+    return replace(data, tolerated=data.tolerated[:, : data.tolerated.shape[1] - count])
 
 
 def relative_change(data: Data, channel: NDArray[np.intp], columns: Matrix) -> NDArray[np.float64]:
@@ -91,7 +99,7 @@ def pieces_of_curve(velocity: NDArray[np.float64], force: NDArray[np.float64]) -
     return [np.interp(relative, points, unit) * force for unit in np.eye(points.size)]
 
 
-def _time_of(data: Data) -> NDArray[np.float64]:
-    """When in the campaign the test of each row was [1], from -1 to 1 in the order of the tests, (m,)."""
-    last = max(data.tests - 1, 1)
-    return 2.0 * data.test / last - 1.0 if data.tests > 1 else np.zeros(data.test.size)
+def _time_of(recorded: NDArray[np.float64]) -> NDArray[np.float64]:
+    """When in the campaign each test was ``recorded`` [1], from -1 for the first to 1 for the last, (t,)."""
+    first, last = float(recorded.min()), float(recorded.max())
+    return 2.0 * (recorded - first) / (last - first) - 1.0 if last > first else np.zeros(recorded.size)

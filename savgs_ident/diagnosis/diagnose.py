@@ -26,13 +26,13 @@ from savgs_ident.diagnosis.candidates import candidates_of, confusable_of, estim
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.gap import Rows, shrinks
-from savgs_ident.diagnosis.held_out import HeldOut, held_out_by_law, hold_out
+from savgs_ident.diagnosis.held_out import HeldOut, hold_out
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.model_selection import (
     recalibrate,
     refit_named,
     select_model,
-    without_support,
+    settle,
 )
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
 from savgs_ident.diagnosis.problem import AbstractProblem
@@ -49,11 +49,9 @@ from savgs_ident.diagnosis.result import (
     Learned,
     NextTest,
     PortShare,
-    Shrink,
 )
 from savgs_ident.diagnosis.search import hypothesis_of
 from savgs_ident.diagnosis.sweep import ModelPoint, sweep_shrink
-from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.diagnosis.verdict import indistinguishable, most_probable
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned import coefficients_at
@@ -191,14 +189,15 @@ def _diagnose(
         lambda: _predict_further(refitted, evidence, law, values, further),
     )
     held = {**held, **last}
-    held = {**held, UNKNOWN: _held_out_unknown(refitted, evidence, held[NONE])}
+    held = {**held, UNKNOWN: _held_out_unknown(evidence, held[NONE])}
     if evidence.kind == "unknown" and member is not None and held[member.hypothesis].mean <= held[NONE].mean:
         law = None
 
     base, model = problem.base, _corrected_model(refitted, evidence, law)
     together, by_channel = shrinks(data, _left_out_rows(problem, held, model))
-    if _unsupported(evidence, together, problem.constants):
-        evidence, law = without_support(evidence), None
+    settled = settle(evidence, together, problem.constants)
+    if settled is not evidence:
+        evidence, law = settled, None
         model = _corrected_model(refitted, evidence, law)
         together, by_channel = shrinks(data, _left_out_rows(problem, held, model))
         apart = _predict_further(refitted, evidence, law, values, further)
@@ -231,7 +230,7 @@ def _diagnose(
         responses=plant.responses(data, problem.given, base.prediction.rows, model.rows),
         measured=measured,
         converged=all(each.status.ok for each in _decisive_fits(problem, selected, evidence, law)),
-        warnings=write_warnings(refitted, evidence, model.fit, together),
+        warnings=write_warnings(refitted, evidence, model.fit),
         learned=None if law is None else _offered(law),
         wall_s=time.perf_counter() - began,
     )
@@ -247,22 +246,9 @@ def _held_out_by_member(
     return {member.hypothesis: member.law.held_out(settings.constants)}
 
 
-def _held_out_unknown(problem: DiagnosisProblem, evidence: DiagnosisEvidence, without: HeldOut) -> HeldOut:
+def _held_out_unknown(evidence: DiagnosisEvidence, without: HeldOut) -> HeldOut:
     """What a law known to first order predicts of tests left out; the baseline where it does worse than that."""
-    linear = held_out_by_law(problem.search, evidence.localisation.held_out)
-    return max(linear, without, key=lambda each: each.mean)
-
-
-def _unsupported(evidence: DiagnosisEvidence, gap: Shrink, constants: DecisionConstants) -> bool:
-    """Whether what is spoken for predicts held-out tests no better than a baseline that misses little.
-
-    Where the baseline misses by more than is small, something is missing, predicted or not; and a tolerance that does
-    not hold is in the recalibrated baseline already.
-    """
-    tolerance = evidence.kind == "unknown" and evidence.unknown.reason == "tolerance"
-    if evidence.kind == "none" or tolerance or gap.after < gap.recalibrated:
-        return False
-    return gap.recalibrated**2 - gap.floor**2 <= constants.material_share**2
+    return max(evidence.localisation.held_out, without, key=lambda each: each.mean)
 
 
 def _port_shares(evidence: DiagnosisEvidence, candidates: Sequence[Candidate]) -> tuple[PortShare, ...]:
@@ -314,7 +300,7 @@ def _corrected_model(
         member = next(each for each in evidence.flexible if each.law is law)
         return _CorrectedModel(member.hypothesis, law.mode, law.mode.prediction.rows)
     if evidence.kind == "unknown":
-        return _CorrectedModel(UNKNOWN, problem.base, evidence.localisation.held_out)
+        return _CorrectedModel(UNKNOWN, problem.base, evidence.localisation.held_out.rows)
     fit = evidence.chosen.mode or problem.base
     return _CorrectedModel(hypothesis_of(fit), fit, fit.prediction.rows)
 

@@ -21,7 +21,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import joint_status
 from savgs_ident.core.values import Values
-from savgs_ident.diagnosis.background import pieces_of_curve, with_background
+from savgs_ident.diagnosis.background import pieces_of_curve, with_background, without_drifts
 from savgs_ident.diagnosis.effect_sensitivities import columns_with_states, impose, node_loads, rehearse
 from savgs_ident.diagnosis.gap import cycle_positions, gap_map
 from savgs_ident.diagnosis.localisation import InputLocation, Localisation
@@ -270,8 +270,14 @@ class DwellProblem(AbstractProblem):
             inputs=np.stack(inputs, axis=1),
             curves=self._curves(values, warm_start),
             drifts=drifts,
+            recorded=self.times,
             constants=self.constants,
         )
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """When each test was recorded, in any unit of time, (d,)."""
+        return np.array(self.recorded or range(self.shape[0]), np.float64)
 
     def _curves(self, values: Mapping[str, float], warm_start: PeriodicSolution) -> NDArray[np.float64]:
         """What relative errors of one at points of the dampers' curves do to the rows, (m, points)."""
@@ -320,7 +326,8 @@ class DwellProblem(AbstractProblem):
 
     def regimes(self, data: Data, fit: LaplaceFit) -> tuple[Regime, ...]:
         """In which regimes the baseline misses: of the cycle, of the tests, and over time."""
-        return find_regimes(dwell_cycles(self, fit), data, fit, self.free)
+        steady = without_drifts(data, len(self.free))
+        return find_regimes(dwell_cycles(self, fit), data, fit, self.free, steady)
 
     def loops(
         self,

@@ -60,6 +60,10 @@ class DiagnosisProblem:
         effects = (self.plant.catalogue[name] for name in hypothesis.effects)
         return tuple(dict.fromkeys(f"{each.port.location}/{each.law.family.value}" for each in effects))
 
+    def words(self, location: str) -> str:
+        """What a reader calls a location."""
+        return self.plant.plant.location_words.get(location, location)
+
     def parameter_port(self, parameter: str) -> str | None:
         """The location at which a parameter of the plant acts; None for one that no port has (hardpoints)."""
         return self._parameter_ports.get(parameter)

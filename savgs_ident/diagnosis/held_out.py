@@ -1,13 +1,13 @@
 """Predictions of tests that a hypothesis has not seen: each is left out once, the others set the parameters."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map
-from savgs_ident.inference.noise_scales import noise_scales
+from savgs_ident.inference.noise_scales import NoiseScales
 from savgs_ident.inference.observations import Term
 
 
@@ -24,14 +24,6 @@ class HeldOut:
         return float(np.mean(self.log_density))
 
 
-def held_out_by_law(search: Search, rows: NDArray[np.float64]) -> HeldOut:
-    """Left-out predictions (m,) [unit of each row] of a learned law, with the noise scales that they show."""
-    data = replace(search.data, shared=None)
-    miss = data.measured - rows
-    spread = noise_scales(data, miss).spread
-    return HeldOut(rows, -0.5 * (miss**2 / spread + np.log(spread / data.variance)))
-
-
 def hold_out(
     search: Search, mode: LaplaceFit, terms: tuple[Term, ...], constants: DecisionConstants = DEFAULTS
 ) -> HeldOut:
@@ -42,20 +34,43 @@ def hold_out(
         out = data.test % folds == fold
         part = Search(search.plant, data, ~out)
         found = find_map(part, terms, mode.values, mode.prediction.warm_start, constants.held_out_steps)
-        rows[out] = found.prediction.rows[out] + _by_tolerated(part, found, out)
-        slopes = found.slopes[out]
-        spread = data.marginal(found.noise_scales.noise, found.noise_scales.discrepancy)
-        variance = spread[out] + np.einsum("ij,jk,ik->i", slopes, found.covariance(), slopes)
-        miss = data.measured[out] - rows[out]
-        density[out] = -0.5 * (miss**2 / variance + np.log(variance / data.variance[out]))
+        rows[out], density[out] = predict_left_out(
+            part,
+            out,
+            found.prediction.rows,
+            found.slopes,
+            part.missed(found.prediction),
+            found.covariance(),
+            found.noise_scales,
+        )
     return HeldOut(rows, density)
 
 
-def _by_tolerated(part: Search, found: LaplaceFit, out: NDArray[np.bool_]) -> NDArray[np.float64] | float:
-    """What errors within tolerances, as the other tests have set them, change in the rows that are left ``out``."""
-    tolerated = part.data.tolerated
-    if tolerated is None:
-        return 0.0
-    scales = found.noise_scales
-    weights = part.part.weights(part.missed(found.prediction) / scales.spread)
-    return np.asarray(scales.noise**2 * tolerated[out] @ (tolerated[part.mask].T @ weights))
+def predict_left_out(
+    part: Search,
+    out: NDArray[np.bool_],
+    rows: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+    missed: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    scales: NoiseScales,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The rows that are left ``out`` (m,), as the ``part`` predicts them, and the log density of each.
+
+    ``rows`` (m,) [unit of each] are those of a model fitted to the part, which it ``missed`` as independent rows,
+    with ``slopes`` (m, n) in coordinates that have this ``covariance`` (n, n). Errors within tolerances are shared by
+    all tests, so that those of the part tell what they are in the others.
+    """
+    data = part.data
+    spread = part.rows.marginal(scales.noise, scales.discrepancy)
+    variance = data.marginal(scales.noise, scales.discrepancy)[out]
+    predicted, steep = rows[out], slopes[out]
+    if data.tolerated is not None:
+        known = scales.noise**2 * data.tolerated[out] @ part.turned(data.tolerated).T
+        weights = known / spread
+        predicted = predicted + weights @ missed
+        steep = steep - weights @ part.turned(slopes)
+        variance = variance - np.sum(weights * known, axis=1)
+    variance = variance + np.einsum("ij,jk,ik->i", steep, covariance, steep)
+    miss = data.measured[out] - predicted
+    return predicted, -0.5 * (miss**2 / variance + np.log(variance / data.variance[out]))

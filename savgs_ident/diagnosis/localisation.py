@@ -17,11 +17,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.diagnosis.held_out import HeldOut, predict_left_out
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Family
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.laplace import log_evidence
-from savgs_ident.inference.noise_scales import linearised_optimum
+from savgs_ident.inference.noise_scales import NoiseScales, linearised_optimum
 from savgs_ident.inference.prior import bounds_of
 
 Matrix = NDArray[np.float64]
@@ -74,7 +75,7 @@ class Localisation:
         share: share of the gap in left-out tests that the most probable law explains; 0 if it makes it worse.
         free_input_share: share that a free input explains.
         evidence: log evidence of the fit with a law, linearised, over all laws and widths of their priors.
-        held_out: rows (m,) [their units] of each test, predicted by the law and parameters that the others set.
+        held_out: each test, predicted by the law and parameters that the others set.
         free_input: coefficients of the free input by test [its unit], (tests, f).
         families: log weight of the laws of each family, prior included; those that mix several are under None.
         ports: the same of the laws at each port, by its name.
@@ -84,7 +85,7 @@ class Localisation:
     share: float
     free_input_share: float
     evidence: float
-    held_out: NDArray[np.float64]
+    held_out: HeldOut
     free_input: NDArray[np.float64]
     families: Mapping[Family | None, float] = field(default_factory=dict)
     ports: Mapping[str, float] = field(default_factory=dict)
@@ -115,8 +116,7 @@ def widths_of(
     ``columns`` (m, q) are the change of the rows per unit of each.
     """
     rms = _rms(search, mode, columns)
-    width, _ = _best_width(search, mode, columns / rms, constants)
-    return np.asarray(width / rms)
+    return np.asarray(_best_width(search, mode, columns / rms, constants).width / rms)
 
 
 def _log_mean_exp(evidences: Sequence[float]) -> float:
@@ -130,29 +130,25 @@ class _Fold(NamedTuple):
     Attributes:
         out: rows of the tests that are left out, (m,).
         search: what counts without them.
-        weight: of its independent rows, one over their sd.
-        slopes: of these in the coordinates, weighed.
-        missed: how far the fit misses them, weighed.
+        slopes: of its independent rows in the coordinates.
+        missed: how far the fit misses these rows.
     """
 
     out: NDArray[np.bool_]
     search: Search
-    weight: NDArray[np.float64]
     slopes: Matrix
     missed: NDArray[np.float64]
 
 
 def _folds_of(search: Search, mode: LaplaceFit, count: int) -> list[_Fold]:
     """The fit without every so many-th test; none where that leaves no test, or leaves out none."""
-    found, scales = [], mode.noise_scales
+    found = []
     for fold in range(count):
         out = search.data.test % count == fold
         if not out.any() or out.all():
             continue
         part = Search(search.plant, search.data, ~out)
-        weight = 1.0 / np.sqrt(part.rows.marginal(scales.noise, scales.discrepancy))
-        slopes, missed = part.turned(mode.slopes), part.missed(mode.prediction)
-        found.append(_Fold(out, part, weight, slopes * weight[:, None], missed * weight))
+        found.append(_Fold(out, part, part.turned(mode.slopes), part.missed(mode.prediction)))
     return found
 
 
@@ -165,16 +161,18 @@ def _localisation(
 ) -> Localisation:
     weight = 1.0 / np.sqrt(search.data.marginal(mode.noise_scales.noise, mode.noise_scales.discrepancy))
     laws = [each.columns / _rms(search, mode, each.columns) for each in location.laws]
-    widths, evidences = zip(*(_best_width(search, mode, each, constants) for each in laws), strict=True)
+    fitted = [_best_width(search, mode, each, constants) for each in laws]
     priors = np.array([each.prior for each in location.laws])
-    weights = np.array(evidences) + np.log(priors / priors.sum())
-    law, width = laws[int(np.argmax(weights))], widths[int(np.argmax(weights))]
+    weights = np.array([each.evidence for each in fitted]) + np.log(priors / priors.sum())
+    law, best = laws[int(np.argmax(weights))], fitted[int(np.argmax(weights))]
     evidence = float(np.logaddexp.reduce(weights))
     free_share, free_input = _free_input(search, mode, location.free, weight, constants.free_input_width)
-    without, missed = (_left_out(search, mode, each, folds) for each in (law * 0.0, law * width))
-    whole = float(np.sum((without * weight) ** 2))
-    share = max(0.0, 1.0 - float(np.sum((missed * weight) ** 2)) / whole) if whole > 0.0 else 0.0
-    held_out = search.data.measured - missed
+    without = _left_out(search, mode, law[:, :0], folds, mode.noise_scales)
+    held_out = _left_out(search, mode, law * best.width, folds, best.noise_scales)
+    whole, left = (
+        float(np.sum(((search.data.measured - each.rows) * weight) ** 2)) for each in (without, held_out)
+    )
+    share = max(0.0, 1.0 - left / whole) if whole > 0.0 else 0.0
     families: dict[Family | None, float] = {}
     ports: dict[str, float] = {}
     for each, one in zip(location.laws, weights.tolist(), strict=True):
@@ -190,36 +188,59 @@ def _rms(search: Search, mode: LaplaceFit, columns: Matrix) -> NDArray[np.float6
     return np.where(size > 0.0, size, 1.0)
 
 
-def _best_width(
-    search: Search, mode: LaplaceFit, law: Matrix, constants: DecisionConstants
-) -> tuple[float, float]:
-    """The width of the prior with the greatest log evidence, and the log evidence averaged over all widths."""
+class _Width(NamedTuple):
+    """The prior width of a law's coefficients with the greatest log evidence.
+
+    Attributes:
+        width: in rms of the residuals in their sd [1].
+        evidence: log evidence, averaged over all widths.
+        noise_scales: noise scale and discrepancy beside the law.
+    """
+
+    width: float
+    evidence: float
+    noise_scales: NoiseScales
+
+
+def _best_width(search: Search, mode: LaplaceFit, law: Matrix, constants: DecisionConstants) -> _Width:
+    """The best of all widths of the prior."""
     missed, inside, across = search.missed(mode.prediction), search.turned(mode.slopes), search.turned(law)
     lower, upper = bounds_of(mode.coordinates)
     wide = np.full(law.shape[1], np.inf)
     bounds = np.concatenate([lower, -wide]), np.concatenate([upper, wide])
     start = np.concatenate([mode.x, np.zeros(law.shape[1])])
-    found = []
+    found, tops = [], []
     for width in constants.law_widths:
         slopes = np.concatenate([inside, width * across], axis=1)
-        top = linearised_optimum(search.rows, missed, slopes, start, bounds)
-        found.append(log_evidence(top.value, top.precision, mode.coordinates))
-    return constants.law_widths[int(np.argmax(found))], _log_mean_exp(found)
+        tops.append(linearised_optimum(search.rows, missed, slopes, start, bounds))
+        found.append(log_evidence(tops[-1].value, tops[-1].precision, mode.coordinates))
+    best = int(np.argmax(found))
+    return _Width(constants.law_widths[best], _log_mean_exp(found), tops[best].noise_scales)
 
 
-def _left_out(search: Search, mode: LaplaceFit, law: Matrix, folds: Sequence[_Fold]) -> NDArray[np.float64]:
-    """Residuals (m,) of every test when the others have set the parameters and the law's coefficients."""
-    residual = search.residual(mode.prediction)
+def _left_out(
+    search: Search, mode: LaplaceFit, law: Matrix, folds: Sequence[_Fold], scales: NoiseScales
+) -> HeldOut:
+    """Every test when the others have set the parameters and the law's coefficients; the fit if none is left out."""
+    prediction = mode.prediction
     slopes = np.concatenate([mode.slopes, law], axis=1)
     x = np.concatenate([mode.x, np.zeros(law.shape[1])])
-    missed = residual.copy()
+    rows, density = prediction.rows.copy(), np.zeros(prediction.rows.size)
     for fold in folds:
-        across = fold.search.turned(law) * fold.weight[:, None]
-        inside = np.concatenate([fold.slopes, across], axis=1)
-        precision = np.eye(x.size) + inside.T @ inside
-        step = np.linalg.solve(precision, inside.T @ fold.missed - x)
-        missed[fold.out] = residual[fold.out] - slopes[fold.out] @ step
-    return missed
+        inside = np.concatenate([fold.slopes, fold.search.turned(law)], axis=1)
+        weighted = inside / fold.search.rows.marginal(scales.noise, scales.discrepancy)[:, None]
+        covariance = np.linalg.inv(np.eye(x.size) + weighted.T @ inside)
+        step = covariance @ (weighted.T @ fold.missed - x)
+        rows[fold.out], density[fold.out] = predict_left_out(
+            fold.search,
+            fold.out,
+            prediction.rows + slopes @ step,
+            slopes,
+            fold.missed - inside @ step,
+            covariance,
+            scales,
+        )
+    return HeldOut(rows, density)
 
 
 def _free_input(

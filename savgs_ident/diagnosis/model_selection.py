@@ -29,7 +29,7 @@ from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, 
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.problem import AbstractProblem
-from savgs_ident.diagnosis.result import NONE, UNKNOWN
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Shrink
 from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.search import (
     Findings,
@@ -44,6 +44,7 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
     BrokenTolerance,
     Change,
+    UnknownEvidence,
     WeighedHypothesis,
     broken_tolerance,
     decide,
@@ -132,7 +133,7 @@ def _decided(
     alone = -np.inf
     if others:
         first = max(others, key=lambda each: each.evidence)
-        change = _change(problem, first.held_out - base.prediction.rows)
+        change = _change(problem, first.held_out.rows - base.prediction.rows)
         alone = anywhere(others) if change.matters(constants) else -np.inf
     unknown = unknown_evidence(findings, alone, beside, broken.weight, constants)
     weighed = weigh(findings, unknown, constants)
@@ -169,10 +170,45 @@ def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: Fl
     return member.left <= constants.unexplained_share_flexible and change.matters(constants)
 
 
-def without_support(evidence: DiagnosisEvidence) -> DiagnosisEvidence:
-    """The evidence where held-out tests do not bear out what it speaks for: then nothing may be named."""
+def settle(
+    evidence: DiagnosisEvidence, gap: Shrink, constants: DecisionConstants = DEFAULTS
+) -> DiagnosisEvidence:
+    """The evidence as tests that were held out allow it to be said: their ``gap`` has the last word.
+
+    Where what is named predicts them no better than the recalibrated baseline, nothing may be named. And where the
+    baseline misses them by more than is small, something is missing, whether anything explains it or not. A tolerance
+    that does not hold is in the recalibrated baseline already.
+    """
+    if evidence.kind == "unknown" and evidence.unknown.reason == "tolerance":
+        return evidence
+    small = gap.recalibrated**2 - gap.floor**2 <= constants.material_share**2
+    supported = gap.after < gap.recalibrated
+    if evidence.kind == "none":
+        return evidence if small else _unexplained(evidence)
+    if supported or (evidence.kind == "unknown" and not small):
+        return evidence
+    if not small:
+        return _unexplained(evidence)
     none = next(each for each in evidence.weighed if each.hypothesis == NONE)
     return replace(evidence, kind="none", chosen=none, named_law=None, unsupported=True)
+
+
+def _unexplained(evidence: DiagnosisEvidence) -> DiagnosisEvidence:
+    """The evidence where the baseline is not complete, though nothing explains what it misses.
+
+    A baseline with a discrepancy that is not small is no model with nothing missing: its weight is that of something
+    unknown.
+    """
+    weights = [each.weight for each in evidence.weighed if each.hypothesis in (NONE, UNKNOWN)]
+    unknown = WeighedHypothesis(UNKNOWN, float(np.logaddexp.reduce(weights)), None)
+    others = [
+        replace(each, weight=-np.inf) if each.hypothesis == NONE else each
+        for each in evidence.weighed
+        if each.hypothesis != UNKNOWN
+    ]
+    weighed = tuple(sorted((unknown, *others), key=lambda each: -each.weight))
+    law = replace(evidence, kind="unknown", chosen=unknown, weighed=weighed, named_law=None)
+    return replace(law, unknown=UnknownEvidence(unknown.weight, "law"))
 
 
 def refit_named(
@@ -309,7 +345,7 @@ def _law_beside_best(
         findings = _material(problem, more)
         if hypothesis_of(most_probable(findings, constants)) != hypothesis_of(best):
             return _law_beside_best(problem, findings, progress)
-    change = _change(problem, localisations[0].held_out - best.prediction.rows)
+    change = _change(problem, localisations[0].held_out.rows - best.prediction.rows)
     return findings, anywhere(localisations) if change.matters(constants) else -np.inf
 
 

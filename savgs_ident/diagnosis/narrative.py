@@ -24,7 +24,7 @@ def write_verdict(
         return Verdict("none", (), (), (), sentence, probability=_probability(evidence, "none"))
     if evidence.kind == "unknown":
         ports = evidence.indistinguishable_ports(problem.constants)
-        sentence = _something_unknown(problem, evidence, ports, gap)
+        sentence = _something_unknown(problem, evidence, gap)
         offered = evidence.offered
         families = () if offered is None or offered.location != evidence.port else (str(offered.hypothesis),)
         return Verdict(
@@ -79,24 +79,38 @@ def _law_missing(
     gap: Shrink,
 ) -> str:
     sentence = (
-        f"The model lacks {_KINDS[member.family]} at the port '{member.location}' by a law that the catalogue does "
-        f"not have: with a law learned there the gap shrinks from {_percent(gap.recalibrated)} recalibrated "
-        f"({_percent(gap.before)} as given) to {_percent(gap.after)} of the response in held-out tests; the noise is "
-        f"{_percent(gap.floor)}."
+        f"The model lacks something at the {problem.words(member.location)}: {_KINDS[member.family]}, by a law that "
+        f"the catalogue does not have. With a law learned there the gap shrinks from {_percent(gap.recalibrated)} "
+        f"recalibrated ({_percent(gap.before)} as given) to {_percent(gap.after)} of the response in held-out tests; "
+        f"the noise is {_percent(gap.floor)}."
     )
     fits = [mode for mode in evidence.findings.modes if mode.terms == (nearest,)]
-    if fits:
-        left = left_over(problem.search, problem.base, fits[0], problem.constants)
-        sentence += (
-            f" The nearest formula of the catalogue, {nearest}, leaves {_left(left)} of the misfit beyond the noise, "
-            f"the learned law {_left(member.left)}."
-        )
-    elif nearest is not None:
-        sentence += f" The nearest formula of the catalogue is {nearest}."
-    ports = evidence.indistinguishable_ports(problem.constants)
-    if ports:
-        sentence += f" This campaign cannot distinguish the port {member.location} from {' or '.join(ports)}."
-    return sentence
+    if nearest is not None:
+        sentence += f" The nearest formula of the catalogue, {_words(problem, nearest)}, "
+        if fits:
+            left = left_over(problem.search, problem.base, fits[0], problem.constants)
+            sentence += (
+                f"explains {_explained(left)} of the misfit beyond the noise, the learned law "
+                f"{_explained(member.left)}."
+            )
+        else:
+            sentence += "promised too little for a fit."
+    return sentence + _not_apart(problem, evidence)
+
+
+def _words(problem: DiagnosisProblem, effect: str) -> str:
+    """What an effect is, with its name."""
+    law = problem.plant.catalogue[effect].law
+    return f"{law.words or _KINDS[law.family]} (`{effect}`)"
+
+
+def _not_apart(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> str:
+    """The ports that the campaign cannot tell from that of something that the catalogue lacks."""
+    ports = [problem.words(each) for each in evidence.indistinguishable_ports(problem.constants)]
+    if not ports:
+        return ""
+    others = " or the ".join(ports)
+    return f" This campaign cannot distinguish the {problem.words(evidence.port)} from the {others}."
 
 
 _KINDS = {
@@ -146,14 +160,13 @@ def _evidence_against(odds: float, constants: DecisionConstants) -> str:
     )
 
 
-def _something_unknown(
-    problem: DiagnosisProblem, evidence: DiagnosisEvidence, ports: Sequence[str], gap: Shrink
-) -> str:
+def _something_unknown(problem: DiagnosisProblem, evidence: DiagnosisEvidence, gap: Shrink) -> str:
     found = evidence.localisation
+    where = problem.words(found.name)
     sentence = "The model lacks something that no effect of the catalogue explains: "
     if gap.after < gap.recalibrated:
         sentence += (
-            f"a law learned at the port '{found.name}' accounts for {100.0 * found.share:.0f} % of the squared gap "
+            f"a law learned at the {where} accounts for {100.0 * found.share:.0f} % of the squared gap "
             f"in held-out tests, which shrinks from {_percent(gap.recalibrated)} recalibrated to "
             f"{_percent(gap.after)} of the response; the noise is {_percent(gap.floor)}."
         )
@@ -161,52 +174,59 @@ def _something_unknown(
         sentence += (
             f"recalibrated it misses by {_percent(gap.recalibrated)} of the response, the noise is "
             f"{_percent(gap.floor)}, and no law learned at a port predicts held-out tests better; the nearest acts "
-            f"at the port '{found.name}'."
+            f"at the {where}."
         )
-    sentence += _nearest(problem, evidence)
-    if ports:
-        sentence += f" This campaign cannot distinguish the port {evidence.port} from {' or '.join(ports)}."
-    return sentence
+    return sentence + _nearest(problem, evidence) + _not_apart(problem, evidence)
 
 
 def _nearest(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> str:
     """The nearest effects of the catalogue, or the tolerance that something unknown would need."""
     if evidence.unknown.reason == "tolerance" and evidence.weighed[0].hypothesis.unknown:
         conflict, effects = evidence.broken.conflict, evidence.broken.beside.effects
-        start = f"With {' and '.join(effects)} the" if effects else "The"
+        start = f"With {' and '.join(f'`{name}`' for name in effects)} the" if effects else "The"
         return (
-            f" {start} model would need {conflict.parameter} {abs(conflict.tolerances):.1f} tolerances "
-            f"{'above' if conflict.tolerances > 0.0 else 'below'} its data sheet, which acts at the port "
-            f"'{evidence.port}'."
+            f" {start} model would need `{conflict.parameter}` {abs(conflict.tolerances):.1f} tolerances "
+            f"{'above' if conflict.tolerances > 0.0 else 'below'} its data sheet, which acts at the "
+            f"{problem.words(evidence.port)}."
         )
     effects = hypothesis_of(most_probable(evidence.findings, problem.constants)).effects
     if not effects:
         return ""
+    several, words = len(effects) > 1, " and ".join(_words(problem, name) for name in effects)
     return (
-        f" The nearest effect of the catalogue, {' and '.join(effects)}, leaves {_left(evidence.left)} of the misfit "
-        "beyond the noise."
+        f" The nearest effect{'s' if several else ''} of the catalogue, {words}, explain{'' if several else 's'} "
+        f"{_explained(evidence.left)} of the misfit beyond the noise."
     )
 
 
 def _effects_missing(
     problem: DiagnosisProblem, evidence: DiagnosisEvidence, alternatives: Sequence[str], gap: Shrink
 ) -> str:
-    effects, ports = evidence.chosen.hypothesis.effects, problem.locations(evidence.chosen.hypothesis)
+    effects = evidence.chosen.hypothesis.effects
     one = len(effects) == 1
-    sentence = (
-        f"{' and '.join(effects)} at the port{'' if len(ports) == 1 else 's'} {' and '.join(ports)} "
-        f"{'is' if one else 'are'} missing in the model: with {'it' if one else 'them'} the gap shrinks from "
-        f"{_percent(gap.recalibrated)} recalibrated ({_percent(gap.before)} as given) to {_percent(gap.after)} of "
-        f"the response; the noise is {_percent(gap.floor)}."
+    places = [problem.words(problem.location(name)) for name in effects]
+    words = [_words(problem, name) for name in effects]
+    if one:
+        sentence = f"The model lacks something at the {places[0]}: {words[0]}."
+    else:
+        each = "; ".join(f"at the {place}, {word}" for place, word in zip(places, words, strict=True))
+        sentence = f"The model lacks {_COUNTS.get(len(effects), 'several')} things: {each}."
+    sentence += (
+        f" With {'it' if one else 'them'} the gap shrinks from {_percent(gap.recalibrated)} recalibrated "
+        f"({_percent(gap.before)} as given) to {_percent(gap.after)} of the response in held-out tests; the noise is "
+        f"{_percent(gap.floor)}."
     )
     if alternatives:
-        which = "it" if one else "one of them"
-        sentence += f" This campaign cannot distinguish {which} from {' or '.join(alternatives)}."
+        others = " or ".join(f"`{name}`" for name in alternatives)
+        sentence += f" This campaign cannot distinguish {'it' if one else 'one of them'} from {others}."
     return sentence
 
 
+_COUNTS = {2: "two", 3: "three", 4: "four"}
+
+
 def write_warnings(
-    problem: DiagnosisProblem, evidence: DiagnosisEvidence, named: LaplaceFit, gap: Shrink
+    problem: DiagnosisProblem, evidence: DiagnosisEvidence, named: LaplaceFit
 ) -> tuple[str, ...]:
     """What the reader must know before using the verdict, a sentence each; ``named`` is the fit of what is named."""
     constants = problem.constants
@@ -226,16 +246,15 @@ def write_warnings(
     ):
         if not mode.status.ok:
             found.append(f"The search for {name} did not converge: {mode.status.advice}.")
-    if (
-        evidence.kind == "none"
-        and not evidence.unsupported
-        and gap.recalibrated**2 - gap.floor**2 > constants.material_share**2
-    ):
-        found.append(
-            f"The recalibrated model differs by {_percent(gap.recalibrated)} of the response where the noise is "
-            f"{_percent(gap.floor)}, by errors that follow no law at any port: look at the tests with the "
-            "largest gap."
-        )
+    conflict, chosen = evidence.broken.conflict, evidence.chosen
+    if evidence.kind in ("effect", "several") and evidence.unknown.weight > chosen.weight:
+        if evidence.unknown.reason == "tolerance":
+            found.append(
+                f"Besides, the model would need `{conflict.parameter}` {abs(conflict.tolerances):.1f} tolerances "
+                f"{'above' if conflict.tolerances > 0.0 else 'below'} its data sheet."
+            )
+        else:
+            found.append("Something more may be missing that is too small to be told what it is.")
     if evidence.kind in ("effect", "several") and evidence.left > constants.reported_share:
         found.append(
             f"The named effects leave {100.0 * evidence.left:.1f} % of the baseline's misfit beyond the noise: their "
@@ -245,8 +264,12 @@ def write_warnings(
     return tuple(dict.fromkeys(found))
 
 
-def _left(share: float) -> str:
-    return "all" if share >= 0.995 else f"{100.0 * share:.2g} %"
+def _explained(left: float) -> str:
+    """What is explained where a share is left; no figure says all where something is left."""
+    share = 1.0 - left
+    if share <= 0.0:
+        return "nothing"
+    return "all" if left < 0.0005 else f"{100.0 * share:.0f} %" if share < 0.985 else f"{100.0 * share:.1f} %"
 
 
 def _percent(share: float) -> str:

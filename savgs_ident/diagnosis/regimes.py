@@ -22,9 +22,10 @@ own: a drift of the friction is greatest in slow tests. So there are two referen
 p-value is the larger one of both.
 
 The last regime is a drift: in every test the residual is projected on the slope in each identified parameter, and the
-coefficients are regressed on the time at which the tests were recorded. It must be a trend, and more than is
-tolerated: the largest |t| of the regressions is held against the draws without shared errors, the largest trend in
-standard deviations of the rows against those with them, which have the tolerated drifts.
+coefficients are regressed on the time at which the tests were recorded. It must be a trend, and more than errors of
+the background look like: the largest |t| of the regressions is held against the draws without shared errors, the
+largest trend in standard deviations of the rows against those with them. Drifts that the background tolerates are
+left out of both: what is tolerated is no reason to call an effect missing, but it is where the model fails.
 
 Regimes of which nine tenths coincide in a campaign cannot be told apart by it and are one: where the port moves like
 a sine, the instants of high speed are those of small stroke. All p-values are corrected together by Holm's method.
@@ -93,46 +94,58 @@ class Cycles:
 
 
 def find_regimes(
-    cycles: Cycles, data: Data, fit: LaplaceFit, free: Sequence[str] = (), draws: int = DRAWS
+    cycles: Cycles,
+    data: Data,
+    fit: LaplaceFit,
+    free: Sequence[str] = (),
+    steady: Data | None = None,
+    draws: int = DRAWS,
 ) -> tuple[Regime, ...]:
     """The regimes of a campaign with the gap in each, the most significant first.
 
     ``fit`` is that of the recalibrated baseline to ``data``, ``free`` names the parameters that it identifies; where
-    there are none, a drift is looked for in all of them. The time is that of ``cycles.recorded``.
+    there are none, a drift is looked for in all of them. The time is that of ``cycles.recorded``. ``steady``
+    are the data less the drifts that they tolerate, where they do.
     """
-    residual = data.measured - fit.prediction.rows
+    residual = (data.measured - fit.prediction.rows)[None]
     drawn, noise = drawn_residuals(data, fit, draws), drawn_noise(data)
-    stacked = np.concatenate([residual[None], *drawn])
-    waves, floor = cycles.waves(stacked), np.mean(cycles.waves(noise) ** 2, axis=(0, 3))
+    waves = cycles.waves(np.concatenate([residual, *drawn]))
+    floor = np.mean(cycles.waves(noise) ** 2, axis=(0, 3))
     named = _joined(dict(_masks(cycles, data)))
     names, masks = list(named), list(named.values())
     spread = _spread(cycles, data, fit, floor)
     p_values = [max(_p_values(each, len(drawn))) for each in concentrations(waves, spread, masks)]
     gaps = [_gap(cycles, data, waves[0] ** 2, floor, mask) for mask in masks]
+    without = drawn if steady is None else drawn_residuals(data, fit, draws, source=steady)
     columns = [n for n, each in enumerate(fit.coordinates) if each.name in free or not free]
-    trend = _trend(data, fit, np.concatenate([stacked, noise]), fit.slopes[:, columns], cycles.recorded)
+    rows = np.concatenate([residual, *without, noise])
+    trend = _trend(data, fit, rows, fit.slopes[:, columns], cycles.recorded)
     if trend is not None:
-        some, rows = len(stacked), trend.rows
+        some = len(rows) - len(noise)
         names.append(_drift_name(cycles))
         p_values.append(
-            max(_p_values(trend.size[:some], len(drawn))[0], _p_values(trend.t[:some], len(drawn))[-1])
+            max(_p_values(trend.size[:some], len(without))[0], _p_values(trend.t[:some], len(without))[-1])
         )
-        gaps.append(_gap_of_trend(cycles, data, rows[:1], rows[some:]))
+        gaps.append(_gap_of_trend(cycles, data, trend.rows[:1], trend.rows[some:]))
     found = zip(names, gaps, holm(np.array(p_values)), strict=True)
     return tuple(sorted((Regime(*each) for each in found), key=lambda each: each.p_value))
 
 
-def drawn_residuals(data: Data, fit: LaplaceFit, draws: int, seed: int = SEED) -> tuple[Array, ...]:
+def drawn_residuals(
+    data: Data, fit: LaplaceFit, draws: int, seed: int = SEED, source: Data | None = None
+) -> tuple[Array, ...]:
     """Residuals (S, m) [unit of each row] of data drawn from the fitted error model, after a fit like ``fit``.
 
-    With the errors that rows share, and without; the first alone where they share none.
+    With the errors that rows share, and without; the first alone where they share none. Errors are those of
+    ``source`` where that is given, otherwise those of ``data``.
     """
+    source = data if source is None else source
     random, noise, discrepancy = np.random.default_rng(seed), fit.noise_scales.noise, _small(data, fit)
     weighted = data.turned(fit.slopes) / fit.noise_scales.spread[:, None]
-    shares = data.shared is not None or data.tolerated is not None
+    shares = source.shared is not None or source.tolerated is not None
     found = []
-    for source in (data, replace(data, shared=None, tolerated=None))[: 2 if shares else 1]:
-        errors = np.stack([source.draw_errors(noise, discrepancy, random) for _ in range(draws)], axis=1)
+    for each in (source, replace(source, shared=None, tolerated=None))[: 2 if shares else 1]:
+        errors = np.stack([each.draw_errors(noise, discrepancy, random) for _ in range(draws)], axis=1)
         errors += fit.slopes @ random.standard_normal((fit.slopes.shape[1], draws))
         taken_up = np.linalg.solve(fit.precision, weighted.T @ data.turned(errors))
         found.append(np.asarray((errors - fit.slopes @ taken_up).T))
@@ -328,5 +341,5 @@ def dwell_cycles(problem: "DwellProblem", fit: LaplaceFit) -> Cycles:
         displacement=over_cycle(motion.displacement),
         load=over_cycle(max(loads, key=lambda each: float(np.abs(each).mean()))) if loads else None,
         frequency=np.asarray(problem.excitation.frequency),
-        recorded=np.array(problem.recorded or range(problem.shape[0]), np.float64),
+        recorded=problem.times,
     )

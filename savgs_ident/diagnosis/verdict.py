@@ -205,7 +205,7 @@ def decide(
     """What may be said, and the hypothesis that it rests on.
 
     ``change`` is what the best fitted hypothesis does to the response; ``left`` the share of the baseline's misfit
-    that it leaves.
+    that it leaves. What leaves next to nothing is named though something unknown may explain the rest as well.
     """
     none, unknown = (
         next(each for each in weighed if each.hypothesis == hypothesis) for hypothesis in (NONE, UNKNOWN)
@@ -214,7 +214,8 @@ def decide(
     best = fitted[0] if fitted else none
     if alarm_odds(weighed) < constants.alarm_log_odds:
         return "none", none
-    if unknown.weight > best.weight:
+    explains = best.weight >= none.weight + constants.alarm_log_odds and left <= constants.explained_share
+    if unknown.weight > best.weight and not (explains and change.matters(constants)):
         return "unknown", unknown
     if not change.matters(constants):
         return "none", none

@@ -209,6 +209,8 @@ class Role(NamedTuple):
 class AbstractLaw(eqx.Module):
     """Base of all laws; each one is final, of one of the kinds below, and lives in its own file.
 
+    ``words`` say what a plant with it has, for a reader who does not know its name; where there are none its family
+    must do.
     ``tried`` are values [SI] of shaping roles at which a diagnosis looks for the law, where multiples of the typical
     ones would leave some out: natural frequencies, say.
     """
@@ -217,6 +219,7 @@ class AbstractLaw(eqx.Module):
     name: eqx.AbstractClassVar[str]
     family: eqx.AbstractClassVar[Family]
     roles: eqx.AbstractClassVar[tuple[Role, ...]]
+    words: ClassVar[str] = ""
     tried: ClassVar[tuple[tuple[str, float], ...]] = ()
 
     @abstractmethod

@@ -20,6 +20,7 @@ from functools import cache
 
 import matplotlib
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
@@ -76,13 +77,21 @@ def render_page(template: str, values: Mapping[str, object]) -> str:
 
 @cache
 def _environment() -> Environment:
-    return Environment(
+    environment = Environment(
         loader=PackageLoader("savgs_ident.report"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["prose"] = prose
+    return environment
+
+
+def prose(text: str) -> Markup:
+    """A sentence for a page: escaped, names in backticks in code font, a number and its per cent on one line."""
+    escaped = str(escape(text)).replace(" %", "\u00a0%")
+    return Markup(re.sub("`([^`]*)`", r"<code>\1</code>", escaped))
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ def test_every_location_has_the_material_size_however_many_functions_it_has() ->
         columns = random.standard_normal((data.measured.size, count)) * random.uniform(0.1, 10.0, count)
         place = InputLocation("rail", (Law(columns),), columns)
         nothing = np.zeros((data.measured.size, 0))
-        there = with_background(data, channel, [place], nothing, nothing, nothing)
+        there = with_background(data, channel, [place], nothing, nothing, nothing, np.arange(5.0))
         assert there.shared is not None
         size = DEFAULTS.material_error * np.sqrt(np.sum(relative_change(data, channel, there.shared) ** 2))
         assert size == pytest.approx(DEFAULTS.material_error)
@@ -46,12 +46,18 @@ def test_every_location_has_the_material_size_however_many_functions_it_has() ->
 
 def test_an_input_errs_in_each_test_by_itself_and_what_is_identified_drifts() -> None:
     data, nothing = _data(), np.zeros((200, 0))
-    there = with_background(data, np.zeros(200, int), [], np.ones((200, 1)), nothing, np.ones((200, 1)))
+    # Another order than that of the frequencies, in which the tests of the data are.
+    recorded = np.array([5.0, 1.0, 3.0, 2.0, 4.0])
+    there = with_background(
+        data, np.zeros(200, int), [], np.ones((200, 1)), nothing, np.ones((200, 1)), recorded
+    )
     assert there.shared is not None
     assert there.tolerated is not None
     size = DEFAULTS.material_error * there.shared
     np.testing.assert_allclose(size, DEFAULTS.input_error * (data.test[:, None] == np.arange(5)))
-    np.testing.assert_allclose(there.tolerated[:, 0], DEFAULTS.drift_tolerance * (data.test / 2.0 - 1.0))
+    np.testing.assert_allclose(
+        there.tolerated[:, 0], DEFAULTS.drift_tolerance * ((recorded - 3.0) / 2.0)[data.test]
+    )
 
 
 def test_the_pieces_of_a_curve_are_the_curve() -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from savgs_ident.core.status import Status
-from savgs_ident.diagnosis.held_out import hold_out
+from savgs_ident.diagnosis.held_out import HeldOut, hold_out, predict_left_out
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation, anywhere, localise
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import cosine, score_terms
@@ -154,6 +154,41 @@ def test_left_out_tests_are_predicted_without_being_seen() -> None:
     assert seen.mean > without.mean + 1.0
 
 
+def test_left_out_rows_are_those_of_the_joint_normal_density() -> None:
+    """Parameters, errors within tolerances and noise as one normal density, conditioned as a whole."""
+    tolerated = 0.02 * np.stack([PLANT.x**2, np.repeat(np.arange(6.0), PLANT.points)], axis=1)
+    data = replace(draw(PLANT, {"a": 1.1}, NOISE, 8), tolerated=tolerated)
+    part = Search(PLANT, data, data.test != 2)
+    found = find_map(part, (), {}, None)
+    out, scales = ~part.mask, found.noise_scales
+    rows, density = predict_left_out(
+        part,
+        out,
+        found.prediction.rows,
+        found.slopes,
+        part.missed(found.prediction),
+        found.covariance(),
+        scales,
+    )
+    errors = scales.noise**2 * (np.diag(data.variance) + tolerated @ tolerated.T)
+    errors += scales.discrepancy**2 * np.diag(data.discrepancy_scale**2) + found.slopes @ found.slopes.T
+    mean = PLANT.rows({})
+    gain = np.linalg.solve(errors[np.ix_(part.mask, part.mask)], errors[np.ix_(part.mask, out)]).T
+    np.testing.assert_allclose(rows, mean[out] + gain @ (data.measured - mean)[part.mask], atol=1e-8)
+    variance = np.diag(errors[np.ix_(out, out)] - gain @ errors[np.ix_(part.mask, out)])
+    expected = -0.5 * ((data.measured[out] - rows) ** 2 / variance + np.log(variance / data.variance[out]))
+    np.testing.assert_allclose(density, expected, atol=1e-8)
+
+
+def test_a_law_predicts_no_better_where_nothing_is_missing_and_better_where_something_is() -> None:
+    place = InputLocation("spring", (Law(np.stack([PLANT.x**2, PLANT.x**4], axis=1)),), PLANT.x[:, None] ** 2)
+    for bend, least, most in ((0.0, -0.2, 0.05), (0.3, 1.0, np.inf)):
+        search = search_of(PLANT, draw(PLANT, {"a": 1.1, "c": bend}, NOISE, 12))
+        base = find_map(search, (), {}, None)
+        (found,) = localise(search, base, [place])
+        assert least < found.held_out.mean - hold_out(search, base, ()).mean < most
+
+
 def test_a_gap_is_attributed_to_the_place_that_can_make_it() -> None:
     search = search_of(PLANT, draw(PLANT, {"c": 0.3}, NOISE, 9))
     base = find_map(search, (), {}, None)
@@ -167,7 +202,7 @@ def test_a_gap_is_attributed_to_the_place_that_can_make_it() -> None:
     assert first.share > 0.98
     assert first.free_input_share > 0.98
     assert second.share < 0.05
-    np.testing.assert_allclose(first.held_out, x + 0.3 * x**2, atol=0.02)
+    np.testing.assert_allclose(first.held_out.rows, x + 0.3 * x**2, atol=0.02)
     assert first.evidence > base.evidence + 100.0 > second.evidence
 
 
@@ -181,7 +216,7 @@ def test_excess_is_what_the_noise_does_not_explain() -> None:
 
 def test_a_law_anywhere_is_as_probable_as_its_places_are_on_average() -> None:
     places = [
-        Localisation(name, 0.0, 0.0, evidence, np.zeros(0), np.zeros((0, 0)))
+        Localisation(name, 0.0, 0.0, evidence, HeldOut(np.zeros(0), np.zeros(0)), np.zeros((0, 0)))
         for name, evidence in (("strut", -700.0), ("rail", -701.0), ("link", -900.0))
     ]
     assert anywhere(places) == pytest.approx(-700.0 + np.log((1.0 + np.exp(-1.0)) / 3.0))
@@ -321,4 +356,4 @@ def test_a_place_that_may_follow_another_law_is_not_much_less_probable_for_it() 
         for laws in ((law,), (law, other))
     )
     assert either.evidence == pytest.approx(alone.evidence - np.log(4.0), abs=1e-3)
-    np.testing.assert_allclose(either.held_out, alone.held_out, atol=1e-9)
+    np.testing.assert_allclose(either.held_out.rows, alone.held_out.rows, atol=1e-9)

@@ -76,7 +76,21 @@ def _weighed(weights: Mapping[str, float], scored: tuple[str, ...] = ()) -> list
             "unknown",
             "unknown",
         ),
-        ({"none": 0.0, "unknown": 600.0, "rail_viscous": 500.0}, 0.05, 0.0, "unknown", "unknown"),
+        (
+            {"none": 0.0, "unknown": 600.0, "rail_viscous": 500.0},
+            0.05,
+            DEFAULTS.explained_share * 1.1,
+            "unknown",
+            "unknown",
+        ),
+        # What leaves next to nothing is not something unknown.
+        (
+            {"none": 0.0, "unknown": 600.0, "rail_viscous": 500.0},
+            0.05,
+            DEFAULTS.explained_share / 2.0,
+            "effect",
+            "rail_viscous",
+        ),
         ({"none": 0.0, "unknown": 600.0}, 0.0, 1.0, "unknown", "unknown"),
         ({"none": 0.0, "unknown": DEFAULTS.alarm_log_odds - 1.0}, 0.0, 1.0, "none", "none"),
         (

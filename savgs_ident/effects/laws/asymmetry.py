@@ -19,6 +19,7 @@ class Asymmetry(AbstractFrictionLimitLaw):
     """More friction one way than the other."""
 
     name: ClassVar[str] = "asymmetry"
+    words: ClassVar[str] = "more friction one way than the other"
     roles: ClassVar[tuple[Role, ...]] = (Role("coefficient"), Role("asymmetry", 0.0))
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:

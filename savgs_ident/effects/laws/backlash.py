@@ -23,6 +23,7 @@ class Backlash(AbstractSeriesLaw):
     """Play in the path of a load."""
 
     name: ClassVar[str] = "backlash"
+    words: ClassVar[str] = "play in the path of the load"
     family: ClassVar[Family] = Family.PLAY
     roles: ClassVar[tuple[Role, ...]] = (Role("backlash", 0.0), Role("change_over"))
 

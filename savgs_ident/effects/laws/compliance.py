@@ -33,6 +33,7 @@ class Compliance(AbstractSeriesLaw):
     """Something that gives way in proportion to the load."""
 
     name: ClassVar[str] = "compliance"
+    words: ClassVar[str] = "something that gives way in proportion to the load"
     family: ClassVar[Family] = Family.COMPLIANCE
     roles: ClassVar[tuple[Role, ...]] = (Role("compliance", 0.0), Role("damping"))
 

@@ -20,6 +20,7 @@ class Coulomb(AbstractFrictionLimitLaw):
     """Friction in proportion to the load."""
 
     name: ClassVar[str] = "coulomb"
+    words: ClassVar[str] = "friction in proportion to the load"
     roles: ClassVar[tuple[Role, ...]] = (Role("coefficient", 0.0),)
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:

@@ -23,6 +23,7 @@ class Delay(AbstractSensorLaw):
     """A sensor that reports late."""
 
     name: ClassVar[str] = "delay"
+    words: ClassVar[str] = "a reading that comes late"
     family: ClassVar[Family] = Family.DYNAMICS
     roles: ClassVar[tuple[Role, ...]] = (Role("time", 0.0),)
 

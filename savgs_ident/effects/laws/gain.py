@@ -22,6 +22,7 @@ class Gain(AbstractSensorLaw):
     """A sensor that shows too much or too little."""
 
     name: ClassVar[str] = "gain"
+    words: ClassVar[str] = "a reading that is too large or too small"
     family: ClassVar[Family] = Family.GAIN
     roles: ClassVar[tuple[Role, ...]] = (Role("error", 0.0),)
 

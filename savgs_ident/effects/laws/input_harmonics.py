@@ -23,6 +23,7 @@ class InputHarmonics(AbstractInputLaw):
     """Second and third order of an input."""
 
     name: ClassVar[str] = "harmonics"
+    words: ClassVar[str] = "waves of second and third order on the input"
     family: ClassVar[Family] = Family.SHAPE
     roles: ClassVar[tuple[Role, ...]] = tuple(
         Role(f"{wave}_{order}", 0.0) for order in ORDERS for wave in ("cos", "sin")

@@ -21,6 +21,7 @@ class InputOffset(AbstractInputLaw):
     """A constant error of a force that is recorded as an input."""
 
     name: ClassVar[str] = "offset"
+    words: ClassVar[str] = "a constant error of the input"
     family: ClassVar[Family] = Family.SHAPE
     roles: ClassVar[tuple[Role, ...]] = (Role("force", 0.0),)
 

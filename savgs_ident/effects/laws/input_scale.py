@@ -19,6 +19,7 @@ class InputScale(AbstractInputLaw):
     """A scale error of what is recorded of an input."""
 
     name: ClassVar[str] = "scale"
+    words: ClassVar[str] = "an input that is larger or smaller than recorded"
     family: ClassVar[Family] = Family.GAIN
     roles: ClassVar[tuple[Role, ...]] = (Role("error", 0.0),)
 

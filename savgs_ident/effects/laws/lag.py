@@ -23,6 +23,7 @@ class Lag(AbstractSensorLaw):
     """A sensor that follows late."""
 
     name: ClassVar[str] = "lag"
+    words: ClassVar[str] = "a reading that follows late and shrinks with frequency"
     family: ClassVar[Family] = Family.DYNAMICS
     roles: ClassVar[tuple[Role, ...]] = (Role("time", 0.0),)
 

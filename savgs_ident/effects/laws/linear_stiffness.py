@@ -21,6 +21,7 @@ class LinearStiffness(AbstractForceLaw):
     """A force against the displacement and in proportion to it."""
 
     name: ClassVar[str] = "stiffness"
+    words: ClassVar[str] = "a stiffness in proportion to the displacement"
     family: ClassVar[Family] = Family.STIFFNESS
     roles: ClassVar[tuple[Role, ...]] = (Role("stiffness", 0.0),)
 

@@ -34,6 +34,7 @@ class MassiveCompliance(AbstractSeriesLaw):
     """Something with a mass that gives way in proportion to the load."""
 
     name: ClassVar[str] = "massive_compliance"
+    words: ClassVar[str] = "something with a mass that gives way under the load"
     family: ClassVar[Family] = Family.COMPLIANCE
     roles: ClassVar[tuple[Role, ...]] = (Role("compliance", 0.0), Role("damping"), Role("mass"))
 

@@ -21,6 +21,7 @@ class Offset(AbstractNumberLaw):
     """A number with something added."""
 
     name: ClassVar[str] = "offset"
+    words: ClassVar[str] = "a number that is larger or smaller than on the sheet"
     roles: ClassVar[tuple[Role, ...]] = (Role("number"), Role("change", 0.0))
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:

@@ -22,6 +22,7 @@ class OneSidedDamping(AbstractForceLaw):
     """Less damping in extension than in compression."""
 
     name: ClassVar[str] = "one_sided"
+    words: ClassVar[str] = "less damping in extension than in compression"
     family: ClassVar[Family] = Family.DAMPING
     roles: ClassVar[tuple[Role, ...]] = (Role("lost", 0.0),)
 

@@ -21,6 +21,7 @@ class Preload(AbstractFrictionLimitLaw):
     """Friction that does not depend on the load."""
 
     name: ClassVar[str] = "preload"
+    words: ClassVar[str] = "friction that does not depend on the load"
     roles: ClassVar[tuple[Role, ...]] = (Role("force", 0.0),)
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:

@@ -35,6 +35,7 @@ class PreslidingFriction(AbstractForceLaw):
     """Friction with a bristle of its own."""
 
     name: ClassVar[str] = "friction"
+    words: ClassVar[str] = "friction that gives like a spring before it slides"
     family: ClassVar[Family] = Family.FRICTION
     roles: ClassVar[tuple[Role, ...]] = (Role("force", 0.0), Role("stretch"), Role("lag"))
 

@@ -28,6 +28,7 @@ class ProgressiveStiffness(AbstractForceLaw):
     """
 
     name: ClassVar[str] = "stiffening"
+    words: ClassVar[str] = "a stiffness that grows with the displacement"
     family: ClassVar[Family] = Family.STIFFNESS
     roles: ClassVar[tuple[Role, ...]] = (Role("stiffness"), Role("rise", 0.0))
     from_rest: bool = eqx.field(static=True, default=True)

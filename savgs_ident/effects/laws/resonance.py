@@ -24,6 +24,7 @@ class Resonance(AbstractSeriesLaw):
     """Something that swings under the load."""
 
     name: ClassVar[str] = "resonance"
+    words: ClassVar[str] = "something that swings under the load"
     family: ClassVar[Family] = Family.OSCILLATOR
     roles: ClassVar[tuple[Role, ...]] = (Role("mobility", 0.0), Role("frequency"), Role("damping_ratio"))
     tried: ClassVar[tuple[tuple[str, float], ...]] = tuple(

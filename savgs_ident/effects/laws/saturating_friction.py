@@ -23,6 +23,7 @@ class SaturatingFriction(AbstractForceLaw):
     """Friction in proportion to a load, with a shaping velocity."""
 
     name: ClassVar[str] = "saturating_friction"
+    words: ClassVar[str] = "friction that sets in smoothly with the velocity"
     family: ClassVar[Family] = Family.FRICTION
     roles: ClassVar[tuple[Role, ...]] = (Role("coefficient", 0.0), Role("velocity"))
 

@@ -21,6 +21,7 @@ class Scale(AbstractNumberLaw):
     """A number that is larger or smaller by a share."""
 
     name: ClassVar[str] = "scale"
+    words: ClassVar[str] = "a number that is larger or smaller than on the sheet"
     roles: ClassVar[tuple[Role, ...]] = (Role("number"), Role("change", 0.0))
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:

@@ -41,6 +41,7 @@ class LowerStop(AbstractForceLaw):
     """A stop at the lower end of the travel: in bump, for a strut."""
 
     name: ClassVar[str] = "lower_stop"
+    words: ClassVar[str] = "a stop at the lower end of the travel"
     family: ClassVar[Family] = Family.STOP
     roles: ClassVar[tuple[Role, ...]] = (Role("stiffness", 0.0), Role("gap"))
 
@@ -58,6 +59,7 @@ class UpperStop(AbstractForceLaw):
     """A stop at the upper end of the travel."""
 
     name: ClassVar[str] = "upper_stop"
+    words: ClassVar[str] = "a stop at the upper end of the travel"
     family: ClassVar[Family] = Family.STOP
     roles: ClassVar[tuple[Role, ...]] = (Role("stiffness", 0.0), Role("gap"))
 

@@ -22,6 +22,7 @@ class Stribeck(AbstractFrictionLimitLaw):
     """More friction at low speed than at high speed."""
 
     name: ClassVar[str] = "stribeck"
+    words: ClassVar[str] = "more friction at low speed than at high speed"
     roles: ClassVar[tuple[Role, ...]] = (Role("coefficient"), Role("rise", 0.0), Role("velocity"))
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:

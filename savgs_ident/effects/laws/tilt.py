@@ -23,6 +23,7 @@ class Tilt(AbstractSensorLaw):
     """A tilted sensor."""
 
     name: ClassVar[str] = "tilt"
+    words: ClassVar[str] = "a sensor that is tilted"
     family: ClassVar[Family] = Family.GAIN
     roles: ClassVar[tuple[Role, ...]] = (Role("versine", 0.0),)
 

@@ -21,6 +21,7 @@ class Viscous(AbstractForceLaw):
     """A force against the velocity and in proportion to it."""
 
     name: ClassVar[str] = "viscous"
+    words: ClassVar[str] = "damping in proportion to the velocity"
     family: ClassVar[Family] = Family.DAMPING
     roles: ClassVar[tuple[Role, ...]] = (Role("damping", 0.0),)
 

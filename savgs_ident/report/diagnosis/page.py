@@ -268,8 +268,7 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "origin": origin,
             "alarm": alarm(diagnosis),
             "verdict": verdict,
-            # A number and its per cent stay on one line.
-            "sentence": verdict.sentence.replace(" %", "\u00a0%"),
+            "sentence": verdict.sentence,
             "named": " + ".join(verdict.effects) or "its verdict",
             "baseline": baseline_sentence(diagnosis),
             "per_input": per_input_words(diagnosis.given),
