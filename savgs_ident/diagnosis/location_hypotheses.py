@@ -10,11 +10,7 @@ A location is where the ports of one name are. What may be unknown there follows
     number   slopes in the numbers, or forces of the masses among them; only where no other port is: elsewhere
              laws of what acts there can do the same
 
-Each is a set of functions of its own, and an unknown signal follows one law of one set.
-
-The functions of a set are smooth, some sharp about zero velocity, where friction turns round. Most of what is
-missing in a model is simple: one friction, one compliance, one delay. A sum of a dozen functions can do the same, but
-so can that of the location beside it; so every set also has its simple laws, of one function or a few.
+Each is a set of functions of its own (:mod:`.port_functions`), and an unknown signal follows one law of one set.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,234 +23,32 @@ from numpy.typing import NDArray
 from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.effect_sensitivities import impose, node_loads
 from savgs_ident.diagnosis.localisation import InputLocation, Law
-from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.effects.base import Family, Load, Port, PortKind, PortSignals
-from savgs_ident.effects.learned import (
-    OF_SLIDERS,
-    OF_THE_LOAD,
-    OF_THE_MOTION,
-    OF_WHAT_GIVES,
-    STRETCHES,
-    filters,
-    functions,
-    what_gives,
+from savgs_ident.diagnosis.port_functions import (
+    GAIN_AND_RATE,
+    RESONANCES,
+    Functions,
+    MeshPoints,
+    Signal,
+    damped_functions,
+    force_functions,
+    input_ripple,
+    input_shape,
+    laws_of_functions,
+    mesh_points,
+    rate_of,
+    resonance,
+    resonance_functions,
+    sensor_filters,
+    sensor_functions,
+    series_functions,
 )
+from savgs_ident.effects.base import Family, Load, Port, PortKind, PortSignals
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.simulate.periodic import PeriodicSolution, harmonics
 from savgs_ident.simulate.program_cache import placed
 
 if TYPE_CHECKING:
     from savgs_ident.diagnosis.dwell_problem import DwellProblem
-
-Signal = NDArray[np.float64]
-
-
-class MeshPoints(NamedTuple):
-    """Phase [rad], dwell and angular frequency [rad/s] of the nodes, (P,) each."""
-
-    phase: Signal
-    dwell: NDArray[np.intp]
-    omega: Signal
-
-
-def mesh_points(solution: PeriodicSolution) -> MeshPoints:
-    """The nodes of a motion."""
-    layout = solution.mesh.layout
-    omega = 2.0 * np.pi * np.asarray(solution.excitation.frequency)[layout.dwell]
-    return MeshPoints(np.asarray(solution.mesh.phase), np.asarray(layout.dwell), omega)
-
-
-def rate_of(signal: Signal, nodes: MeshPoints, solution: PeriodicSolution) -> Signal:
-    """Time derivative [unit/s], (P,), of a signal (P,) at the nodes, by differences to both neighbours."""
-    layout, gap = solution.mesh.layout, np.asarray(solution.mesh.gap)
-    ahead, behind = gap, gap[layout.preceding]
-    forward = (signal[layout.following] - signal) / ahead
-    backward = (signal - signal[layout.preceding]) / behind
-    return np.asarray(nodes.omega * (forward * behind + backward * ahead) / (ahead + behind))
-
-
-RESONANCES = (3.0, 4.0, 5.4, 7.3, 9.8, 13.0, 18.0, 24.0, 33.0, 50.0)
-"""Natural frequencies [Hz] of what may swing under its load."""
-
-WAVES = (4, 5, 6, 7, 8, 9)
-"""Orders of the ripple of an input, beyond those of its shape."""
-
-INSTANTS = 256
-"""Instants of a period at which a law of a sensor's reading is evaluated."""
-
-_WORDS = [each.words for each in (*OF_THE_MOTION, *OF_THE_LOAD)]
-PLAIN_FORCES = tuple(_WORDS.index(words) for words in ("tanh(v/0.01)", "v", "x"))
-"""Indices of the plain ones among the :func:`motion_functions`: a friction, a damper, a spring."""
-
-_LOADED_FRICTION = _WORDS.index("n tanh(v/0.01)")
-
-
-GAIN_AND_RATE = (0, 1)
-"""Indices of the plain ones among the :func:`sensor_filters`: a gain, and the rate, which is a small delay."""
-
-
-class Functions(NamedTuple):
-    """Functions of what is seen at P nodes, any sum of which is a law.
-
-    Attributes:
-        values: q of them [1, or the unit of what they are made of], (P,) each.
-        families: to which family each belongs.
-        plain: indices of those that make a simple law together.
-    """
-
-    values: list[Signal]
-    families: tuple[Family, ...]
-    plain: tuple[int, ...] = ()
-
-
-def laws_of_functions(
-    columns: NDArray[np.float64], families: Sequence[Family], plain: tuple[int, ...] = (), port: str = ""
-) -> tuple[Law, ...]:
-    """The laws of a set of functions: any sum of them or of those of a family, each alone, the plain ones together.
-
-    The functions change the rows by ``columns`` [unit of the row], (m, q); they are of the ``families``, and
-    ``plain`` are indices among the q; ``port`` is the name of the port where they act.
-    """
-    alone = [([place], families[place]) for place in range(columns.shape[1])]
-    shares = [DEFAULTS.simple_law_prior / len(alone)] * len(alone)
-    simple = [
-        Law(columns[:, places], share, False, family, port)
-        for (places, family), share in zip(alone, shares, strict=True)
-    ]
-    if plain:
-        simple = [each._replace(prior=each.prior / 2.0) for each in simple]
-        simple.append(Law(columns[:, list(plain)], DEFAULTS.simple_law_prior / 2.0, False, None, port))
-    different = dict.fromkeys(families)
-    if len(different) == 1:
-        return (Law(columns, 1.0, True, families[0], port), *simple)
-    flexible = []
-    for family in different:
-        places = [place for place, each in enumerate(families) if each is family]
-        if len(places) > 1:
-            flexible.append(Law(columns[:, places], 1.0 / len(different), False, family, port))
-    return (Law(columns, 1.0, True, None, port), *flexible, *simple)
-
-
-def force_functions(port: Port, seen: PortSignals, solution: PeriodicSolution) -> Functions:
-    """Forces as functions of what a ``port`` sees at the nodes of ``solution``, and those of spring-sliders."""
-    displacement, velocity, load = (np.asarray(part) for part in seen[:3])
-    held = [_slider(displacement, share * port.displacement, solution) for share in STRETCHES]
-    return motion_functions(displacement, velocity, load, held)
-
-
-def series_functions(load: Load) -> Functions:
-    """Ways by which something gives under a ``load`` [the port's unit of force], (P,), as functions of it."""
-    beyond = np.asarray(load.beyond_rest)
-    largest = max(float(np.abs(beyond).max()), np.finfo(float).tiny)
-    n, whole, rest = (
-        jnp.asarray(np.broadcast_to(each, beyond.shape) / largest) for each in (beyond, load.total, load.rest)
-    )
-    values = [np.asarray(each) for each in what_gives(n, whole, rest)]
-    return Functions(values, tuple(each.family for each in OF_WHAT_GIVES), (0,))
-
-
-def damped_functions(beyond: Signal, nodes: MeshPoints, solution: PeriodicSolution) -> Functions:
-    """Ways by which something gives under a load (P,) [its unit] and its rate: what a damper beside it changes."""
-    rate = rate_of(beyond, nodes, solution)
-    found = [each / max(float(np.abs(each).max()), np.finfo(float).tiny) for each in (beyond, rate)]
-    values = [*found, found[1] * np.abs(found[1]), found[0] * found[1]]
-    return Functions(values, (Family.COMPLIANCE,) * len(values), (0, 1))
-
-
-def resonance_functions(beyond: Signal, nodes: MeshPoints) -> Functions:
-    """What gives under a load [the port's unit of force], (P,), and what slightly damped modes would make of it."""
-    modes = [_resonance(beyond, natural, nodes) for natural in RESONANCES]
-    return Functions([beyond, *modes], (Family.OSCILLATOR,) * (1 + len(modes)))
-
-
-def input_shape(angle: Signal, nodes: MeshPoints) -> Functions:
-    """Another shape or size [1] of an input, and one that comes a moment earlier or later than recorded.
-
-    ``angle`` [rad], (P,), is that of the test.
-    """
-    speed = nodes.omega / np.max(nodes.omega)
-    shapes = [wave(order * angle) for order in (1, 2, 3) for wave in (np.cos, np.sin)]
-    families = (Family.GAIN, Family.DYNAMICS, *(Family.SHAPE,) * 4, Family.DYNAMICS, Family.DYNAMICS)
-    return Functions([*shapes, speed * np.cos(angle), speed * np.sin(angle)], families, (0, 1))
-
-
-def input_ripple(angle: Signal) -> Functions:
-    """Waves [1] on an input that are shorter than those of a wrong shape; ``angle`` [rad], (P,), is the test's."""
-    waves = [wave(order * angle) for order in WAVES for wave in (np.cos, np.sin)]
-    return Functions(waves, (Family.SHAPE,) * len(waves))
-
-
-def sensor_filters(omega: Signal) -> list[NDArray[np.complex128]]:
-    """Linear filters of a reading [1]: those of a learned transfer function.
-
-    Filters and angular frequencies ``omega`` [rad/s] are (dwells, orders) each.
-    """
-    return [np.asarray(each, np.complex128) for each in filters(jnp.asarray(omega))]
-
-
-def sensor_functions(reading: NDArray[np.complex128], omega: Signal) -> list[NDArray[np.complex128]]:
-    """Harmonics [1] of functions of a reading and its rate.
-
-    They, the harmonics of the ``reading`` [its unit] and the angular frequencies ``omega`` [rad/s] are
-    (dwells, orders) each.
-    """
-    orders = reading.shape[1]
-    turn = np.exp(2j * np.pi * np.outer(np.arange(orders), np.arange(INSTANTS)) / INSTANTS)
-    along, rate = (np.real(each[:, 1:] @ turn[1:]) for each in (reading, 1j * omega * reading))
-    found = motion_functions(along.ravel(), rate.ravel(), np.zeros(along.size))
-    return [np.fft.rfft(each.reshape(along.shape))[:, :orders] * 2.0 / INSTANTS for each in found.values]
-
-
-def motion_functions(
-    displacement: Signal, velocity: Signal, load: Signal, held: Sequence[Signal] = ()
-) -> Functions:
-    """Functions of what a port sees, each of about unit size, and what its spring-sliders carry, ``held``."""
-    x = displacement - displacement.mean()
-    x = x / max(float(np.abs(x).max()), np.finfo(float).tiny)
-    v = velocity / max(float(np.abs(velocity).max()), np.finfo(float).tiny)
-    loaded = bool(np.any(load))
-    n = load / np.abs(load).max() if loaded else load
-    found = [np.asarray(each) for each in functions(jnp.asarray(x), jnp.asarray(v), jnp.asarray(n))]
-    if not loaded:
-        found = found[: -len(OF_THE_LOAD)]
-    families = [each.family for each in (*OF_THE_MOTION, *OF_THE_LOAD)][: len(found)]
-    plain = (*PLAIN_FORCES, *([_LOADED_FRICTION] if loaded else []))
-    sliders = tuple(each.family for each in OF_SLIDERS[: len(held)])
-    beyond = tuple(range(len(found), len(found) + len(held)))
-    return Functions([*found, *held], (*families, *sliders), (*plain, *beyond))
-
-
-def _slider(displacement: Signal, width: float, solution: PeriodicSolution) -> Signal:
-    """What a spring-slider of unit grip carries that gives by ``width`` [m] before it slides, over a period."""
-    carried = np.zeros_like(displacement)
-    for first, count in zip(solution.mesh.layout.starts, solution.mesh.layout.counts, strict=True):
-        along = displacement[first : first + count]
-        # The first period forgets where it began.
-        carried[first : first + count] = prandtl_element(np.concatenate([along, along]), width)[count:]
-    return carried
-
-
-def prandtl_element(displacement: Signal, width: float) -> Signal:
-    """What a spring and a slider of unit grip carry along a motion (n,), sliding when stretched by ``width`` [m]."""
-    carried = np.zeros_like(displacement)
-    moves, now = np.diff(displacement, prepend=displacement[:1]) / width, 0.0
-    for place, move in enumerate(moves):
-        now = min(max(now + move, -1.0), 1.0)
-        carried[place] = now
-    return carried
-
-
-def _resonance(load: Signal, natural: float, nodes: MeshPoints) -> Signal:
-    """What an oscillator of a natural frequency [Hz] makes of a load (P,)."""
-    out, grid, own = np.zeros_like(load), 2.0 * np.pi * np.arange(256) / 256, 2.0 * np.pi * natural
-    for test in range(int(nodes.dwell.max()) + 1):
-        rows = np.flatnonzero(nodes.dwell == test)
-        spectrum = np.fft.rfft(np.interp(grid, nodes.phase[rows], load[rows], period=2.0 * np.pi))
-        omega = nodes.omega[rows[0]] * np.arange(spectrum.size)
-        answer = np.fft.irfft(spectrum * own**2 / (own**2 - omega**2 + 0.2j * own * omega), 256)
-        out[rows] = np.interp(nodes.phase[rows], grid, answer, period=2.0 * np.pi)
-    return out
-
 
 Fields = list[tuple[str, Signal]]
 """Ports at which something is imposed, and what, at the nodes."""
@@ -386,7 +180,7 @@ def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
         velocity = sum(np.asarray(seen.signals[where].velocity) for where in each.velocity)
         acceleration = rate_of(np.asarray(velocity), seen.nodes, seen.solution)
         fields.append((each.force, acceleration))
-        swinging += [(each.force, _resonance(acceleration, natural, seen.nodes)) for natural in RESONANCES]
+        swinging += [(each.force, resonance(acceleration, natural, seen.nodes)) for natural in RESONANCES]
     columns = seen.imposed([*fields, *swinging])
     still, moving = columns[:, : len(fields)], columns[:, len(fields) :]
     laws = [*laws_of_functions(still, (Family.NUMBER,) * len(fields))]

@@ -277,12 +277,18 @@ def _flexible_members(
 def _worth_learning(
     problem: DiagnosisProblem, findings: Findings, localisations: Sequence[Localisation]
 ) -> list[Port]:
-    """The ports whose learned laws are worth a fit: those that explain most to first order.
+    """The ports whose learned laws are worth a fit: those that explain most to first order, if that is anything.
 
     And the ports of the best single effects: to first order about the baseline a strong effect may explain little.
     """
     constants = problem.constants
-    ports = {name: weight for each in localisations for name, weight in each.ports.items() if name}
+    least = problem.base.evidence + constants.alarm_log_odds
+    ports = {
+        name: weight
+        for each in localisations
+        for name, weight in each.ports.items()
+        if name and weight > least
+    }
     ranked = sorted(ports, key=lambda name: -ports[name])[: constants.learned_fits]
     singles = [mode for mode in findings.modes if len(mode.terms) == 1]
     ranked += [

@@ -20,12 +20,11 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation
-from savgs_ident.diagnosis.location_hypotheses import (
+from savgs_ident.diagnosis.location_hypotheses import force_port, ports_by_location
+from savgs_ident.diagnosis.port_functions import (
     Functions,
-    force_port,
     laws_of_functions,
     motion_functions,
-    ports_by_location,
     prandtl_element,
 )
 from savgs_ident.diagnosis.problem import AbstractProblem, spans_of_force

@@ -61,12 +61,12 @@ class _BlindStudy(AbstractPresenter["BlindStudy"]):
     stem = "blind"
 
     def record(self, result: "BlindStudy") -> Mapping[str, Any]:
-        from savgs_ident.report.validation import blind_record
+        from savgs_ident.report.blind import blind_record
 
         return blind_record(result.scores, result.settings, result.origin.command)
 
     def text(self, result: "BlindStudy") -> RenderableType:
-        from savgs_ident.report.validation import blind_text
+        from savgs_ident.report.blind import blind_text
 
         return blind_text(result.scores)
 
@@ -74,12 +74,12 @@ class _BlindStudy(AbstractPresenter["BlindStudy"]):
         return () if result.trusted else ("the diagnosis is not right as often as it should be.",)
 
     def page(self, result: "BlindStudy") -> str:
-        from savgs_ident.report.validation import blind_html
+        from savgs_ident.report.blind import blind_html
 
         return blind_html(result.scores, result.settings, result.origin.command)
 
     def figures(self, result: "BlindStudy") -> Figures:
-        from savgs_ident.report.validation import confusion_figure, reliability_figure
+        from savgs_ident.report.blind import confusion_figure, reliability_figure
 
         scores = result.scores
         return {

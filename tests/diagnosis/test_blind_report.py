@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import pytest
 from rich.console import Console
 
-from savgs_ident.report.validation import (
+from savgs_ident.report.blind import (
     blind_html,
     blind_record,
     blind_text,

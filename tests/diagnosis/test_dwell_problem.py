@@ -7,7 +7,8 @@ import pytest
 
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.effect_sensitivities import impose, marched_effect, node_loads
-from savgs_ident.diagnosis.location_hypotheses import free_signal, input_locations, mesh_points
+from savgs_ident.diagnosis.location_hypotheses import free_signal, input_locations
+from savgs_ident.diagnosis.port_functions import mesh_points
 from savgs_ident.inference.observations import MULTIPLES, Data, Term
 from savgs_ident.inference.prior import sheet_coordinate
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE

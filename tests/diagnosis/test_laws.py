@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from savgs_ident.diagnosis.localisation import InputLocation, Law, localise
-from savgs_ident.diagnosis.location_hypotheses import laws_of_functions, sensor_filters
+from savgs_ident.diagnosis.port_functions import laws_of_functions, sensor_filters
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.effects.base import Family
 from savgs_ident.inference.find_map import find_map, search_of

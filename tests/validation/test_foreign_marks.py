@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from savgs_ident.report.validation import blind_html, blind_record, blind_text, reliability_figure
+from savgs_ident.report.blind import blind_html, blind_record, blind_text, reliability_figure
 from savgs_ident.validation.blind_rates import (
     EDGES,
     confusion_of,

@@ -1,0 +1,368 @@
+"""Reports of blind trials: JSON object, sentences, tables, figures and a page."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from math import isfinite
+from typing import Any
+
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from rich.console import Group, RenderableType
+
+from savgs_ident.core.presentation import package_versions
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.report.html import embed, render_page
+from savgs_ident.report.text import DASH, decimal, percentage, plain, table
+from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, new_figure, printable, styled
+from savgs_ident.validation.blind_rates import (
+    Rate,
+    Reliability,
+    confusion_of,
+    median_closed,
+    rates_of,
+    reliability_of,
+)
+from savgs_ident.validation.blind_score import Score, is_right, said_words, truth_words
+from savgs_ident.validation.foreign_laws import FOREIGN
+
+RATE_WORDS: Mapping[str, str] = {
+    "named_right": "Effect named correctly",
+    "located_right": "Located correctly",
+    "false_alarms": "False alarms where nothing is missing",
+    "unknown_recognised": "Unknown effect recognised as unknown",
+    "both_named": "Both of two effects named",
+    "intervals_hold": "95 % intervals that contain the truth",
+    "share_closed_90": "Nine tenths of the gap closed, where all effects are named",
+    "named_exactly": "Effect named strictly, without indistinguishable ones",
+    "located_exactly": "Located strictly, without indistinguishable ports",
+    "port_right": "Foreign effect put at a right port",
+    "port_listed": "The same, or a right port listed as not distinguishable",
+    "family_right": "Foreign effect given a right family",
+    "closed_by_effect_90": "Nine tenths of the recalibrated gap closed",
+}
+"""What each rate counts."""
+
+
+def rate_words(rate: Rate) -> tuple[str, str, str, str]:
+    """A rate as count, share, interval and required bound."""
+    if rate.rate is None:
+        return ("0 of 0", DASH, DASH, wanted_words(rate))
+    ends = f"{percentage(rate.low, 0)} to {percentage(rate.high, 0)}"
+    return (f"{rate.count} of {rate.total}", percentage(rate.rate), ends, wanted_words(rate))
+
+
+def wanted_words(rate: Rate) -> str:
+    """The bounds that a rate should keep."""
+    if rate.least > 0.0 and rate.most < 1.0:
+        return f"{percentage(rate.least, 0)} to {percentage(rate.most, 0)}"
+    if rate.least > 0.0:
+        return f"at least {percentage(rate.least, 0)}"
+    return f"at most {percentage(rate.most, 0)}" if rate.most < 1.0 else DASH
+
+
+def change_words(score: Score) -> str:
+    """By how much it changes the response."""
+    return " + ".join(percentage(change) for change in score.changes) or DASH
+
+
+def closed_words(score: Score) -> str:
+    """The share of the gap that was closed; of a foreign trial, by what was named alone."""
+    share = score.closed_by_effect if score.foreign else score.share_closed
+    return DASH if share is None or not isfinite(share) or score.verdict == "none" else percentage(share)
+
+
+def summary(scores: Sequence[Score]) -> str:
+    """All trials in one sentence."""
+    right = sum(map(is_right, scores))
+    return f"The diagnosis was right in {right} of {len(scores)} blind campaigns."
+
+
+def blind_text(scores: Sequence[Score]) -> RenderableType:
+    """The rates, and the trials whose verdict is not right."""
+    rates = [
+        (RATE_WORDS[name], *rate_words(rate), {True: "yes", False: "NO", None: ""}[rate.met])
+        for name, rate in rates_of(scores).items()
+    ]
+    headers = ("", "trials", "rate", "95 % interval", "required", "met")
+    wrong = [
+        (score.number, truth_words(score), change_words(score), said_words(score))
+        for score in scores
+        if not is_right(score)
+    ]
+    parts: list[RenderableType] = [plain(summary(scores), "bold"), plain("")]
+    parts.append(table("Blind trials", headers, rates))
+    parts += [plain(""), _reliability_text(reliability_of(scores))]
+    if wrong:
+        heads = ("trial", "truth", "change", "verdict")
+        parts.append(table("Wrong verdicts", heads, wrong, texts=(1, 3)))
+    return Group(*parts)
+
+
+def probability_words(probability: float | None) -> str:
+    """A stated probability in per cent."""
+    return DASH if probability is None else percentage(probability)
+
+
+def error_words(reliability: Reliability) -> str:
+    """The expected calibration error in a sentence."""
+    if reliability.error is None:
+        return "No verdict states a probability."
+    return f"Expected calibration error of the stated probabilities: {decimal(reliability.error, 3)}."
+
+
+def reliability_rows(reliability: Reliability) -> list[tuple[str, str, str, str, str]]:
+    """Bins as stated probabilities, their mean, verdicts, share that is true, and its interval."""
+    return [
+        (
+            f"{decimal(each.low, 2)} to {decimal(each.high, 2)}",
+            probability_words(each.stated),
+            *rate_words(each.rate)[:3],
+        )
+        for each in reliability.bins
+    ]
+
+
+RELIABILITY_HEADS = ("stated probability", "mean", "true", "share", "95 % interval")
+
+
+def _reliability_text(reliability: Reliability) -> RenderableType:
+    rows = reliability_rows(reliability)
+    return Group(
+        table("Stated probabilities", RELIABILITY_HEADS, rows, texts=(0,)), plain(error_words(reliability))
+    )
+
+
+PACKAGES = ("jax", "numpy", "scipy")
+
+
+def blind_record(
+    scores: Sequence[Score], settings: Mapping[str, Any], command: Sequence[str]
+) -> dict[str, Any]:
+    """Rates with their 95 % intervals (Wilson) and bounds, the confusion matrix, and the marks of every trial.
+
+    ``trusted`` says that every rate keeps its bounds. Shares and changes are relative, parameters in SI.
+    """
+    rates, confusion = rates_of(scores), confusion_of(scores, ORDER)
+    return {
+        "schema": 1,
+        "trusted": all(rate.met is not False for rate in rates.values()),
+        "trials": len(scores),
+        "kinds": {
+            kind: sum(score.kind == kind for score in scores)
+            for kind in ("none", "effect", "two", "unknown", "foreign")
+        },
+        "median_closed_by_effect": median_closed(scores),
+        "reliability": _reliability(reliability_of(scores)),
+        "code": sorted({score.version for score in scores} - {""}),
+        "rates": {name: _rate(rate) for name, rate in rates.items()},
+        "confusion": {
+            "truths": confusion.truths,
+            "verdicts": confusion.verdicts,
+            "counts": confusion.counts,
+        },
+        "settings": dict(settings),
+        "scores": [
+            asdict(score)
+            | {"intervals": {name: asdict(i) | {"holds": i.holds} for name, i in score.intervals.items()}}
+            for score in scores
+        ],
+        "command": " ".join(command),
+        "versions": package_versions(PACKAGES),
+    }
+
+
+def _reliability(reliability: Reliability) -> dict[str, Any]:
+    bins = [
+        {
+            "low": each.low,
+            "high": each.high,
+            "stated": each.stated,
+            "true": each.rate.count,
+            "of": each.rate.total,
+            "share": each.rate.rate,
+            "interval": [each.rate.low, each.rate.high],
+        }
+        for each in reliability.bins
+    ]
+    return {"bins": bins, "calibration_error": reliability.error}
+
+
+def _rate(rate: Rate) -> dict[str, Any]:
+    return {
+        "count": rate.count,
+        "of": rate.total,
+        "rate": rate.rate,
+        "interval": [rate.low, rate.high],
+        "least": rate.least,
+        "most": rate.most,
+        "met": rate.met,
+    }
+
+
+_RIGHT = LinearSegmentedColormap.from_list("right", ["#dbe8f4", BLUE])
+_WRONG = LinearSegmentedColormap.from_list("wrong", ["#fbe3d3", ORANGE])
+_CELL = 0.27
+"""Size of a cell [inch]."""
+
+ORDER = (*CATALOGUE, *FOREIGN)
+"""Effects in the order in which the confusion matrix has them."""
+
+
+def confusion_figure(scores: Sequence[Score]) -> Figure:
+    """Truths down, verdicts across; blue is right, orange is not, the number says how many trials."""
+    confusion = confusion_of(scores, ORDER)
+    truths, verdicts, counts = confusion.truths, confusion.verdicts, confusion.counts
+    most = max(int(counts.max(initial=1)), 1)
+    with styled():
+        figure = new_figure(2.9 + _CELL * len(verdicts), 2.6 + _CELL * len(truths))
+        axes = figure.subplots()
+        axes.grid(visible=False)
+        for row, truth in enumerate(truths):
+            for column, verdict in enumerate(verdicts):
+                count = int(counts[row, column])
+                if count == 0:
+                    if truth == verdict:
+                        axes.plot(column, row, ".", color=GREY, markersize=3)
+                    continue
+                shade = (_RIGHT if truth == verdict else _WRONG)(count / most)
+                axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, color=shade, linewidth=0.0))
+                dark = count > 0.6 * most and truth == verdict
+                axes.text(column, row, str(count), ha="center", va="center", color="white" if dark else INK)
+        axes.set_xticks(range(len(verdicts)), [printable(name) for name in verdicts], rotation=90)
+        axes.set_yticks(range(len(truths)), [printable(name) for name in truths])
+        axes.set_xlim(-0.5, len(verdicts) - 0.5)
+        axes.set_ylim(len(truths) - 0.5, -0.5)
+        axes.set_aspect("equal")
+        axes.tick_params(length=0)
+        axes.set_xlabel("verdict")
+        axes.set_ylabel("truth")
+        axes.set_title(f"{len(scores)} blind trials", loc="left")
+    return figure
+
+
+def reliability_figure(scores: Sequence[Score]) -> Figure:
+    """Stated probabilities across, how often what was said is true up, with 95 % intervals; the diagonal is ideal."""
+    reliability = reliability_of(scores)
+    with styled():
+        figure = new_figure(3.8, 3.6)
+        axes = figure.subplots()
+        axes.plot([0.0, 1.0], [0.0, 1.0], color=INK, linestyle="--", linewidth=0.8, label="ideal")
+        for each in reliability.bins:
+            if each.stated is None or each.rate.rate is None:
+                continue
+            share, ends = (
+                each.rate.rate,
+                [[each.rate.rate - each.rate.low], [each.rate.high - each.rate.rate]],
+            )
+            axes.errorbar(
+                each.stated, share, yerr=ends, color=BLUE, marker="o", capsize=2.5, linestyle="none"
+            )
+            axes.annotate(
+                str(each.rate.total),
+                (each.stated, share),
+                (-5.0, 5.0),
+                textcoords="offset points",
+                ha="right",
+            )
+        axes.set_xlim(0.0, 1.03)
+        axes.set_ylim(0.0, 1.03)
+        axes.set_aspect("equal")
+        axes.set_xlabel("stated probability [1]")
+        axes.set_ylabel("share of verdicts that are true [1]")
+        error = "" if reliability.error is None else f", calibration error {decimal(reliability.error, 3)}"
+        stated = sum(each.rate.total for each in reliability.bins)
+        axes.set_title(f"{stated} verdicts{error}", loc="left")
+        axes.legend(loc="upper left")
+    return figure
+
+
+_FACTS = ("named_right", "located_right", "false_alarms", "unknown_recognised", "both_named")
+_FOREIGN_FACTS = ("port_right", "family_right", "false_alarms", "intervals_hold")
+
+
+_OWN_RIGS = (
+    "Rigs drawn at random within their tolerances, with effects that change the response by 3 to 25 %; campaigns"
+    " simulated in time, with noise; the answers were opened after the diagnosis."
+)
+_FOREIGN_RIGS = (
+    "Rigs drawn at random within their tolerances, each with small errors, most with an effect by a law that the"
+    " diagnosis does not have and that changes the response by 3 to 25 %; campaigns simulated in time with another"
+    " method, with coloured noise, filters and converters; the answers were opened after the diagnosis."
+)
+_OWN_NOTE = (
+    "Wilson intervals. Located: the ports of the verdict are those at which the effects act. The rates with"
+    " “strictly” do not count effects and ports that the verdict lists as indistinguishable from the ones named."
+)
+_FOREIGN_NOTE = (
+    "Wilson intervals. A port is right where an engineer would rightly put the effect, a family where it would"
+    " rightly be called that. “Unknown” at a right port has the port, not the family."
+)
+
+
+def blind_html(scores: Sequence[Score], settings: Mapping[str, Any], command: Sequence[str]) -> str:
+    """The page: one file, no network, nothing executed; the same trials give the same bytes."""
+    rates, reliability, median = rates_of(scores), reliability_of(scores), median_closed(scores)
+    foreign = any(score.foreign for score in scores)
+    missed = [RATE_WORDS[name].lower() for name, rate in rates.items() if rate.met is False]
+    words = (
+        f"Confusion matrix of {len(scores)} trials: {sum(map(is_right, scores))} on its diagonal are right."
+    )
+    return render_page(
+        "blind.html.j2",
+        {
+            "sentence": summary(scores),
+            "alarm": f"Required rate missed: {', '.join(missed)}." if missed else "",
+            "facts": [_fact(name, rates[name]) for name in (_FOREIGN_FACTS if foreign else _FACTS)],
+            "about": _FOREIGN_RIGS if foreign else _OWN_RIGS,
+            "note": _FOREIGN_NOTE if foreign else _OWN_NOTE,
+            "median": f"Median share of the recalibrated gap that is closed: {percentage(median)}."
+            if foreign and median is not None
+            else "",
+            "reliability": reliability_rows(reliability),
+            "reliability_heads": [head.capitalize() for head in RELIABILITY_HEADS],
+            "reliability_words": error_words(reliability),
+            "reliability_picture": embed(reliability_figure(scores), error_words(reliability)),
+            "rates": [(RATE_WORDS[name], *rate_words(rate), _met(rate)) for name, rate in rates.items()],
+            "picture": embed(confusion_figure(scores), words),
+            "scores": [
+                (
+                    str(score.number),
+                    truth_words(score),
+                    change_words(score),
+                    said_words(score),
+                    "right" if is_right(score) else "wrong",
+                    probability_words(score.probability),
+                    closed_words(score),
+                    _held(score),
+                    score.version,
+                )
+                for score in scores
+            ],
+            "settings": [(name, str(value)) for name, value in settings.items()],
+            "command": " ".join(command),
+            "versions": package_versions(PACKAGES),
+        },
+    )
+
+
+def _fact(name: str, rate: Rate) -> dict[str, object]:
+    count, share, _, wanted = rate_words(rate)
+    return {
+        "name": RATE_WORDS[name],
+        "value": share,
+        "then": f"{count}; required {wanted}",
+        "bad": rate.met is False,
+    }
+
+
+def _met(rate: Rate) -> str:
+    return {True: "yes", False: "no", None: ""}[rate.met]
+
+
+def _held(score: Score) -> str:
+    """How many of the intervals hold the truth."""
+    if not score.intervals:
+        return ""
+    held = sum(interval.holds for interval in score.intervals.values())
+    return f"{held} of {len(score.intervals)}"
