@@ -120,7 +120,8 @@ class ShrinkRow:
     recalibrated: str
     after: str
     floor: str
-    closed: str
+    by_calibration: str
+    by_effect: str
 
 
 @dataclass(frozen=True)
@@ -192,7 +193,8 @@ def shrink_table(diagnosis: Diagnosis) -> tuple[ShrinkRow, ...]:
                 recalibrated=gap_percentage(other.recalibrated),
                 after=gap_percentage(other.after),
                 floor=gap_percentage(other.floor),
-                closed=DASH,
+                by_calibration=DASH,
+                by_effect=DASH,
             )
         )
     return tuple(rows)
@@ -210,13 +212,15 @@ def parameter_table(diagnosis: Diagnosis) -> tuple[ParameterRow, ...]:
 
 
 def _shrink_row(name: str, each: Shrink) -> ShrinkRow:
+    by_calibration, by_effect = closed_words(each)
     return ShrinkRow(
         name=name,
         before=gap_percentage(each.before),
         recalibrated=gap_percentage(each.recalibrated),
         after=gap_percentage(each.after),
         floor=gap_percentage(each.floor),
-        closed=closed_words(each),
+        by_calibration=by_calibration,
+        by_effect=by_effect,
     )
 
 

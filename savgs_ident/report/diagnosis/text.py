@@ -132,12 +132,9 @@ def baseline_sentence(diagnosis: Diagnosis) -> str:
     )
 
 
-def closed_words(shrink: Shrink) -> str:
-    """Share of the explainable gap that is closed, with its interval."""
-    if not isfinite(shrink.share_closed):
-        return DASH
-    low, high = (percentage(end) for end in shrink.interval)
-    return f"{percentage(shrink.share_closed)} ({low} to {high})"
+def closed_words(shrink: Shrink) -> tuple[str, str]:
+    """What calibration closes of the gap beyond the noise, and what the effect closes of what is left of it."""
+    return percentage(shrink.closed_by_calibration), percentage(shrink.closed_by_effect)
 
 
 def gap_percentage(gap: float) -> str:
@@ -241,7 +238,7 @@ def diagnosis_text(diagnosis: Diagnosis) -> RenderableType:
 def _gap(diagnosis: Diagnosis) -> RenderableType:
     def cells(name: str, each: Shrink) -> tuple[str, ...]:
         gaps = (each.before, each.recalibrated, each.after, each.floor)
-        return (name, *map(gap_percentage, gaps), closed_words(each))
+        return (name, *map(gap_percentage, gaps), *closed_words(each))
 
     rows = [cells("together", diagnosis.shrink)]
     rows += [
@@ -251,8 +248,16 @@ def _gap(diagnosis: Diagnosis) -> RenderableType:
     if diagnosis.further is not None:
         other = diagnosis.further
         gaps = (other.before, other.recalibrated, other.after, other.floor)
-        rows.append((other.name, *map(gap_percentage, gaps), DASH))
-    headers = ("gap on held-out tests", "before", "recali-\nbrated", "after", "floor", "share closed (95 %)")
+        rows.append((other.name, *map(gap_percentage, gaps), DASH, DASH))
+    headers = (
+        "gap on held-out tests",
+        "before",
+        "recali-\nbrated",
+        "after",
+        "floor",
+        "closed by\ncalibration",
+        "closed by\neffect",
+    )
     return table("Gap by model", headers, rows)
 
 
