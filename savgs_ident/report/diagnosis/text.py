@@ -41,7 +41,9 @@ KIND_WORDS: Mapping[str, str] = MappingProxyType(
 LEVEL = 0.05
 """P-values below are significant: a regime is named."""
 
-_SMALL = 0.001
+SMALL = 0.001
+"""Hypotheses, and ports, families and laws, that are less probable are not shown each."""
+
 _SHOWN = 5
 
 
@@ -85,7 +87,7 @@ def about_candidate(diagnosis: Diagnosis, candidate: Candidate) -> str:
 def shown_candidates(diagnosis: Diagnosis) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
     """The hypotheses worth reading, and the others: the first few, all with a chance, and "none" and "unknown"."""
     worth = [
-        place < _SHOWN or each.probability >= _SMALL or not each.effects
+        place < _SHOWN or each.probability >= SMALL or not each.effects
         for place, each in enumerate(diagnosis.candidates)
     ]
     return (
@@ -144,7 +146,7 @@ def gap_percentage(gap: float) -> str:
 
 def probability_words(probability: float) -> str:
     """A probability in per cent; neither 0 nor 100 unless it is."""
-    return "< 0.1 %" if 0.0 < probability < 0.5 * _SMALL else percentage(probability)
+    return "< 0.1 %" if 0.0 < probability < 0.5 * SMALL else percentage(probability)
 
 
 def gain_words(gain: float) -> str:
