@@ -198,6 +198,17 @@ def friction(velocity: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(-45.0 * np.tanh(velocity / 0.002) * np.exp(-((velocity / 0.1) ** 2)))
 
 
+def candidate_of(hypothesis: Hypothesis, probability: float) -> Candidate:
+    """A hypothesis with a probability, with ports and families as a diagnosis gives them."""
+    if hypothesis.flexible:
+        kinds = [tuple(hypothesis.flexible.split("/"))]
+    else:
+        effects = [CATALOGUE[name] for name in hypothesis.effects]
+        kinds = [(each.port.location, each.law.family.value) for each in effects]
+    ports, families = (tuple(dict.fromkeys(each[place] for each in kinds)) for place in (0, 1))
+    return Candidate(hypothesis, probability, 0.0, 0.0, float("nan"), (), False, ports, families)
+
+
 def _parameters(effects: tuple[str, ...]) -> tuple[Estimate, ...]:
     of = {"rail_stribeck": STRIBECK, "accel_lag": LAG}
     return tuple(each for name in effects for each in of[name])
@@ -234,11 +245,11 @@ def _map(measured: HarmonicResponse, predicted: NDArray[np.complex128]) -> tuple
 
 
 def _candidates(named: Hypothesis) -> tuple[Candidate, ...]:
-    first = Candidate(named, 0.982, 61.2, 3.413, 0.9994, _parameters(named.effects), True)
+    first = _fitted(named, 0.982, (61.2, 3.413, 0.9994), _parameters(named.effects))
     others = [
-        Candidate(Hypothesis(("rail_preload",)), 0.017, 58.7, 3.391, 0.9712, (), True),
-        Candidate(NONE, 0.0007, 0.0, 0.0, 0.0, (), True),
-        Candidate(UNKNOWN, 0.0003, 22.4, 1.02, 0.741, (), True),
+        _fitted(Hypothesis(("rail_preload",)), 0.017, (58.7, 3.391, 0.9712)),
+        _fitted(NONE, 0.0007, (0.0, 0.0, 0.0)),
+        _fitted(UNKNOWN, 0.0003, (22.4, 1.02, 0.741)),
     ]
     rest = [name for name in CATALOGUE if name not in {"rail_preload", "rail_coulomb", "tyre_friction"}]
     found = [first, *(each for each in others if each.hypothesis != named)]
@@ -247,10 +258,27 @@ def _candidates(named: Hypothesis) -> tuple[Candidate, ...]:
         hypothesis = Hypothesis((name,))
         if hypothesis != named:
             share = left if place == len(rest) - 1 else 0.0
-            found.append(
-                Candidate(hypothesis, share, 9.0 / (1 + place), -0.01 * place, float("nan"), (), False)
-            )
+            scored = candidate_of(hypothesis, share)
+            found.append(replace(scored, score_sigma=9.0 / (1 + place), heldout_gain=-0.01 * place))
     return tuple(found)
+
+
+def _fitted(
+    hypothesis: Hypothesis,
+    probability: float,
+    found: tuple[float, float, float],
+    parameters: tuple[Estimate, ...] = (),
+) -> Candidate:
+    """A hypothesis that was fitted, with score, gain and share closed."""
+    sigma, gain, closed = found
+    return replace(
+        candidate_of(hypothesis, probability),
+        score_sigma=sigma,
+        heldout_gain=gain,
+        share_closed=closed,
+        parameters=parameters,
+        refitted=True,
+    )
 
 
 def _loops(verdict: Verdict, frequencies: tuple[float, ...]) -> tuple[ForceLoop, ...]:

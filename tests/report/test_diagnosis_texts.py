@@ -63,8 +63,11 @@ def test_the_terminal_tells_the_verdict_first_in_80_columns(by_kind: dict[str, D
 
 def test_the_terminal_tells_the_numbers(diagnosis: Diagnosis) -> None:
     text = rendered(diagnosis)
-    assert re.search(r"together +17\.3 % +8\.71 % +0\.47 % +0\.21 % +99\.9 % \(99\.9 % to > 99\.9 %\)", text)
-    assert re.search(rf"sweep, first harmonic +18\.8 % +9\.42 % +1\.32 % +0\.21 % +{DASH}", text)
+    # 1 - (8.71^2 - 0.21^2) / (17.32^2 - 0.21^2) and 1 - (0.47^2 - 0.21^2) / (8.71^2 - 0.21^2).
+    assert re.search(r"together +17\.3 % +8\.71 % +0\.47 % +0\.21 % +74\.7 % +99\.8 %", text)
+    assert re.search(rf"sweep, first harmonic +18\.8 % +9\.42 % +1\.32 % +0\.21 % +{DASH} +{DASH}", text)
+    # The share that counts both together is in the record alone.
+    assert "95 %)" not in text
     assert re.search(r"rail_stribeck +98\.2 % +61\.2 +\+3\.41 +99\.9 %", text)
     assert "- stribeck_velocity: 0.1012 (0.0957 to 0.1066) m/s" in text
     assert "This campaign cannot distinguish it from: rail_preload." in text
@@ -119,6 +122,7 @@ def test_the_page_tells_numbers_and_origin(page: Reader) -> None:
     for part in (
         "98.2 %",
         "17.3 %",
+        "74.7 % 99.8 %",
         "0.1012 (0.0957 to 0.1066) m/s",
         "Friction is highest where the body turns round: slow tests stick more than fast ones.",
         "Armstrong-Helouvry",
@@ -212,7 +216,9 @@ def test_numbers_are_told_to_the_digits_that_they_justify() -> None:
     assert gain_words(3.413) == "+3.41"
     assert gain_words(41.3) == "+41.3"
     assert gain_words(float("nan")) == "\u2013"
-    assert closed_words(NO_SHRINK) == "\u2013"
+    # Calibration closed 1 - (2.2^2 - 2.1^2) / (3.5^2 - 2.1^2), and nothing was added.
+    assert closed_words(NO_SHRINK) == ("94.5 %", "0.0 %")
+    assert closed_words(replace(NO_SHRINK, before=0.002, recalibrated=0.002)) == (DASH, DASH)
     assert estimate_words(Estimate("tau", 0.01503, 0.0147, 0.0153, "s")) == "0.01503 (0.01470 to 0.01530) s"
     assert smallest_words(NotJudgeable("a", "b", 0.25, "1")) == "0.250"
     assert smallest_words(NotJudgeable("a", "b", float("inf"), "m")) == "whatever its size"

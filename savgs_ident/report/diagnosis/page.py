@@ -59,6 +59,7 @@ from savgs_ident.report.diagnosis.text import (
     sigma_words,
     smallest_words,
 )
+from savgs_ident.report.diagnosis.tree import named_hypotheses, nested_bars
 from savgs_ident.report.html import Picture, embed, render_page
 from savgs_ident.report.text import (
     DASH,
@@ -91,7 +92,6 @@ class CandidateRow:
     about: str
     named: bool
     probability: str
-    bar: Bar
     score: str
     gain: str
     closed: str
@@ -120,7 +120,8 @@ class ShrinkRow:
     recalibrated: str
     after: str
     floor: str
-    closed: str
+    by_calibration: str
+    by_effect: str
 
 
 @dataclass(frozen=True)
@@ -151,9 +152,8 @@ def candidate_row(each: Candidate, diagnosis: Diagnosis) -> CandidateRow:
     return CandidateRow(
         name=str(each.hypothesis),
         about=about_candidate(diagnosis, each),
-        named=bool(each.effects) and each.effects == diagnosis.verdict.effects,
+        named=bool(each.ports) and each.hypothesis in named_hypotheses(diagnosis.verdict),
         probability=probability_words(each.probability),
-        bar=_bar(each.probability),
         score=sigma_words(each.score_sigma),
         gain=gain_words(each.heldout_gain),
         closed=percentage(each.share_closed),
@@ -192,7 +192,8 @@ def shrink_table(diagnosis: Diagnosis) -> tuple[ShrinkRow, ...]:
                 recalibrated=gap_percentage(other.recalibrated),
                 after=gap_percentage(other.after),
                 floor=gap_percentage(other.floor),
-                closed=DASH,
+                by_calibration=DASH,
+                by_effect=DASH,
             )
         )
     return tuple(rows)
@@ -210,13 +211,15 @@ def parameter_table(diagnosis: Diagnosis) -> tuple[ParameterRow, ...]:
 
 
 def _shrink_row(name: str, each: Shrink) -> ShrinkRow:
+    by_calibration, by_effect = closed_words(each)
     return ShrinkRow(
         name=name,
         before=gap_percentage(each.before),
         recalibrated=gap_percentage(each.recalibrated),
         after=gap_percentage(each.after),
         floor=gap_percentage(each.floor),
-        closed=closed_words(each),
+        by_calibration=by_calibration,
+        by_effect=by_effect,
     )
 
 
@@ -280,6 +283,7 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "bode": [_bode(diagnosis, c) for c in compared_channels(diagnosis)],
             "loops": [_loop(diagnosis, each) for each in spread_loops(diagnosis.loops)],
             "lawful": any(each.law.size for each in diagnosis.loops),
+            "tree": nested_bars(diagnosis),
             "shown": [candidate_row(each, diagnosis) for each in shown],
             "rest": [candidate_row(each, diagnosis) for each in rest],
             "references": references(diagnosis),

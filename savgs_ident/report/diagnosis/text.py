@@ -41,7 +41,9 @@ KIND_WORDS: Mapping[str, str] = MappingProxyType(
 LEVEL = 0.05
 """P-values below are significant: a regime is named."""
 
-_SMALL = 0.001
+SMALL = 0.001
+"""Hypotheses, and ports, families and laws, that are less probable are not shown each."""
+
 _SHOWN = 5
 
 
@@ -85,7 +87,7 @@ def about_candidate(diagnosis: Diagnosis, candidate: Candidate) -> str:
 def shown_candidates(diagnosis: Diagnosis) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
     """The hypotheses worth reading, and the others: the first few, all with a chance, and "none" and "unknown"."""
     worth = [
-        place < _SHOWN or each.probability >= _SMALL or not each.effects
+        place < _SHOWN or each.probability >= SMALL or not each.effects
         for place, each in enumerate(diagnosis.candidates)
     ]
     return (
@@ -132,12 +134,9 @@ def baseline_sentence(diagnosis: Diagnosis) -> str:
     )
 
 
-def closed_words(shrink: Shrink) -> str:
-    """Share of the explainable gap that is closed, with its interval."""
-    if not isfinite(shrink.share_closed):
-        return DASH
-    low, high = (percentage(end) for end in shrink.interval)
-    return f"{percentage(shrink.share_closed)} ({low} to {high})"
+def closed_words(shrink: Shrink) -> tuple[str, str]:
+    """What calibration closes of the gap beyond the noise, and what the effect closes of what is left of it."""
+    return percentage(shrink.closed_by_calibration), percentage(shrink.closed_by_effect)
 
 
 def gap_percentage(gap: float) -> str:
@@ -147,7 +146,7 @@ def gap_percentage(gap: float) -> str:
 
 def probability_words(probability: float) -> str:
     """A probability in per cent; neither 0 nor 100 unless it is."""
-    return "< 0.1 %" if 0.0 < probability < 0.5 * _SMALL else percentage(probability)
+    return "< 0.1 %" if 0.0 < probability < 0.5 * SMALL else percentage(probability)
 
 
 def gain_words(gain: float) -> str:
@@ -241,7 +240,7 @@ def diagnosis_text(diagnosis: Diagnosis) -> RenderableType:
 def _gap(diagnosis: Diagnosis) -> RenderableType:
     def cells(name: str, each: Shrink) -> tuple[str, ...]:
         gaps = (each.before, each.recalibrated, each.after, each.floor)
-        return (name, *map(gap_percentage, gaps), closed_words(each))
+        return (name, *map(gap_percentage, gaps), *closed_words(each))
 
     rows = [cells("together", diagnosis.shrink)]
     rows += [
@@ -251,8 +250,16 @@ def _gap(diagnosis: Diagnosis) -> RenderableType:
     if diagnosis.further is not None:
         other = diagnosis.further
         gaps = (other.before, other.recalibrated, other.after, other.floor)
-        rows.append((other.name, *map(gap_percentage, gaps), DASH))
-    headers = ("gap on held-out tests", "before", "recali-\nbrated", "after", "floor", "share closed (95 %)")
+        rows.append((other.name, *map(gap_percentage, gaps), DASH, DASH))
+    headers = (
+        "gap on held-out tests",
+        "before",
+        "recali-\nbrated",
+        "after",
+        "floor",
+        "closed by\ncalibration",
+        "closed by\neffect",
+    )
     return table("Gap by model", headers, rows)
 
 
