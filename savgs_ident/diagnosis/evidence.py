@@ -8,6 +8,7 @@ laws as hypotheses.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import Hypothesis, Kind
 from savgs_ident.diagnosis.search import Findings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.diagnosis.verdict import BrokenTolerance, UnknownEvidence, WeighedHypothesis
+from savgs_ident.diagnosis.verdict import BrokenTolerance, UnknownEvidence, WeighedHypothesis, uncertain_odds
 from savgs_ident.effects.base import Family, Port
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Term
@@ -92,11 +93,13 @@ class FlexibleMember(NamedTuple):
         law: the law at its best.
         weight: log evidence plus log prior.
         left: share of the baseline's misfit that it leaves.
+        sd: standard deviation of the weight [nat].
     """
 
     law: LearnedLaw
     weight: float
     left: float
+    sd: float = 0.0
 
     @property
     def location(self) -> str:
@@ -164,12 +167,18 @@ class DiagnosisEvidence:
 
         A law that was fitted on the nonlinear plant counts instead of its linear estimate.
         """
-        found = {each.name: each.evidence for each in self.localisations}
-        solved: dict[str, float] = {}
+        return {name: weight for name, (weight, _) in self._weights.items()}
+
+    @cached_property
+    def _weights(self) -> Mapping[str, tuple[float, float]]:
+        """Log weight of a law at every location with its standard deviation [nat], the most probable first."""
+        found = {each.name: (each.evidence, 0.0) for each in self.localisations}
+        solved: dict[str, tuple[float, float]] = {}
         for each in self.flexible:
             evidence = each.law.mode.evidence
-            solved[each.location] = max(evidence, solved.get(each.location, -np.inf))
-        return dict(sorted((found | solved).items(), key=lambda item: -item[1]))
+            if each.location not in solved or evidence > solved[each.location][0]:
+                solved[each.location] = evidence, each.sd
+        return dict(sorted((found | solved).items(), key=lambda item: -item[1][0]))
 
     @property
     def port(self) -> str:
@@ -181,8 +190,12 @@ class DiagnosisEvidence:
 
     def indistinguishable_ports(self, constants: DecisionConstants = DEFAULTS) -> tuple[str, ...]:
         """Other ports at which a law of something unknown is nearly as probable, the most probable first."""
-        (first, most), *others = self.weight_by_location.items()
+        (first, most), *others = self._weights.items()
         if self.port != first:
             return ()
-        least = most - constants.indistinguishable_log_odds
-        return tuple(name for name, weight in others if weight > least)
+        return tuple(
+            name
+            for name, each in others
+            if uncertain_odds(most[0] - each[0], hypot(most[1], each[1]))
+            < constants.indistinguishable_log_odds
+        )

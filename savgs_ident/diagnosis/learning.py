@@ -76,6 +76,13 @@ class LearnedLaw:
         return dict.fromkeys(self.units, 0.0) | self.mode.values | dict(self.spans)
 
     @property
+    def identified(self) -> float:
+        """How many coefficients the data identify: the share of each one's prior variance that they took away."""
+        coefficients = {each.name for each in self.term.amplitudes}
+        mine = np.array([each.name in coefficients for each in self.mode.coordinates])
+        return float(np.sum(1.0 - np.diag(self.mode.covariance())[mine]))
+
+    @property
     def family(self) -> Family:
         """The family that explains most."""
         return max(self.families, key=lambda family: self.families[family])

@@ -17,7 +17,7 @@ evidence says where, its functions say of which family, and the effect that come
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import log
+from math import log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,7 +138,7 @@ def _decided(
     unknown = unknown_evidence(findings, alone, beside, broken.weight, constants)
     weighed = weigh(findings, unknown, constants)
     kind, chosen = decide(weighed, change_without(problem, best, best.terms), left, constants)
-    more = [WeighedHypothesis(each.hypothesis, each.weight, each.law.mode) for each in members]
+    more = [WeighedHypothesis(each.hypothesis, each.weight, each.law.mode, each.sd) for each in members]
     weighed = tuple(sorted((*weighed, *more), key=lambda each: -each.weight))
     found = DiagnosisEvidence(
         findings=findings,
@@ -268,7 +268,12 @@ def _flexible_members(
     laws = [each for each in in_parallel(fitted, ports) if each is not None and each.mode.solved]
     prior = log(constants.prior_unknown / max(len(localisations), 1))
     members = [
-        FlexibleMember(law, law.mode.evidence + prior, left_over(law.search, base, law.mode, constants))
+        FlexibleMember(
+            law,
+            law.mode.evidence + prior,
+            left_over(law.search, base, law.mode, constants),
+            constants.width_uncertainty * sqrt(law.identified),
+        )
         for law in laws
     ]
     return sorted(members, key=lambda each: -each.weight)

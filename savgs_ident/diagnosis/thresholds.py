@@ -75,6 +75,15 @@ class DecisionConstants:
     0.7 nat for every shape that the campaign identifies; verdicts are not measured.
     """
 
+    width_uncertainty: float = 0.7
+    """Standard deviation [nat] of a learned law's log evidence for every coefficient that the data identify.
+
+    Origin: by choice: log 2, as the width of a coefficient's prior is known to a factor of two at best, and Occam's
+    factor with it. It changes no verdict, but the probabilities that are stated and which ports are said to be
+    indistinguishable. Halved or doubled: probabilities of ports that do nearly the same move towards those of the
+    weights alone, or towards one half.
+    """
+
     # Thresholds on log odds
 
     alarm_log_odds: float = 4.0

@@ -14,7 +14,7 @@ of an alarm, and where it changes the response by enough to matter.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import log
+from math import log, pi, sqrt
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -29,11 +29,15 @@ from savgs_ident.inference.find_map import LaplaceFit
 
 @dataclass(frozen=True)
 class WeighedHypothesis:
-    """A hypothesis with its log weight, evidence and prior; ``mode`` is its fit, None where it was only scored."""
+    """A hypothesis with its log weight, evidence and prior, and how well that is known.
+
+    ``mode`` is its fit, None where it was only scored; ``sd`` the standard deviation of the weight [nat].
+    """
 
     hypothesis: Hypothesis
     weight: float
     mode: LaplaceFit | None
+    sd: float = 0.0
 
 
 class Change(NamedTuple):
@@ -179,11 +183,27 @@ def _by_weight(weighed: Sequence[WeighedHypothesis]) -> tuple[WeighedHypothesis,
     return tuple(sorted(weighed, key=lambda each: -each.weight))
 
 
+DRAWS = 4000
+"""Draws of uncertain weights over which probabilities are averaged: to a hundredth."""
+
+
 def probabilities(weighed: Sequence[WeighedHypothesis]) -> NDArray[np.float64]:
-    """Their probabilities, (n,), which sum to 1."""
-    weights = np.array([each.weight for each in weighed])
-    shares = np.exp(weights - weights.max())
-    return np.asarray(shares / shares.sum())
+    """Their probabilities, (n,), which sum to 1: averaged over what their weights may be."""
+    weights, sd = np.array([each.weight for each in weighed]), np.array([each.sd for each in weighed])
+    drawn = weights
+    if np.any(sd):
+        drawn = weights + sd * np.random.default_rng(0).standard_normal((DRAWS, sd.size))
+    shares = np.exp(drawn - drawn.max(axis=-1, keepdims=True))
+    each = shares / shares.sum(axis=-1, keepdims=True)
+    return np.asarray(each.reshape(-1, weights.size).mean(axis=0))
+
+
+def uncertain_odds(odds: float, sd: float) -> float:
+    """Log odds [nat] of what is known with log odds that have a standard deviation ``sd`` [nat].
+
+    Source: the logistic function averaged over a normal density, MacKay 1992, Neural Computation 4(5).
+    """
+    return odds / sqrt(1.0 + pi * sd**2 / 8.0)
 
 
 def alarm_odds(weighed: Sequence[WeighedHypothesis]) -> float:

@@ -7,6 +7,8 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
 
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
@@ -23,6 +25,7 @@ from savgs_ident.diagnosis.verdict import (
     indistinguishable,
     most_probable,
     probabilities,
+    uncertain_odds,
     unknown_evidence,
     weigh,
     without_immaterial_members,
@@ -132,6 +135,16 @@ def test_only_what_was_fitted_can_be_named() -> None:
 def test_a_verdict_follows_the_constants_that_it_is_given(constants: DecisionConstants, kind: str) -> None:
     weighed = _weighed({"none": 0.0, "unknown": -20.0, "rail_viscous": 10.0})
     assert decide(weighed, Change(0.05, 0.05), 0.02, constants)[0] == kind
+
+
+@pytest.mark.parametrize(("odds", "sd"), [(0.0, 3.0), (3.0, 2.0), (6.0, 3.0), (-4.0, 1.0)])
+def test_what_is_weighed_badly_is_less_probable_than_its_weight_says(odds: float, sd: float) -> None:
+    """Against the integral of the logistic function over a normal density, which the short form meets to 0.02."""
+    first = replace(_weighed({"none": 0.0})[0], weight=odds, sd=sd)
+    shares = probabilities([first, *_weighed({"none": 0.0})])
+    expected, _ = quad(lambda z: norm.pdf(z) / (1.0 + np.exp(-odds - sd * z)), -9.0, 9.0)
+    assert shares[0] == pytest.approx(expected, abs=0.01)
+    assert 1.0 / (1.0 + np.exp(-uncertain_odds(odds, sd))) == pytest.approx(expected, abs=0.02)
 
 
 def test_probabilities_are_those_of_the_weights() -> None:
