@@ -1,6 +1,7 @@
 """Hypotheses as a report shows them: with probabilities, parameters and what they gain on tests left out."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from math import nan
 
 import numpy as np
 
@@ -35,8 +36,9 @@ def candidates_of(
     gap, found = excess(search, findings.base), []
     for each, share in zip(weighed, probabilities(weighed), strict=True):
         hypothesis, mode = each.hypothesis, each.mode
-        gain = held[hypothesis].mean - held[NONE].mean if hypothesis in held else float("nan")
-        closed = float("nan")
+        gain = held[hypothesis].mean - held[NONE].mean if hypothesis in held else nan
+        beyond = held[hypothesis].beyond - held[NONE].beyond if hypothesis in held else nan
+        closed = nan
         if mode is not None and gap > constants.negligible_misfit:
             left = left_over(search, findings.base, mode, constants)
             closed = 1.0 - left if hypothesis.effects or hypothesis.flexible else 0.0
@@ -47,6 +49,7 @@ def candidates_of(
                 probability=float(share),
                 score_sigma=joint_sigma([scores[name] for name in hypothesis.effects if name in scores]),
                 heldout_gain=float(gain),
+                gain_beyond=float(beyond),
                 share_closed=closed,
                 parameters=() if mode is None or hypothesis.flexible else estimates_of(mode, scores),
                 refitted=mode is not None,

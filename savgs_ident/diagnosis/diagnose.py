@@ -26,7 +26,7 @@ from savgs_ident.diagnosis.candidates import candidates_of, confusable_of, estim
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.gap import Rows, shrinks
-from savgs_ident.diagnosis.held_out import HeldOut, hold_out
+from savgs_ident.diagnosis.held_out import HeldOut, hold_out, select_in_folds
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.model_selection import (
     recalibrate,
@@ -194,12 +194,12 @@ def _diagnose(
         law = None
 
     base, model = problem.base, _corrected_model(refitted, evidence, law)
-    together, by_channel = shrinks(data, _left_out_rows(problem, held, model))
+    together, by_channel = shrinks(data, _left_out_rows(problem, evidence, held, model))
     settled = settle(evidence, together, problem.constants)
     if settled is not evidence:
         evidence, law = settled, None
         model = _corrected_model(refitted, evidence, law)
-        together, by_channel = shrinks(data, _left_out_rows(problem, held, model))
+        together, by_channel = shrinks(data, _left_out_rows(problem, evidence, held, model))
         apart = _predict_further(refitted, evidence, law, values, further)
     # Before what is named was refitted: the alternatives were not.
     candidates = candidates_of(
@@ -230,7 +230,9 @@ def _diagnose(
         responses=plant.responses(data, problem.given, base.prediction.rows, model.rows),
         measured=measured,
         converged=all(each.status.ok for each in _decisive_fits(problem, selected, evidence, law)),
-        warnings=write_warnings(refitted, evidence, model.fit),
+        warnings=write_warnings(
+            refitted, evidence, model.fit, held[model.hypothesis].beyond - held[NONE].beyond
+        ),
         learned=None if law is None else _offered(law),
         wall_s=time.perf_counter() - began,
     )
@@ -266,13 +268,23 @@ def _port_shares(evidence: DiagnosisEvidence, candidates: Sequence[Candidate]) -
 
 
 def _left_out_rows(
-    problem: DiagnosisProblem, held: Mapping[Hypothesis, HeldOut], model: "_CorrectedModel"
+    problem: DiagnosisProblem,
+    evidence: DiagnosisEvidence,
+    held: Mapping[Hypothesis, HeldOut],
+    model: "_CorrectedModel",
 ) -> Rows:
-    """Rows of the tests when each was left out, by the three models."""
+    """Rows of the tests when each was left out, by the three models; what is named is selected anew without each."""
+    after = held[model.hypothesis].rows
+    if model.hypothesis not in (NONE, UNKNOWN):
+        priors = {each.hypothesis: each.weight - each.mode.evidence for each in evidence.weighed if each.mode}
+        known = [name for name, each in held.items() if each.evidence and name in priors]
+        after = select_in_folds(
+            problem.data, [held[name] for name in known], [priors[name] for name in known], problem.constants
+        )
     return Rows(
         before=problem.given,
         recalibrated=held[NONE].rows,
-        after=held[model.hypothesis].rows,
+        after=after,
         channel=problem.plant.channel,
         channels=problem.plant.channels,
     )

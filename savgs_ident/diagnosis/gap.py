@@ -72,13 +72,20 @@ def _shrink(
     whole = {name: float(_relative(square, power, channels)) for name, square in squares.items()}
     tests = np.random.default_rng(SEED).integers(0, len(power), (RESAMPLES, len(power)))
     drawn = {name: _relative(square[tests], power[tests], channels) for name, square in squares.items()}
-    closed = _closed(drawn["before"], drawn["after"], drawn["floor"])
-    low, high = np.nanquantile(closed, [0.025, 0.975]) if np.isfinite(closed).any() else (np.nan, np.nan)
     return Shrink(
         **{name: float(np.sqrt(value)) for name, value in whole.items()},
         share_closed=float(_closed(*(np.array(whole[name]) for name in ("before", "after", "floor")))),
-        interval=(float(low), float(high)),
+        interval=_interval(_closed(drawn["before"], drawn["after"], drawn["floor"])),
+        interval_by_effect=_interval(_closed(drawn["recalibrated"], drawn["after"], drawn["floor"])),
     )
+
+
+def _interval(drawn: NDArray[np.float64]) -> tuple[float, float]:
+    """The middle 95 % of resampled shares [1]; NaN where there was nothing to close in any sample."""
+    if not np.isfinite(drawn).any():
+        return np.nan, np.nan
+    low, high = np.nanquantile(drawn, [0.025, 0.975])
+    return float(low), float(high)
 
 
 def _closed(

@@ -226,9 +226,13 @@ _COUNTS = {2: "two", 3: "three", 4: "four"}
 
 
 def write_warnings(
-    problem: DiagnosisProblem, evidence: DiagnosisEvidence, named: LaplaceFit
+    problem: DiagnosisProblem, evidence: DiagnosisEvidence, named: LaplaceFit, beyond: float
 ) -> tuple[str, ...]:
-    """What the reader must know before using the verdict, a sentence each; ``named`` is the fit of what is named."""
+    """What the reader must know before using the verdict, a sentence each.
+
+    ``named`` is the fit of what is named, ``beyond`` what it gains over the baseline in the last tests when these are
+    left out together [nat per datum].
+    """
     constants = problem.constants
     found = [
         f"The fit of {hypothesis} found no periodic motion of the plant, so this hypothesis was not evaluated: "
@@ -260,6 +264,11 @@ def write_warnings(
             f"The named effects leave {100.0 * evidence.left:.1f} % of the baseline's misfit beyond the noise: their "
             "laws are not quite those of the plant, or a small effect is missing besides. The intervals of their "
             "parameters contain the noise alone."
+        )
+    if evidence.kind in ("effect", "several") and beyond <= 0.0:
+        found.append(
+            "The last third of the tests, the fastest ones of dwells, left out together, is predicted no better with "
+            "what is named than without: do not use it beyond the tests that were recorded."
         )
     return tuple(dict.fromkeys(found))
 

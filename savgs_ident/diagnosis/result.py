@@ -190,6 +190,7 @@ class Candidate:
         probability: its probability, all hypotheses sum to 1.
         score_sigma: significance at the null, nuisances projected out.
         heldout_gain: rise of the log predictive density of left-out tests over the baseline, per datum [nat].
+        gain_beyond: the same of the last third of the tests, left out together.
         share_closed: share that it explains of what the recalibrated baseline leaves beyond the noise, all
             tests; NaN where it leaves nothing.
         parameters: those of its effects.
@@ -207,6 +208,7 @@ class Candidate:
     refitted: bool
     ports: tuple[str, ...] = ()
     families: tuple[str, ...] = ()
+    gain_beyond: float = nan
 
     @property
     def port(self) -> str | None:
@@ -229,8 +231,8 @@ class Shrink:
     """Relative rms gap [1] over held-out tests (0.1 is 10 %): before, recalibrated, after, and of the noise alone.
 
     ``share_closed`` is 1 - (after^2 - floor^2) / (before^2 - floor^2), ``interval`` its 95 % interval by
-    resampling the tests. It counts what calibration closes, too; the two shares apart are below. All are NaN where
-    there was nothing to close.
+    resampling the tests. It counts what calibration closes, too; the two shares apart are below, and
+    ``interval_by_effect`` is that of the second. All are NaN where there was nothing to close.
     """
 
     before: float
@@ -239,6 +241,7 @@ class Shrink:
     floor: float
     share_closed: float
     interval: tuple[float, float]
+    interval_by_effect: tuple[float, float] = (nan, nan)
 
     @property
     def closed_by_calibration(self) -> float:

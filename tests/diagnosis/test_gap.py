@@ -55,6 +55,16 @@ def test_the_interval_is_wider_when_tests_differ() -> None:
     assert np.ptp(even.interval) < 1e-6 < 0.01 < np.ptp(rough.interval)
 
 
+def test_what_the_effect_closes_has_an_interval_of_its_own() -> None:
+    """Recalibrated from 20 % to 10 %; two halves of the tests are brought to 5 % and to 1 % of the response."""
+    data, truth, channel = _case(4, 1e-6)
+    uneven = np.where(data.test < TESTS // 2, 1.05, 1.01)
+    found, _ = shrinks(data, Rows(truth * 1.2, truth * 1.1, truth * uneven, channel, CHANNELS))
+    low, high = found.interval_by_effect
+    assert 0.75 - 1e-6 < low < found.closed_by_effect < high < 0.99 + 1e-6
+    assert found.closed_by_effect < found.share_closed
+
+
 def test_where_there_is_nothing_to_close_no_share_is_given() -> None:
     data, truth, channel = _case(5, 0.01)
     perfect = data.measured

@@ -155,7 +155,7 @@ def test_what_could_not_be_judged_or_settled_is_a_warning() -> None:
         refit_failed=True,
     )
     problem: Any = SimpleNamespace(base=_mode(0.0), constants=DEFAULTS)
-    told = " ".join(write_warnings(problem, evidence, _mode(0.0)))
+    told = " ".join(write_warnings(problem, evidence, _mode(0.0), 1.0))
     assert "The fit of gear_backlash found no periodic motion of the plant" in told
     assert "not evaluated: stopped at the iteration limit" in told
     assert "on twice as many mesh nodes failed" in told
@@ -169,7 +169,7 @@ def test_what_an_effect_does_not_explain_is_a_warning(reason: Reason, told: str)
     evidence = _evidence("rail_viscous", reason, {"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0})
     evidence = replace(evidence, kind="effect", left=0.0)
     problem: Any = SimpleNamespace(base=_mode(0.0), constants=DEFAULTS)
-    assert any(told in each for each in write_warnings(problem, evidence, _mode(0.0)))
+    assert any(told in each for each in write_warnings(problem, evidence, _mode(0.0), 1.0))
 
 
 GAPS = st.floats(0.0, 0.3)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from savgs_ident.core.status import Status
-from savgs_ident.diagnosis.held_out import HeldOut, hold_out, predict_left_out
+from savgs_ident.diagnosis.held_out import HeldOut, hold_out, predict_left_out, select_in_folds
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation, anywhere, localise
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import cosine, score_terms
@@ -178,6 +178,36 @@ def test_left_out_rows_are_those_of_the_joint_normal_density() -> None:
     variance = np.diag(errors[np.ix_(out, out)] - gain @ errors[np.ix_(part.mask, out)])
     expected = -0.5 * ((data.measured[out] - rows) ** 2 / variance + np.log(variance / data.variance[out]))
     np.testing.assert_allclose(density, expected, atol=1e-8)
+
+
+def test_each_test_is_predicted_by_what_the_others_select() -> None:
+    """A bend in one fold alone: the other folds do not know of it, and that fold does not get to say so."""
+    bend = np.where(over_tests(0), 0.3, 0.0)
+    data = draw(PLANT, {"a": 1.1}, NOISE, 14)
+    data = replace(data, measured=data.measured + bend * PLANT.x**2)
+    search = search_of(PLANT, data)
+    held = [hold_out(search, find_map(search, terms, {}, None), terms) for terms in ((), TERMS[:1])]
+    rows = select_in_folds(data, held, [0.0, 0.0])
+    first = over_tests(0)
+    np.testing.assert_array_equal(rows[first], held[0].rows[first])
+    np.testing.assert_array_equal(rows[~first], held[1].rows[~first])
+
+
+def test_what_holds_in_the_first_tests_alone_does_not_reach_beyond_them() -> None:
+    def gain(bend: np.ndarray) -> float:
+        data = draw(PLANT, {"a": 1.1}, NOISE, 15)
+        search = search_of(PLANT, replace(data, measured=data.measured + bend * PLANT.x**2))
+        without, bent = (hold_out(search, find_map(search, t, {}, None), t) for t in ((), TERMS[:1]))
+        return bent.beyond - without.beyond
+
+    everywhere = np.full(PLANT.x.size, 0.3)
+    assert gain(everywhere) > 1.0
+    assert gain(np.where(np.arange(PLANT.x.size) < 4 * PLANT.points, 0.3, 0.0)) < 0.0
+
+
+def over_tests(fold: int) -> np.ndarray:
+    """Rows of one of the interleaved folds."""
+    return np.repeat(np.arange(PLANT.tests), PLANT.points) % DEFAULTS.held_out_folds == fold
 
 
 def test_a_law_predicts_no_better_where_nothing_is_missing_and_better_where_something_is() -> None:

@@ -60,6 +60,7 @@ CONTRACT: dict[str, object] = {
             "probability": NUMBER,
             "score_sigma": NUMBER,
             "heldout_gain": NUMBER,
+            "gain_beyond": MAYBE,
             "parameters": {},
         }
     ],

@@ -11,7 +11,7 @@ def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
     """The contract's keys first, then further results and the origin.
 
     Gaps and shares are relative (0.1 is 10 %), but for ``gap_percent`` of the map; ``gap_sigma`` and
-    ``score_sigma`` are in standard deviations, ``heldout_gain`` is in nats per datum.
+    ``score_sigma`` are in standard deviations, ``heldout_gain`` and ``gain_beyond`` are in nats per datum.
     """
     return {
         "schema": 2,
@@ -118,6 +118,7 @@ def _candidate(each: Candidate) -> dict[str, object]:
         "probability": each.probability,
         "score_sigma": each.score_sigma,
         "heldout_gain": each.heldout_gain,
+        "gain_beyond": each.gain_beyond,
         "parameters": _parameters(each.parameters),
         "effects": each.effects,
         "share_closed": each.share_closed,
@@ -158,6 +159,7 @@ def _shrink(each: Shrink) -> dict[str, object]:
         "floor": each.floor,
         "closed_by_calibration": each.closed_by_calibration,
         "closed_by_effect": each.closed_by_effect,
+        "interval_by_effect": each.interval_by_effect,
         "share_closed": each.share_closed,
         "interval": each.interval,
     }

@@ -31,7 +31,7 @@ def regime_figure(diagnosis: Diagnosis) -> Figure:
     lines = sum(name.count("\n") + 1 for name in names)
     with styled():
         height = _EDGES + _LINE * lines + _SPACE * len(names)
-        figure = new_figure(4.5, height)
+        figure = new_figure(4.6, height)
         figure.set_layout_engine("none")
         axes = figure.add_axes((0.385, 0.46 / height, 0.59, 1.0 - _EDGES / height))
         at, above = [], 0.0

@@ -135,8 +135,14 @@ def baseline_sentence(diagnosis: Diagnosis) -> str:
 
 
 def closed_words(shrink: Shrink) -> tuple[str, str]:
-    """What calibration closes of the gap beyond the noise, and what the effect closes of what is left of it."""
-    return percentage(shrink.closed_by_calibration), percentage(shrink.closed_by_effect)
+    """What calibration closes of the gap beyond the noise, and what the effect closes of what is left of it.
+
+    The second with its 95 % interval, where it has one.
+    """
+    closed, (low, high) = percentage(shrink.closed_by_effect), shrink.interval_by_effect
+    if isfinite(shrink.closed_by_effect) and isfinite(low):
+        closed += f" ({percentage(low)} to {percentage(high)})"
+    return percentage(shrink.closed_by_calibration), closed
 
 
 def gap_percentage(gap: float) -> str:
@@ -297,6 +303,8 @@ def _candidates(diagnosis: Diagnosis) -> RenderableType:
 
 def _parameters(diagnosis: Diagnosis) -> Iterator[RenderableType]:
     """Of the hypothesis that the verdict names."""
+    if not diagnosis.verdict.law_known:
+        return
     named = [each for each in diagnosis.candidates if each.effects == diagnosis.verdict.effects]
     estimates = named[0].parameters if named and diagnosis.verdict.effects else ()
     if estimates:
