@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.diagnosis_peers import choose, compare, marks_of, merit, scores_of, shares_of
 from benchmarks.figures import FIGURES
-from benchmarks.sparse_selection import PEERS, THRESHOLDS, by_frols, by_stlsq
+from benchmarks.sparse_selection import PEERS, THRESHOLDS, by_frols, by_lasso, by_stlsq
 from benchmarks.trial_regression import VARIANTS, Regression, Trial, merged, trial_folders
 from savgs_ident.validation.blind_record import Answer, SmallErrors
 
@@ -104,6 +104,50 @@ def test_peers_find_what_stands_out_and_keep_quiet_about_noise() -> None:
         said = dict(zip(THRESHOLDS, peer(given), strict=True))
         assert {name for limit, name in said.items() if 5.0 < limit < 35.0} == {"accel_lag"}
         assert said[THRESHOLDS[-1]] is None
+
+
+def _lasso(library: np.ndarray, residual: np.ndarray, names: str, either_sign: bool = False) -> str | None:
+    unit = library / np.linalg.norm(library, axis=0)
+    signs = np.full(len(names), either_sign)
+    (said,) = by_lasso(Regression(tuple(names), unit, signs, residual))
+    return said
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_l1_selection_finds_the_column_among_others_like_it(sign: float) -> None:
+    """Ten columns that have cosines of 0.8 with each other, one of them at 15 standard deviations."""
+    pytest.importorskip("sklearn")
+    random = np.random.default_rng(6)
+    for truth in "adgj":
+        library = random.standard_normal((ROWS, 10)) + 2.0 * random.standard_normal((ROWS, 1))
+        column = library[:, "abcdefghij".index(truth)]
+        residual = sign * 15.0 * column / np.linalg.norm(column) + random.standard_normal(ROWS)
+        assert _lasso(library, residual, "abcdefghij", either_sign=True) == truth
+
+
+def test_l1_selection_keeps_signs_and_adds_up_what_shapes_of_an_effect_contribute() -> None:
+    pytest.importorskip("sklearn")
+    random = np.random.default_rng(7)
+    library = random.standard_normal((ROWS, 3))
+    unit = library / np.linalg.norm(library, axis=0)
+    noise = random.standard_normal(ROWS)
+    # Two shapes at 20 standard deviations each are more than another effect at 25.
+    both = 20.0 * unit[:, 0] + 20.0 * unit[:, 1] + 25.0 * unit[:, 2] + noise
+    assert _lasso(library, both, "aab") == "a"
+    assert _lasso(library, both, "acb") == "b"
+    # What cannot be negative is not what is missing.
+    negative = -20.0 * unit[:, 0] + 10.0 * unit[:, 1] + noise
+    assert _lasso(library, negative, "abc") == "b"
+    assert _lasso(library, negative, "abc", either_sign=True) == "a"
+
+
+def test_l1_selection_keeps_something_of_pure_noise_once_in_the_root_of_the_rows() -> None:
+    """0.041 of 600 rows: 4 of 100 expected, of which 10 or more have a probability of 0.008."""
+    pytest.importorskip("sklearn")
+    random = np.random.default_rng(8)
+    library = random.standard_normal((ROWS, 10))
+    said = [_lasso(library, random.standard_normal(ROWS), "abcdefghij", either_sign=True) for _ in range(100)]
+    assert sum(each is not None for each in said) < 10
 
 
 def test_a_peer_is_compared_at_its_best_on_either_kind_of_trials() -> None:
