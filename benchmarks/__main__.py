@@ -3,6 +3,7 @@
     python -m benchmarks                                  everything: half an hour
     python -m benchmarks --quick                          four dwells, two minutes of MCAP, few draws
     python -m benchmarks --only response --only scipy --json benchmarks.json
+    python -m benchmarks --only sindy --trials out/blind out/foreign
 
 Progress goes to standard error, the table to standard output.
 """
@@ -21,8 +22,9 @@ from benchmarks.suite import NAMES, Size, run_suite
 from benchmarks.table import make_table, print_table
 from benchmarks.task import DWELLS_HZ, QUICK_HZ
 
-FULL = Size(DWELLS_HZ, 60.0, 1000.0, 308, 150_000, Path("out/blind"), 32)
-QUICK = Size(QUICK_HZ, 2.0, 100.0, 24, 5000, Path("out/blind"), 4)
+TRIALS = (Path("out/blind"),)
+FULL = Size(DWELLS_HZ, 60.0, 1000.0, 308, 150_000, TRIALS, 32)
+QUICK = Size(QUICK_HZ, 2.0, 100.0, 24, 5000, TRIALS, 4)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -36,16 +38,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--trials",
         type=Path,
+        nargs="+",
         metavar="DIR",
-        default=FULL.trials,
-        help="what `savgs-ident blind` wrote, for `sindy`",
+        default=TRIALS,
+        help="what `savgs-ident blind` wrote, own or `--foreign`, for `sindy`",
     )
     options = parser.parse_args(arguments)
 
     # Results are fetched at once everywhere here; handing each call to another thread only delays them.
     jax.config.update("jax_cpu_enable_async_dispatch", False)
     began = time.perf_counter()
-    size = (QUICK if options.quick else FULL)._replace(trials=options.trials)
+    size = (QUICK if options.quick else FULL)._replace(trials=tuple(options.trials))
 
     def progress(line: str) -> None:
         print(f"{time.perf_counter() - began:7.1f} s  {line}", file=sys.stderr, flush=True)

@@ -96,9 +96,37 @@ FIGURES: dict[str, Figure] = {
     "top1_percent_ours": Figure("%", ".0f", "Effects that the diagnosis names first and by their own name."),
     "top1_percent_stlsq": Figure("%", ".0f", "The same by pySINDy's STLSQ on our residuals and library."),
     "top1_percent_frols": Figure("%", ".0f", "The same by pySINDy's FROLS."),
+    "top1_percent_lasso": Figure("%", ".0f", "The same by L1 selection (scikit-learn's LASSO path and BIC)."),
     "false_alarms_percent_ours": Figure("%", ".0f", "Where nothing is missing: something said to be."),
     "false_alarms_percent_stlsq": Figure("%", ".0f", "The same by STLSQ."),
     "false_alarms_percent_frols": Figure("%", ".0f", "The same by FROLS."),
+    "false_alarms_percent_lasso": Figure("%", ".0f", "The same by L1 selection."),
+    "foreign_trials_effects": Figure(
+        "", ".0f", "Blind trials with one effect by a law that no catalogue has."
+    ),
+    "foreign_trials_nothing": Figure("", ".0f", "Blind trials with the same small errors and nothing else."),
+    "foreign_port_percent_ours": Figure(
+        "%", ".0f", "Foreign effects that the diagnosis puts where they are."
+    ),
+    "foreign_port_percent_stlsq": Figure(
+        "%", ".0f", "The same by STLSQ: the port of the effect that it names."
+    ),
+    "foreign_port_percent_frols": Figure("%", ".0f", "The same by FROLS."),
+    "foreign_port_percent_lasso": Figure("%", ".0f", "The same by L1 selection."),
+    "foreign_family_percent_ours": Figure(
+        "%", ".0f", "Those of which it names the family at that port, too."
+    ),
+    "foreign_family_percent_stlsq": Figure(
+        "%", ".0f", "The same by STLSQ: the family of the effect that it names."
+    ),
+    "foreign_family_percent_frols": Figure("%", ".0f", "The same by FROLS."),
+    "foreign_family_percent_lasso": Figure("%", ".0f", "The same by L1 selection."),
+    "foreign_false_alarms_percent_ours": Figure(
+        "%", ".0f", "Where there are only small errors: something named."
+    ),
+    "foreign_false_alarms_percent_stlsq": Figure("%", ".0f", "The same by STLSQ."),
+    "foreign_false_alarms_percent_frols": Figure("%", ".0f", "The same by FROLS."),
+    "foreign_false_alarms_percent_lasso": Figure("%", ".0f", "The same by L1 selection."),
     "closed_loop_sweep_s": Figure(
         "s", ".2f", "60 s of closed loop (sweep, 1000 samples per second of the law), program compiled."
     ),

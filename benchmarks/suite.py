@@ -25,7 +25,7 @@ class Size(NamedTuple):
         target_ess: effective sample size that the posterior's samplers are to reach.
         integrations: of single dwells by scipy, for the time of a likelihood.
         stretch_steps: of emcee's own move, at most.
-        trials: folder of blind trials on which the diagnosis is compared.
+        trials: folders of blind trials on which the diagnosis is compared.
         campaigns: how many are identified side by side.
     """
 
@@ -34,7 +34,7 @@ class Size(NamedTuple):
     target_ess: float
     integrations: int
     stretch_steps: int
-    trials: Path
+    trials: tuple[Path, ...]
     campaigns: int = 32
 
 
@@ -53,9 +53,9 @@ def run_suite(names: Sequence[str], size: Size, progress: Progress) -> Outcome:
 
         outcome += cross_check.measure(size.dwells_hz, progress)
     if "sindy" in names:
-        from benchmarks import diagnosis_by_sindy
+        from benchmarks import diagnosis_peers
 
-        outcome += diagnosis_by_sindy.measure(size.trials, progress)
+        outcome += diagnosis_peers.measure(size.trials, progress)
     if "closed-loop" in names:
         from benchmarks import closed_loop
 
