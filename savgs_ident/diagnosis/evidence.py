@@ -156,6 +156,15 @@ class DiagnosisEvidence:
         return next(each for each in self.localisations if each.name == first)
 
     @property
+    def prior_gain(self) -> float:
+        """By how much what is chosen spares the parameters of the plant implausible values: rise of log prior [nat].
+
+        Calibration can take up much of what is missing, but only by parameters that are far off their sheet.
+        """
+        base, mode = self.findings.base, self.chosen.mode
+        return 0.0 if mode is None else 0.5 * float(base.x @ base.x - mode.x @ mode.x)
+
+    @property
     def offered(self) -> FlexibleMember | None:
         """The learned law that explains most, where it acts at the most probable location."""
         there = [each for each in self.flexible if each.location == self.localisation.name]

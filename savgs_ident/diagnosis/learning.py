@@ -34,6 +34,12 @@ from savgs_ident.inference.prior import Linear, bounds_of
 STEPS = 20
 """Most steps of the fit."""
 
+SEEN = 1e-3
+"""A function of unit size that changes the rows by less than this share of what another one does is left out.
+
+Data that hardly see a function, as a constant force, would let its coefficient be of any size.
+"""
+
 
 @dataclass(frozen=True)
 class LearnedLaw:
@@ -144,12 +150,14 @@ def _with_amplitudes(
 ) -> Term:
     """The term with coefficients whose prior is as wide as to first order about the baseline explains most.
 
-    ``columns`` are the change of the rows (m,) per unit of each, by name.
+    ``columns`` are the change of the rows (m,) per unit of each, by name; what the data hardly see is left out.
     """
-    widths = widths_of(search, base, np.stack(list(columns.values()), axis=1), constants)
+    size = {name: float(np.linalg.norm(column)) for name, column in columns.items()}
+    seen = [name for name in columns if size[name] > SEEN * max(size.values())]
+    widths = widths_of(search, base, np.stack([columns[name] for name in seen], axis=1), constants)
     units = {each.name: each.unit for each in effect.parameters}
     amplitudes = tuple(
-        Linear(name, units[name], 0.0, float(width)) for name, width in zip(columns, widths, strict=True)
+        Linear(name, units[name], 0.0, float(width)) for name, width in zip(seen, widths, strict=True)
     )
     return replace(term, amplitudes=amplitudes)
 

@@ -175,14 +175,15 @@ def settle(
 ) -> DiagnosisEvidence:
     """The evidence as tests that were held out allow it to be said: their ``gap`` has the last word.
 
-    Where what is named predicts them no better than the recalibrated baseline, nothing may be named. And where the
-    baseline misses them by more than is small, something is missing, whether anything explains it or not. A tolerance
-    that does not hold is in the recalibrated baseline already.
+    Where what is named predicts them no better than the recalibrated baseline, nothing may be named, unless the
+    baseline predicts them by parameters that are far off their sheet. And where the baseline misses them by more than
+    is small, something is missing, whether anything explains it or not. A tolerance that does not hold is in the
+    recalibrated baseline already.
     """
     if evidence.kind == "unknown" and evidence.unknown.reason == "tolerance":
         return evidence
     small = gap.recalibrated**2 - gap.floor**2 <= constants.material_share**2
-    supported = gap.after < gap.recalibrated
+    supported = gap.after < gap.recalibrated or (small and evidence.prior_gain >= constants.alarm_log_odds)
     if evidence.kind == "none":
         return evidence if small else _unexplained(evidence)
     if supported or (evidence.kind == "unknown" and not small):

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.model_selection import nearest_effect
 from savgs_ident.diagnosis.result import Shrink, Verdict
@@ -80,10 +82,9 @@ def _law_missing(
 ) -> str:
     sentence = (
         f"The model lacks something at the {problem.words(member.location)}: {_KINDS[member.family]}, by a law that "
-        f"the catalogue does not have. With a law learned there the gap shrinks from {_percent(gap.recalibrated)} "
-        f"recalibrated ({_percent(gap.before)} as given) to {_percent(gap.after)} of the response in held-out tests; "
-        f"the noise is {_percent(gap.floor)}."
+        "the catalogue does not have."
     )
+    sentence += _shrinking(evidence, gap, "a law learned there")
     fits = [mode for mode in evidence.findings.modes if mode.terms == (nearest,)]
     if nearest is not None:
         sentence += f" The nearest formula of the catalogue, {_words(problem, nearest)}, "
@@ -211,15 +212,28 @@ def _effects_missing(
     else:
         each = "; ".join(f"at the {place}, {word}" for place, word in zip(places, words, strict=True))
         sentence = f"The model lacks {_COUNTS.get(len(effects), 'several')} things: {each}."
-    sentence += (
-        f" With {'it' if one else 'them'} the gap shrinks from {_percent(gap.recalibrated)} recalibrated "
-        f"({_percent(gap.before)} as given) to {_percent(gap.after)} of the response in held-out tests; the noise is "
-        f"{_percent(gap.floor)}."
-    )
+    sentence += _shrinking(evidence, gap, "it" if one else "them")
     if alternatives:
         others = " or ".join(f"`{name}`" for name in alternatives)
         sentence += f" This campaign cannot distinguish {'it' if one else 'one of them'} from {others}."
     return sentence
+
+
+def _shrinking(evidence: DiagnosisEvidence, gap: Shrink, named: str) -> str:
+    """How far the gap shrinks with what is ``named``; where it does not, what calibration needs in its place."""
+    if gap.after < gap.recalibrated:
+        return (
+            f" With {named} the gap shrinks from {_percent(gap.recalibrated)} recalibrated "
+            f"({_percent(gap.before)} as given) to {_percent(gap.after)} of the response in held-out tests; the "
+            f"noise is {_percent(gap.floor)}."
+        )
+    base = evidence.findings.base
+    worst = int(np.argmax(np.abs(base.x)))
+    return (
+        f" Calibration closes the gap as well, from {_percent(gap.before)} to {_percent(gap.recalibrated)} of the "
+        f"response in held-out tests (noise {_percent(gap.floor)}), but needs `{base.coordinates[worst].name}` "
+        f"{abs(base.x[worst]):.1f} standard deviations {'above' if base.x[worst] > 0.0 else 'below'} its sheet."
+    )
 
 
 _COUNTS = {2: "two", 3: "three", 4: "four"}

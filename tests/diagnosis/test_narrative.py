@@ -5,6 +5,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -27,6 +28,7 @@ from savgs_ident.diagnosis.verdict import (
     decide,
 )
 from savgs_ident.effects.base import Family
+from savgs_ident.inference.prior import Linear
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.ports import LOCATION_WORDS
 
@@ -44,8 +46,12 @@ PROBLEM: Any = SimpleNamespace(
 )
 
 
-def _mode(evidence: float, *terms: str) -> Any:
-    return SimpleNamespace(terms=terms, evidence=evidence, status=Status.CONVERGED)
+def _mode(evidence: float, *terms: str, off: float = 0.0) -> Any:
+    """A fit whose only tolerance is ``off`` by so many standard deviations."""
+    coordinates = (Linear("m_u", "kg", 50.0, 1.0),)
+    return SimpleNamespace(
+        terms=terms, evidence=evidence, status=Status.CONVERGED, x=np.array([off]), coordinates=coordinates
+    )
 
 
 def _evidence(kind: Any, reason: Reason, weights: dict[str, float], **more: Any) -> DiagnosisEvidence:
@@ -62,7 +68,7 @@ def _evidence(kind: Any, reason: Reason, weights: dict[str, float], **more: Any)
     ranked = tuple(sorted(weighed, key=lambda each: -each.weight))
     modes = tuple(each.mode for each in weighed if each.mode is not None and each.hypothesis.effects)
     return DiagnosisEvidence(
-        findings=Findings(_mode(weights["none"]), (), modes, more.get("lost", ())),
+        findings=Findings(_mode(weights["none"], off=more.get("off", 0.0)), (), modes, more.get("lost", ())),
         localisations=(RAIL,),
         flexible=more.get("flexible", ()),
         weighed=ranked,
@@ -182,11 +188,12 @@ GAPS = st.floats(0.0, 0.3)
     change=st.floats(0.0, 0.1),
     reason=st.sampled_from(("law", "law beside effects", "tolerance")),
     gaps=st.tuples(GAPS, GAPS, GAPS, GAPS),
+    off=st.floats(-8.0, 8.0),
 )
 def test_no_verdict_contradicts_its_numbers(
-    odds: dict[str, float], left: float, change: float, reason: Reason, gaps: tuple[float, ...]
+    odds: dict[str, float], left: float, change: float, reason: Reason, gaps: tuple[float, ...], off: float
 ) -> None:
-    evidence = replace(_evidence("none", reason, {"none": 0.0} | odds), left=left)
+    evidence = replace(_evidence("none", reason, {"none": 0.0} | odds, off=off), left=left)
     kind, chosen = decide(evidence.weighed, Change(change, change), left)
     # Parameters have something to do with the gap: the noise is the least that is left.
     before, recalibrated, after, floor = gaps[0], max(gaps[1], gaps[3]), max(gaps[2], gaps[3]), gaps[3]
@@ -201,7 +208,9 @@ def test_no_verdict_contradicts_its_numbers(
     if verdict.kind == "unknown" and odds["rail_viscous"] > DEFAULTS.alarm_log_odds and explained:
         assert gap.after >= gap.recalibrated
     if verdict.kind in ("effect", "several"):
-        assert gap.after < gap.recalibrated
+        spared = 0.5 * off**2 >= DEFAULTS.alarm_log_odds and not large
+        assert gap.after < gap.recalibrated or spared
+        assert ("needs `m_u`" in verdict.sentence) == (gap.after >= gap.recalibrated)
         assert left <= DEFAULTS.unexplained_share
     if "shrinks from" in verdict.sentence:
         assert gap.after < gap.recalibrated or tolerance

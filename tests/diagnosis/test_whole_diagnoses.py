@@ -1,0 +1,150 @@
+"""One whole diagnosis for each kind of verdict, on the linear two masses: seconds each, all stages of it."""
+
+from collections.abc import Iterator, Mapping
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from savgs_ident.core.parameter import Parameter, ParameterTable
+from savgs_ident.core.values import Values, as_values
+from savgs_ident.diagnosis.diagnose import baseline_problem, diagnose_dwells
+from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
+from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.effects.base import AbstractForceLaw, Family, Port, PortSignals, Role
+from savgs_ident.effects.effect import Effect, effect_at, generic_effects
+from savgs_ident.plants.base import Excitation
+from savgs_ident.plants.model import PlantModel
+from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
+
+from ..relaxed import as_users_have_it
+
+FREQUENCY = np.array([0.7, 1.0, 1.4, 1.9, 2.6, 4.0, 6.0, 8.0, 12.0])
+STROKE, ORDERS, NOISE = 0.01, 3, 1e-3
+TRUTH = {"m_s": 321.0, "k": 6.3e4, "c": 2.2e3, "k_t": 2.79e5}
+CHANNELS = ("road_height", *(each.name for each in TwoMass.channels))
+ALL = generic_effects(TwoMass.ports)
+OFFERED = (
+    "guide_viscous",
+    "suspension_stiffness",
+    "potentiometer_delay",
+    "accelerometer_gain",
+    "tyre_stiffness",
+)
+
+
+class CubicDamping(AbstractForceLaw):
+    """A force against the velocity that grows with its cube: no law of the catalogue."""
+
+    name: ClassVar[str] = "cubic_damping"
+    family: ClassVar[Family] = Family.DAMPING
+    roles: ClassVar[tuple[Role, ...]] = (Role("coefficient", 0.0),)
+
+    def typical(self, port: Port) -> Mapping[str, Parameter | float]:
+        return {"coefficient": 3000.0}
+
+    def force(self, v: Values, signals: PortSignals, state: jnp.ndarray) -> jnp.ndarray:
+        return -v["coefficient"] * signals.velocity**3
+
+
+GUIDE = next(port for port in TwoMass.ports if port.name == "guide")
+FOREIGN = effect_at("guide_cubic", GUIDE, CubicDamping(), {"coefficient": 3000.0})
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _relaxed() -> Iterator[None]:
+    with as_users_have_it():
+        yield
+
+
+def _recorded(*effects: Effect, miss: float = 0.0) -> HarmonicResponse:
+    """Dwells of the plant with effects of typical size; ``miss`` is a relative error of every test by itself."""
+    random, model = np.random.default_rng(5), TwoMass()
+    for each in effects:
+        model = model + each
+    own = [parameter for each in effects for parameter in each.parameters]
+    p = as_values((PARAMETERS.with_values(TRUTH) + ParameterTable(tuple(own))).as_dict())
+    road = np.zeros((FREQUENCY.size, 2), complex)
+    road[:, 1] = STROKE
+    excitation = Excitation(jnp.asarray(FREQUENCY), {"road_height": jnp.asarray(road)})
+    solution = simulate_periodic(model, p, excitation, PeriodicSettings(nodes=256))
+    assert all(status.ok for status in solution.status())
+    seen = np.zeros((FREQUENCY.size, len(CHANNELS), ORDERS + 1), complex)
+    seen[:, 0, :2] = road
+    seen[:, 1:] = np.asarray(harmonics(model, p, solution, ORDERS))
+    seen[:, 1:] *= np.exp(miss * random.standard_normal((FREQUENCY.size, len(CHANNELS) - 1, 1)))
+    sd = NOISE * np.abs(seen[:, :, 1])
+    noise = random.standard_normal(seen.shape) + 1j * random.standard_normal(seen.shape)
+    seen[:, 1:] += (sd[:, :, None] * noise)[:, 1:]
+    return HarmonicResponse(
+        tests=tuple(f"dwell_{f}Hz" for f in FREQUENCY),
+        channels=CHANNELS,
+        frequency=FREQUENCY,
+        frequency_sd=np.zeros(FREQUENCY.size),
+        harmonics=seen,
+        covariance=sd[:, :, None, None, None] ** 2 * np.ones(ORDERS + 1)[:, None, None] * np.eye(2),
+        valid=np.ones(seen.shape, bool),
+        peak_to_peak=np.zeros(sd.shape),
+        peak_to_peak_sd=np.zeros(sd.shape),
+        noise_sd=sd,
+        periods=np.full(FREQUENCY.size, 20),
+    )
+
+
+def _diagnosed(response: HarmonicResponse) -> Diagnosis:
+    settings = DiagnosisSettings(
+        "two_mass", free=("k", "c"), orders=ORDERS, periodic=PeriodicSettings(nodes=128, adaptations=0)
+    )
+    offered = {name: ALL[name] for name in OFFERED}
+    problem, data = baseline_problem(response, TwoMass(), PARAMETERS, offered, settings)
+    return diagnose_dwells(problem, data, response, PlantModel(TwoMass(), PARAMETERS), settings, {})
+
+
+def _missing(found: Diagnosis) -> float:
+    """The recalibrated gap beyond the noise [1]."""
+    return float(np.sqrt(max(found.shrink.recalibrated**2 - found.shrink.floor**2, 0.0)))
+
+
+def test_nothing_is_missing() -> None:
+    found = _diagnosed(_recorded())
+    assert found.verdict.kind == "none"
+    assert found.converged
+    assert _missing(found) < DEFAULTS.material_share
+    assert found.parameters["k"] == pytest.approx(TRUTH["k"], rel=0.01)
+
+
+def test_an_effect_is_named() -> None:
+    found = _diagnosed(_recorded(ALL["guide_viscous"]))
+    assert (found.verdict.kind, found.verdict.effects) == ("effect", ("guide_viscous",))
+    assert found.verdict.law_known
+    assert found.shrink.closed_by_effect > 0.98
+    (damping,) = found.candidates[0].parameters
+    assert damping.lo < ALL["guide_viscous"].parameters[0].value < damping.hi
+
+
+def test_two_effects_are_named() -> None:
+    found = _diagnosed(_recorded(ALL["guide_viscous"], ALL["potentiometer_delay"]))
+    assert found.verdict.kind == "several"
+    assert set(found.verdict.effects) == {"guide_viscous", "potentiometer_delay"}
+    assert found.shrink.closed_by_effect > 0.98
+
+
+def test_a_law_that_the_catalogue_does_not_have_is_learned_at_its_port() -> None:
+    found = _diagnosed(_recorded(FOREIGN))
+    assert (found.verdict.kind, found.verdict.ports) == ("effect", ("guide",))
+    assert not found.verdict.law_known
+    assert found.verdict.families == ("guide/damping",)
+    assert found.shrink.closed_by_effect > 0.9
+    assert found.learned is not None
+
+
+def test_what_follows_no_law_is_unknown() -> None:
+    """Every test is off by itself: something is missing, and no law at any port says what."""
+    found = _diagnosed(_recorded(miss=0.03))
+    assert _missing(found) > 3.0 * DEFAULTS.material_share
+    assert found.verdict.kind == "unknown"
+    assert found.shrink.closed_by_effect < 0.5
+    assert "no law learned at a port predicts held-out tests better" in found.verdict.sentence
