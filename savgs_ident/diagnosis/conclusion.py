@@ -1,0 +1,227 @@
+"""The conclusion of a diagnosis: what is named found again, tests held out, and what these leave of the evidence.
+
+Model selection has seen all tests. Here the named hypothesis and its rivals predict tests that were left out, and
+these have the last word (:func:`~savgs_ident.diagnosis.model_selection.settle`); the gap that is reported is theirs.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.executor import in_parallel, side_by_side
+from savgs_ident.core.presentation import Progress
+from savgs_ident.diagnosis.candidates import confusable_of
+from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
+from savgs_ident.diagnosis.gap import Rows, shrinks
+from savgs_ident.diagnosis.held_out import HeldOut, hold_out, select_in_folds
+from savgs_ident.diagnosis.learning import LearnedLaw
+from savgs_ident.diagnosis.model_selection import (
+    refit_named,
+    settle,
+)
+from savgs_ident.diagnosis.problem import AbstractProblem
+from savgs_ident.diagnosis.result import (
+    NONE,
+    UNKNOWN,
+    FurtherShrink,
+    Hypothesis,
+    NextTest,
+    Shrink,
+)
+from savgs_ident.diagnosis.search import hypothesis_of
+from savgs_ident.diagnosis.sweep import ModelPoint
+from savgs_ident.diagnosis.thresholds import DecisionConstants
+from savgs_ident.inference.find_map import LaplaceFit
+
+FurtherRecording = Callable[[AbstractProblem, Sequence[ModelPoint]], FurtherShrink | None]
+"""Predicts a recording that takes no part, by two or three models: as given, recalibrated, with what is named."""
+
+
+@dataclass(frozen=True)
+class CorrectedModel:
+    """The model with what the verdict puts into it.
+
+    Attributes:
+        hypothesis: what that is.
+        fit: the fit of the named effects; of the baseline where none are named.
+        rows: of the response that it predicts [unit of each reading], (m,).
+    """
+
+    hypothesis: Hypothesis
+    fit: LaplaceFit
+    rows: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What the evidence and the tests that were held out allow to be said.
+
+    Attributes:
+        problem: the problem, free of discretisation error about what is named.
+        evidence: what may be said.
+        law: the learned law that is named or offered, if one is.
+        model: the corrected model.
+        held: predictions of tests left out, by hypothesis.
+        gap: that of all channels together in these tests.
+        by_channel: that of each.
+        further: that of a recording which took no part.
+        next_tests: tests that would separate what is named from what looks like it.
+    """
+
+    problem: DiagnosisProblem
+    evidence: DiagnosisEvidence
+    law: LearnedLaw | None
+    model: CorrectedModel
+    held: Mapping[Hypothesis, HeldOut]
+    gap: Shrink
+    by_channel: Mapping[str, Shrink]
+    further: FurtherShrink | None
+    next_tests: tuple[NextTest, ...]
+
+
+def conclude(
+    problem: DiagnosisProblem,
+    selected: DiagnosisEvidence,
+    values: Mapping[str, float],
+    progress: Progress,
+    further: FurtherRecording | None,
+) -> Conclusion:
+    """What is named found again, tests held out, and what these leave of what was ``selected``."""
+    others = [each for each in _compared(problem, selected) if each is not selected.chosen.mode]
+    (refitted, evidence), (tests, held) = side_by_side(
+        lambda: refit_named(problem, selected, progress),
+        lambda: (_next_tests(problem, selected, progress), _held_out(problem, others, progress)),
+    )
+    member = evidence.named_law or (evidence.offered if evidence.kind == "unknown" else None)
+    law = None if member is None else member.law
+    fits = [] if evidence.chosen.mode is None or law is not None else [evidence.chosen.mode]
+    last, apart = side_by_side(
+        lambda: {
+            **_held_out(refitted, fits, progress),
+            **_held_out_by_member(member, progress, problem.constants),
+        },
+        lambda: _predict_further(refitted, evidence, law, values, further),
+    )
+    held = {**held, **last}
+    held = {**held, UNKNOWN: _held_out_unknown(evidence, held[NONE])}
+    if evidence.kind == "unknown" and member is not None and held[member.hypothesis].mean <= held[NONE].mean:
+        law = None
+    model = _corrected_model(refitted, evidence, law)
+    gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
+    settled = settle(evidence, gap, problem.constants)
+    if settled is not evidence:
+        evidence, law = settled, None
+        model = _corrected_model(refitted, evidence, law)
+        gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
+        apart = _predict_further(refitted, evidence, law, values, further)
+    return Conclusion(refitted, evidence, law, model, held, gap, by_channel, apart, tests)
+
+
+def _compared(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> list[LaplaceFit]:
+    """The baseline and the two best fitted hypotheses: those that predict tests that were left out."""
+    return [problem.base, *sorted(evidence.findings.modes, key=lambda each: -each.evidence)[:2]]
+
+
+def _held_out(
+    problem: DiagnosisProblem, modes: Sequence[LaplaceFit], progress: Progress
+) -> dict[Hypothesis, HeldOut]:
+    """Predictions of tests left out, by hypothesis."""
+
+    def without_parts(mode: LaplaceFit) -> tuple[Hypothesis, HeldOut]:
+        hypothesis = hypothesis_of(mode)
+        progress(f"leaving tests out: {hypothesis}")
+        return hypothesis, hold_out(problem.search, mode, problem.terms(hypothesis), problem.constants)
+
+    return dict(in_parallel(without_parts, modes))
+
+
+def _held_out_by_member(
+    member: FlexibleMember | None, progress: Progress, constants: DecisionConstants
+) -> dict[Hypothesis, HeldOut]:
+    """What a learned law predicts of tests left out."""
+    if member is None:
+        return {}
+    progress(f"leaving tests out: {member.hypothesis}")
+    return {member.hypothesis: member.law.held_out(constants)}
+
+
+def _held_out_unknown(evidence: DiagnosisEvidence, without: HeldOut) -> HeldOut:
+    """What a law known to first order predicts of tests left out; the baseline where it does worse than that."""
+    return max(evidence.localisation.held_out, without, key=lambda each: each.mean)
+
+
+def _left_out_rows(
+    problem: DiagnosisProblem,
+    evidence: DiagnosisEvidence,
+    held: Mapping[Hypothesis, HeldOut],
+    model: CorrectedModel,
+) -> Rows:
+    """Rows of the tests when each was left out, by the three models; what is named is selected anew without each."""
+    after = held[model.hypothesis].rows
+    if model.hypothesis not in (NONE, UNKNOWN):
+        priors = {each.hypothesis: each.weight - each.mode.evidence for each in evidence.weighed if each.mode}
+        known = [name for name, each in held.items() if each.evidence and name in priors]
+        after = select_in_folds(
+            problem.data, [held[name] for name in known], [priors[name] for name in known], problem.constants
+        )
+    return Rows(
+        before=problem.given,
+        recalibrated=held[NONE].rows,
+        after=after,
+        channel=problem.plant.channel,
+        channels=problem.plant.channels,
+    )
+
+
+def _corrected_model(
+    problem: DiagnosisProblem, evidence: DiagnosisEvidence, law: LearnedLaw | None
+) -> CorrectedModel:
+    if law is not None:
+        member = next(each for each in evidence.flexible if each.law is law)
+        return CorrectedModel(member.hypothesis, law.mode, law.mode.prediction.rows)
+    if evidence.kind == "unknown":
+        return CorrectedModel(UNKNOWN, problem.base, evidence.localisation.held_out.rows)
+    fit = evidence.chosen.mode or problem.base
+    return CorrectedModel(hypothesis_of(fit), fit, fit.prediction.rows)
+
+
+def _predict_further(
+    problem: DiagnosisProblem,
+    evidence: DiagnosisEvidence,
+    law: LearnedLaw | None,
+    values: Mapping[str, float],
+    further: FurtherRecording | None,
+) -> FurtherShrink | None:
+    """The gap of a further recording: of the baseline as given, recalibrated, and with what is named.
+
+    Nothing comes after where a law is known to first order alone: no model can be solved with that.
+    """
+    if further is None:
+        return None
+    base = problem.base
+    points: list[ModelPoint] = [((), values), ((), base.values)]
+    if law is not None:
+        return further(law.problem, [*points, ((law.name,), law.values)])
+    if evidence.kind == "unknown":
+        return further(problem.plant, points)
+    fit = evidence.chosen.mode or base
+    return further(problem.plant, [*points, (fit.terms, fit.values)])
+
+
+def _next_tests(
+    problem: DiagnosisProblem, evidence: DiagnosisEvidence, progress: Progress
+) -> tuple[NextTest, ...]:
+    """Tests that separate the chosen hypothesis from the best fitted one that looks like it."""
+    chosen = evidence.chosen.mode
+    if chosen is None or len(chosen.terms) != 1:
+        return ()
+    pairs = [each.effects for each in confusable_of(evidence.findings, problem.constants)]
+    alike = {name for pair in pairs if chosen.terms[0] in pair for name in pair} - {*chosen.terms}
+    rivals = [mode for mode in evidence.findings.modes if len(mode.terms) == 1 and mode.terms[0] in alike]
+    if not rivals:
+        return ()
+    rival = max(rivals, key=lambda each: each.evidence)
+    progress(f"looking for a test that separates {chosen.terms[0]} from {rival.terms[0]}")
+    return problem.plant.next_tests(problem.search, chosen, rival)
