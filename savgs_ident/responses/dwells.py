@@ -24,7 +24,9 @@ from savgs_ident.responses.fundamental import (
     highest_valid_order,
 )
 from savgs_ident.responses.harmonic_response import HarmonicResponse, unbiased_peak_to_peak
-from savgs_ident.responses.robust_dwell import check_outliers, fit_robust_dwell
+from savgs_ident.responses.outliers import check_outliers
+from savgs_ident.responses.robust_dwell import fit_robust_dwell
+from savgs_ident.responses.standstill import estimate_standstill_noise
 
 FEWEST_PERIODS = 3
 _FREQUENCY_MISS = 0.02
@@ -269,13 +271,16 @@ def check_steady(
 
 
 def check_noise(campaign: Campaign, fits: Mapping[str, DwellFit]) -> tuple[DataWarning, ...]:
-    """One warning for each channel that is much noisier in the dwells than at standstill.
+    """One warning for each channel that is much noisier in the dwells than at standstill, and those of the latter.
 
     More noise in motion than at rest is motion that does not repeat from period to period: rattle, a transient
     not yet over, a supply that hums with the load, or orders above the sampling.
     """
-    found = []
-    for name, at_rest in _standstill_noise(campaign).items():
+    noise, warnings = estimate_standstill_noise(campaign)
+    found = list(warnings)
+    for name, at_rest in noise.items():
+        if at_rest == 0.0:
+            continue
         ratio = {
             test: fit.channels[name].noise_sd / at_rest for test, fit in fits.items() if name in fit.channels
         }
@@ -372,19 +377,3 @@ def _end_fundamentals(
         values = group.values[:, part] - group.values[:, part].mean(axis=1, keepdims=True)
         ends.append(2.0 * np.mean(values * turns, axis=1))
     return ends[0], ends[1], count
-
-
-def _standstill_noise(campaign: Campaign) -> dict[str, float]:
-    """Standard deviation of each channel about its trend over the standstill records, where it is not 0."""
-    noise: dict[str, float] = {}
-    for recording in campaign.of_kind("standstill"):
-        for channel in recording.channels.values():
-            usable = np.isfinite(channel.values)
-            if np.count_nonzero(usable) < 16:
-                continue
-            time, values = channel.time[usable], channel.values[usable]
-            trend = np.polynomial.Polynomial.fit(time, values, 1)
-            spread = float(np.std(values - trend(time)))
-            if spread > 0.0:
-                noise[channel.name] = max(spread, noise.get(channel.name, 0.0))
-    return noise
