@@ -32,6 +32,7 @@ FEWEST_PERIODS = 3
 _FREQUENCY_MISS = 0.02
 _STEADY_SHARE = 0.01
 _STEADY_SIGMAS = 5.0
+_STEADY_ORDERS = 3
 _NOISE_FACTOR = 1.5
 _CLOCK_SIGMAS = 5.0
 
@@ -257,7 +258,8 @@ def check_steady(
         names = [name for name in group.names if name in fit.channels]
         if not names:
             continue
-        first, last, samples = _end_fundamentals(group, fit.frequency, max(fit.periods // 3, 1))
+        highest = min(_STEADY_ORDERS, fit.channels[names[0]].amplitude.size - 1)
+        first, last, samples = _end_fundamentals(group, fit.frequency, max(fit.periods // 3, 1), highest)
         for i, name in enumerate(group.names):
             channel = fit.channels[name]
             size = abs(channel.amplitude[1])
@@ -367,13 +369,18 @@ def check_clocks(
 
 
 def _end_fundamentals(
-    group: ClockGroup, frequency: float, periods: int
+    group: ClockGroup, frequency: float, periods: int, highest: int
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128], int]:
-    """Fundamental over the first and over the last whole ``periods``, and the samples in each."""
-    count = max(round(periods / frequency * group.rate_hz), 1)
-    ends = []
-    for part in (slice(None, count), slice(-count, None)):
-        turns = np.exp(-2j * np.pi * frequency * group.time[part])
-        values = group.values[:, part] - group.values[:, part].mean(axis=1, keepdims=True)
-        ends.append(2.0 * np.mean(values * turns, axis=1))
-    return ends[0], ends[1], count
+    """Fundamental over the first and over the last whole ``periods``, and the samples in the shorter of them.
+
+    By least squares with orders up to ``highest``, so that a gap in the samples does not look like a change.
+    """
+    span, orders = periods / frequency, np.arange(1, highest + 1)
+    ends, samples = [], []
+    for inside in (group.time < group.time[0] + span, group.time > group.time[-1] - span):
+        angle = 2.0 * np.pi * frequency * np.outer(group.time[inside], orders)
+        columns = np.column_stack([np.cos(angle), np.sin(angle), np.ones(angle.shape[0])])
+        weights, *_ = np.linalg.lstsq(columns, group.values[:, inside].T)
+        ends.append(weights[0] - 1j * weights[highest])
+        samples.append(angle.shape[0])
+    return ends[0], ends[1], min(samples)
