@@ -67,6 +67,10 @@ class InputError(SavgsIdentError):
         self.time, self.remedy = time, remedy
         super().__init__(_compose(what, self.source, test, channel, time, remedy))
 
+    def as_warning(self, code: str) -> "DataWarning":
+        """The same as a warning, where the rest of the data can be used."""
+        return DataWarning(code, self.what, self.source, self.test, self.channel, self.time, self.remedy)
+
 
 @contextmanager
 def blamed_on(source: object) -> Iterator[None]:

@@ -61,17 +61,18 @@ def diagnose(
             "a held-out motion goes with a measured motion alone", remedy="diagnose each campaign by itself"
         )
     response = measured_response(measured, model.plant, orders, max_frequency, progress)
-    campaign = campaign_of(measured)
+    campaign, warnings = campaign_of(measured), response.warnings
     if isinstance(model, RigModel):
         rig, settings, values = baseline_of(model, orders, without)
-        sweep = None if campaign is None else first_sweep(campaign, model.plant)
+        sweep, found_in_sweep = (None, ()) if campaign is None else first_sweep(campaign, model.plant)
+        warnings += found_in_sweep
         found = diagnose_response(response, rig, settings, values, progress, sweep)
     else:
         given, settings, values = model.before, *_asked(model, orders, without)
         bare = replace(model.build(), effects=())
         plant, data = baseline_problem(response, bare, given.table, model.catalogue, settings)
         found = diagnose_dwells(plant, data, response, given, settings, values, progress)
-    return replace(found, origin=model.origin(campaign, response.warnings))
+    return replace(found, origin=model.origin(campaign, warnings))
 
 
 def _diagnose_motion(

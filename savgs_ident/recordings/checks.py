@@ -23,6 +23,7 @@ from savgs_ident.recordings.checks_signal import (
     check_stamps,
     check_time,
     find_longest_constant,
+    ordinary_samples,
 )
 from savgs_ident.recordings.recording import RecordedChannel, Recording, RecordingLayout
 
@@ -85,8 +86,8 @@ def screen_test(
             continue
         ordered, found = check_time(whole, place, longest_gap)
         warnings.extend(found)
-        check_possible(ordered, layout.specs[name], place)
-        channels[name] = ordered
+        channels[name], found = check_possible(ordered, layout.specs[name], place)
+        warnings.extend(found)
     place = DataLocation(source, recording.name)
     cleaned = replace(recording, channels=channels)
     stuck = find_stuck_channels(cleaned, layout, place)
@@ -186,7 +187,7 @@ def measure_frequency(road: RecordedChannel) -> float:
 
 def _frequency_near(road: RecordedChannel, nominal: float | None) -> float:
     """Frequency [Hz] of the driven channel; without its spikes where only so it is ``nominal`` [Hz]."""
-    measured = measure_frequency(road)
+    measured = measure_frequency(ordinary_samples(road))
     if nominal is not None and abs(measured / nominal - 1.0) > _FREQUENCY_OFF:
         smooth = measure_frequency(replace(road, values=median_filter(road.values, _SPIKE_FILTER)))
         if abs(smooth / nominal - 1.0) <= _FREQUENCY_OFF:
@@ -236,12 +237,12 @@ def _check_still(
     recording: Recording, layout: RecordingLayout, place: DataLocation
 ) -> tuple[DataWarning, ...]:
     driven = recording.channels.get(layout.driven)
-    if driven is None or np.ptp(driven.values) <= layout.still:
+    if driven is None or (travel := float(np.ptp(ordinary_samples(driven).values))) <= layout.still:
         return ()
     return (
         DataLocation(place.source, place.test, layout.driven).warning(
             "standstill_moves",
-            f"moves by {float(np.ptp(driven.values)):.3g} {driven.unit} in a standstill",
+            f"moves by {travel:.3g} {driven.unit} in a standstill",
             "check the name of the test",
         ),
     )

@@ -6,7 +6,9 @@ jump loses samples; a harmonic estimate tolerates this up to a tenth of the reco
 eight periods).
 
 The bounds on values are those of the layout, with a wide margin. They detect a wrong unit (27.5 mm read
-as 27.5 m) and do not assess a measurement.
+as 27.5 m) and do not assess a measurement. A few samples beyond them are left out; other spikes are for the response
+to find, which knows the waveform. A check of the size of a signal does not look at its largest samples
+(:func:`ordinary_samples`).
 
 A clipped sensor repeats one extreme value, in run after run, far more often than the value next to it. A
 quantised sinusoid also dwells at its turning points, but the outermost of its levels holds at most
@@ -143,14 +145,9 @@ def check_missing(
     """The channel without its missing samples; None where there is nothing else.
 
     Regularly missing samples are those of a slower sensor in a faster table, and no fault. Raises
-    :class:`InputError` for infinite values, and where more is missing than an estimate tolerates.
+    :class:`InputError` where more is missing than an estimate tolerates.
     ``longest_gap`` is how long a gap may be, as a share of the record.
     """
-    infinite = np.flatnonzero(np.isinf(channel.values))
-    if infinite.size:
-        raise place.error(
-            f"{infinite.size} values are infinite", "mend the export", time=float(channel.time[infinite[0]])
-        )
     missing = np.isnan(channel.values)
     count = int(np.count_nonzero(missing))
     if count == 0:
@@ -190,16 +187,54 @@ def _is_slower_sensor(kept: NDArray[np.float64], grid: NDArray[np.float64]) -> b
     return bool(inner and kept[0] - grid[0] <= _REGULAR * step and grid[-1] - kept[-1] <= _REGULAR * step)
 
 
-def check_possible(channel: RecordedChannel, spec: ChannelSpec, place: DataLocation) -> None:
-    """Raises :class:`InputError` where a value is larger than any rig of this kind gives."""
-    worst = int(np.argmax(np.abs(channel.values)))
-    value = float(channel.values[worst])
-    if abs(value) > spec.largest:
-        raise place.error(
-            f"{value:.4g} {spec.unit} is not possible, the data may be in {spec.suspect}",
-            "put the right unit into the header or channels.toml",
-            time=float(channel.time[worst]),
-        )
+_LARGEST_NUMBER = 1e100
+"""Larger numbers are not measured in any unit, and their squares overflow."""
+_TYPICAL_SHARE, _TYPICAL_MOST = 0.95, 0.5
+"""So many of the samples are no larger than this share of what is possible, or the others are no spikes."""
+
+
+def check_possible(
+    channel: RecordedChannel, spec: ChannelSpec, place: DataLocation
+) -> tuple[RecordedChannel, tuple[DataWarning, ...]]:
+    """The channel without the samples that no rig of this kind gives: larger than any, or infinite.
+
+    Raises :class:`InputError` where most samples are large, too: then they are no spikes but in another unit.
+    """
+    size, largest = np.abs(channel.values), min(spec.largest, _LARGEST_NUMBER)
+    impossible = size > largest
+    count = int(np.count_nonzero(impossible))
+    if count == 0:
+        return channel, ()
+    first = float(channel.time[np.argmax(impossible)])
+    typical = float(np.quantile(size, _TYPICAL_SHARE, method="higher"))
+    if np.isinf(typical):
+        infinite = np.count_nonzero(np.isinf(size))
+        raise place.error(f"{infinite} of {size.size} values are infinite", "mend the export", time=first)
+    what = f"{count} of {size.size} samples are not possible (up to {np.max(size):.4g} {spec.unit})"
+    if typical > _TYPICAL_MOST * largest:
+        remedy = "put the right unit into the header or channels.toml"
+        raise place.error(f"{what}, the data may be in {spec.suspect}", remedy, time=first)
+    kept = replace(channel, time=channel.time[~impossible], values=channel.values[~impossible])
+    remedy = "check the sensor's cable and the logger"
+    return kept, (place.warning("impossible_samples", f"{what}, left out", remedy, time=first),)
+
+
+_TAIL = 0.02
+
+
+def ordinary_samples(channel: RecordedChannel) -> RecordedChannel:
+    """The channel without its gross spikes, for a check of its size.
+
+    These exceed the range of 96 % of the samples by more than its width; there are none where it is a single value.
+    """
+    if channel.values.size == 0:
+        return channel
+    low, high = np.quantile(channel.values, (_TAIL, 1.0 - _TAIL))
+    width = high - low
+    gross = (channel.values < low - width) | (channel.values > high + width)
+    if width == 0.0 or not np.any(gross):
+        return channel
+    return replace(channel, time=channel.time[~gross], values=channel.values[~gross])
 
 
 def find_longest_constant(channel: RecordedChannel) -> tuple[float, float]:
@@ -226,10 +261,14 @@ def check_clipping(recordings: Sequence[Recording], source: str) -> tuple[DataWa
     """A warning ``clipped_sensor`` for every channel and side where a sensor ran into its end."""
     warnings = []
     for name in sorted({name for recording in recordings for name in recording.channels}):
-        having = [recording for recording in recordings if name in recording.channels]
+        having = [
+            (recording, ordinary_samples(recording.channels[name]))
+            for recording in recordings
+            if name in recording.channels
+        ]
         for sign, side in ((1.0, "upper"), (-1.0, "lower")):
-            end = max(float(np.max(sign * recording.channels[name].values)) for recording in having)
-            clips = [clip for recording in having if (clip := _clip(recording, name, sign, end))]
+            end = max(float(np.max(sign * channel.values)) for _, channel in having)
+            clips = [clip for test, channel in having if (clip := _clip(test, channel, sign, end))]
             if clips:
                 worst = max(clips, key=lambda clip: clip.share)
                 warnings.append(
@@ -244,8 +283,7 @@ def check_clipping(recordings: Sequence[Recording], source: str) -> tuple[DataWa
     return tuple(warnings)
 
 
-def _clip(recording: Recording, name: str, sign: float, end: float) -> _Clip | None:
-    channel = recording.channels[name]
+def _clip(recording: Recording, channel: RecordedChannel, sign: float, end: float) -> _Clip | None:
     values = sign * channel.values
     if recording.kind == "standstill" or values.size == 0 or values.max() < end:
         return None

@@ -24,12 +24,15 @@ from savgs_ident.responses.fundamental import (
     highest_valid_order,
 )
 from savgs_ident.responses.harmonic_response import HarmonicResponse, unbiased_peak_to_peak
-from savgs_ident.responses.robust_dwell import check_outliers, fit_robust_dwell
+from savgs_ident.responses.outliers import check_outliers
+from savgs_ident.responses.robust_dwell import fit_robust_dwell
+from savgs_ident.responses.standstill import estimate_standstill_noise
 
 FEWEST_PERIODS = 3
 _FREQUENCY_MISS = 0.02
 _STEADY_SHARE = 0.01
 _STEADY_SIGMAS = 5.0
+_STEADY_ORDERS = 3
 _NOISE_FACTOR = 1.5
 _CLOCK_SIGMAS = 5.0
 
@@ -255,7 +258,8 @@ def check_steady(
         names = [name for name in group.names if name in fit.channels]
         if not names:
             continue
-        first, last, samples = _end_fundamentals(group, fit.frequency, max(fit.periods // 3, 1))
+        highest = min(_STEADY_ORDERS, fit.channels[names[0]].amplitude.size - 1)
+        first, last, samples = _end_fundamentals(group, fit.frequency, max(fit.periods // 3, 1), highest)
         for i, name in enumerate(group.names):
             channel = fit.channels[name]
             size = abs(channel.amplitude[1])
@@ -269,13 +273,16 @@ def check_steady(
 
 
 def check_noise(campaign: Campaign, fits: Mapping[str, DwellFit]) -> tuple[DataWarning, ...]:
-    """One warning for each channel that is much noisier in the dwells than at standstill.
+    """One warning for each channel that is much noisier in the dwells than at standstill, and those of the latter.
 
     More noise in motion than at rest is motion that does not repeat from period to period: rattle, a transient
     not yet over, a supply that hums with the load, or orders above the sampling.
     """
-    found = []
-    for name, at_rest in _standstill_noise(campaign).items():
+    noise, warnings = estimate_standstill_noise(campaign)
+    found = list(warnings)
+    for name, at_rest in noise.items():
+        if at_rest == 0.0:
+            continue
         ratio = {
             test: fit.channels[name].noise_sd / at_rest for test, fit in fits.items() if name in fit.channels
         }
@@ -362,29 +369,18 @@ def check_clocks(
 
 
 def _end_fundamentals(
-    group: ClockGroup, frequency: float, periods: int
+    group: ClockGroup, frequency: float, periods: int, highest: int
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128], int]:
-    """Fundamental over the first and over the last whole ``periods``, and the samples in each."""
-    count = max(round(periods / frequency * group.rate_hz), 1)
-    ends = []
-    for part in (slice(None, count), slice(-count, None)):
-        turns = np.exp(-2j * np.pi * frequency * group.time[part])
-        values = group.values[:, part] - group.values[:, part].mean(axis=1, keepdims=True)
-        ends.append(2.0 * np.mean(values * turns, axis=1))
-    return ends[0], ends[1], count
+    """Fundamental over the first and over the last whole ``periods``, and the samples in the shorter of them.
 
-
-def _standstill_noise(campaign: Campaign) -> dict[str, float]:
-    """Standard deviation of each channel about its trend over the standstill records, where it is not 0."""
-    noise: dict[str, float] = {}
-    for recording in campaign.of_kind("standstill"):
-        for channel in recording.channels.values():
-            usable = np.isfinite(channel.values)
-            if np.count_nonzero(usable) < 16:
-                continue
-            time, values = channel.time[usable], channel.values[usable]
-            trend = np.polynomial.Polynomial.fit(time, values, 1)
-            spread = float(np.std(values - trend(time)))
-            if spread > 0.0:
-                noise[channel.name] = max(spread, noise.get(channel.name, 0.0))
-    return noise
+    By least squares with orders up to ``highest``, so that a gap in the samples does not look like a change.
+    """
+    span, orders = periods / frequency, np.arange(1, highest + 1)
+    ends, samples = [], []
+    for inside in (group.time < group.time[0] + span, group.time > group.time[-1] - span):
+        angle = 2.0 * np.pi * frequency * np.outer(group.time[inside], orders)
+        columns = np.column_stack([np.cos(angle), np.sin(angle), np.ones(angle.shape[0])])
+        weights, *_ = np.linalg.lstsq(columns, group.values[:, inside].T)
+        ends.append(weights[0] - 1j * weights[highest])
+        samples.append(angle.shape[0])
+    return ends[0], ends[1], min(samples)

@@ -1,14 +1,15 @@
-"""Spikes and dropouts of a periodic record: samples that lie far off the waveform that all others follow.
+"""Spikes and dropouts of a record: samples that lie far off the waveform that all others follow.
 
-A harmonic fit spreads the error of one sample over the record, so that a few wrong samples hide each other and look
-like noise. The samples farthest off the fit are therefore left out first, the fit is repeated without them, and so
-on until no sample is left that is an outlier (:func:`find_outliers`). A sample is one where the residual r of the fit
+The record may be periodic (a dwell), nearly so over a few periods (a sweep), or at rest (a standstill). A fit
+spreads the error of one sample over the record, so that a few wrong samples hide each other and look like noise. The
+samples farthest off the fit are therefore left out first, the fit is repeated without them, and so on until no sample
+is left that is an outlier (:func:`find_outliers`). A sample is one where the residual r of the fit
 
 - exceeds 8 robust standard deviations, s = 1.4826 median |r - median r|, or 6 once the channel has an outlier; s is
   taken no smaller than the sensor's quantisation and 1e-4 of the waveform's standard deviation,
 - stands alone: |r| exceeds a fifth of its peak, and half of the distance above, in a run of at most five samples, or
   of samples with one and the same value (a sensor that sticks or drops to zero),
-- does not recur: at the same phase of most other periods |r| is a third or less.
+- does not recur: at the same phase of most other periods, in a sweep of those nearby, |r| is a third or less.
 
 Gaussian noise exceeds 8 s once in 1e15 samples. What a mechanism does, such as a step of the friction that comes
 a little early or late or has orders beyond those fitted, recurs at its phase; a transient or a rattle lasts.
@@ -16,12 +17,16 @@ a little early or late or has orders beyond those fitted, recurs at its phase; a
 Reference: P. J. Huber, E. M. Ronchetti, Robust Statistics (2009), sections 5.1 and 7.9.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
+
+from savgs_ident.core.errors import DataWarning
+from savgs_ident.recordings.recording import RecordedChannel, Recording
 
 FARTHEST = 8.0
 """Distance from the fit [robust standard deviations] beyond which a sample may be an outlier."""
@@ -32,6 +37,8 @@ FARTHEST_AGAIN = 6.0
 MOST_LEFT_OUT = 0.2
 """Share of the samples up to which outliers are left out; with more, which samples are wrong is not known."""
 
+_MANY = 0.05
+"""Share of outlying samples above which a sensor is not to be trusted."""
 _NORMAL = 1.4826
 """Standard deviation of a normal variable over its median absolute deviation."""
 _LEAST_SHARE = 1e-4
@@ -48,16 +55,24 @@ _MOST_ROUNDS = 40
 
 
 @dataclass(frozen=True)
-class PeriodicSamples:
-    """One channel: ``time`` [s] and ``values`` [unit], (N,), on a fundamental ``frequency`` [Hz].
+class WaveformSamples:
+    """One channel that follows a waveform.
 
-    ``floor`` [unit] is the least standard deviation of a sample.
+    Attributes:
+        time: [s], (N,).
+        values: [unit], (N,).
+        phase: of the fundamental [periods], (N,); None for a record at rest, in which nothing recurs.
+        floor: least standard deviation of a sample [unit].
+        alike: how many periods to either side have nearly the same waveform.
+        drift: how far [periods] its features move within these.
     """
 
     time: NDArray[np.float64]
     values: NDArray[np.float64]
-    frequency: float
+    phase: NDArray[np.float64] | None
     floor: float
+    alike: float = inf
+    drift: float = 0.0
 
 
 Refit = Callable[[NDArray[np.bool_]], NDArray[np.float64]]
@@ -65,7 +80,7 @@ Refit = Callable[[NDArray[np.bool_]], NDArray[np.float64]]
 
 
 def find_outliers(
-    samples: PeriodicSamples, residual: NDArray[np.float64], out: NDArray[np.bool_], refit: Refit
+    samples: WaveformSamples, residual: NDArray[np.float64], out: NDArray[np.bool_], refit: Refit
 ) -> NDArray[np.bool_]:
     """Which samples are outliers, (N,); ``residual`` [unit], (N,), is that of a fit without those in ``out`` (N,).
 
@@ -84,7 +99,7 @@ def find_outliers(
 
 
 def largest_outliers(
-    samples: PeriodicSamples, residual: NDArray[np.float64], out: NDArray[np.bool_]
+    samples: WaveformSamples, residual: NDArray[np.float64], out: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """The outliers of about the largest size among those not yet ``out``, (N,).
 
@@ -118,7 +133,7 @@ def _levels(largest: float, smallest: float, lowest: float) -> list[float]:
 
 
 def _is_outlier(
-    samples: PeriodicSamples, size: NDArray[np.float64], out: NDArray[np.bool_], run: slice
+    samples: WaveformSamples, size: NDArray[np.float64], out: NDArray[np.bool_], run: slice
 ) -> bool:
     """Whether a run is short or constant, and does not recur."""
     left_out_nearby = np.count_nonzero(out[max(run.start - _LONGEST_RUN, 0) : run.stop + _LONGEST_RUN])
@@ -128,7 +143,7 @@ def _is_outlier(
     return (short or constant) and not _recurs(samples, size, run)
 
 
-def _scale(samples: PeriodicSamples, residual: NDArray[np.float64]) -> float:
+def _scale(samples: WaveformSamples, residual: NDArray[np.float64]) -> float:
     """Robust standard deviation [unit] of a sample."""
     spread = _NORMAL * float(np.median(np.abs(residual - np.median(residual))))
     middle = np.median(samples.values)
@@ -150,23 +165,61 @@ def _runs(size: NDArray[np.float64], level: float, clean: float) -> list[slice]:
     return [slice(int(places[a]), int(places[b - 1]) + 1) for a, b in pairwise(edges)]
 
 
-def _recurs(samples: PeriodicSamples, size: NDArray[np.float64], run: slice) -> bool:
+def _recurs(samples: WaveformSamples, size: NDArray[np.float64], run: slice) -> bool:
     """Whether residuals like that of the run are found at its phase in other periods.
 
     The residual that an outlier leaves in the n other periods of a fit is 1 / n of its own at most: where n is small,
     the factor is.
     """
-    time = samples.time
+    if samples.phase is None:
+        return False
+    time, phase = samples.time, samples.phase
     peak = run.start + int(np.argmax(size[run]))
-    period, reach = 1.0 / samples.frequency, _PHASE_SAMPLES * float(np.median(np.diff(time)))
-    before = int((time[peak] - time[0]) / period)
-    after = int((time[-1] - time[peak]) / period)
+    before = int(min(phase[peak] - phase[0], samples.alike))
+    after = int(min(phase[-1] - phase[peak], samples.alike))
     shifts = np.concatenate([np.arange(-before, 0), np.arange(1, after + 1)])
     if shifts.size == 0:
         return True
-    edges = np.searchsorted(time, time[peak] + shifts[:, None] * period + np.array([-reach, reach]))
+    there = phase[peak] + shifts[:, None] + samples.drift * np.array([-1.0, 1.0])
+    reach = _PHASE_SAMPLES * float(np.median(np.diff(time))) * np.array([-1.0, 1.0])
+    edges = np.searchsorted(time, np.interp(there, phase, time) + reach)
     largest = [float(np.max(size[a:b])) for a, b in edges if b > a]
     if not largest:
         return True
     usual = float(np.quantile(largest, _RECURRING, method="lower"))
     return bool(size[peak] < min(_ABOVE_RECURRING, _ECHO * shifts.size) * usual)
+
+
+Outliers = Mapping[str, NDArray[np.bool_]]
+"""Which of the finite samples of a channel are outliers, by name; channels without any are not in it."""
+
+
+def can_leave_out(out: NDArray[np.bool_]) -> bool:
+    """Whether so few of the samples, (N,), are ``out`` that the others can be trusted."""
+    return bool(np.mean(out) <= MOST_LEFT_OUT)
+
+
+def check_outliers(source: str, recording: Recording, outliers: Outliers) -> tuple[DataWarning, ...]:
+    """A warning for every channel of a test with outlying samples."""
+    return tuple(
+        _warning(source, recording.name, recording.channels[name], out) for name, out in outliers.items()
+    )
+
+
+def _warning(source: str, test: str, channel: RecordedChannel, out: NDArray[np.bool_]) -> DataWarning:
+    count, share = int(np.count_nonzero(out)), float(np.mean(out))
+    what = (
+        f"{count} of {out.size} samples ({100 * share:.2g} %) are spikes or dropouts, alone and far off the waveform"
+        " of the others;"
+    )
+    if not can_leave_out(out):
+        what += " too many to leave out: the sensor cannot be trusted in this test"
+    elif share > _MANY:
+        what += " left out, but so many that the sensor cannot be trusted in this test"
+    else:
+        what += " left out: harmonics and noise are those of the other samples"
+    code, remedy = "outlying_samples", "check the sensor's cable and the logger"
+    if share > _MANY:
+        code, remedy = "unreliable_sensor", f"{remedy}, or leave this test out"
+    first = channel.time[np.isfinite(channel.values) & np.isfinite(channel.time)][np.argmax(out)]
+    return DataWarning(code, what, source, test, channel.name, float(first), remedy)

@@ -1,33 +1,21 @@
-"""One dwell without its spikes and dropouts, and the warnings about them.
+"""One dwell without its spikes and dropouts.
 
 The outliers of every channel (:mod:`outliers`) are found in the residual of the plain fit and left out of another
 fit, until the same samples stand out of two fits in turn: outliers of the driven channel move the fundamental, which
 moves the residuals of all channels. A dwell in which no sample stands out keeps the plain fit, number for number.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.errors import DataWarning
-from savgs_ident.recordings.recording import RecordedChannel, Recording
 from savgs_ident.responses.dwell_fit import DwellFit, fit_dwell, smallest_density
 from savgs_ident.responses.fundamental import ClockGroup
-from savgs_ident.responses.outliers import (
-    MOST_LEFT_OUT,
-    PeriodicSamples,
-    find_outliers,
-)
+from savgs_ident.responses.outliers import Outliers, WaveformSamples, can_leave_out, find_outliers
 from savgs_ident.responses.periodic_fit import fit_periodic, plan_basis, signals
 
 _MOST_REFITS = 4
-_MANY = 0.05
-"""Share of outlying samples above which a sensor is not to be trusted."""
-
-Outliers = Mapping[str, NDArray[np.bool_]]
-"""Which of the finite samples of a channel are outliers, by name; channels without any are not in it."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +65,7 @@ def _further_outliers(groups: tuple[ClockGroup, ...], fit: DwellFit, outliers: O
     for group in groups:
         for name in (name for name in group.names if name in fit.channels):
             out = outliers.get(name, np.zeros(group.time.size, dtype=np.bool_))
-            if _can_leave_out(out):
+            if can_leave_out(out):
                 out = _outliers(group, name, fit, residual_without(group, name, fit, out), out)
             found[name] = out
     return {name: mask for name, mask in found.items() if np.any(mask)}
@@ -89,7 +77,7 @@ def _outliers(
     """As :func:`find_outliers`; none where the samples left would not determine the harmonics."""
     i = group.names.index(name)
     floor = float(np.sqrt(smallest_density(group.values[i : i + 1])[0]))
-    samples = PeriodicSamples(group.time, group.values[i], fit.frequency, floor)
+    samples = WaveformSamples(group.time, group.values[i], fit.frequency * group.time, floor)
     try:
         return find_outliers(samples, residual, out, lambda mask: residual_without(group, name, fit, mask))
     except np.linalg.LinAlgError:
@@ -125,7 +113,7 @@ def _without(groups: tuple[ClockGroup, ...], outliers: Outliers) -> tuple[ClockG
     """
     parts: list[ClockGroup] = []
     for group in groups:
-        cleaned = [name for name in group.names if name in outliers and _can_leave_out(outliers[name])]
+        cleaned = [name for name in group.names if name in outliers and can_leave_out(outliers[name])]
         whole = [i for i, name in enumerate(group.names) if name not in cleaned]
         if whole:
             names = tuple(group.names[i] for i in whole)
@@ -138,44 +126,14 @@ def _without(groups: tuple[ClockGroup, ...], outliers: Outliers) -> tuple[ClockG
     return tuple(parts)
 
 
-def _can_leave_out(out: NDArray[np.bool_]) -> bool:
-    return bool(np.mean(out) <= MOST_LEFT_OUT)
-
-
 def _mended(groups: tuple[ClockGroup, ...], fit: DwellFit, outliers: Outliers) -> tuple[ClockGroup, ...]:
     """The groups with outliers that were left out replaced by the fitted waveform."""
     mended = []
     for group in groups:
         values = group.values.copy()
         for i, name in enumerate(group.names):
-            if name in outliers and name in fit.channels and _can_leave_out(outliers[name]):
+            if name in outliers and name in fit.channels and can_leave_out(outliers[name]):
                 out = outliers[name]
                 values[i, out] -= residual_without(group, name, fit, out)[out]
         mended.append(replace(group, values=values))
     return tuple(mended)
-
-
-def check_outliers(source: str, recording: Recording, outliers: Outliers) -> tuple[DataWarning, ...]:
-    """A warning for every channel of a dwell with outlying samples."""
-    return tuple(
-        _warning(source, recording.name, recording.channels[name], out) for name, out in outliers.items()
-    )
-
-
-def _warning(source: str, test: str, channel: RecordedChannel, out: NDArray[np.bool_]) -> DataWarning:
-    count, share = int(np.count_nonzero(out)), float(np.mean(out))
-    what = (
-        f"{count} of {out.size} samples ({100 * share:.2g} %) are spikes or dropouts, alone and far off the periodic"
-        " waveform;"
-    )
-    if share > MOST_LEFT_OUT:
-        what += " too many to leave out: the sensor cannot be trusted in this test"
-    elif share > _MANY:
-        what += " left out, but so many that the sensor cannot be trusted in this test"
-    else:
-        what += " left out: harmonics and noise are those of the other samples"
-    code, remedy = "outlying_samples", "check the sensor's cable and the logger"
-    if share > _MANY:
-        code, remedy = "unreliable_sensor", f"{remedy}, or leave this test out"
-    first = channel.time[np.isfinite(channel.values) & np.isfinite(channel.time)][np.argmax(out)]
-    return DataWarning(code, what, source, test, channel.name, float(first), remedy)

@@ -4,19 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.recordings.recording import Campaign, Recording
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
+from savgs_ident.responses.standstill import estimate_standstill_noise
 from savgs_ident.responses.sweeps import estimate_sweep_response
 
 LEAST_RATIO = 3.0
 """Least signal-to-noise ratio [1] of an order that counts as seen."""
-
-_FEWEST_SAMPLES = 16
 
 
 @dataclass(frozen=True)
@@ -56,7 +53,7 @@ def inspect(
             response = estimate_response(campaign, orders)
             warnings += response.warnings
         except InputError as error:
-            warnings.append(_as_warning("no_usable_dwell", error))
+            warnings.append(error.as_warning("no_usable_dwell"))
     else:
         what = "there is no harmonic dwell, which a fit needs"
         warnings.append(DataWarning("no_dwell", what, campaign.source, remedy="name the tests dwell_<f>Hz"))
@@ -67,30 +64,13 @@ def inspect(
         try:
             sweeps.append(estimate_sweep_response(_only(recording, wanted), driven, source=campaign.source))
         except InputError as error:
-            warnings.append(_as_warning("sweep_not_used", error))
+            warnings.append(error.as_warning("sweep_not_used"))
     warnings += [warning for sweep in sweeps for warning in sweep.warnings]
-    return CampaignSummary(
-        campaign, response, tuple(sweeps), _standstill_noise(campaign), tuple(dict.fromkeys(warnings))
-    )
+    noise, found = estimate_standstill_noise(campaign)
+    warnings += found
+    return CampaignSummary(campaign, response, tuple(sweeps), noise, tuple(dict.fromkeys(warnings)))
 
 
 def _only(recording: Recording, channels: Sequence[str]) -> Recording:
     found = {name: channel for name, channel in recording.channels.items() if name in channels}
     return Recording(recording.name, recording.kind, recording.frequency_hz, found)
-
-
-def _standstill_noise(campaign: Campaign) -> dict[str, float]:
-    """Standard deviation of each channel about its trend, the largest over the standstill records."""
-    noise: dict[str, float] = {}
-    for recording in campaign.of_kind("standstill"):
-        for name, channel in recording.channels.items():
-            usable = np.isfinite(channel.values)
-            if np.count_nonzero(usable) >= _FEWEST_SAMPLES:
-                time, values = channel.time[usable], channel.values[usable]
-                trend = np.polynomial.Polynomial.fit(time, values, 1)
-                noise[name] = max(float(np.std(values - trend(time))), noise.get(name, 0.0))
-    return noise
-
-
-def _as_warning(code: str, error: InputError) -> DataWarning:
-    return DataWarning(code, error.what, error.source, error.test, error.channel, error.time, error.remedy)

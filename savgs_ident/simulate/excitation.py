@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.core.errors import InputError
+from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.effects.base import Fundamental, InputSignal
@@ -161,11 +161,16 @@ def measured_response(
     return up_to_frequency(estimate_response(only, orders, plant.inputs[0].name), max_frequency)
 
 
-def first_sweep(campaign: Campaign, plant: AbstractPlant | type[AbstractPlant]) -> SweepResponse | None:
-    """The response along the first sweep of a campaign; None if there is none that can be used."""
+def first_sweep(
+    campaign: Campaign, plant: AbstractPlant | type[AbstractPlant]
+) -> tuple[SweepResponse | None, tuple[DataWarning, ...]]:
+    """The response along the first sweep of a campaign that can be used, if there is one, and all warnings."""
+    refused: tuple[DataWarning, ...] = ()
     for recording in campaign.only(recorded_names(plant)).of_kind("sweep"):
         try:
-            return estimate_sweep_response(recording, plant.inputs[0].name, source=campaign.source)
-        except InputError:
+            sweep = estimate_sweep_response(recording, plant.inputs[0].name, source=campaign.source)
+        except InputError as error:
+            refused += (error.as_warning("sweep_not_used"),)
             continue
-    return None
+        return sweep, (*refused, *sweep.warnings)
+    return None, refused

@@ -176,7 +176,8 @@ def diagnose_folder(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping
     settings = replace(SIMTR, without=without)
     campaign = load_campaign(folder)
     measured = measured_response(campaign, QuarterCar, settings.orders)
-    diagnosis = diagnose_response(measured, rig, settings, sweep=first_sweep(campaign, QuarterCar))
+    sweep, _ = first_sweep(campaign, QuarterCar)
+    diagnosis = diagnose_response(measured, rig, settings, sweep=sweep)
     origin = RigModel(rig, settings.baseline).origin(campaign, measured.warnings)
     record: Mapping[str, Any] = json.loads(replace(diagnosis, origin=origin).to_json())
     return record

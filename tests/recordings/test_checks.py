@@ -79,6 +79,27 @@ WARNINGS: dict[str, tuple[Change, str, str, float | None, str]] = {
         3.0,
         "3 of",
     ),
+    "one huge value": (
+        _where("sprung_accel", 300, -1e9),
+        "impossible_samples",
+        "sprung_accel",
+        3.0,
+        "1 of 1000 samples.*up to 1e+09 m/s^2.*left out",
+    ),
+    "two infinite values": (
+        _where("road_height", [300, 700], np.inf),
+        "impossible_samples",
+        "road_height",
+        3.0,
+        "2 of 1000 samples.*up to inf m",
+    ),
+    "a deflection longer than the strut": (
+        _where("susp_deflection", slice(300, 303), 0.6),
+        "impossible_samples",
+        "susp_deflection",
+        3.0,
+        "3 of 1000 samples.*up to 0.6 m",
+    ),
     "small jump": (_jump, "time_jump", "road_height", 4.99, "by 0.21 s"),
     "repeated stamps": (_repeat, "repeated_time", "road_height", 0.99, "2 samples repeat"),
     "clipped": (_clip, "clipped_sensor", "sprung_accel", None, "upper end 0.35"),
@@ -140,6 +161,56 @@ def test_missing_and_repeated_samples_are_gone(
     assert read(_repeat).recordings[0].channels["sprung_accel"].values.size == 998
 
 
+def test_a_few_impossible_samples_are_gone_and_nothing_else(
+    read: Callable[..., Campaign], signals: Callable[..., Signals]
+) -> None:
+    def change(signals: Signals) -> Signals:
+        faulty = _where("sprung_accel", 300, np.inf)(signals)
+        return _where("susp_deflection", [500, 700], 1e9)(faulty)
+
+    campaign = read(change)
+    channels = campaign.recordings[0].channels
+    np.testing.assert_array_equal(channels["road_height"].values, signals()["road_height"])
+    np.testing.assert_array_equal(channels["sprung_accel"].values, np.delete(signals()["sprung_accel"], 300))
+    np.testing.assert_array_equal(
+        channels["susp_deflection"].values, np.delete(signals()["susp_deflection"], [500, 700])
+    )
+    np.testing.assert_allclose(channels["susp_deflection"].time, np.delete(signals()["time"], [500, 700]))
+    assert [w.code for w in campaign.warnings] == ["impossible_samples"] * 2
+
+
+def test_a_slower_sensor_may_have_an_impossible_sample(read: Callable[..., Campaign]) -> None:
+    slower = _where("susp_deflection", np.arange(1000) % 5 != 2, np.nan)
+    campaign = read(lambda signals: _where("susp_deflection", 502, np.inf)(slower(signals)))
+    assert [w.code for w in campaign.warnings] == ["impossible_samples"]
+    assert campaign.recordings[0].channels["susp_deflection"].values.size == 199
+
+
+SPIKES = {"road_height": 0.4, "sprung_accel": 100.0, "susp_deflection": 0.4}
+"""Sizes of spikes that are possible, in SI units: tens of standard deviations."""
+
+
+def _spiked(signals: Signals) -> Signals:
+    random = np.random.default_rng(2)
+    for name, size in SPIKES.items():
+        for sign in (-1.0, 1.0):
+            signals = _where(name, random.choice(1000, 3, replace=False), sign * size)(signals)
+    return signals
+
+
+def test_spikes_are_no_other_unit_and_no_other_sign(read: Callable[..., Campaign]) -> None:
+    assert read(_spiked).warnings == ()
+
+
+@pytest.mark.parametrize(
+    "case", ["g called m/s^2", "m called mm", "deflection upside down", "road upside down", "clipped"]
+)
+def test_spikes_do_not_hide_another_fault(case: str, read: Callable[..., Campaign]) -> None:
+    change, code, channel, _, _ = WARNINGS[case]
+    found = read(lambda signals: _spiked(change(signals))).warnings
+    assert [(w.code, w.channel) for w in found] == [(code, channel)]
+
+
 def test_a_stuck_response_is_left_out_and_the_other_kept(read: Callable[..., Campaign]) -> None:
     (recording,) = read(_where("sprung_accel", slice(0, 400), 0.1)).recordings
     assert "sprung_accel" not in recording.channels
@@ -170,6 +241,30 @@ def test_gravity_and_bias_are_taken_off_by_the_standstill(
     np.testing.assert_allclose(known.recordings[0].channels["sprung_accel"].values, values, atol=1e-9)
     np.testing.assert_allclose(
         unknown.recordings[0].channels["sprung_accel"].values, values + 9.9 - 9.80665, atol=1e-9
+    )
+
+
+def test_a_spike_at_rest_moves_neither_bias_nor_standstill(
+    tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Callable[..., bytes]
+) -> None:
+    random = np.random.default_rng(1)
+    noise = 0.05 * random.standard_normal(1000)
+    still = signals() | {
+        "road_height": 1e-5 * random.standard_normal(1000),
+        "sprung_accel": 9.9 + noise,
+        "susp_deflection": np.zeros(1000),
+    }
+    spiked = _where("road_height", 400, 0.4)(_where("sprung_accel", 500, 250.0)(still))
+    dwell = signals() | {"sprung_accel": signals()["sprung_accel"] + 9.9}
+    (tmp_path / "dwell_1Hz.csv").write_bytes(csv_bytes(dwell))
+    (tmp_path / "standstill.csv").write_bytes(csv_bytes(spiked))
+    campaign = load_campaign(tmp_path)
+    assert [w.code for w in campaign.warnings] == ["gravity_removed"]
+    bias = float(np.mean(np.delete(noise, 500)))
+    np.testing.assert_allclose(
+        campaign.recordings[0].channels["sprung_accel"].values,
+        signals()["sprung_accel"] - bias,
+        atol=1e-9,
     )
 
 

@@ -94,6 +94,11 @@ CASES: dict[str, tuple[str, Build, str]] = {
     "unit of something else": (NAME, _replaced(b"road_height [m]", b"road_height [s]"), "'s' is a time"),
     "unit of the time": (NAME, _replaced(b"time [s]", b"time [m]"), "channel 'time': unit 'm' is a length"),
     "mm called m": (NAME, _scaled("susp_deflection", 1e3), "channel 'susp_deflection'.*not possible.*mm"),
+    "mm/s^2 called m/s^2, hardly beyond": (
+        NAME,
+        lambda s, csv: csv(s | {"sprung_accel": s["sprung_accel"] * 300.1 / np.abs(s["sprung_accel"]).max()}),
+        "sprung_accel'.*1 of 1000 samples are not possible.*mm/s.2",
+    ),
     "road in mm called m": (
         NAME,
         _scaled("road_height", 1e3),
@@ -119,10 +124,15 @@ CASES: dict[str, tuple[str, Build, str]] = {
         ),
         "samples are missing",
     ),
-    "infinite value": (
+    "infinite values": (
         NAME,
-        _edit("sprung_accel", 123, np.inf),
-        "sprung_accel', at 1.230 s: 1 values are inf",
+        _edit("sprung_accel", slice(123, 223), np.inf),
+        "sprung_accel', at 1.230 s: 100 of 1000 values are inf",
+    ),
+    "impossible values": (
+        NAME,
+        _edit("sprung_accel", slice(123, 223), -1e9),
+        "sprung_accel', at 1.230 s: 100 of 1000 samples are not possible \\(up to 1e\\+09 m/s.2\\), the data may",
     ),
     "stuck road": (NAME, _edit("road_height", slice(0, 1000), 0.005), "channel 'road_height'.*unusable"),
     "dwell too short": (NAME, _cut(2.5), "test 'dwell_1.00Hz': the dwell holds 2.5 periods in 2.49 s"),

@@ -233,6 +233,18 @@ def test_a_decaying_dwell_is_called_unsteady(synthetic: Any, bus: Any) -> None:
     assert found[0].remedy
 
 
+def test_a_gap_at_one_end_is_no_change(synthetic: Any, bus: Any) -> None:
+    dwell = synthetic.dwell(np.random.default_rng(20), bus, 2.2, 6.4)
+
+    def with_gap(channel: RecordedChannel) -> RecordedChannel:
+        missing = (channel.time > 1.0) & (channel.time < 1.15)
+        return replace(channel, values=np.where(missing, np.nan, channel.values))
+
+    for name in dwell.channels:
+        response = estimate_response(synthetic.campaign(change(dwell, **{name: with_gap})))
+        assert "not_steady" not in {warning.code for warning in response.warnings}
+
+
 def test_noise_far_above_standstill_is_told(synthetic: Any, bus: Any) -> None:
     rng = np.random.default_rng(21)
     dwell = synthetic.dwell(rng, bus, 2.2, 6.4, name="dwell_a")

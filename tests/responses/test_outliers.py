@@ -18,30 +18,15 @@ from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recordin
 from savgs_ident.responses.dwell_fit import fit_dwell
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.responses.outliers import PeriodicSamples
-from savgs_ident.responses.robust_dwell import RobustDwell, check_outliers
+from savgs_ident.responses.outliers import WaveformSamples, check_outliers
+from savgs_ident.responses.robust_dwell import RobustDwell
 from savgs_ident.responses.summary import inspect
 from savgs_ident.simulate.excitation import campaign_of, measured_response
 
+from .corruption import drop, spike
+
 NAMES = ("road_height", "sprung_accel", "susp_deflection")
 WARNED = {"outlying_samples", "unreliable_sensor"}
-
-
-def spike(values: NDArray[np.float64], share: float, rng: np.random.Generator) -> NDArray[np.float64]:
-    """A share of the samples moved by 0.2 to 1.5 times the peak-to-peak value, either way."""
-    bad = values.copy()
-    count = max(round(share * values.size), 1)
-    places = rng.choice(values.size, count, replace=False)
-    bad[places] += np.ptp(values) * rng.uniform(0.2, 1.5, count) * rng.choice([-1.0, 1.0], count)
-    return bad
-
-
-def drop(values: NDArray[np.float64], share: float, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Runs of one to five zeros, ``share`` of the samples in all."""
-    bad = values.copy()
-    for start in rng.choice(values.size - 5, max(round(share * values.size / 3), 1), replace=False):
-        bad[start : start + rng.integers(1, 6)] = 0.0
-    return bad
 
 
 def corrupted(campaign: Campaign, names: tuple[str, ...], change: Any) -> Campaign:
@@ -195,7 +180,7 @@ def test_too_many_outliers_are_not_left_out_but_warned_of(synthetic: Any) -> Non
     time = np.arange(1000) / 100.0
     residual = rng.standard_normal(time.size)
     residual[::4] += rng.choice([-30.0, 30.0], 250)
-    samples = PeriodicSamples(time, residual, 0.317, 0.0)
+    samples = WaveformSamples(time, residual, 0.317 * time, 0.0)
     none = np.zeros(time.size, dtype=np.bool_)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(outliers, "_recurs", lambda *_: False)

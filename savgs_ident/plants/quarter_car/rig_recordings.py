@@ -27,7 +27,7 @@ import numpy as np
 
 from savgs_ident.core.errors import DataWarning
 from savgs_ident.recordings.channels import ChannelMap, Progress
-from savgs_ident.recordings.checks_signal import DataLocation
+from savgs_ident.recordings.checks_signal import DataLocation, ordinary_samples
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import (
     STANDARD_GRAVITY,
@@ -49,8 +49,14 @@ _SMALLEST_DEFLECTION = 0.005
 
 def check_physics(recordings: Sequence[Recording], source: str) -> tuple[DataWarning, ...]:
     """Warnings ``implausible_unit`` and ``sign_suspect``, at most one a pair of channels."""
-    dwells = [recording for recording in recordings if recording.kind == "dwell"]
+    dwells = [_without_spikes(recording) for recording in recordings if recording.kind == "dwell"]
     return (*_body_follows_road(dwells, source), *_strut_pushes(dwells, source), *_deflects(dwells, source))
+
+
+def _without_spikes(recording: Recording) -> Recording:
+    return replace(
+        recording, channels={name: ordinary_samples(each) for name, each in recording.channels.items()}
+    )
 
 
 def _body_follows_road(dwells: list[Recording], source: str) -> tuple[DataWarning, ...]:
@@ -139,7 +145,9 @@ def remove_gravity(
     Raises :class:`InputError` where the sensor reads gravity downwards: its sign is the other one.
     """
     means = {
-        r.name: float(np.mean(r.channels[_CHANNEL].values)) for r in recordings if _CHANNEL in r.channels
+        r.name: float(np.mean(ordinary_samples(r.channels[_CHANNEL]).values))
+        for r in recordings
+        if _CHANNEL in r.channels
     }
     level = float(np.median(list(means.values()))) if means else 0.0
     place = DataLocation(source, channel=_CHANNEL)
