@@ -110,13 +110,20 @@ def conclude(
         law = None
     model = _corrected_model(refitted, evidence, law)
     gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
-    settled = settle(evidence, gap, problem.constants)
+    settled = settle(evidence, gap, _fitted_gap(problem), problem.constants)
     if settled is not evidence:
         evidence, law = settled, None
         model = _corrected_model(refitted, evidence, law)
         gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
         apart = _predict_further(refitted, evidence, law, values, further)
     return Conclusion(refitted, evidence, law, model, held, gap, by_channel, apart, tests)
+
+
+def _fitted_gap(problem: DiagnosisProblem) -> float:
+    """The gap [1] that the recalibrated baseline leaves in the tests that it was fitted to."""
+    rows, plant = problem.base.prediction.rows, problem.plant
+    together, _ = shrinks(problem.data, Rows(problem.given, rows, rows, plant.channel, plant.channels))
+    return together.recalibrated
 
 
 def _compared(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> list[LaplaceFit]:

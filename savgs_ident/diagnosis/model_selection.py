@@ -171,9 +171,12 @@ def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: Fl
 
 
 def settle(
-    evidence: DiagnosisEvidence, gap: Shrink, constants: DecisionConstants = DEFAULTS
+    evidence: DiagnosisEvidence, gap: Shrink, fitted: float, constants: DecisionConstants = DEFAULTS
 ) -> DiagnosisEvidence:
     """The evidence as tests that were held out allow it to be said: their ``gap`` has the last word.
+
+    ``fitted`` is the gap [1] that the recalibrated baseline leaves where it was fitted to all tests: few or noisy
+    tests predict others badly though nothing is missing.
 
     Where what is named predicts them no better than the recalibrated baseline, nothing may be named, unless the
     baseline predicts them by parameters that are far off their sheet. And where the baseline misses them by more than
@@ -182,7 +185,7 @@ def settle(
     """
     if evidence.kind == "unknown" and evidence.unknown.reason == "tolerance":
         return evidence
-    small = gap.recalibrated**2 - gap.floor**2 <= constants.material_share**2
+    small = min(gap.recalibrated, fitted) ** 2 - gap.floor**2 <= constants.material_share**2
     supported = gap.after < gap.recalibrated or (small and evidence.prior_gain >= constants.alarm_log_odds)
     if evidence.kind == "none":
         return evidence if small else _unexplained(evidence)
