@@ -103,12 +103,12 @@ def _own_rates(scores: Sequence[Score]) -> dict[str, Rate]:
     held = [interval.holds for score in scores for interval in score.intervals.values()]
     closed = [score.share_closed for score in scores if score.named_right or score.both_named]
     return {
-        "named_right": _rate([score.named_right for score in scores], least=0.90),
-        "located_right": _rate([score.located_right for score in scores], least=0.95),
-        "false_alarms": _rate([score.false_alarm for score in scores], most=0.02),
+        "named_right": _rate([score.named_right for score in scores], least=0.92),
+        "located_right": _rate([score.located_right for score in scores], least=0.97),
+        "false_alarms": _rate([score.false_alarm for score in scores], most=0.01),
         "unknown_recognised": _rate([score.unknown_recognised for score in scores], least=0.80),
-        "both_named": _rate([score.both_named for score in scores], least=0.70),
-        "intervals_hold": _rate(held, least=0.90, most=0.99),
+        "both_named": _rate([score.both_named for score in scores], least=0.85),
+        "intervals_hold": _rate(held, least=0.92, most=0.98),
         "share_closed_90": _rate([share is not None and share >= 0.9 for share in closed]),
         "named_exactly": _rate([score.named_exactly for score in scores]),
         "located_exactly": _rate([score.located_exactly for score in scores]),
