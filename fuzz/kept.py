@@ -22,8 +22,9 @@ from savgs_ident.inference.samplers import nuts as nuts_sampler
 from savgs_ident.inference.samplers.chains import new_checkpoint, open_checkpoint
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, rig_content
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
+from savgs_ident.report.blind import blind_record
 from savgs_ident.report.campaigns.record import campaigns_columns, campaigns_record
-from savgs_ident.report.validation import alarms_record, blind_record, calibration_record
+from savgs_ident.report.validation import alarms_record, calibration_record
 from savgs_ident.validation.blind import Job as BlindJob
 from savgs_ident.validation.blind import plan_of
 from savgs_ident.validation.blind_record import FILE, Answer, Envelope, sealed

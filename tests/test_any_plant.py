@@ -137,7 +137,7 @@ def test_friction_of_the_guide_is_diagnosed_and_reported_without_a_word_of_the_q
     force = {"guide_coulomb": ("coefficient", 0.03), "guide_preload": ("force", 0.03 * 320.0 * 9.80665)}
     role, true = force[verdict.effects[0]]
     assert abs(found.identified[f"{verdict.effects[0]}_{role}"] / true - 1.0) < 0.03
-    assert "at the port guide is missing" in str(found)
+    assert "The model lacks something at the guide" in str(found)
     record = json.loads(found.to_json())
     assert record["verdict"]["ports"] == ["guide"]
     assert record["baseline"]["model"] == "TwoMass"

@@ -288,8 +288,10 @@ class MotionProblem(AbstractProblem):
         law = np.zeros(0)
         if effect is not None and effect.port.kind is PortKind.FORCE:
             terms = () if effect.name in self.baseline else (effect.name,)
+            # A learned law is none of the catalogue.
+            there = replace(self, catalogue={**self.catalogue, effect.name: effect})
             forces = [
-                np.asarray(self._at_ports(terms, each).forces[effect.port.name])
+                np.asarray(there._at_ports(terms, each).forces[effect.port.name])
                 for each in (values, dict(values) | dict(effect.null))
             ]
             law = self.motion.rows(forces[0] - forces[1])[start:end]
