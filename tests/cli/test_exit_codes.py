@@ -137,7 +137,8 @@ def test_options_before_and_after_the_argument_give_the_same_result(
     [
         ("demo", (), "fit.json", 0),
         ("inspect", (), "inspect.json", 0),
-        ("fit", QUICK, "fit.json", 0),
+        # The damping alone, with all else as on the sheet, does not explain the recordings.
+        ("fit", QUICK, "fit.json", 1),
         ("fit", ONE_DWELL, "fit.json", 1),
         ("bode", (), "bode.json", 0),
         ("simulate", ("--frequency", "2"), "simulate.json", 0),
@@ -147,7 +148,7 @@ def test_options_before_and_after_the_argument_give_the_same_result(
         ("design", ("--rigs", "1"), "design.json", 0),
         ("closed-loop", ("--rigs", "0"), "closed-loop.json", 0),
         ("export", (), "export.json", 0),
-        ("campaign", QUICK, "campaign.json", 0),
+        ("campaign", QUICK, "campaign.json", 1),
         ("campaign", ONE_DWELL, "campaign.json", 1),
     ],
 )

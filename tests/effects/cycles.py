@@ -41,7 +41,7 @@ from savgs_ident.plants.quarter_car.ports import (
 )
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
 
-NODES, PERIODS, FREQUENCY = 1024, 8, 1.7
+NODES, PERIODS, FREQUENCY = 1024, 20, 1.7
 STEP = 1.0 / (FREQUENCY * NODES)
 
 CENTRE = {STRUT: 0.45, TYRE_RADIAL: 0.013, TYRE_LATERAL: 0.65}

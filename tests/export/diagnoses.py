@@ -2,6 +2,9 @@
 
 from typing import Any
 
+from savgs_ident.effects.learned import coefficients_at
+from savgs_ident.plants.quarter_car.ports import STRUT
+
 MOUNT_FITTED = {
     "mount_compliance": {"value": 1.65e-06, "lo": 1.63e-06, "hi": 1.67e-06, "unit": "m/N"},
     "mount_damping": {"value": 357.0, "lo": 292.0, "hi": 434.0, "unit": "N s/m"},
@@ -51,7 +54,7 @@ SPANS = {
     "learned_strut_speed": 0.3,
     "learned_strut_carried": 4e3,
 }
-COEFFICIENTS = {f"learned_strut_{number}": 10.0 * number for number in range(1, 17)}
+COEFFICIENTS = {name: 10.0 * number for number, name in enumerate(coefficients_at(STRUT), 1)}
 LEARNED = diagnosis(
     "unknown", [], ["strut"],
     learned={
