@@ -49,6 +49,7 @@ from savgs_ident.diagnosis.verdict import (
     broken_tolerance,
     decide,
     log_prior,
+    log_prior_of_pair,
     most_probable,
     unknown_evidence,
     weigh,
@@ -91,8 +92,8 @@ def recalibrate(
 def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvidence:
     """Hypotheses, ports and the kind of the verdict.
 
-    Single effects first; where none explains all, the flexible members of the ports; where these do not either, pairs
-    of effects, and laws beside the best of all.
+    Single effects first; where none explains all, the flexible members of the ports, and pairs of effects; where these
+    do not either, laws beside the best of all.
     """
     plant, search, base, constants = problem.plant, problem.search, problem.base, problem.constants
     progress("locating the gap, and looking for its cause")
@@ -101,9 +102,12 @@ def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvid
         lambda: _localised(problem, base),
     )
     members = _flexible_members(problem, findings, localisations, progress)
-    beside = -np.inf
-    if not members or members[0].left > constants.explained_share_flexible:
-        findings = with_pairs(search, findings, plant.candidates, progress, constants)
+    beside, least = -np.inf, -np.inf
+    law_explains = bool(members) and members[0].left <= constants.explained_share_flexible
+    if law_explains:
+        least = members[0].weight - log_prior_of_pair(len(findings.scores), constants)
+    findings = with_pairs(search, findings, plant.candidates, progress, constants, least)
+    if not law_explains:
         findings = _with_nearest(problem, findings, localisations, progress)
         findings, beside = _law_beside_best(problem, _material(problem, findings), progress)
     broken = broken_tolerance(

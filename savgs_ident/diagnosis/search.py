@@ -132,13 +132,17 @@ def with_pairs(
     terms: Sequence[Term],
     progress: Progress,
     constants: DecisionConstants = DEFAULTS,
+    least: float = -np.inf,
 ) -> Findings:
-    """The findings, and pairs of effects where the best single one is not enough."""
+    """The findings, and pairs of effects where the best single one is not enough.
+
+    Pairs whose score promises no log evidence beyond ``least`` are not fitted.
+    """
     fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
     singles = [mode for mode in findings.modes if len(mode.terms) == 1]
     if not singles or singles[0].evidence <= findings.base.evidence + constants.pair_log_evidence:
         return findings
-    pairs = _pairs(fits, singles, findings.scores, findings.sensitivities)
+    pairs = _pairs(fits, singles, findings.scores, findings.sensitivities, least)
     more = _findings(findings.base, findings.scores, [*findings.modes, *pairs], findings.sensitivities)
     return replace(more, lost=(*findings.lost, *more.lost))
 
@@ -305,18 +309,22 @@ def _pairs(
     singles: Sequence[LaplaceFit],
     scores: Sequence[Score],
     sensitivities: Mapping[str, NDArray[np.float64]],
+    least: float,
 ) -> list[LaplaceFit]:
-    """Fits of pairs, best first; ``sensitivities`` are those of all effects about the baseline, by name."""
+    """Fits of pairs that promise more than ``least``, best first.
+
+    ``sensitivities`` are those of all effects about the baseline, by name.
+    """
     best = singles[0]
     wanting = not fits.explains_all(best)
     if wanting or fits.conflicts(best):
         parents = [mode for mode in singles[: fits.constants.parents if wanting else 1] if mode.solved]
         pairs: list[LaplaceFit] = []
         for parent in parents:
-            pairs += _with_partners(fits, parent, pairs)
+            pairs += _with_partners(fits, parent, pairs, least)
         pairs = fits.refined(pairs)
         if pairs and not fits.is_spotless(pairs[0]):
-            pairs = _with_other_partners(fits, pairs, {hypothesis_of(mode) for mode in parents})
+            pairs = _with_other_partners(fits, pairs, {hypothesis_of(mode) for mode in parents}, least)
     else:
         pairs = fits.refined(_with_small_partners(fits, best, sensitivities))
     if pairs and pairs[0].evidence > best.evidence:
@@ -324,8 +332,13 @@ def _pairs(
     return pairs
 
 
-def _with_partners(fits: _Fits, parent: LaplaceFit, known: Sequence[LaplaceFit]) -> list[LaplaceFit]:
-    """Pairs of a fitted term with the partners that score best beside it, less those that are ``known``."""
+def _with_partners(
+    fits: _Fits, parent: LaplaceFit, known: Sequence[LaplaceFit], least: float
+) -> list[LaplaceFit]:
+    """Pairs of a fitted term with the partners that score best beside it, and more than ``least``.
+
+    Less those that are ``known``.
+    """
     fits.progress(f"partners of {hypothesis_of(parent)}")
     tried, alone = {hypothesis_of(mode) for mode in known}, hypothesis_of(parent)
     others = [
@@ -334,11 +347,13 @@ def _with_partners(fits: _Fits, parent: LaplaceFit, known: Sequence[LaplaceFit])
         if name not in parent.terms and alone.with_effect(name) not in tried
     ]
     scores = score_terms(fits.search, parent, others)
-    worth = [each for each in scores if each.evidence > parent.evidence]
+    worth = [each for each in scores if each.evidence > max(parent.evidence, least)]
     return fits.extended(parent, worth[: fits.constants.partners])
 
 
-def _with_other_partners(fits: _Fits, pairs: list[LaplaceFit], parents: set[Hypothesis]) -> list[LaplaceFit]:
+def _with_other_partners(
+    fits: _Fits, pairs: list[LaplaceFit], parents: set[Hypothesis], least: float
+) -> list[LaplaceFit]:
     """The pairs, and those that keep a member of the best ones and exchange the other.
 
     A member that shows only beside another one is no parent by itself: the other may have been a stand-in.
@@ -349,7 +364,7 @@ def _with_other_partners(fits: _Fits, pairs: list[LaplaceFit], parents: set[Hypo
     }
     for parent in in_parallel(lambda name: fits.fitted_alone(name, members[name]), list(members)):
         if parent.solved:
-            pairs = [*pairs, *_with_partners(fits, parent, pairs)]
+            pairs = [*pairs, *_with_partners(fits, parent, pairs, least)]
     return fits.refined(pairs)
 
 

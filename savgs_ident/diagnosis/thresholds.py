@@ -184,9 +184,10 @@ class DecisionConstants:
     """
 
     explained_share_flexible: float = 0.02
-    """Share of the baseline's misfit that a learned law may leave and still make the search for pairs needless.
+    """Share of the baseline's misfit that a learned law may leave and still count as explaining all.
 
-    Origin: by choice. Halved or doubled: not measured.
+    Then only those pairs of effects are fitted whose scores promise to be more probable. Origin: by choice. Halved or
+    doubled: not measured.
     """
 
     # Localisation

@@ -87,6 +87,11 @@ def log_prior(hypothesis: Hypothesis, count: int, constants: DecisionConstants =
         return log(constants.prior_none)
     if len(hypothesis.effects) == 1:
         return log(constants.prior_single / max(count, 1))
+    return log_prior_of_pair(count, constants)
+
+
+def log_prior_of_pair(count: int, constants: DecisionConstants = DEFAULTS) -> float:
+    """Log prior probability that two certain ones of ``count`` effects are missing."""
     return log(constants.prior_pair / max(count * (count - 1) / 2, 1))
 
 
