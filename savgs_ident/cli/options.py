@@ -138,8 +138,8 @@ def read_model(path: Path | None, model: ModelName | None) -> "QuarterCar":
     found = si.load_model(path, effects_of(model))
     provenance = found.rig.provenance
     if not provenance.get("trusted", True):
-        status = provenance.get("status", "no status")
-        print_error(f"Warning: {path}: its own fit is not to be trusted ({status}).")
+        why = provenance.get("doubt", provenance.get("status", "no status"))
+        print_error(f"Warning: {path}: its own fit is not to be trusted ({why}).")
     return found
 
 

@@ -92,8 +92,8 @@ def recalibrate(
 def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvidence:
     """Hypotheses, ports and the kind of the verdict.
 
-    Single effects first; where none explains all, the flexible members of the ports, and pairs of effects; where these
-    do not either, laws beside the best of all.
+    Single effects first; where none explains all, the flexible members of the ports, and pairs of effects; where
+    these do not either, laws beside the best of all.
     """
     plant, search, base, constants = problem.plant, problem.search, problem.base, problem.constants
     progress("locating the gap, and looking for its cause")

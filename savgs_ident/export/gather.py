@@ -134,7 +134,9 @@ def _doubts_of_fit(rig: Rig, found: Diagnosed) -> tuple[str, ...]:
     left = [name for name in moved if name not in found.taken]
     if moved and not left:  # The diagnosis fitted all of them anew.
         return ()
-    doubt = f"The rig file's own fit is not to be trusted ({rig.provenance.get('status', 'no status')})"
+    said = rig.provenance
+    why = said.get("doubt", said.get("status", "no status"))
+    doubt = f"The rig file's own fit is not to be trusted ({why})"
     if not found.added:
         return (f"{doubt}.",)
     names = f" ({', '.join(left[:LISTED])}{', ...' if len(left) > LISTED else ''})" if left else ""

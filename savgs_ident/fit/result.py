@@ -35,6 +35,9 @@ class Estimate:
     prior_sd: float
 
 
+UNEXPLAINED = "the model does not explain the data"
+
+
 @dataclass(frozen=True)
 class Verdict:
     """What the data identify, in words.
@@ -132,8 +135,18 @@ class Fit(Result):
     @property
     def trusted(self) -> bool:
         """Whether the fit converged everywhere, the model explains the data, and they identify what is free."""
-        converged = self.status.ok and all(each.ok for each in self.dwell_status)
-        return converged and self.verdict.explained and self.verdict.identifiable
+        return not self.doubt
+
+    @property
+    def doubt(self) -> str:
+        """The first reason why the fit is not to be trusted; empty if it is."""
+        if not self.status.ok:
+            return self.status.advice
+        if not all(each.ok for each in self.dwell_status):
+            return "the model's periodic motion was not found in every dwell"
+        if not self.verdict.explained:
+            return UNEXPLAINED
+        return "" if self.verdict.identifiable else "the data do not identify every free parameter"
 
     @property
     def by_name(self) -> Mapping[str, Estimate]:
@@ -169,7 +182,8 @@ class Fit(Result):
             "chi2": float(self.chi2),
             "dof": int(self.dof),
             "status": self.status.name.lower(),
-            "trusted": bool(self.trusted),
+            "trusted": self.trusted,
+            **({"doubt": self.doubt} if self.doubt else {}),
             "before": {each.name: each.prior for each in self.estimates},
             "versions": package_versions(PACKAGES),
             "covariance": {

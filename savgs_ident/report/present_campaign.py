@@ -82,15 +82,12 @@ class _Fit(_Identified["Fit"]):
         return fit_text(result)
 
     def doubts(self, result: "Fit") -> tuple[str, ...]:
-        if result.trusted:
+        from savgs_ident.fit.result import UNEXPLAINED
+
+        if not result.doubt:
             return ()
-        if not result.status.ok:
-            return (f"{result.status.advice}.",)
-        if not all(status.ok for status in result.dwell_status):
-            return ("the model's periodic motion was not found in every dwell.",)
-        if not result.verdict.explained:
-            return ("the model does not explain the data: look for what is missing with `diagnose`.",)
-        return ("the data do not identify every free parameter.",)
+        remedy = ": look for what is missing with `diagnose`" if result.doubt == UNEXPLAINED else ""
+        return (f"{result.doubt}{remedy}.",)
 
     def comparison(self, result: "Fit") -> "Comparison":
         from savgs_ident.fit.comparison import comparison_of

@@ -1,16 +1,13 @@
-"""Traced programs, kept from one run to the next beside the compiled ones.
+"""Programs, traced and compiled, kept from one run to the next in the user's cache folder.
 
-The compilation cache spares a later run the compiler; to ask for a compiled program, Python must still trace
-the model through a few thousand operations, which takes longer than solving it. Where a persistent cache is
-in use (:mod:`savgs_ident.simulate.program_cache`), what was traced is kept too.
+The compilation cache of JAX spares a later run the compiler; but to ask for a compiled program, Python must still
+trace the model through a few thousand operations, which takes longer than solving it. So what was traced is kept
+beside what was compiled.
 
-What a traced program depends on, as one short text.
-
-A traced program may serve again where nothing that shaped it has changed: the source of what is traced, the
-versions of what traced it, and of its arguments everything but the numbers in arrays. Whatever cannot be
-described with certainty, such as an effect that is defined outside this package, has no fingerprint.
-
-Programs, traced and compiled, kept from one run to the next in the user's cache folder.
+A traced program may serve again where nothing that shaped it has changed: the source of what is traced, the versions
+of what traced it, and of its arguments everything but the numbers in arrays. Its :func:`fingerprint` says all of that
+in one digest. What cannot be described with certainty, such as an effect that is defined outside this package, has
+none, and is traced anew.
 """
 
 import dataclasses

@@ -12,7 +12,7 @@ from savgs_ident.simulate.program_cache import mapped_regions
 
 pytestmark = pytest.mark.slow
 
-PROGRAMS = 30
+PROGRAMS = 100
 
 _COUNT = """
 import jax
