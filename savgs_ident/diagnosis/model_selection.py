@@ -103,7 +103,7 @@ def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvid
     )
     members = _flexible_members(problem, findings, localisations, progress)
     beside, least = -np.inf, -np.inf
-    law_explains = bool(members) and members[0].left <= constants.explained_share_flexible
+    law_explains = _law_explains(members, localisations, constants)
     if law_explains:
         least = members[0].weight - log_prior_of_pair(len(findings.scores), constants)
     findings = with_pairs(search, findings, plant.candidates, progress, constants, least)
@@ -119,6 +119,24 @@ def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvid
     return _decided(problem, findings, localisations, members, beside, broken)
 
 
+def _law_explains(
+    members: Sequence[FlexibleMember], localisations: Sequence[Localisation], constants: DecisionConstants
+) -> bool:
+    """Whether a learned law leaves next to nothing, and no location where none was learned promises more."""
+    if not members or members[0].left > constants.explained_share_flexible:
+        return False
+    others = _not_learned(members, localisations)
+    return not others or members[0].weight >= anywhere(others) + log(constants.prior_unknown)
+
+
+def _not_learned(
+    members: Sequence[FlexibleMember], localisations: Sequence[Localisation]
+) -> list[Localisation]:
+    """The locations that no learned law stands for."""
+    learned = {each.location for each in members}
+    return [each for each in localisations if each.name not in learned]
+
+
 def _decided(
     problem: DiagnosisProblem,
     findings: Findings,
@@ -132,8 +150,7 @@ def _decided(
     best = most_probable(findings, constants)
     left = left_over(search, base, best, constants)
     # A law that was learned on the nonlinear plant stands for itself.
-    learned = {each.location for each in members}
-    others = [each for each in localisations if each.name not in learned]
+    others = _not_learned(members, localisations)
     alone = -np.inf
     if others:
         first = max(others, key=lambda each: each.evidence)
@@ -166,9 +183,7 @@ def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: Fl
     constants = problem.constants
     none = next(each for each in evidence.weighed if each.hypothesis == NONE)
     fitted = [each.weight for each in evidence.weighed if each.mode is not None and each.hypothesis.effects]
-    if member.weight < max([none.weight + constants.alarm_log_odds, *fitted]):
-        return False
-    if evidence.unknown.reason == "tolerance" and evidence.unknown.weight > member.weight:
+    if member.weight < max([none.weight + constants.alarm_log_odds, evidence.unknown.weight, *fitted]):
         return False
     change = _change(problem, member.law.mode.prediction.rows - problem.base.prediction.rows)
     return member.left <= constants.unexplained_share_flexible and change.matters(constants)

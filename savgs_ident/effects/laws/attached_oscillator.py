@@ -25,7 +25,7 @@ class AttachedOscillator(AbstractForceLaw):
     """What swings on a body."""
 
     name: ClassVar[str] = "oscillator"
-    words: ClassVar[str] = "something that swings on it"
+    words: ClassVar[str] = "something that hangs there and swings"
     family: ClassVar[Family] = Family.OSCILLATOR
     roles: ClassVar[tuple[Role, ...]] = (Role("mass", 0.0), Role("frequency"), Role("damping_ratio"))
     tried: ClassVar[tuple[tuple[str, float], ...]] = tuple(
