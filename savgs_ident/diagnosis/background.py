@@ -64,7 +64,7 @@ def with_background(
         tolerated=np.concatenate(
             [
                 constants.curve_tolerance * curves,
-                constants.drift_tolerance * drifts * _time_of(recorded)[data.test, None],
+                constants.drift_tolerance * drifts * time_of(recorded)[data.test, None],
             ],
             axis=1,
         ),
@@ -76,6 +76,21 @@ def without_drifts(data: Data, count: int) -> Data:
     if data.tolerated is None:
         return data
     return replace(data, tolerated=data.tolerated[:, : data.tolerated.shape[1] - count])
+
+
+def with_wider_drifts(data: Data, count: int, width: float) -> Data:
+    """The data of :func:`with_background` with ``count`` drifts, ``width`` times as large as tolerated."""
+    steady = without_drifts(data, count).tolerated
+    if data.tolerated is None or steady is None:
+        return data
+    return replace(data, tolerated=np.concatenate([steady, width * drifts_of(data, count)], axis=1))
+
+
+def drifts_of(data: Data, count: int) -> Matrix:
+    """What the ``count`` drifts that the data tolerate do to the rows [unit of the row], (m, count)."""
+    if data.tolerated is None:
+        return np.zeros((data.measured.size, count))
+    return data.tolerated[:, data.tolerated.shape[1] - count :]
 
 
 def relative_change(data: Data, channel: NDArray[np.intp], columns: Matrix) -> NDArray[np.float64]:
@@ -99,7 +114,7 @@ def pieces_of_curve(velocity: NDArray[np.float64], force: NDArray[np.float64]) -
     return [np.interp(relative, points, unit) * force for unit in np.eye(points.size)]
 
 
-def _time_of(recorded: NDArray[np.float64]) -> NDArray[np.float64]:
+def time_of(recorded: NDArray[np.float64]) -> NDArray[np.float64]:
     """When in the campaign each test was ``recorded`` [1], from -1 for the first to 1 for the last, (t,)."""
     first, last = float(recorded.min()), float(recorded.max())
     return 2.0 * (recorded - first) / (last - first) - 1.0 if last > first else np.zeros(recorded.size)

@@ -20,6 +20,7 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.diagnosis.candidates import candidates_of, confusable_of, estimates_among, not_judgeable_of
 from savgs_ident.diagnosis.conclusion import CorrectedModel, FurtherRecording, conclude
+from savgs_ident.diagnosis.drift import drifting
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem
 from savgs_ident.diagnosis.learning import LearnedLaw
@@ -163,6 +164,10 @@ def _diagnose(
     began = time.perf_counter()
     problem = recalibrate(plant, data, values, progress, settings.constants)
     selected = select_model(problem, progress)
+    drifts = drifting(problem, selected, progress)
+    if drifts is not None:
+        problem = drifts
+        selected = select_model(problem, progress)
     found = conclude(problem, selected, values, progress, further)
     base, evidence, model = problem.base, found.evidence, found.model
     # Before what is named was refitted: the alternatives were not.

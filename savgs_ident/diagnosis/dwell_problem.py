@@ -101,6 +101,7 @@ class DwellProblem(AbstractProblem):
         corrections: by terms, what is added to the rows [unit of each], (m,), for the motions that are
             found on finitely many nodes.
         recorded: when each test was recorded, in any unit of time; the tests are in that order where empty.
+        beyond: what drifts do to all rows beyond first order [unit of each], (m,); None where nothing drifts.
     """
 
     excitation: Excitation = field(kw_only=True)
@@ -109,6 +110,7 @@ class DwellProblem(AbstractProblem):
     settings: PeriodicSettings = field(kw_only=True)
     corrections: Mapping[tuple[str, ...], NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
     recorded: tuple[float, ...] = field(default=(), kw_only=True)
+    beyond: NDArray[np.float64] | None = field(default=None, kw_only=True)
 
     @cached_property
     def layout(self) -> Layout:
@@ -172,7 +174,7 @@ class DwellProblem(AbstractProblem):
         model, p = self.model(terms), placed(self.values(values))
         solution = resolve(model, p, warm_start, ITERATIONS, self._fitting(model, warm_start))
         rows = np.asarray(rows_of(model, self.likelihood, p, solution, self.orders))
-        rows = rows + self.corrections.get(terms, 0.0)
+        rows = rows + self.corrections.get(terms, 0.0) + (0.0 if self.beyond is None else self.beyond)
         status = joint_status(solution.status())
         return Prediction(rows, self.slopes(model, p, solution, names), status, solution)
 

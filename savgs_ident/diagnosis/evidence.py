@@ -6,7 +6,7 @@ laws as hypotheses.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import hypot
 from typing import NamedTuple
@@ -37,6 +37,8 @@ class DiagnosisProblem:
         given: rows of the baseline as given [unit of each reading], (m,).
         base: the baseline recalibrated.
         constants: what the verdict is decided by.
+        drifts: relative change of parameters from the first test of the campaign to the last [1], by name, where the
+            baseline drifts by more than is tolerated.
     """
 
     plant: AbstractProblem
@@ -45,6 +47,7 @@ class DiagnosisProblem:
     given: NDArray[np.float64]
     base: LaplaceFit
     constants: DecisionConstants = DEFAULTS
+    drifts: Mapping[str, float] = field(default_factory=dict)
 
     def location(self, effect: str) -> str:
         """Where an effect of the catalogue acts."""

@@ -44,9 +44,10 @@ def shrinks(data: Data, rows: Rows) -> tuple[Shrink, dict[str, Shrink]]:
         "after": _by_test(data, rows, (data.measured - rows.after) ** 2),
         "floor": _by_test(data, rows, data.variance),
     }
+    scatter = _by_test(data, rows, 2.0 * data.variance**2)
     present = [c for c in range(len(rows.channels)) if np.any(rows.channel == c)]
-    together = _shrink(squares, power, present)
-    return together, {rows.channels[c]: _shrink(squares, power, [c]) for c in present}
+    together = _shrink(squares, power, scatter, present)
+    return together, {rows.channels[c]: _shrink(squares, power, scatter, [c]) for c in present}
 
 
 def _by_test(data: Data, rows: Rows, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -67,8 +68,16 @@ def _relative(
 
 
 def _shrink(
-    squares: dict[str, NDArray[np.float64]], power: NDArray[np.float64], channels: list[int]
+    squares: dict[str, NDArray[np.float64]],
+    power: NDArray[np.float64],
+    scatter: NDArray[np.float64],
+    channels: list[int],
 ) -> Shrink:
+    """The gap in some channels, by sums over rows in each test and channel, (t, C).
+
+    These are the ``squares`` of residuals and noise, those of what was measured (``power``), and the variance of the
+    noise's squares (``scatter``).
+    """
     whole = {name: float(_relative(square, power, channels)) for name, square in squares.items()}
     tests = np.random.default_rng(SEED).integers(0, len(power), (RESAMPLES, len(power)))
     drawn = {name: _relative(square[tests], power[tests], channels) for name, square in squares.items()}
@@ -77,7 +86,15 @@ def _shrink(
         share_closed=float(_closed(*(np.array(whole[name]) for name in ("before", "after", "floor")))),
         interval=_interval(_closed(drawn["before"], drawn["after"], drawn["floor"])),
         interval_by_effect=_interval(_closed(drawn["recalibrated"], drawn["after"], drawn["floor"])),
+        scatter=_scatter(scatter, power, channels),
     )
+
+
+def _scatter(scatter: NDArray[np.float64], power: NDArray[np.float64], channels: list[int]) -> float:
+    """Standard deviation [1] of a relative mean square that is that of the noise."""
+    variances, powers = scatter[:, channels].sum(axis=1), power[:, channels].sum(axis=1)
+    measured = powers > 0.0
+    return float(np.sqrt(np.sum(variances[measured] / powers[measured] ** 2)) / measured.sum())
 
 
 def _interval(drawn: NDArray[np.float64]) -> tuple[float, float]:

@@ -204,7 +204,8 @@ def settle(
     """
     if evidence.kind == "unknown" and evidence.unknown.reason == "tolerance":
         return evidence
-    small = min(gap.recalibrated, fitted) ** 2 - gap.floor**2 <= constants.material_share**2
+    least = constants.material_share**2 + constants.sure_of_gap * gap.scatter
+    small = min(gap.recalibrated, fitted) ** 2 - gap.floor**2 <= least
     supported = gap.after < gap.recalibrated or (small and evidence.prior_gain >= constants.alarm_log_odds)
     if evidence.kind == "none":
         return evidence if small else _unexplained(evidence)

@@ -1,6 +1,7 @@
 """The verdict of a diagnosis as a sentence, and its warnings."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,6 +22,24 @@ def write_verdict(
 
     ``alternatives`` are effects that the campaign cannot distinguish from those named.
     """
+    verdict = _verdict(problem, evidence, alternatives, gap)
+    return replace(verdict, sentence=verdict.sentence + _drifting(problem.drifts))
+
+
+def _drifting(drifts: Mapping[str, float]) -> str:
+    """Which parameters changed over the campaign, by relative changes of one [1]."""
+    if not drifts:
+        return ""
+    each = " and ".join(
+        f"`{name}` {'rose' if change > 0.0 else 'fell'} by {100.0 * abs(change):.2g} %"
+        for name, change in drifts.items()
+    )
+    return f" While the campaign went on, {each}: the recalibrated model follows that."
+
+
+def _verdict(
+    problem: DiagnosisProblem, evidence: DiagnosisEvidence, alternatives: Sequence[str], gap: Shrink
+) -> Verdict:
     if evidence.kind == "none":
         sentence = _nothing_missing(problem, evidence, gap)
         return Verdict("none", (), (), (), sentence, probability=_probability(evidence, "none"))

@@ -232,7 +232,8 @@ class Shrink:
 
     ``share_closed`` is 1 - (after^2 - floor^2) / (before^2 - floor^2), ``interval`` its 95 % interval by
     resampling the tests. It counts what calibration closes, too; the two shares apart are below, and
-    ``interval_by_effect`` is that of the second. All are NaN where there was nothing to close.
+    ``interval_by_effect`` is that of the second. All are NaN where there was nothing to close. ``scatter`` is the
+    standard deviation [1] of floor^2 in as many rows, by chance.
     """
 
     before: float
@@ -242,6 +243,7 @@ class Shrink:
     share_closed: float
     interval: tuple[float, float]
     interval_by_effect: tuple[float, float] = (nan, nan)
+    scatter: float = 0.0
 
     @property
     def closed_by_calibration(self) -> float:

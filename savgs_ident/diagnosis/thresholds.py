@@ -115,6 +115,14 @@ class DecisionConstants:
     Origin: by choice; a friction that shows in the slow tests alone reaches it. Halved or doubled: not measured.
     """
 
+    sure_of_gap: float = 3.0
+    """Standard deviations, by chance, of the noise's mean square by which a gap must exceed what matters.
+
+    Below, a gap is no sign that something is missing. Origin: by choice, the convention of three sigma; with few
+    tests and much noise the square of a gap of the noise alone scatters by more than ``material_share``. Halved or
+    doubled: not measured.
+    """
+
     # The background of small errors
 
     material_error: float = 0.002

@@ -90,3 +90,14 @@ def test_what_calibration_and_the_effect_close_make_up_the_whole() -> None:
     assert gap.closed_by_effect == pytest.approx(1.0 - (0.004**2 - 0.002**2) / (0.05**2 - 0.002**2))
     nothing = Shrink(0.001, 0.001, 0.001, 0.002, share_closed=0.0, interval=(0.0, 1.0))
     assert np.isnan(nothing.closed_by_effect)
+
+
+def test_the_square_of_a_gap_of_noise_alone_scatters_as_it_says() -> None:
+    data, truth, channel = _case(8, 0.02)
+    rng = np.random.default_rng(9)
+    squares = []
+    for _ in range(400):
+        drawn = truth + np.sqrt(data.variance) * rng.standard_normal(truth.size)
+        together, _ = shrinks(data, Rows(drawn, data.measured + drawn - truth, truth, channel, CHANNELS))
+        squares.append(together.recalibrated**2)
+    assert np.std(squares) == pytest.approx(together.scatter, rel=0.12)

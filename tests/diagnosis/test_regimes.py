@@ -13,11 +13,11 @@ from savgs_ident.diagnosis.result import Regime
 from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import Scales
-from savgs_ident.plants.two_mass import PARAMETERS, TwoMass, closed_form
-from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
 from savgs_ident.simulate.periodic import PeriodicSettings
 
 from ..relaxed import as_users_have_it
+from .fading_damper import ORDER, fading_campaign
 from .toy import ToyPlant, draw
 
 PLANT = ToyPlant()
@@ -151,40 +151,9 @@ def test_holm_corrects_the_smallest_by_all_and_keeps_the_order() -> None:
     assert holm(np.array([])) == ()
 
 
-FREQUENCY = np.array([0.8, 1.2, 1.6, 2.2, 3.0, 4.0, 6.0, 9.0])
-ORDER = np.array([4.0, 1.0, 6.0, 0.0, 7.0, 3.0, 5.0, 2.0])
-ROAD, NOISY = 0.01, 2e-3
-
-
-def _campaign(damping: np.ndarray, recorded: np.ndarray) -> HarmonicResponse:
-    """Dwells of the two masses, each with its own damping [N s/m]."""
-    sheet = PARAMETERS.as_dict()
-    seen = np.zeros((FREQUENCY.size, 3, 4), complex)
-    seen[:, 0, 1] = ROAD
-    for d, c in enumerate(damping):
-        seen[d, 1:, 1] = ROAD * closed_form(sheet | {"c": c}, FREQUENCY[d : d + 1])[0]
-    random, sd = np.random.default_rng(8), NOISY * np.abs(seen[:, :, 1])
-    noise = random.standard_normal(seen.shape) + 1j * random.standard_normal(seen.shape)
-    seen[:, 1:] += (sd[:, :, None] * noise)[:, 1:]
-    return HarmonicResponse(
-        tests=tuple(f"dwell_{f}Hz" for f in FREQUENCY),
-        channels=("road_height", "sprung_accel", "susp_deflection"),
-        frequency=FREQUENCY,
-        frequency_sd=np.zeros(FREQUENCY.size),
-        harmonics=seen,
-        covariance=sd[:, :, None, None, None] ** 2 * np.ones(4)[:, None, None] * np.eye(2),
-        valid=np.ones(seen.shape, bool),
-        peak_to_peak=np.zeros(sd.shape),
-        peak_to_peak_sd=np.zeros(sd.shape),
-        noise_sd=sd,
-        periods=np.full(FREQUENCY.size, 20),
-        recorded=recorded,
-    )
-
-
 def _regimes_of(damping: np.ndarray) -> dict[str, float]:
     """Those of the two masses in which the misfit is concentrated, recalibrated with the background."""
-    response = _campaign(damping, ORDER)
+    response = fading_campaign(damping, ORDER)
     settings = PeriodicSettings(nodes=64, adaptations=0)
     problem, data = dwell_problem(
         response, TwoMass(), PARAMETERS, {}, free=("k", "c"), orders=3, settings=settings
