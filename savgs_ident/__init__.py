@@ -35,8 +35,7 @@ if TYPE_CHECKING:
     from savgs_ident.effects.base import Number, Port, PortKind, PortSignals
     from savgs_ident.effects.effect import Effect, generic_effects
     from savgs_ident.export.public import Exported, export
-    from savgs_ident.fit.comparison import Comparison, compare
-    from savgs_ident.fit.public import demo, fit
+    from savgs_ident.fit.public import Comparison, compare, demo, fit
     from savgs_ident.fit.result import Fit
     from savgs_ident.fit.sampling import sample
     from savgs_ident.inference.result import Posterior
@@ -88,7 +87,7 @@ _PLACES = {
     "demo": "fit.public",
     "inspect": "responses.summary",
     "fit": "fit.public",
-    "compare": "fit.comparison",
+    "compare": "fit.public",
     "simulate": "simulate.public",
     "simulate_sweep": "simulate.public",
     "sample": "fit.sampling",
@@ -116,7 +115,7 @@ _PLACES = {
     "CampaignStudy": "campaigns.study",
     "Campaign": "recordings.recording",
     "CampaignSummary": "responses.summary",
-    "Comparison": "fit.comparison",
+    "Comparison": "fit.public",
     "Design": "control.design",
     "Diagnosis": "diagnosis.result",
     "DigitalController": "control.design",

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from savgs_ident.fit.residuals import MeasuredPoints
+from savgs_ident.fit.result import MeasuredPoints
 from savgs_ident.report.text import ChannelLabel
 from savgs_ident.report.theme import (
     BLUE,

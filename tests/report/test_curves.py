@@ -7,7 +7,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from savgs_ident.fit.residuals import measured_points
+from savgs_ident.fit.result import measured_points
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.report.bode import phase_deg
 from savgs_ident.responses.harmonic_response import HarmonicResponse

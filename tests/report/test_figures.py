@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from savgs_ident.fit.residuals import measured_points, whitened
-from savgs_ident.fit.result import Fit
+from savgs_ident.fit.result import Fit, measured_points, whitened
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.report.bode import bode_figure, response_figure
 from savgs_ident.report.campaigns.inspect import campaign_figure

@@ -19,7 +19,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.result import Diagnosis, DriveForces, Responses
-from savgs_ident.fit.residuals import measured_points
+from savgs_ident.fit.result import measured_points
 from savgs_ident.report.bode import LINES, draw_magnitude, draw_phase
 from savgs_ident.report.diagnosis.text import model_label
 from savgs_ident.report.text import channel_labels

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from savgs_ident.fit.residuals import measured_points
+from savgs_ident.fit.result import measured_points
 from savgs_ident.inference.result import Posterior
 from savgs_ident.report.bode import draw_magnitude, draw_phase, phase_deg
 from savgs_ident.report.text import channel_labels
