@@ -52,8 +52,14 @@ if TYPE_CHECKING:
     from savgs_ident.responses.driven_motion import DrivenMotion, load_motion
     from savgs_ident.responses.harmonic_response import HarmonicResponse
     from savgs_ident.responses.summary import CampaignSummary, inspect
-    from savgs_ident.simulate.frequency_response import SimulatedResponse, SimulatedSweep
-    from savgs_ident.simulate.public import DWELLS, simulate, simulate_dwells, simulate_sweep
+    from savgs_ident.simulate.public import (
+        DWELLS,
+        SimulatedResponse,
+        SimulatedSweep,
+        simulate,
+        simulate_dwells,
+        simulate_sweep,
+    )
     from savgs_ident.validation.blind import BlindStudy, blind
     from savgs_ident.validation.calibration import CalibrationStudy, calibrate
     from savgs_ident.validation.false_alarms import AlarmStudy, false_alarms
@@ -128,8 +134,8 @@ _PLACES = {
     "LoopStudy": "control.closed_loop.study",
     "Posterior": "inference.result",
     "Rig": "plants.quarter_car.rig",
-    "SimulatedResponse": "simulate.frequency_response",
-    "SimulatedSweep": "simulate.frequency_response",
+    "SimulatedResponse": "simulate.public",
+    "SimulatedSweep": "simulate.public",
 }
 """Where each public name is defined, with the name that it has there if that is another one."""
 

@@ -4,13 +4,14 @@ A comparison shows a model with its effects and without, at the measured dwells 
 """
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.least_squares import FitSettings, fit_least_squares
 from savgs_ident.fit.result import Fit, comparable
@@ -20,13 +21,13 @@ from savgs_ident.plants.quarter_car.rig import default_campaign_path
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import Measurements, campaign_of, measured_excitation, measured_response
-from savgs_ident.simulate.frequency_response import (
+from savgs_ident.simulate.program_cache import use_persistent_cache
+from savgs_ident.simulate.public import (
     SimulatedResponse,
     disable_effects,
     simulate_between,
     simulate_response,
 )
-from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
 def fit(
@@ -129,9 +130,9 @@ class Comparison(Result):
             found = simulate_between(self.model)
             return found, found
         # A solver needs one core and leaves Python free: both take the time of one.
-        with ThreadPoolExecutor(1) as pool:
-            other = pool.submit(simulate_between, self.frictionless)
-            return simulate_between(self.model), other.result()
+        return side_by_side(
+            partial(simulate_between, self.model), partial(simulate_between, self.frictionless)
+        )
 
 
 def compare(

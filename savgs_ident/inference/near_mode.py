@@ -23,9 +23,6 @@ v_k depends on t_k and later ones only, volumes stay as they are and the way bac
 other.
 """
 
-import os
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -34,6 +31,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
 
+from savgs_ident.core.executor import in_parallel
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.inference.prior import NUISANCE, Prior
 from savgs_ident.inference.problem import Problem
@@ -91,16 +89,6 @@ class ExactModel(eqx.Module):
         """Their rows of the likelihood [unit of the reading], (W, m), and whether they were solved, (W,)."""
         found = self.responses(us)
         return np.asarray(_rows_of(self.likelihood, placed(jnp.asarray(found.harmonics)))), found.solved
-
-
-def in_parallel(work: Any, items: Sequence[Any] | np.ndarray) -> list[Any]:
-    """``work`` on every item, numbers of any unit and arrays of any shape, in their order.
-
-    A solver leaves Python free while it runs.
-    """
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    with ThreadPoolExecutor(cores) as pool:
-        return list(pool.map(work, items))
 
 
 def anchor_at(problem: Problem, u: Float[Array, " n"], solution: PeriodicSolution) -> Anchor:

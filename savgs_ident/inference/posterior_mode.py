@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
+from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status, joint_status
 from savgs_ident.inference.find_map import LaplaceFit, find_map, principal_axes, search_of
@@ -27,7 +28,6 @@ from savgs_ident.inference.near_mode import (
     anchor_at,
     bend_of,
     identity_map,
-    in_parallel,
     no_bend,
     rows_and_slopes,
     triangular_map_of,

@@ -30,7 +30,7 @@ from savgs_ident.report.theme import (
     printable,
     styled,
 )
-from savgs_ident.simulate.frequency_response import ModelCurve
+from savgs_ident.simulate.public import ModelCurve
 
 _COLUMN = 5.25
 """Width of a column [in]."""

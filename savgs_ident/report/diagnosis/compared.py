@@ -25,7 +25,7 @@ from savgs_ident.report.diagnosis.text import model_label
 from savgs_ident.report.text import channel_labels
 from savgs_ident.report.theme import GREY, INK, PALE, frequency_axis, magnitude_axis, new_figure, styled
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.frequency_response import ModelCurve, model_curve
+from savgs_ident.simulate.public import ModelCurve, model_curve
 
 _MARKERS = ("o", "s", "^")
 
