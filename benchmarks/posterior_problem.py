@@ -13,12 +13,12 @@ from jaxtyping import Float
 
 from benchmarks.campaign import read_dwells, response_of
 from benchmarks.outcome import Progress
+from savgs_ident.inference.near_mode import Surrogate, identity_map
 from savgs_ident.inference.posterior_mode import expand
 from savgs_ident.inference.problem import Problem
 from savgs_ident.inference.sample import Question, case_of, locate, plan
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.inference.samplers.emcee import pcn_steps
-from savgs_ident.inference.surrogate import Surrogate, identity_map
 from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel

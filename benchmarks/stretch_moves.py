@@ -19,7 +19,7 @@ from jaxtyping import Array, Float
 from benchmarks.outcome import Progress
 from benchmarks.posterior_problem import PosteriorProblem
 from savgs_ident.core.transforms import FreeVector
-from savgs_ident.inference.surrogate import Surrogate
+from savgs_ident.inference.near_mode import Surrogate
 
 LONG_ENOUGH = 50.0
 """Autocorrelation times that a run must last, as emcee asks for."""

@@ -35,8 +35,7 @@ if TYPE_CHECKING:
     from savgs_ident.effects.base import Number, Port, PortKind, PortSignals
     from savgs_ident.effects.effect import Effect, generic_effects
     from savgs_ident.export.public import Exported, export
-    from savgs_ident.fit.comparison import Comparison, compare
-    from savgs_ident.fit.public import demo, fit
+    from savgs_ident.fit.public import Comparison, compare, demo, fit
     from savgs_ident.fit.result import Fit
     from savgs_ident.fit.sampling import sample
     from savgs_ident.inference.result import Posterior
@@ -53,8 +52,14 @@ if TYPE_CHECKING:
     from savgs_ident.responses.driven_motion import DrivenMotion, load_motion
     from savgs_ident.responses.harmonic_response import HarmonicResponse
     from savgs_ident.responses.summary import CampaignSummary, inspect
-    from savgs_ident.simulate.frequency_response import SimulatedResponse, SimulatedSweep
-    from savgs_ident.simulate.public import DWELLS, simulate, simulate_dwells, simulate_sweep
+    from savgs_ident.simulate.public import (
+        DWELLS,
+        SimulatedResponse,
+        SimulatedSweep,
+        simulate,
+        simulate_dwells,
+        simulate_sweep,
+    )
     from savgs_ident.validation.blind import BlindStudy, blind
     from savgs_ident.validation.calibration import CalibrationStudy, calibrate
     from savgs_ident.validation.false_alarms import AlarmStudy, false_alarms
@@ -88,7 +93,7 @@ _PLACES = {
     "demo": "fit.public",
     "inspect": "responses.summary",
     "fit": "fit.public",
-    "compare": "fit.comparison",
+    "compare": "fit.public",
     "simulate": "simulate.public",
     "simulate_sweep": "simulate.public",
     "sample": "fit.sampling",
@@ -116,7 +121,7 @@ _PLACES = {
     "CampaignStudy": "campaigns.study",
     "Campaign": "recordings.recording",
     "CampaignSummary": "responses.summary",
-    "Comparison": "fit.comparison",
+    "Comparison": "fit.public",
     "Design": "control.design",
     "Diagnosis": "diagnosis.result",
     "DigitalController": "control.design",
@@ -129,8 +134,8 @@ _PLACES = {
     "LoopStudy": "control.closed_loop.study",
     "Posterior": "inference.result",
     "Rig": "plants.quarter_car.rig",
-    "SimulatedResponse": "simulate.frequency_response",
-    "SimulatedSweep": "simulate.frequency_response",
+    "SimulatedResponse": "simulate.public",
+    "SimulatedSweep": "simulate.public",
 }
 """Where each public name is defined, with the name that it has there if that is another one."""
 

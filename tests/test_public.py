@@ -58,7 +58,7 @@ def test_what_is_listed_is_what_there_is() -> None:
 def test_a_room_of_the_same_name_does_not_hide_a_call() -> None:
     assert si.fit is fit_call
     __import__("savgs_ident.simulate.periodic")
-    __import__("savgs_ident.export.registry")
+    __import__("savgs_ident.export.public")
     assert callable(si.simulate)
     assert callable(si.export)
 

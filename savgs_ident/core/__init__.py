@@ -1,1 +1,1 @@
-"""What every stage speaks: parameters with units, the rig file, statuses and errors."""
+"""What every stage speaks: parameters with units, transforms and priors, files, results, statuses and errors."""

@@ -7,18 +7,16 @@ The work is a function at the top of a module, or a ``partial`` of one. It runs 
 existing Dask cluster whose address is given. A process has one task at a time, so that its end, whatever the cause,
 concerns that task and no other: what a worker that was killed had in hand is done again by another one, and what is
 killed each time is :class:`Lost`. Ctrl-C ends the processes and leaves what came before with the caller, who keeps
-each result as it comes; the processes end with the program, however it ends. Keeping is the caller's
-(:mod:`savgs_ident.campaigns.store`, :mod:`savgs_ident.validation.trials`).
+each result as it comes (:mod:`savgs_ident.campaigns.store`, :mod:`savgs_ident.validation.trials`); the processes end
+with the program, however it ends. What is too short for processes runs in threads over all cores
+(:func:`in_parallel`, :func:`side_by_side`): compiled solvers release Python's lock while they run.
 
-Why processes of our own: in loky's executor, as in that of the standard library, a process that is killed breaks the
-pool, every task in hand is lost with it, and nothing says which one was to blame. Dask's local cluster does keep
-the others, but is an optional dependency, opens ports, takes seconds to start, and answers Ctrl-C with the tracebacks
-of its workers. Neither replaces processes after so many tasks, which bounds the memory that compiled programs take.
-
-It stands in ``core`` because validation and campaigns use it, which are apart in the order of imports.
-
-:func:`in_parallel` and :func:`side_by_side` are the same within a process, for what is short: threads over all cores;
-compiled solvers release Python's lock while they run.
+The processes are our own because in loky's executor, as in that of the standard library, a process that is killed
+breaks the pool, every task in hand is lost with it, and nothing says which one was to blame. Dask's local cluster
+does keep the others, but is an optional dependency, opens ports, takes seconds to start, and answers Ctrl-C with
+the tracebacks of its workers. Neither replaces processes after so many tasks, which bounds the memory that compiled
+programs take. The executor stands in ``core`` because validation and campaigns use it, which are apart in the order
+of imports.
 """
 
 import asyncio
@@ -32,7 +30,7 @@ import threading
 import time
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -363,7 +361,7 @@ Item = TypeVar("Item")
 Other = TypeVar("Other")
 
 
-def in_parallel(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+def in_parallel(work: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """Apply ``work`` to every item on all cores; results in the order of the items."""
     with ThreadPoolExecutor(cores()) as pool:
         return list(pool.map(work, items))

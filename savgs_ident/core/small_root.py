@@ -1,15 +1,13 @@
-"""Roots of small systems of equations, a few unknowns each, inside larger computations.
-
-Newton's method with the exact Jacobian. The forces of the rig are piecewise smooth in the unknowns (a friction
-changes sign), so a step may land on another piece: steps are repeated until the next one is negligible. A root that
-was not found is NaN, never a plausible number.
-
-Derivatives, of any order and in either direction, come from the implicit function theorem at the root, not
-from the iterations.
+"""Newton's method for the roots of small systems of equations, a few unknowns each, inside larger computations.
 
     >>> root = find_root(lambda x: x**2 - 2.0, jnp.ones(1), jnp.ones(1))
     >>> round(float(root[0]), 9)
     1.414213562
+
+The Jacobian is exact. The forces of the rig are piecewise smooth in the unknowns (a friction changes sign), so a
+step may land on another piece: steps are repeated until the next one is negligible. A root that was not found is
+NaN, never a plausible number. Derivatives, of any order and in either direction, come from the implicit function
+theorem at the root, not from the iterations.
 """
 
 from collections.abc import Callable

@@ -2,7 +2,8 @@
 
 A transform is a smooth one-to-one map from the whole line to the open range of a parameter. A solver works on the
 coordinate u without bounds; the model only ever sees values strictly inside them. At u = 0 stands the table's value
-(moved inside a little where it is a bound, for there the slope would be zero).
+(moved inside a little where it is a bound, for there the slope would be zero). There are four
+(:func:`transform_of`): the first for a parameter with a tolerance, the others for the rest, by their bounds.
 
 - :class:`Tolerated`: v = v0 + sigma s(u), a parameter in standard deviations of what is known of it. s is
   exactly u up to half way to a bound and bends towards it beyond, twice differentiable.
@@ -10,16 +11,15 @@ coordinate u without bounds; the model only ever sees values strictly inside the
 - :class:`TwoSided`: v = lower + (upper - lower) / (1 + exp(-(u + offset))): logarithmic near either bound.
 - :class:`Unbounded`: v = v0 + scale u.
 
-A parameter with a tolerance has the first, any other one of the rest (:func:`transform_of`). The prior is normal on
-the coordinate, about 0 with the standard deviation of :func:`prior_width`: 1 where a tolerance is known, whether the
-parameter is to be identified or not, and :data:`WIDTH` where nothing is.
-
     >>> friction = transform_of(Parameter("mu_r", 0.03, "1", lower=0.0, upper=0.5))
     >>> round(friction.inverse(0.03), 12), bool(friction.forward(jnp.array(-50.0)) > 0.0)
     (0.0, True)
 
-A :class:`FreeVector` holds the coordinates of the parameters that may move. *Identified* ones, which are asked for,
-come first, then those *tolerated* ones that are estimated along.
+The prior is normal on the coordinate, about 0 with the standard deviation of :func:`prior_width`: 1 where a tolerance
+is known, whether the parameter is to be identified or not, and :data:`WIDTH` where nothing is.
+
+The parameters of a table that may move form a :class:`FreeVector` of coordinates. *Identified* ones, which are asked
+for, come first, then those *tolerated* ones that are estimated along.
 
     >>> table = ParameterTable((
     ...     Parameter("mu_r", 0.03, "1", lower=0.0, upper=0.5),

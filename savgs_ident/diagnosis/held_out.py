@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map
-from savgs_ident.inference.noise_scales import NoiseScales
+from savgs_ident.inference.likelihood import NoiseScales
 from savgs_ident.inference.observations import Data, Term
 
 

@@ -25,9 +25,14 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Family, Port
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned import coefficients_at, coefficients_of, functions_at, learned_effect
-from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
-from savgs_ident.inference.laplace import log_evidence
-from savgs_ident.inference.noise_scales import linearised_optimum
+from savgs_ident.inference.find_map import (
+    LaplaceFit,
+    Search,
+    find_map,
+    linearised_optimum,
+    log_evidence,
+    search_of,
+)
 from savgs_ident.inference.observations import Data, Term
 from savgs_ident.inference.prior import Linear, bounds_of
 

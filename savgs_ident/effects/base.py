@@ -1,6 +1,13 @@
 """Ports, what a law sees there, and the kinds of laws.
 
-A plant without effects has ports where something more may act. A port is of one of a few kinds, and so is a law:
+A plant without effects has ports where something more may act. An effect is a law at a port under a name, with a
+parameter for every number that the law takes (:mod:`savgs_ident.effects.effect`):
+
+    rail_stribeck = Stribeck at the rail, rise = stribeck_rise, velocity = stribeck_velocity, coefficient = mu_r
+
+A law knows neither parameters by name nor plants: its numbers have *roles*. Every law has a *null*: values of some
+roles at which it vanishes and is differentiable. So it can be tested for, at no more cost than a gradient, on a model
+that does not have it. A port is of one of a few kinds, and so is a law:
 
     port      law                        what the law does
     force     AbstractForceLaw           adds a force, beside what the plant has there  (a spring, a damper)
@@ -10,22 +17,14 @@ A plant without effects has ports where something more may act. A port is of one
     input     AbstractInputLaw           adds to what a recorded input says             (a cam of another shape)
     sensor    AbstractSensorLaw          shows other than what is there                 (a gain, a lag)
 
-A law knows neither parameters by name nor plants: its numbers have *roles*. An effect is a law at a port under a
-name, with a parameter for every role (:mod:`savgs_ident.effects.effect`):
-
-    rail_stribeck = Stribeck at the rail, rise = stribeck_rise, velocity = stribeck_velocity, coefficient = mu_r
-
-Every law has a *null*: values of some roles at which it vanishes and is differentiable. So it can be tested for, at
-no more cost than a gradient, on a model that does not have it.
-
-The friction limits at a contact load one elasto-plastic bristle, which makes the contact stick before it slides. A
-bristle of stiffness k and damping c, anchored at w, gives
+A friction limit alone is no force: the sum of all limits at a contact loads one elasto-plastic bristle
+(:func:`bristle`), which makes the contact stick before it slides. A bristle of stiffness k and damping c, those of
+the presliding of the sheet, anchored at w, gives
 
     f = k x + c v held within -G_down .. G_up,      x = z - w,
 
 opposing the motion, with limits of friction G in both directions; the anchor is dragged along so that the spring
-stays within them (Dupont et al. 2002). A contact has one for the sum of all limits there, with the presliding of the
-sheet.
+stays within them (Dupont et al. 2002).
 """
 
 from abc import abstractmethod

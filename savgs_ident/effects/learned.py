@@ -9,10 +9,9 @@ A learned law is a sum of known functions of what its port sees, with coefficien
     sensor   LearnedTransfer    the frequency: what comes on top of a transfer function of one
 
 Every function belongs to a family (:class:`~savgs_ident.effects.base.Family`): those of one family alone are its
-flexible member, all together the general law of the port. With all coefficients at zero the law vanishes. The
-functions are held at the edge of what was seen when the law was learned: it says nothing about what lies beyond.
-
-    law = learned_effect(plant_port)             # nothing learned yet: "learned_rail" at the port "rail"
+flexible member, all together the general law of the port. With all coefficients at zero, as :func:`learned_effect`
+gives it, the law vanishes. The functions are held at the edge of what was seen when the law was learned: it says
+nothing about what lies beyond.
 """
 
 from collections.abc import Callable, Mapping
@@ -149,11 +148,8 @@ OF_THE_FREQUENCY = (
     Function("1", Family.GAIN),
     Function("s/20", Family.DYNAMICS),
     Function("(s/20)^2", Family.DYNAMICS),
-    *(Function(f"1/(1 + s/{corner:g}) - 1", Family.DYNAMICS) for corner in CORNERS),
-    *(
-        Function(f"1/(1 + 1.4 s/{corner:g} + (s/{corner:g})^2) - 1", Family.DYNAMICS)
-        for corner in SECOND_CORNERS
-    ),
+    *(Function(f"1/(1 + s/{c:g}) - 1", Family.DYNAMICS) for c in CORNERS),
+    *(Function(f"1/(1 + 1.4 s/{c:g} + (s/{c:g})^2) - 1", Family.DYNAMICS) for c in SECOND_CORNERS),
 )
 """Functions of s = j 2 pi f [rad/s] at a sensor."""
 
@@ -266,12 +262,11 @@ class LearnedForce(AbstractForceLaw):
     def _sliders(self, signals: PortSignals, state: Float[Array, " s"]) -> list[Bristle]:
         """Spring-sliders of unit friction: what they carry is a function of the motion alone."""
         one = jnp.ones_like(signals.displacement)
+        limit = FrictionLimit(one, one)
         moved = signals._replace(displacement=signals.displacement - signals.rest)
         widths = [share * self.port.displacement for share in STRETCHES]
         sticks = [Presliding(one / width, one * (SLIDER_LAG / width)) for width in widths]
-        return [
-            bristle(stick, moved, FrictionLimit(one, one), state[place]) for place, stick in enumerate(sticks)
-        ]
+        return [bristle(stick, moved, limit, state[place]) for place, stick in enumerate(sticks)]
 
 
 class LearnedCompliance(AbstractSeriesLaw):

@@ -1,12 +1,12 @@
 """CasADi and C: the explicit equations, the outputs and the implicit residual as functions without this package.
 
-CasADi: serialised functions of SX, which can be differentiated, mapped and used in optimal control as they are.
+For CasADi they are serialised functions of SX, which can be differentiated, mapped and used in optimal control as
+they are:
 
     rates = casadi.Function.load("rates.casadi")
     dx = rates(x, u, p)             # the order of the names is in signals.json
 
-C: the same functions as C99 without dependencies, for a real-time computer or another simulation, each with CasADi's
-signature
+For a real-time computer or another simulation they are C99 without dependencies, each with CasADi's signature:
 
     int rates(const double** arg, double** res, casadi_int* iw, double* w, int mem);
 

@@ -1,6 +1,7 @@
 """JSON documents: readable writing and strict reading.
 
-Writing: a table over several lines, a list of plain values on one. Numbers keep all their digits.
+What is written is made to be read: a table stands over several lines, a list of plain values on one, and numbers keep
+all their digits.
 
     >>> print(json_text({"names": ["a", "b"], "matrix": [[1.0, 0.5], [0.5, 1.0]]}), end="")
     {
@@ -11,7 +12,7 @@ Writing: a table over several lines, a list of plain values on one. Numbers keep
       ]
     }
 
-Reading: a :class:`JsonValue` knows its place in the document, so that every error names that place.
+What is read is checked: a :class:`JsonValue` knows its place in the document, so that every error names that place.
 
     >>> document = JsonValue({"k_t": {"value": 275000.0, "unit": "N/m"}})
     >>> k_t = document.table(("k_t",))["k_t"].table(("value", "unit"))

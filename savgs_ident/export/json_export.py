@@ -26,8 +26,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.export.document import JsonValue, Plain, as_plain, read_document, write_json_text
-from savgs_ident.export.equations import Equations, Signal, build_equations
-from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.exported_model import Equations, ExportedModel, Signal, build_equations
 from savgs_ident.export.gather import parse_diagnosis
 from savgs_ident.export.linear_models import (
     EQUIVALENT_UNITS,

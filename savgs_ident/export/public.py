@@ -1,9 +1,15 @@
-"""What ``import savgs_ident`` offers of exports: a model in the forms that other tools read."""
+"""The public call ``export``, and the formats in which it writes a model, one line each.
+
+The module of a format is loaded when it is used, so that a missing package affects no other format. A new format is a
+module with a function of the model and a folder that returns the files it wrote, and one line in :data:`EXPORTS`.
+"""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 from savgs_ident.core.errors import InputError, SavgsIdentError, blamed_on
@@ -13,11 +19,53 @@ from savgs_ident.diagnosis.result import Diagnosis
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.gather import DIAGNOSIS_REMEDY, Gathered, gather, read_diagnosis
 from savgs_ident.export.json_export import covariance_record
-from savgs_ident.export.registry import EXPORTS
-from savgs_ident.inference.draws import DrawSource
-from savgs_ident.inference.result import Posterior
+from savgs_ident.inference.result import DrawSource, Posterior
 from savgs_ident.plants.quarter_car.model import RigModel, load_rig, model_of
 from savgs_ident.simulate.program_cache import use_persistent_cache
+
+
+@dataclass(frozen=True)
+class Exporter:
+    """A format: its description, and the function that writes it and returns the files it wrote."""
+
+    about: str
+    write: Callable[[ExportedModel, Path], tuple[Path, ...]]
+
+
+def _exporter(writer: str, about: str) -> Exporter:
+    """A format written by ``module.function`` of this package, which is imported when it is called."""
+    module, _, function = writer.partition(".")
+
+    def write(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
+        if not folder.is_dir():
+            raise InputError(
+                "is no folder", source=folder, remedy="make it before anything is exported to it"
+            )
+        files: tuple[Path, ...] = getattr(import_module(f"{__package__}.{module}"), function)(model, folder)
+        return files
+
+    return Exporter(about, write)
+
+
+EXPORTS: Mapping[str, Exporter] = MappingProxyType(
+    {
+        "json": _exporter(
+            "json_export.write_json", "one versioned document with everything, and its JSON Schema"
+        ),
+        "mat": _exporter("mat_export.write_mat", "MATLAB: parameters, state spaces, frequency responses"),
+        "python-control": _exporter(
+            "python_control_export.write_python_control", "python-control: linear and nonlinear systems"
+        ),
+        "casadi": _exporter(
+            "casadi_export.write_casadi", "CasADi: rates, outputs and residual as serialised functions"
+        ),
+        "c": _exporter("casadi_export.write_c", "C99 source of the same functions"),
+        "fmu": _exporter(
+            "fmu_export.write_fmu", "FMI 3.0 model exchange, compiled; needs FMPy and a C compiler"
+        ),
+    }
+)
+"""All formats by name."""
 
 
 @dataclass(frozen=True)

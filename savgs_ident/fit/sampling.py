@@ -1,13 +1,31 @@
-"""What ``import savgs_ident`` offers of inference: the posterior of what was identified."""
+"""The public call ``sample``: the posterior of what was identified, and in words what its draws identify.
 
+The sentences say which parameters trade off, what the data add to what was known, and which further dwell would
+identify what the draws do not.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Progress, no_progress
-from savgs_ident.fit.posterior_advice import describe_posterior
+from savgs_ident.fit.identifiability import (
+    LARGEST_SD,
+    advice_of,
+    confounded_groups,
+    known_combination,
+    verdict_of,
+)
+from savgs_ident.fit.minimise import Minimiser
 from savgs_ident.fit.result import Fit
-from savgs_ident.inference.result import Posterior, Sampler
+from savgs_ident.inference.posterior_mode import PosteriorMode
+from savgs_ident.inference.problem import Task
+from savgs_ident.inference.result import Marginal, Posterior, Sampler
 from savgs_ident.inference.sample import Question, sample_posterior
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.plants.model import Model
@@ -94,3 +112,112 @@ def _measured(
     if isinstance(identified, Fit):
         return identified.measured
     raise InputError("a model alone has no posterior", remedy="give the campaign, or the fit")
+
+
+TIED = 0.8
+"""Correlation of logarithms from which two parameters are said to trade off."""
+
+SHRUNK = 0.5
+"""Contraction below which the data are said to add little to what was known."""
+
+CLOSE = 0.15
+"""Relative difference of standard deviations within which the Laplace approximation is said to agree."""
+
+
+def describe_posterior(
+    task: Task, mode: PosteriorMode, marginals: Sequence[Marginal], draws: Mapping[str, NDArray[np.float64]]
+) -> tuple[str, ...]:
+    """All statements about a posterior, the most important first. ``draws`` (s,) are in SI, by name."""
+    return sentences_of(marginals, draws, advise(task, mode, draws))
+
+
+def sentences_of(
+    marginals: Sequence[Marginal],
+    draws: Mapping[str, NDArray[np.float64]],
+    advice: tuple[str, ...],
+) -> tuple[str, ...]:
+    """The statements of a report, the most important first. ``draws`` (s,) are in SI, by name."""
+    identified = [each for each in marginals if each.role == "identified"]
+    names = tuple(each.name for each in identified)
+    covariance = log_covariance(names, draws)
+    values = {each.name: each.median for each in identified}
+    units = {each.name: each.unit for each in identified}
+    verdict = verdict_of(names, values, units, covariance, {}, advice)
+    return (
+        *verdict.sentences,
+        *_tied(names, covariance, confounded_groups(names, covariance)),
+        *_discrepancy(marginals),
+        *_added(identified),
+        *_laplace(identified),
+    )
+
+
+def log_covariance(names: Sequence[str], draws: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Covariance of the logarithms of the named parameters' draws, (n, n)."""
+    logs = np.stack([np.log(np.maximum(np.abs(draws[name]), np.finfo(float).tiny)).ravel() for name in names])
+    return np.atleast_2d(np.cov(logs))
+
+
+def _tied(
+    names: tuple[str, ...], covariance: NDArray[np.float64], confounded: Sequence[tuple[str, ...]]
+) -> list[str]:
+    """Pairs that are identifiable, but trade off: what is known of them together."""
+    deviation = np.sqrt(np.diag(covariance))
+    found = []
+    for i, one in enumerate(names):
+        for j, other in enumerate(names[:i]):
+            tied = abs(covariance[i, j]) > TIED * deviation[i] * deviation[j]
+            known = max(deviation[i], deviation[j]) <= LARGEST_SD
+            if tied and known and not any({one, other} <= set(group) for group in confounded):
+                label, error = known_combination((other, one), names, covariance)
+                found.append(
+                    f"{other} and {one} trade off along a line: {label} is known to {100.0 * error:.2g} %, "
+                    f"they themselves to {100.0 * deviation[j]:.2g} % and {100.0 * deviation[i]:.2g} %."
+                )
+    return found
+
+
+def _discrepancy(marginals: Sequence[Marginal]) -> list[str]:
+    scale = next(each for each in marginals if each.name == "discrepancy")
+    noise = next(each for each in marginals if each.name == "noise_scale")
+    if scale.q975 < 0.01:
+        miss = f"The model misses by less than {100.0 * scale.q975:.2g} % of the response beyond the noise (95 %)."
+    else:
+        miss = (
+            f"The model misses by {100.0 * scale.median:.2g} % of the response, more than the noise: something is "
+            "missing in it. The intervals allow for that as for independent errors."
+        )
+    return [miss, f"The noise is {noise.median:.3g} times what does not repeat from period to period."]
+
+
+def _added(identified: Sequence[Marginal]) -> list[str]:
+    little = [each.name for each in identified if each.contraction < SHRUNK]
+    return [f"The data add little to what was known of {', '.join(little)}."] if little else []
+
+
+def _laplace(identified: Sequence[Marginal]) -> list[str]:
+    off = [
+        f"{each.name} ({100.0 * (each.laplace_sd / each.sd - 1.0):+.0f} %)"
+        for each in identified
+        if not abs(each.laplace_sd / each.sd - 1.0) < CLOSE
+    ]
+    if off:
+        return [
+            f"The posterior is not normal: its curvature at the mode misjudges the spread of {', '.join(off)}."
+        ]
+    return [f"The curvature at the mode gives the same standard deviations to {100.0 * CLOSE:.0f} %."]
+
+
+def advise(task: Task, mode: PosteriorMode, draws: Mapping[str, NDArray[np.float64]]) -> tuple[str, ...]:
+    """Sentences on dwells that would help; none if all parameters are identifiable.
+
+    ``draws`` (s,) are in SI, by name.
+    """
+    covariance = log_covariance(task.problem.free.identified, draws)
+    if np.sqrt(np.diag(covariance)).max() <= LARGEST_SD:
+        return ()
+    minimiser = Minimiser(task.problem)
+    known = minimiser.evaluate(
+        jnp.asarray(mode.linearisation_point.point[:-2]), mode.linearisation_point.solution
+    )
+    return advice_of(task, minimiser, known)

@@ -25,12 +25,12 @@ from savgs_ident.core.status import Status
 from savgs_ident.core.transforms import FreeVector
 from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
 from savgs_ident.inference.likelihood import values_of
+from savgs_ident.inference.near_mode import Surrogate
 from savgs_ident.inference.observations import Prediction, Term
 from savgs_ident.inference.posterior_mode import Case
 from savgs_ident.inference.prior import NUISANCE, Coordinates, sheet_coordinate
 from savgs_ident.inference.result import Convergence, Marginal, ProfileLine, Role
 from savgs_ident.inference.samplers.chains import Chains
-from savgs_ident.inference.surrogate import Surrogate
 
 LEAST_DRAWS = 8
 """Steps of a chain below which nothing can be said."""

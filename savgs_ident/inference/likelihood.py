@@ -7,16 +7,21 @@ A harmonic X_k (Re, Im) of a channel in a dwell is taken as normal about the mod
 where C_k is its measured noise covariance, s the noise scale and d the model discrepancy: the relative rms
 error of the model's first harmonic. Higher orders err less, with a power m that the plant declares for each channel:
 m = 1 for an acceleration, which follows a force that jumps, and m = 2 for a deflection, which lies between following
-it and being moved by it. Errors
-of different orders, channels and dwells count as independent: a discrepancy that many dwells share is not
-covered by the intervals, it is what a diagnosis looks for. With d = 0 the intervals are those of the noise
-alone, which for a model that misses by more than the noise are absurdly narrow.
+it and being moved by it. Errors of different orders, channels and dwells count as independent: a discrepancy that
+many dwells share is not covered by the intervals, it is what a diagnosis looks for. With d = 0 the intervals are
+those of the noise alone, which for a model that misses by more than the noise are absurdly narrow.
 
-In the principal axes of C_k every real part is a row of its own, independent of all others.
+In the principal axes of C_k every real part is a row of its own, independent of all others: row i is normal about the
+model with variance s^2 v_i + (d a_i)^2, where v_i is its noise and a_i what a relative discrepancy of one would do to
+it.
 
-Both scales are estimated, see :class:`savgs_ident.inference.prior.Scales`: here as coordinates of a point that a
-sampler moves, in :mod:`savgs_ident.inference.noise_scales` at their best values for given residuals.
+Both scales are estimated, under the priors of :class:`savgs_ident.inference.prior.Scales`: in :class:`Likelihood` as
+coordinates of a point that a sampler moves, in :func:`noise_scales` at their best values for given residuals. A model
+that misses is thereby weighed by what it can explain.
 """
+
+from math import exp, isfinite, sqrt
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -130,3 +135,137 @@ def values_of(
 @eqx.filter_jit
 def _constrained(free: FreeVector, us: Array) -> dict[str, Array]:
     return jax.vmap(free.to_constrained)(us)
+
+
+_ROUNDS = 60
+_HALVINGS = 40
+_LONGEST = 1.5
+_LEVEL = 1e-9
+
+
+class NoiseScales(NamedTuple):
+    """The best noise scale and discrepancy for given residuals.
+
+    Attributes:
+        noise: factor on the standard deviation of the noise [1].
+        discrepancy: relative rms by which the model misses beyond the noise [1].
+        spread: variance of the rows (m,) that they make [unit of the row squared].
+        value: log density of the rows in units of their noise, the priors of both scales included.
+        converged: whether the search for them ended at a maximum.
+    """
+
+    noise: float
+    discrepancy: float
+    spread: NDArray[np.float64]
+    value: float
+    converged: bool
+
+
+def noise_scales(data: Data, residual: NDArray[np.float64], start: float = 1e-2) -> NoiseScales:
+    """The best noise scale and discrepancy for residuals (m,) of independent rows.
+
+    The discrepancy is looked for from ``start`` on.
+
+    There may be two maxima, of which one has little discrepancy: where the residuals have room for more than was
+    found, it is looked for from there too.
+    """
+    found = _maximum_from(data, residual, start)
+    excess, discrepancy_scale = (
+        float(np.sum(residual**2 - data.variance)),
+        float(np.sum(data.discrepancy_scale**2)),
+    )
+    if excess > 2.0 * max(found.discrepancy, 1e-4) ** 2 * discrepancy_scale > 0.0:
+        return max(
+            found,
+            _maximum_from(data, residual, float(np.sqrt(excess / discrepancy_scale))),
+            key=lambda each: each.value,
+        )
+    return found
+
+
+def _maximum_from(data: Data, residual: NDArray[np.float64], start: float) -> NoiseScales:
+    """The maximum that is reached from a discrepancy.
+
+    Steps in the logarithm of the noise scale and the square of the discrepancy: the better of Newton's, which is
+    short where residuals far exceed the noise, and Fisher's, which is long there, halved until the density rises.
+    Without that, Fisher's scoring swings to and fro where the noise is understated.
+    """
+    rows = _Rows(residual**2, data.variance, data.discrepancy_scale**2, data.scales)
+    point = (0.0, start**2 if rows.discrepancy_scale.any() else 0.0)
+    value, converged = _density(rows, point), False
+    for _ in range(_ROUNDS):
+        steps, promised = _steps(rows, point)
+        if promised < _LEVEL:
+            converged = isfinite(value)
+            break
+        for halving in range(_HALVINGS):
+            share = 0.5**halving
+            tried = [(point[0] + share * log, max(point[1] + share * square, 0.0)) for log, square in steps]
+            found, there = max((_density(rows, each), each) for each in tried)
+            if found > value:
+                break
+        else:
+            # What is promised is less than a sum over the rows resolves.
+            converged = promised < 1e-6
+            break
+        point, value = there, found
+    scale, miss = exp(point[0]), sqrt(point[1])
+    return NoiseScales(
+        scale, miss, scale**2 * rows.noise + miss**2 * rows.discrepancy_scale, value, converged
+    )
+
+
+class _Rows(NamedTuple):
+    """Squares (m,) of residuals, of the noise's deviations and of what a relative discrepancy of one does; priors."""
+
+    residual: NDArray[np.float64]
+    noise: NDArray[np.float64]
+    discrepancy_scale: NDArray[np.float64]
+    scales: Scales
+
+
+_Point = tuple[float, float]
+"""Logarithm of the noise scale, square of the discrepancy."""
+
+
+def _steps(rows: _Rows, point: _Point) -> tuple[list[_Point], float]:
+    """Newton's step, where the density is concave, and Fisher's; and the rise that they promise at most."""
+    trust, width = rows.scales.noise_trust, rows.scales.discrepancy
+    noise = exp(2.0 * point[0]) * rows.noise
+    spread = noise + point[1] * rows.discrepancy_scale
+    # Derivatives of the logarithm of the variance by either coordinate.
+    by = np.stack([2.0 * noise / spread, rows.discrepancy_scale / spread])
+    relative = rows.residual / spread
+    slope = 0.5 * by @ (relative - 1.0)
+    gradient = float(slope[0]) - point[0] / trust**2, float(slope[1]) - 0.5 / width**2
+    fisher, newton = 0.5 * by @ by.T, (by * (relative - 0.5)) @ by.T
+    newton[0, 0] -= 2.0 * slope[0]
+    # No discrepancy is the least one: there it is held.
+    held = point[1] == 0.0 and gradient[1] <= 0.0
+    found, promised = [], 0.0
+    for curvature in (newton, fisher):
+        own, both, other = (
+            float(curvature[0, 0]) + 1.0 / trust**2,
+            float(curvature[0, 1]),
+            float(curvature[1, 1]),
+        )
+        determinant = own * other - both**2
+        if held and own > 0.0:
+            log, square = gradient[0] / own, 0.0
+        elif own > 0.0 and determinant > 1e-12 * own * abs(other):
+            log = (other * gradient[0] - both * gradient[1]) / determinant
+            square = (own * gradient[1] - both * gradient[0]) / determinant
+        else:
+            continue
+        promised = max(promised, 0.5 * (gradient[0] * log + gradient[1] * square))
+        short = min(1.0, _LONGEST / max(abs(log), _LONGEST))
+        found.append((short * log, short * square))
+    return found, promised
+
+
+def _density(rows: _Rows, point: _Point) -> float:
+    spread = exp(2.0 * point[0]) * rows.noise + point[1] * rows.discrepancy_scale
+    data = -0.5 * float(np.sum(rows.residual / spread + np.log(spread / rows.noise)))
+    return (
+        data - 0.5 * (point[0] / rows.scales.noise_trust) ** 2 - 0.5 * point[1] / rows.scales.discrepancy**2
+    )

@@ -16,16 +16,25 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
+from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status, joint_status
-from savgs_ident.inference.exact import Anchor, ExactModel, anchor_at, in_parallel, rows_and_slopes
-from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
-from savgs_ident.inference.laplace import principal_axes
+from savgs_ident.inference.find_map import LaplaceFit, find_map, principal_axes, search_of
 from savgs_ident.inference.likelihood import Likelihood
+from savgs_ident.inference.near_mode import (
+    Anchor,
+    ExactModel,
+    Surrogate,
+    anchor_at,
+    bend_of,
+    identity_map,
+    no_bend,
+    rows_and_slopes,
+    triangular_map_of,
+)
 from savgs_ident.inference.observations import Prediction, Term
 from savgs_ident.inference.prior import Coordinates, Prior, sheet_coordinate
 from savgs_ident.inference.problem import Problem
-from savgs_ident.inference.surrogate import Surrogate, bend_of, identity_map, no_bend, triangular_map_of
 from savgs_ident.simulate.periodic import PeriodicSolution, adapt
 
 LONGEST = 1.0

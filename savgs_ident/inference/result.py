@@ -1,18 +1,28 @@
-"""What sampling gives: draws with their convergence, marginals, predictions, and sentences on what they mean."""
+"""What sampling gives: draws with their convergence, marginals, predictions, what they mean, and the draws on file.
 
-from collections.abc import Mapping
+The file is ArviZ's inference data (netCDF), written whole and read back by name. Its groups are posterior,
+posterior_predictive, sample_stats and observed_data; complex harmonics stand in them as real and imaginary parts.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
+from math import prod
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.files import scratch_folder, write_bytes
 from savgs_ident.core.presentation import Result
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 if TYPE_CHECKING:
     import xarray as xr
+
 
 Sampler = Literal["emcee", "nuts"]
 """The samplers there are."""
@@ -178,9 +188,6 @@ class Posterior(Result):
 
     def to_arviz(self) -> "xr.DataTree":
         """The draws as ArviZ's inference data: the content of ``posterior.nc``."""
-        # Only here: ArviZ and what it brings along take seconds to load.
-        from savgs_ident.inference.draws import inference_data
-
         return inference_data(self)
 
     def of_role(self, role: Role) -> tuple[Marginal, ...]:
@@ -190,3 +197,130 @@ class Posterior(Result):
     def correlation(self, names: tuple[str, ...]) -> NDArray[np.float64]:
         """Correlation [1] of the draws of the named parameters, (n, n)."""
         return np.atleast_2d(np.corrcoef(np.stack([self.draws[name].ravel() for name in names])))
+
+
+LARGEST = 2**28
+"""Most bytes that all draws, or a piece of the file that has to be unpacked for them, may take in memory."""
+
+FAR = 6.0
+"""Standard deviations by which a parameter may be off the mean of its draws: its own posterior has it within 3."""
+
+REMEDY = "give the posterior.nc that `savgs-ident posterior` wrote for this model"
+
+Draws: TypeAlias = NDArray[np.float64]
+"""Of one parameter, (n,), SI."""
+
+DrawSource: TypeAlias = Path | Posterior
+"""A ``posterior.nc``, or the posterior itself."""
+
+
+def source_name(source: DrawSource) -> str:
+    """What sentences call where draws come from."""
+    return "the posterior" if isinstance(source, Posterior) else str(source)
+
+
+def read_draws(path: DrawSource, names: Collection[str], count: int | None = None) -> dict[str, Draws]:
+    """Draws by name, each (n,), SI, chains one after the other; of ``names``, those that the file holds.
+
+    With a ``count``, at most so many, evenly spread over all. Raises :class:`InputError` if the file cannot be read
+    or holds no finite draws of any.
+    """
+    if isinstance(path, Posterior):
+        return thin_draws({name: np.ravel(path.draws[name]) for name in names if name in path.draws}, count)
+    try:
+        with h5py.File(path, "r") as file:
+            group = file["posterior"]
+            held = set(group.keys())
+            _check_size(path, [group[name] for name in names if name in held])
+            draws = {name: np.ravel(group[name][()]) for name in names if name in held}
+    except OSError as error:
+        raise InputError(f"cannot be read: {error}", source=path, remedy=REMEDY) from error
+    except (KeyError, TypeError, AttributeError, ValueError, RuntimeError) as error:
+        raise InputError("is no posterior", source=path, remedy=REMEDY) from error
+    lengths = {values.size for values in draws.values()}
+    finite = all(values.dtype.kind == "f" and np.isfinite(values).all() for values in draws.values())
+    if len(lengths) != 1 or 0 in lengths or not finite:
+        raise InputError("holds no finite draws of the model's parameters", source=path, remedy=REMEDY)
+    return thin_draws({name: values.astype(np.float64) for name, values in draws.items()}, count)
+
+
+def thin_draws(draws: Mapping[str, Draws], count: int | None) -> dict[str, Draws]:
+    """At most ``count`` draws of each parameter, evenly spread over all, each (n,), SI; all without a count."""
+    total = min((values.size for values in draws.values()), default=0)
+    chosen = np.unique(np.linspace(0, total - 1, min(count or total, total)).astype(int))
+    return {name: values[chosen] for name, values in draws.items()}
+
+
+def far_from_draws(
+    values: Mapping[str, float], draws: Mapping[str, Draws], limit: float = FAR
+) -> tuple[str, ...]:
+    """Names of the ``values`` [SI] that are more than ``limit`` standard deviations [1] off the mean of their draws.
+
+    To be asked of all draws (n,), before they are thinned: few of them know no standard deviation, and one has none.
+    """
+    return tuple(
+        name
+        for name, each in draws.items()
+        if each.size > 1 and abs(values[name] - float(np.mean(each))) > limit * float(np.std(each))
+    )
+
+
+def _check_size(path: Path, held: Sequence[h5py.Dataset]) -> None:
+    """A file of some kilobytes can declare terabytes, and be read as so many zeros."""
+    whole = sum(each.size * each.dtype.itemsize for each in held)
+    pieces = [prod(each.chunks) * each.dtype.itemsize for each in held if each.chunks]
+    if max([whole, *pieces]) > LARGEST:
+        raise InputError(f"declares more than {LARGEST} bytes of draws", source=path, remedy=REMEDY)
+
+
+_DIMENSIONS = ["dwell", "channel", "order"]
+
+
+def inference_data(posterior: Posterior) -> "xr.DataTree":
+    """All groups; variables carry their units."""
+    # Only here: ArviZ and what it brings along take seconds to load.
+    import arviz_base
+
+    predictive, measured = posterior.predictive, posterior.measured
+    orders = predictive.used.shape[2]
+    channels = [each.name for each in posterior.model.channels]
+    rows = [measured.channel(name) if name in measured.channels else 0 for name in channels]
+    observed = np.where(predictive.used, measured.harmonics[:, rows, :orders], np.nan)
+    replicated = np.where(predictive.used, predictive.replicated, np.nan)[None]
+    model = predictive.model[None]
+    tree = arviz_base.from_dict(
+        {
+            "posterior": dict(posterior.draws),
+            "posterior_predictive": _parts("harmonics", replicated) | _parts("model", model),
+            "sample_stats": dict(posterior.statistics),
+            "observed_data": _parts("harmonics", observed),
+        },
+        dims={f"{name}_{part}": _DIMENSIONS for name in ("harmonics", "model") for part in ("re", "im")},
+        coords={
+            "dwell": list(measured.tests),
+            "channel": channels,
+            "order": np.arange(orders),
+        },
+        # A run that was stopped early may have fewer draws than walkers.
+        check_conventions=False,
+    )
+    for marginal in posterior.marginals:
+        tree["posterior"][marginal.name].attrs.update(
+            unit=marginal.unit, about=marginal.about, role=marginal.role
+        )
+    for group in ("posterior_predictive", "observed_data"):
+        tree[group].coords["frequency"] = ("dwell", measured.frequency, {"unit": "Hz"})
+    tree.attrs["sampler"] = posterior.sampler
+    return tree
+
+
+def write_inference_data(posterior: Posterior, path: Path) -> Path:
+    """Write the inference data, whole or not at all; raises :class:`InputError` if it cannot be written."""
+    with scratch_folder() as folder:
+        file = folder / "posterior.nc"
+        inference_data(posterior).to_netcdf(file, engine="h5netcdf")
+        return write_bytes(path, file.read_bytes())
+
+
+def _parts(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    return {f"{name}_re": np.real(values), f"{name}_im": np.imag(values)}

@@ -33,8 +33,8 @@ from savgs_ident.inference.diagnostics import (
     others_mixed,
     precise,
 )
-from savgs_ident.inference.exact import ExactModel
 from savgs_ident.inference.likelihood import likelihood_of, values_of
+from savgs_ident.inference.near_mode import ExactModel, Surrogate
 from savgs_ident.inference.posterior_mode import Case, Expansion, PosteriorMode, expand, find_mode
 from savgs_ident.inference.prior import Prior
 from savgs_ident.inference.problem import ProblemSettings, Task, harmonic_target, plan_task
@@ -49,7 +49,6 @@ from savgs_ident.inference.samplers.chains import (
 )
 from savgs_ident.inference.samplers.emcee import sample_by_emcee
 from savgs_ident.inference.samplers.nuts import sample_by_nuts
-from savgs_ident.inference.surrogate import Surrogate
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import simulate_periodic

@@ -1,19 +1,18 @@
-"""A recording of a servo axis under closed loop: where it was, where it was to be, and the force of its drive.
+"""A recording of a servo axis under closed loop, from a MATLAB file: position, reference and the force of the drive.
 
-The file has, in MATLAB's format, column vectors ``t`` [s], ``qm`` (measured position [m]), ``qg`` (reference [m])
-and ``vir`` (controller output [V]), and the scalar ``gtau`` (force of the drive per volt [N/V]). Pulses that were
-added to the controller's output are in ``vir`` already, so that nothing else is read.
+The file (version 5 to 7 of MATLAB's format) has column vectors ``t`` [s], ``qm`` (measured position [m]), ``qg``
+(reference [m]) and ``vir`` (controller output [V]), and the scalar ``gtau`` (force of the drive per volt [N/V]).
+Pulses that were added to the controller's output are in ``vir`` already, so that nothing else is read.
 
-Numeric arrays out of a MATLAB file (version 5 to 7), from a stranger.
-
-Nothing in the file is run or built: only the named arrays are read, and only if they are real and numeric; what would
-unpack to more than :data:`LARGEST` bytes is refused before it does. The few parts of such an array are read here
-because SciPy's reader, which knows all of the format, ends the process on some malformed files.
+The file may come from a stranger. Nothing in it is run or built: only the named arrays are read, and only if they
+are real and numeric; what would unpack to more than :data:`LARGEST` bytes is refused before it does. The few parts
+of such an array are read here because SciPy's reader, which knows all of the format, ends the process on some
+malformed files:
 
     element   type, size, content; a small one has both in one word. Packed ones hold another element.
     array     flags (class, complex), shape, name, numbers: in this order, each an element of its own
 
-MathWorks, MAT-File Format, on the Level 5 format.
+Source: MathWorks, MAT-File Format, on the Level 5 format.
 """
 
 import struct

@@ -1,7 +1,12 @@
 """Which signal of a file is which channel: by ``channels.toml``, or by its usual name.
 
-The file ``channels.toml`` says which column or topic is which channel where the names do not say it. It lies beside
-the recordings or is given::
+A reader of a file format lists the signals that a file offers (columns, fields of topics) as
+:class:`SignalCandidate` records. :func:`bind` assigns them to channels: by the channel map first, then by their
+usual names. The reader returns a :class:`Reading`: the tests as they stand in the file, before any check, and its
+warnings.
+
+The channel map is the file ``channels.toml``, beside the recordings or given. It says which column or topic is which
+channel where the names do not say it::
 
     [channels.link_velocity]
     column = "SPEED_3"          # CSV: the header as it is, or without its unit
@@ -27,12 +32,6 @@ the recordings or is given::
     [tests]
     column = "condition"        # CSV: the column that names the test
     topic  = "/operator"        # MCAP: the topic that carries "start X" and "end X"
-
-A channel that the map does not mention is still recognised by its usual name.
-
-A reader of a file format lists the signals that a file offers (columns, fields of topics) as :class:`SignalCandidate`
-records. :func:`bind` assigns them to channels: the channel map first, then the usual names. The reader returns a
-:class:`Reading`: the tests as they stand in the file, before any check, and its warnings.
 """
 
 import tomllib

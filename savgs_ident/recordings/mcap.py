@@ -1,8 +1,8 @@
 """MCAP campaigns: JSON or ROS 2 CDR topics, each with its own clock, cut into tests by their events.
 
-Chunked or not, compressed with zstd, lz4 or not at all, with index and summary or without. A topic is used if
-the channel map names it, or if it is a usual one: a field or Float64 topic with a usual name, the vertical axis
-of ``sensor_msgs/Imu``, the single link in ``sensor_msgs/JointState``.
+A file may be chunked or not, compressed with zstd, lz4 or not at all, with index and summary or without. A topic is
+used if the channel map names it, or if it is a usual one: a field or Float64 topic with a usual name, the vertical
+axis of ``sensor_msgs/Imu``, the single link in ``sensor_msgs/JointState``.
 
 Segments of the container go to ``_TopicCollector``, which keeps a :class:`TopicColumns` for each topic: its
 decoder, its bindings, its growing columns. At the end each topic gets its clock and is cut into tests.

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from savgs_ident.fit.residuals import MeasuredPoints
+from savgs_ident.fit.result import MeasuredPoints
 from savgs_ident.report.text import ChannelLabel
 from savgs_ident.report.theme import (
     BLUE,
@@ -30,7 +30,7 @@ from savgs_ident.report.theme import (
     printable,
     styled,
 )
-from savgs_ident.simulate.frequency_response import ModelCurve
+from savgs_ident.simulate.public import ModelCurve
 
 _COLUMN = 5.25
 """Width of a column [in]."""

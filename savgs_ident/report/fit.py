@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from rich.console import Group, RenderableType
 
 from savgs_ident.core.files import warning_record
-from savgs_ident.fit.comparison import Comparison
-from savgs_ident.fit.residuals import (
+from savgs_ident.fit.public import Comparison
+from savgs_ident.fit.result import (
+    Estimate,
+    Fit,
     Gap,
     MeasuredPoints,
     chi2_by_dwell,
@@ -23,7 +25,6 @@ from savgs_ident.fit.residuals import (
     predicted_peak_to_peak,
     whitened,
 )
-from savgs_ident.fit.result import Estimate, Fit
 from savgs_ident.plants.model import Model
 from savgs_ident.report.text import channel_label, data_warnings, fixed, per_input_key, plain, table
 

@@ -15,7 +15,7 @@ from savgs_ident.export.gather import Gathered
 from savgs_ident.plants.base import Input
 from savgs_ident.report.text import channel_labels, fixed, per_input_key, plain, table
 from savgs_ident.report.theme import BLUE, GREY, new_figure, styled
-from savgs_ident.simulate.frequency_response import (
+from savgs_ident.simulate.public import (
     DURATION_S,
     HIGHEST_HZ,
     LOWEST_HZ,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from savgs_ident.diagnosis.result import Diagnosis
-    from savgs_ident.fit.comparison import Comparison
+    from savgs_ident.fit.public import Comparison
     from savgs_ident.fit.result import Fit
     from savgs_ident.inference.result import Posterior
     from savgs_ident.responses.summary import CampaignSummary
@@ -90,7 +90,7 @@ class _Fit(_Identified["Fit"]):
         return (f"{result.doubt}{remedy}.",)
 
     def comparison(self, result: "Fit") -> "Comparison":
-        from savgs_ident.fit.comparison import comparison_of
+        from savgs_ident.fit.public import comparison_of
 
         return comparison_of(result)
 
@@ -137,7 +137,7 @@ def comparison_figure(comparison: "Comparison", progress: Progress = no_progress
     # Loading what draws takes as long as solving, which leaves Python free.
     with ThreadPoolExecutor(1) as pool:
         solving = pool.submit(comparison.between)
-        from savgs_ident.fit.residuals import measured_points, whitened
+        from savgs_ident.fit.result import measured_points, whitened
         from savgs_ident.report.bode import bode_figure
         from savgs_ident.report.text import channel_labels
     model, frictionless = solving.result()
@@ -200,7 +200,7 @@ class _Posterior(AbstractPresenter["Posterior"]):
         }
 
     def write(self, result: "Posterior", folder: Path, progress: Progress) -> Iterator[Path]:
-        from savgs_ident.inference.draws import write_inference_data
+        from savgs_ident.inference.result import write_inference_data
 
         progress("writing")
         yield write_inference_data(result, folder / "posterior.nc")

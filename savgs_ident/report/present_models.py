@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from savgs_ident.control.linear_study import LinearStudy
     from savgs_ident.core.values import Values
     from savgs_ident.export.public import Exported
-    from savgs_ident.simulate.frequency_response import SimulatedResponse, SimulatedSweep
+    from savgs_ident.simulate.public import SimulatedResponse, SimulatedSweep
 
 _UNSOLVED = "the simulation did not converge everywhere; see the status in the table."
 

@@ -8,10 +8,10 @@ The position is filtered without phase and differentiated centrally. A friction 
 so that a model is evaluated at every sample, and its force goes through the same low-pass and thinning as the
 measured one: both sides of M a + ... = F see the same filter, and it moves no parameter.
 
-The reference goes through the same cycle several times. What is left of the force once inertia and a viscous
-friction have explained their part holds whatever such a model lacks; between one cycle and the next that is the
-same, and the difference is noise, that of the differentiated position included. Its median size is taken, so that a
-few instants (reversals, a pulse in one cycle) do not count as noise.
+The noise of the force comes from the cycles of the reference, which goes through the same one several times. What is
+left of the force once inertia and a viscous friction have explained their part holds whatever such a model lacks;
+between one cycle and the next that is the same, and the difference is noise, that of the differentiated position
+included. Its median size is taken, so that a few instants (reversals, a pulse in one cycle) do not count as noise.
 """
 
 from dataclasses import dataclass

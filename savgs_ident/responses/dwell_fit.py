@@ -4,17 +4,15 @@ The fit starts at the road's own frequency; every channel then estimates the dri
 estimates are pooled by their variances. A channel is fitted with all orders that its sampling carries, not only
 those asked for: truncated orders would otherwise bias the orders kept, or be counted as noise.
 
-The noise of a periodic record, from what does not repeat from period to period.
-
-A periodic signal has power at the multiples of its fundamental f and nowhere else; a record of P periods also
-resolves the P - 1 frequencies between two neighbouring harmonics, and power found there is noise. The power at
-those frequencies, I(v) = |sum_j r_j exp(-2 pi i v t_j)|^2 / N, is exponentially distributed about the noise
-density S(v) (variance per sample if the noise were white). Its logarithm is fitted by an even polynomial in
-asinh(2 v / f) by maximum likelihood (Whittle), the degree chosen by an information criterion (3.5 for a
-coefficient): white noise takes one coefficient and hundreds of degrees of freedom, coloured noise as many as it
-needs. A peak too narrow for the polynomial is found by its excess over the neighbouring frequencies. Noise that
-still rises towards zero below a few cycles per record (slow drift beyond a straight line) is understated at order
-0, and only there: its level there is not in the record.
+The noise is what does not repeat from period to period. A periodic signal has power at the multiples of its
+fundamental f and nowhere else; a record of P periods also resolves the P - 1 frequencies between two neighbouring
+harmonics, and power found there is noise. The power at those frequencies, I(v) = |sum_j r_j exp(-2 pi i v t_j)|^2 /
+N, is exponentially distributed about the noise density S(v) (variance per sample if the noise were white). Its
+logarithm is fitted by an even polynomial in asinh(2 v / f) by maximum likelihood (Whittle), the degree chosen by an
+information criterion (3.5 for a coefficient): white noise takes one coefficient and hundreds of degrees of freedom,
+coloured noise as many as it needs. A peak too narrow for the polynomial is found by its excess over the
+neighbouring frequencies. Noise that still rises towards zero below a few cycles per record (slow drift beyond a
+straight line) is understated at order 0, and only there: its level there is not in the record.
 
 References: P. Whittle, Ark. Mat. 2 (1953) 423; R. Pintelon, J. Schoukens, System Identification: A
 Frequency Domain Approach (2012), chapter 2 (noise from non-excited frequencies).

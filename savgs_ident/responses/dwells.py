@@ -24,9 +24,7 @@ from savgs_ident.responses.fundamental import (
     highest_valid_order,
 )
 from savgs_ident.responses.harmonic_response import HarmonicResponse, unbiased_peak_to_peak
-from savgs_ident.responses.outliers import check_outliers
-from savgs_ident.responses.robust_dwell import fit_robust_dwell
-from savgs_ident.responses.standstill import estimate_standstill_noise
+from savgs_ident.responses.outliers import check_outliers, estimate_standstill_noise, fit_robust_dwell
 
 FEWEST_PERIODS = 3
 _FREQUENCY_MISS = 0.02

@@ -7,14 +7,14 @@ With the harmonics X_k fitted at a trial frequency f, the residual r changes wit
 The part of d that is orthogonal to the harmonics, d', gives the Gauss-Newton step <d', r> / <d', d'> and, with the
 noise density S_k near order k, its variance sum_k w_k S_k / <d', d'>, w_k the share of order k in d.
 
-Channels are grouped by the clock that stamped them (:class:`ClockGroup`). A rate that differs between clocks shows
-in the data as a different fundamental. A constant offset between two clocks does not: it looks like a phase lag
+Channels are grouped by the clock that stamped them (:class:`ClockGroup`), because a rate that differs between clocks
+shows in the data as a different fundamental. A constant offset between two clocks does not: it looks like a phase lag
 that grows with frequency, as a sensor's delay does. Stamps are therefore taken as true up to their rate.
 
-A signal sampled without a filter folds what lies above the Nyquist frequency back into the band. A periodic one
-folds onto lines of its own unless the sampling rate and the fundamental have a small common multiple: orders k and
-l share a line where (k - l) f is a multiple of the rate, to within the resolution 1 / T. Up to that order, orders
-above the Nyquist frequency are fitted as well.
+How many orders can be fitted depends on the sampling of a group. A signal sampled without a filter folds what lies
+above the Nyquist frequency back into the band. A periodic one folds onto lines of its own unless the sampling rate
+and the fundamental have a small common multiple: orders k and l share a line where (k - l) f is a multiple of the
+rate, to within the resolution 1 / T. Up to that order, orders above the Nyquist frequency are fitted as well.
 """
 
 from collections.abc import Mapping

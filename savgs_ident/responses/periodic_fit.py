@@ -4,19 +4,19 @@ The signals y_c(t_j) of one clock are written as
 
     y_c(t) = sum_{k=-K..K} c_k exp(i k w t) + b t + noise,    c_{-k} = conj(c_k),  X_k = 2 c_k,  X_0 = c_0.
 
-The normal matrix of the exponentials has the entries sum_j exp(i (l - k) w t_j): it depends on l - k only (a
-Toeplitz matrix), so 2K + 1 sums over the stamps determine it, and it is close to N times the identity whatever
-the jitter. Conjugate gradients, with products by fast Fourier transform, therefore converge to rounding in about
-ten steps; where they do not, the stamps do not determine the harmonics. The slope b absorbs slow drift. Neither
-equal spacing nor a whole number of periods is needed.
-
     >>> time = np.arange(1000) / 250.0 - 2.0
     >>> basis = plan_basis(time, 2.0, highest=3)
     >>> fit = fit_periodic(basis, np.cos(4 * np.pi * time)[None], highest=3, gains_to=1)
     >>> np.round(np.abs(fit.amplitude[0]), 9).tolist()
     [0.0, 1.0, 0.0, 0.0]
 
-The sums of exponentials over unevenly spaced stamps are a nonuniform fast Fourier transform. Each sample is
+The normal matrix of the exponentials has the entries sum_j exp(i (l - k) w t_j): it depends on l - k only (a
+Toeplitz matrix), so 2K + 1 sums over the stamps determine it, and it is close to N times the identity whatever
+the jitter. Conjugate gradients, with products by fast Fourier transform, therefore converge to rounding in about
+ten steps; where they do not, the stamps do not determine the harmonics. The slope b absorbs slow drift. Neither
+equal spacing nor a whole number of periods is needed.
+
+These sums of exponentials over unevenly spaced stamps are a nonuniform fast Fourier transform. Each sample is
 spread over the nearest 14 points of a fine, even grid of phases by a smooth kernel; the grid is transformed; the
 kernel's own transform is divided out. With the kernel exp(b (sqrt(1 - x^2) - 1)), a grid twice as fine as the
 highest order needs and b = 2.3 * 14, the result is accurate to about 1e-12 of the largest sum. No threaded library

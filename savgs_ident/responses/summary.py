@@ -9,7 +9,7 @@ from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.recordings.recording import Campaign, Recording
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
-from savgs_ident.responses.standstill import estimate_standstill_noise
+from savgs_ident.responses.outliers import estimate_standstill_noise
 from savgs_ident.responses.sweeps import estimate_sweep_response
 
 LEAST_RATIO = 3.0

@@ -1,1 +1,1 @@
-"""Motions of the rig: periodic steady states and transients."""
+"""Motions of a plant: periodic steady states and transients."""

@@ -1,26 +1,25 @@
-"""Periodic collocation: the implicit residual at every node, the trapezoidal rule between nodes.
+"""Periodic collocation: a plant's equations at time nodes over a period, and Newton steps that close the period.
 
-Unknowns at a node are x = (q, qd, s) and y = (qdd, sd): m = 2 n + s and k = n + s numbers for a plant with n
-coordinates and s internal states. The plant asks for r(x, y) = 0 at every node; between nodes
+The implicit residual holds at every node, the trapezoidal rule between nodes. Unknowns at a node are x = (q, qd, s)
+and y = (qdd, sd): m = 2 n + s and k = n + s numbers for a plant with n coordinates and s internal states. The plant
+asks for r(x, y) = 0 at every node; between nodes
 
     x_{n+1} = x_n + h ((1 - g) xd_n + g xd_{n+1}),      xd = (qd, y),
 
 with g = 1/2, or g = 1 for states that slip, where backward Euler is the exact play operator. A Newton step
-eliminates y at each node, dy = J dx + e, and what is left is
+(:func:`linearise`) eliminates y at each node, dy = J dx + e, and what is left is
 
     A_{n+1} dx_{n+1} = B_n dx_n + d_n,    A_n = I - h_{n-1} g F_n,    B_n = I + h_n (1 - g) F_n,
 
-with F = d(xd)/dx. In terms of A_n dx_n it is an affine recurrence whose matrices B_n A_n^-1 need one node
-only; it closes after one period.
+with F = d(xd)/dx. In terms of A_n dx_n it is an affine recurrence whose matrices M_n = B_n A_n^-1 need one node only:
 
-Affine recurrences that close after one period,
+    x_{n+1} = M_n x_n + d_n,    x_N = x_0.
 
-    x_{n+1} = M_n x_n + d_n,    x_N = x_0,
-
-with small matrices M_n, are solved dwell by dwell. Eliminating from node to node is stable because a rig
-forgets its past (the products of M_n shrink). Products are formed in chunks, all chunks of all dwells at a
-time, then over the chunks of a dwell; the period closes with (I - M_{N-1} ... M_0) x_0 = d. The
-factorisation serves any number of right sides, which is what makes sensitivities cheap.
+Such recurrences are solved dwell by dwell (:func:`factorise_recurrence`, :func:`solve_recurrence`). Eliminating from
+node to node is stable because a rig forgets its past (the products of M_n shrink). Products are formed in chunks, all
+chunks of all dwells at a time, then over the chunks of a dwell; the period closes with
+(I - M_{N-1} ... M_0) x_0 = d. The factorisation serves any number of right sides, which is what makes sensitivities
+cheap.
 
 Arrays are laid out with the matrix indices first and the nodes of all dwells last, so that every operation is
 a long vector.

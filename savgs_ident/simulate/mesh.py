@@ -1,4 +1,4 @@
-"""Time nodes of periodic solutions, dense where the acceleration moves fast.
+"""Time nodes of periodic solutions: dense where the acceleration moves fast, those of all dwells in flat arrays.
 
 A friction that sticks turns the acceleration round within a few milliseconds of a period that may last two
 seconds. Equal steps waste nodes; here the nodes follow the arc length of the acceleration in an earlier,
@@ -6,11 +6,9 @@ coarser solution: half of them are spread evenly over the period, half in propor
 accelerations change. The map from node number to time is smooth, so that sums over the nodes, weighted with
 the map's own derivative, converge as fast as they do on equal steps.
 
-How the time nodes of all dwells share flat arrays.
-
-A slow dwell needs more nodes than a fast one: its reversals take the same few milliseconds of a longer
-period. The nodes of all dwells stand one after the other in flat arrays, so that the model is evaluated once
-for all of them; chunks of equal length are what the linear algebra runs over in parallel.
+A slow dwell needs more nodes than a fast one, because its reversals take the same few milliseconds of a longer period
+(:class:`Layout`). The nodes of all dwells stand one after the other, so that the model is evaluated once for all of
+them; chunks of equal length are what the linear algebra runs over in parallel.
 """
 
 from dataclasses import dataclass

@@ -1,19 +1,19 @@
 """Periodic steady states of all dwells at once, and what the sensors read along them.
 
+    solution = simulate_periodic(plant, p, excitation)
+    response = harmonics(plant, p, solution, orders=9)   # complex, (dwells, channels, 10)
+
 A dwell's motion is periodic but not smooth: the rail sticks at every reversal. The motion is found by
 periodic collocation in time (:mod:`savgs_ident.simulate.collocation`): a coarse, evenly spaced solution shows
 where the accelerations change, the nodes move there, and the solution is repeated on them. The nodes then
 serve any nearby parameter set, which is how fits warm-start.
 
-    solution = simulate_periodic(plant, p, excitation)
-    response = harmonics(plant, p, solution, orders=9)   # complex, (dwells, channels, 10)
-
-:mod:`savgs_ident.simulate.sensitivity` says how the response changes with the parameters. What the truncation to a
-finite number of nodes costs is stated by :func:`truncation_error`, which solves once more on twice as many nodes.
-
 Newton's iteration is damped, and on all dwells at once. Each dwell has its own damping: where a step is longer than
 the one before it (a friction that sticks now here, now there), the next ones are shortened; where steps shrink they
 are taken whole again.
+
+What the truncation to a finite number of nodes costs is stated by :func:`truncation_error`, which solves once more on
+twice as many nodes. How the response changes with the parameters is in :mod:`savgs_ident.simulate.sensitivity`.
 """
 
 from dataclasses import dataclass

@@ -10,21 +10,19 @@
     9.0
 
 The function is traced once, at the shapes of the examples given, and the trace is evaluated on CasADi scalars,
-equation by equation. Each equation applies one primitive. If its operands depend on the inputs, the rule of the
-primitive's name builds the expressions; if they are known, JAX computes the value immediately.
+equation by equation. Each equation applies one primitive. If its operands are known, JAX computes the value
+immediately; if they depend on the inputs, the rule of the primitive's name builds the expressions. Rules that compute
+are in :mod:`savgs_ident.symbolic.operations`.
 
-Arrays become columns, last index fastest. Integers and booleans become numbers. CasADi differentiates what is
+Operations that move elements (reshape, slice, concatenate, pad, gather, ...) are left to JAX itself: it is given an
+array of whole numbers, the index of each element, and the result shows where each element went. So none of them is
+written a second time, and another one is one more name in :data:`MOVING`. An index that depends on the inputs (the
+piece of a table that an input falls into) has a few possible values: the operation is done for each of them, and the
+result is selected among theirs.
+
+In the result arrays are columns, last index fastest; integers and booleans are numbers. CasADi differentiates what is
 computed: derivatives that were overridden in JAX (``stop_gradient``, ``custom_jvp``) are not carried over, and where
 JAX gives the mean of two slopes at a kink, CasADi gives one of them.
-
-Operations that move elements: reshape, slice, concatenate, pad, gather, ...
-
-JAX itself moves them. It is given an array of whole numbers, the index of each element, and the result shows where
-each element went. So none of these operations is written a second time, and another one is one more name in
-:data:`MOVING`.
-
-An index that depends on the inputs (the piece of a table that an input falls into) has a few possible values: the
-operation is done for each of them, and the result is selected among theirs.
 """
 
 from collections.abc import Callable, Mapping, Sequence

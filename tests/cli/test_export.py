@@ -12,9 +12,9 @@ import pytest
 from click.testing import Result
 
 from savgs_ident.core.errors import InputError, SavgsIdentError
-from savgs_ident.export import registry
+from savgs_ident.export import public
 from savgs_ident.export.json_export import read_model_json
-from savgs_ident.export.registry import Exporter
+from savgs_ident.export.public import Exporter
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig, write_rig
 
@@ -238,8 +238,6 @@ def test_a_format_that_cannot_hold_the_model_is_code_2(
     def fails(*args: object) -> tuple[Path, ...]:
         raise raised
 
-    from savgs_ident.export import public
-
     monkeypatch.setattr(public, "EXPORTS", {"json": Exporter("", fails)})
     done = invoke("export", RIG, "--to", "json", "--quiet")
     assert done.exit_code == 2
@@ -248,7 +246,7 @@ def test_a_format_that_cannot_hold_the_model_is_code_2(
 
 def test_the_help_names_every_format(invoke: Invoke) -> None:
     told = " ".join(invoke("export", "--help").output.split())
-    for name in registry.EXPORTS:
+    for name in public.EXPORTS:
         assert name in told
 
 

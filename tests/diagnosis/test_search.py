@@ -17,7 +17,7 @@ from savgs_ident.diagnosis.score_test import cosine, score_terms
 from savgs_ident.diagnosis.search import Findings, excess, forward_selection, left_over, pairs_with
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
-from savgs_ident.inference.noise_scales import noise_scales
+from savgs_ident.inference.likelihood import noise_scales
 from savgs_ident.inference.observations import Prediction, Term
 from savgs_ident.inference.prior import Linear
 

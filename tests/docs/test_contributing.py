@@ -17,7 +17,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import as_values
 from savgs_ident.effects import effect
 from savgs_ident.effects.base import PortSignals
-from savgs_ident.export import registry
+from savgs_ident.export import public
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.plants.base import Excitation, find_rest, nominal_inputs, standing
 from savgs_ident.plants.quarter_car.catalogue import build_model
@@ -164,9 +164,9 @@ def test_the_reader_reads_what_is_saved_and_refuses_what_is_damaged(
 
 def test_the_export_can_be_read_back(rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write = _example("table_export").write_table
-    table = registry.Exporter("parameters as a table", write)
-    monkeypatch.setattr(registry, "EXPORTS", {**registry.EXPORTS, "table": table})
-    (path,) = registry.EXPORTS["table"].write(ExportedModel(rig, ("rail_coulomb",)), tmp_path)
+    table = public.Exporter("parameters as a table", write)
+    monkeypatch.setattr(public, "EXPORTS", {**public.EXPORTS, "table": table})
+    (path,) = public.EXPORTS["table"].write(ExportedModel(rig, ("rail_coulomb",)), tmp_path)
     lines = path.read_text().splitlines()
     assert lines[0] == "name,value,unit"
     values = {name: float(value) for name, value, _ in (line.split(",") for line in lines[1:])}

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.export import registry
+from savgs_ident.export import public
 from savgs_ident.export.exported_model import ExportedModel
-from savgs_ident.export.registry import EXPORTS
+from savgs_ident.export.public import EXPORTS
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.rig import Rig
 
@@ -70,7 +70,7 @@ def test_a_package_that_is_not_there_stands_in_the_way_of_no_other_format(
             raise ImportError("no such package")
         return importlib.import_module(name)
 
-    monkeypatch.setattr(registry, "import_module", lacking)
+    monkeypatch.setattr(public, "import_module", lacking)
     assert EXPORTS["json"].write(model, tmp_path)
     with pytest.raises(ImportError):
         EXPORTS["mat"].write(model, tmp_path)

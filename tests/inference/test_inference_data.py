@@ -8,9 +8,8 @@ import xarray as xr
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.inference.diagnostics import judge_chains, mixing_of
-from savgs_ident.inference.draws import inference_data, write_inference_data
 from savgs_ident.inference.likelihood import values_of
-from savgs_ident.inference.result import Marginal, Posterior
+from savgs_ident.inference.result import Marginal, Posterior, inference_data, write_inference_data
 from savgs_ident.inference.sample import predict
 from savgs_ident.inference.samplers.chains import Chains
 from savgs_ident.plants.quarter_car.model import RigModel

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 
 from savgs_ident.inference.find_map import find_map, search_of
-from savgs_ident.inference.noise_scales import noise_scales
+from savgs_ident.inference.likelihood import noise_scales
 from savgs_ident.inference.observations import Data
 
 from ..diagnosis.toy import TERMS, ToyPlant, draw

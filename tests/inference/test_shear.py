@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from jaxtyping import Array
 
-from savgs_ident.inference.surrogate import TriangularMap, identity_map, triangular_map_of
+from savgs_ident.inference.near_mode import TriangularMap, identity_map, triangular_map_of
 
 SIZE, ROWS = 4, 12
 

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from savgs_ident.inference.surrogate import SHAPES, bend_of
+from savgs_ident.inference.near_mode import SHAPES, bend_of
 
 from .toy import Toy, bent_toy
 from .toy_surrogate import Stand, stand_for

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from savgs_ident.fit.posterior_advice import log_covariance, sentences_of
+from savgs_ident.fit.sampling import log_covariance, sentences_of
 from savgs_ident.inference.result import Marginal, Role
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from savgs_ident.inference.near_mode import Surrogate, bend_of, triangular_map_of
 from savgs_ident.inference.posterior_mode import Case, LinearisationPoint, linear_surrogate
 from savgs_ident.inference.prior import Prior
-from savgs_ident.inference.surrogate import Surrogate, bend_of, triangular_map_of
 
 from .toy import Toy
 

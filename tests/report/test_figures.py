@@ -12,15 +12,14 @@ from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from savgs_ident.fit.residuals import measured_points, whitened
-from savgs_ident.fit.result import Fit
+from savgs_ident.fit.result import Fit, measured_points, whitened
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.report.bode import bode_figure, response_figure
 from savgs_ident.report.campaigns.inspect import campaign_figure
 from savgs_ident.report.text import response_labels
 from savgs_ident.report.theme import DPI, printable, write_figure
 from savgs_ident.responses.summary import CampaignSummary, inspect
-from savgs_ident.simulate.frequency_response import ModelCurve, model_curve
+from savgs_ident.simulate.public import ModelCurve, model_curve
 
 LABELS = tuple(response_labels(RIG_LAYOUT).values())
 

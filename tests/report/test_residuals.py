@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose
 from scipy.stats import chi2 as chi2_distribution
 from scipy.stats import kstest
 
-from savgs_ident.fit.residuals import (
+from savgs_ident.fit.result import (
+    Fit,
     chi2_by_dwell,
     comparable,
     entries_by_dwell,
@@ -16,7 +17,6 @@ from savgs_ident.fit.residuals import (
     predicted_peak_to_peak,
     whitened,
 )
-from savgs_ident.fit.result import Fit
 from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.responses.harmonic_response import HarmonicResponse

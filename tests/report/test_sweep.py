@@ -14,8 +14,7 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.report.model import sweep_columns, sweep_figure, sweep_record
 from savgs_ident.report.theme import write_figure
-from savgs_ident.simulate.frequency_response import DURATION_S, HIGHEST_HZ, SimulatedSweep
-from savgs_ident.simulate.public import simulate_sweep
+from savgs_ident.simulate.public import DURATION_S, HIGHEST_HZ, SimulatedSweep, simulate_sweep
 
 
 @pytest.fixture

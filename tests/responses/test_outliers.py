@@ -18,8 +18,7 @@ from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recordin
 from savgs_ident.responses.dwell_fit import fit_dwell
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.responses.outliers import WaveformSamples, check_outliers
-from savgs_ident.responses.robust_dwell import RobustDwell
+from savgs_ident.responses.outliers import RobustDwell, WaveformSamples, check_outliers
 from savgs_ident.responses.summary import inspect
 from savgs_ident.simulate.excitation import campaign_of, measured_response
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
-from savgs_ident.responses.standstill import estimate_standstill_noise
+from savgs_ident.responses.outliers import estimate_standstill_noise
 from savgs_ident.responses.summary import inspect
 
 TIME = np.arange(4000) / 500.0

@@ -3,17 +3,13 @@
     found = fit_by_collocation(campaign, measured, model, free=FREE)
     found.by_name["mu_r"].value, found.by_name["mu_r"].stderr
 
-It starts from the model's values and the periodic motions there. Parameters known to a tolerance are
-estimated along under their priors, as in the fit.
+The optimisation (:mod:`savgs_ident.fit.collocation.program`) starts from the model's values and the periodic motions
+there. Parameters known to a tolerance are estimated along under their priors, as in the fit. IPOPT solves it, and its
+outcome becomes a status.
 
-IPOPT on a program, and how it ended.
-
-What the samples say of the parameters, from the solved program.
-
-The constraints fix the motions once the parameters are given: J_z dz = -J_u du. So the objective's curvature,
-taken along, is the information on parameters and sensors' zeros; the latter are eliminated.
-
-What the cross-check found, with what the samples say of it.
+What the samples say of the parameters follows from the solved program (:func:`information`). The constraints fix the
+motions once the parameters are given: J_z dz = -J_u du. So the objective's curvature, taken along, is the information
+on parameters and sensors' zeros; the latter are eliminated.
 """
 
 import time
@@ -49,7 +45,7 @@ from savgs_ident.fit.collocation.transcription import (
 )
 from savgs_ident.fit.least_squares import INFORMED
 from savgs_ident.fit.result import Estimate
-from savgs_ident.inference.laplace import Spread, spread_of
+from savgs_ident.inference.find_map import Spread, spread_of
 from savgs_ident.inference.problem import ProblemSettings, Task, plan_task
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model

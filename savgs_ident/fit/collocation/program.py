@@ -1,18 +1,16 @@
-"""The whole optimisation: an objective, constraints and their exact derivatives.
+"""The whole optimisation: an objective, constraints and their exact derivatives, and where it starts.
 
-Constraints are the equations of the points, and the rule of the steps, which is linear. The equations of a point
-know the parameters and the unknowns of that point only: so one small dense Jacobian, translated to CasADi once and
-evaluated at all points, is put in its places of the large sparse one.
+What is minimised is quadratic in the unknowns: the misfits of the samples, and the priors
+(:func:`assemble_objective`).
 
-What is minimised: samples and priors, quadratic in the unknowns.
+Constraints are the equations of the points, and the rule of the steps, which is linear. The equations of a point,
+the model's residual and what the sensors read, know the parameters and the unknowns of that point only: so one
+small dense Jacobian, translated to CasADi once (:func:`point_equations`) and evaluated at all points, is put in its
+places of the large sparse one.
 
 As Hessian IPOPT is given that of the objective alone (Gauss-Newton): where residuals are noise, the curvature of
 the constraints weighs little, and along the constraints the objective is convex from the start, so that every
-step leads downhill.
-
-The equations of one point, translated to CasADi: the model's residual, and what the sensors read.
-
-Where the optimisation starts: the model's values, and the periodic motions there.
+step leads downhill. It starts at the model's values and the periodic motions there (:func:`start_vector`).
 """
 
 from typing import NamedTuple

@@ -1,4 +1,6 @@
-"""Which unknowns there are, in which units, and where they stand in one long vector.
+"""Motions and samples as an optimisation sees them: the unknowns, the rule between them, and the samples' misfit.
+
+The unknowns stand in one long vector (:class:`Unknowns`),
 
     [ parameters (n) | point 0: x, y, m | point 1: x, y, m | ... | zeros of the sensors (D, C) ]
 
@@ -6,22 +8,21 @@ with x the states, y their algebraic partners (accelerations and rates of intern
 read. Parameters stand as unconstrained coordinates, everything else in units of its typical size, so that all
 unknowns are of the order of one.
 
-Periodic motions by the Radau IIA rule with two points a step, the model's residual holding at each point.
+The motions are periodic by the Radau IIA rule with two points a step, the model's residual holding at each point:
 
-    x_i = x_0 + h sum_j a_ij xd_j,    a = ((5/12, -1/12), (3/4, 1/4)),    points at 1/3 and 1 of the step
+    x_i = x_0 + h sum_j a_ij xd_j,    a = ((5/12, -1/12), (3/4, 1/4)),    points at 1/3 and 1 of the step.
 
-of third order, and stable however stiff the model: what a friction's bristle asks for. The steps are pairs of
+It is of third order, and stable however stiff the model: what a friction's bristle asks for. The steps are pairs of
 those of an earlier solution on a :class:`savgs_ident.simulate.mesh.Mesh`, so that there are as many points as
 that has nodes, dense where it is.
 
-The samples of a dwell against values at nodes of its period, as a quadratic form.
-
-A sample at phase phi is predicted by interpolation between nodes, linear in the values m there: W m + o, with
-o the unknown zero of the sensor. So the sum of squares over all samples,
+The samples of a dwell are held against the readings m (:class:`Misfit`). A sample at phase phi is predicted by
+interpolation between points, linear in the values m there: W m + o, with o the unknown zero of the sensor. So the sum
+of squares over all samples,
 
     |y - W m - o|^2 / sd^2,
 
-is a quadratic form of (m, o): thousands of samples become a band matrix over the nodes, with nothing lost.
+is a quadratic form of (m, o): thousands of samples become a band matrix over the points, with nothing lost.
 """
 
 from dataclasses import dataclass

@@ -23,8 +23,8 @@ from jaxtyping import Array, Bool, Float
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import scratch_folder, write_bytes
-from savgs_ident.inference.exact import ExactModel
 from savgs_ident.inference.likelihood import Likelihood
+from savgs_ident.inference.near_mode import ExactModel
 from savgs_ident.inference.prior import Prior
 from savgs_ident.inference.result import Sampler
 from savgs_ident.simulate.periodic import PeriodicSettings

@@ -25,9 +25,8 @@ import numpy as np
 from emcee.backends import HDFBackend
 from jaxtyping import Array, Float
 
-from savgs_ident.inference.exact import ExactModel
+from savgs_ident.inference.near_mode import ExactModel, Surrogate
 from savgs_ident.inference.samplers.chains import Chains, Checkpoint, decide, unsettled
-from savgs_ident.inference.surrogate import Surrogate
 from savgs_ident.simulate.program_cache import placed, stored
 
 STEPS = 60

@@ -5,23 +5,17 @@ its coordinates t the posterior is nearly a unit normal (the Laplace approximati
 chain therefore is
 
 1. from the chain's present state x, :data:`TRANSITIONS` transitions of NUTS (blackjax) on s, which lead to y;
-2. the exact density pi at y, and y is accepted with probability
-
-       min(1, w(y) / w(x)),    w = pi / s;
-
-   otherwise the chain stays at x, and the next step begins at x again.
+2. the exact density pi at y, and y is accepted with probability min(1, w(y) / w(x)), w = pi / s; otherwise the chain
+   stays at x, and the next step begins at x again.
 
 This is the surrogate transition method (Liu, Monte Carlo Strategies in Scientific Computing, 2001, section 9.4.3). It
 leaves pi invariant, however rough the surrogate and however short the trajectories, because the proposal's kernel K
 is reversible with respect to s, s(x) K(x, y) = s(y) K(y, x): then the acceptance probability above is Metropolis's
-own. K is reversible because
-
-- a NUTS transition is: all states of a trajectory are equally likely to give rise to it, and the state drawn from it
-  satisfies detailed balance (multinomial draws within each half, min(1, W_new / W_old) between halves);
-- any number of transitions by one and the same kernel is. Hence the step size is adapted beforehand, and then fixed.
-
-A proposal must start from the state that the chain is in. To go on from the last *proposal* instead, accepted or not,
-is right only where proposals are independent of where they start.
+own. One transition of NUTS is reversible: all states of a trajectory are equally likely to give rise to it, and the
+state drawn from it satisfies detailed balance (multinomial draws within each half, min(1, W_new / W_old) between
+halves). Any number of transitions by one and the same kernel is, too; hence the step size is adapted beforehand, and
+then fixed. And a proposal must start from the state that the chain is in: to go on from the last *proposal* instead,
+accepted or not, is right only where proposals are independent of where they start.
 
 The tail of the weights w at the proposals, which are nearly draws of s, shows whether the surrogate covers the
 posterior: its Pareto index k is reported.
@@ -40,9 +34,8 @@ import numpy as np
 from blackjax.adaptation.step_size import dual_averaging_adaptation
 from jaxtyping import Array, Bool, Float
 
-from savgs_ident.inference.exact import ExactModel
+from savgs_ident.inference.near_mode import ExactModel, Surrogate
 from savgs_ident.inference.samplers.chains import Chains, Checkpoint, decide, unsettled
-from savgs_ident.inference.surrogate import Surrogate
 from savgs_ident.simulate.program_cache import placed, stored
 
 CHAINS = 8

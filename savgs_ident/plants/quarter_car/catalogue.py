@@ -107,8 +107,7 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
         {
             "coefficient": "mu_r",
             "asymmetry": _own(
-                "rail_asymmetry", 0.2, "1", -0.95, 0.95, "rail friction up over the mean of up and down, less one",
-            ),
+                "rail_asymmetry", 0.2, "1", -0.95, 0.95, "rail friction up over the mean of up and down, less one"),
         },
         symptom="the acceleration steps more at one reversal than at the other: even orders appear",
         reference="Armstrong-Helouvry 1991, Control of Machines with Friction",
@@ -125,11 +124,8 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
         reference="Dupont, Hayward, Armstrong, Altpeter 2002, IEEE Transactions on Automatic Control 47(5)",
     ),
     effect_at("bushing_stiffness", SUSPENSION, LinearStiffness(),
-        {
-            "stiffness": _own(
-                "bushing_stiffness", 1500.0, "N/m", -2e4, 6e4, "stiffness of the bushings, at the wheel",
-            ),
-        },
+        {"stiffness": _own(
+            "bushing_stiffness", 1500.0, "N/m", -2e4, 6e4, "stiffness of the bushings, at the wheel")},
         symptom="the resonance moves up as with a stiffer spring, but not with the link's angle",
         reference="Blundell and Harty 2004, The Multibody Systems Approach to Vehicle Dynamics, on bushes",
     ),
@@ -189,8 +185,7 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
         {
             "stiffness": _own("bump_stop_stiffness", 2e5, "N/m", 0.0, 1e7, "stiffness of the bump stop"),
             "gap": _own(
-                "bump_stop_gap", 5e-3, "m", 0.0, 0.05, "strut travel from the nominal state to the bump stop",
-            ),
+                "bump_stop_gap", 5e-3, "m", 0.0, 0.05, "strut travel from the nominal state to the bump stop"),
         },
         symptom="near the resonance the deflection is cut off in bump; small motions fit",
         reference="Milliken and Milliken 1995, Race Car Vehicle Dynamics, on bump stops",
@@ -215,8 +210,7 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
         {
             "stiffness": "k_t",
             "rise": _own(
-                "tyre_stiffening", 5.0, "1/m", -15.0, 100.0, "rise of the tyre's secant stiffness per compression",
-            ),
+                "tyre_stiffening", 5.0, "1/m", -15.0, 100.0, "rise of the tyre's secant stiffness per compression"),
         },
         symptom="the tyre is stiffer in the valleys of the motion than on its crests: even orders of the"
         " acceleration",
@@ -235,8 +229,7 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
     effect_at("tyre_lateral_compliance", CARCASS, MassiveCompliance(),
         {
             "compliance": _own(
-                "tyre_lateral_compliance", 2e-6, "m/N", 0.0, 1e-3, "lateral compliance of the carcass",
-            ),
+                "tyre_lateral_compliance", 2e-6, "m/N", 0.0, 1e-3, "lateral compliance of the carcass"),
             "damping": 1000.0,
             "mass": 5.0,
         },
@@ -259,8 +252,7 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
     effect_at("gear_compliance", LINK, Compliance(),
         {
             "compliance": _own(
-                "gear_compliance", 1e-3, "rad/(N m)", 0.0, 0.01, "torsional compliance of gear and link",
-            ),
+                "gear_compliance", 1e-3, "rad/(N m)", 0.0, 0.01, "torsional compliance of gear and link"),
             "damping": 0.0,
         },
         states=("gear_windup",),
@@ -272,8 +264,7 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
         {
             "number": "theta_0",
             "change": _own(
-                "link_offset", 0.2, "rad", -0.5, 0.5, "true angle of the link less the one of its encoder",
-            ),
+                "link_offset", 0.2, "rad", -0.5, 0.5, "true angle of the link less the one of its encoder"),
         },
         symptom="passive tests at 90 deg hardly change; away from it the leverage of the link is off",
         reference="Mooring, Roth, Driels 1991, Fundamentals of Manipulator Calibration, on joint offsets",
@@ -325,8 +316,7 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
         {
             "number": "m_u",
             "change": _own(
-                "unsprung_mass_change", 8.0, "kg", -20.0, 40.0, "unsprung mass beyond the sheet's, at the upright",
-            ),
+                "unsprung_mass_change", 8.0, "kg", -20.0, 40.0, "unsprung mass beyond the sheet's, at the upright"),
         },
         symptom="the fast tests change, the slow ones do not: wheel hop moves",
         reference="Gillespie 1992, Fundamentals of Vehicle Dynamics, ch. 5",
@@ -353,11 +343,8 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
         reference="Doebelin 2004, Measurement Systems, ch. 3, first-order instruments",
     ),
     effect_at("accel_tilt", ACCEL, Tilt(),
-        {
-            "versine": _own(
-                "accel_tilt_versine", 0.0075, "1", 0.0, 0.5, "one less the cosine of the accelerometer's tilt",
-            ),
-        },
+        {"versine": _own(
+            "accel_tilt_versine", 0.0075, "1", 0.0, 0.5, "one less the cosine of the accelerometer's tilt")},
         symptom="the acceleration alone is too small by the same share in every test and order",
         reference="Titterton and Weston 2004, Strapdown Inertial Navigation Technology, on misalignment",
     ),

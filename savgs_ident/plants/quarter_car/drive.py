@@ -6,19 +6,17 @@
 A reference is a link angle to be kept or a link velocity to be followed. Limits: motor speed (3000 rpm, on
 the demand; the loop passes it by up to 5 % for a moment), torque of the drive, 500 W at the shaft when motoring,
 length of the voltage vector. The velocity loop does not integrate against a limit, or it would pass the speed
-limit by three times as much; the current loop gives back what its limit takes away.
+limit by three times as much; the current loop gives back what its limit takes away. Speeds and torques of the loops
+are those of the motor; the state holds angle and velocity of the link.
 
-Speeds and torques of the loops are those of the motor; the state holds angle and velocity of the link.
-
-Permanent-magnet synchronous motor in d-q axes with its current controller.
-
-Peak-value convention, mechanical speed w, electrical speed w_e = pole_pairs w:
+The motor is a permanent-magnet synchronous one in d-q axes, in the peak-value convention, with the mechanical speed w
+and the electrical speed w_e = pole_pairs w:
 
     L_d di_d/dt = v_d - R i_d + w_e L_q i_q
     L_q di_q/dt = v_q - R i_q - w_e (L_d i_d + psi)
     torque      = 3/2 pole_pairs (psi + (L_d - L_q) i_d) i_q
 
-The controller is a PI on each axis (gains by pole-zero cancellation: 500 Hz) with the speed voltages fed
+Its current controller is a PI on each axis (gains by pole-zero cancellation: 500 Hz) with the speed voltages fed
 forward. The voltage vector cannot be longer than V_dc / sqrt(3); the integrators give back what it clips.
 """
 

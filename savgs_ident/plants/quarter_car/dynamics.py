@@ -1,4 +1,4 @@
-"""Equations of motion by virtual power, railway reactions included.
+"""Equations of motion by virtual power, railway reactions included, and what of them depends on one angle alone.
 
 Coordinates are q = (z_s, theta_LW, y_s, phi): height of the sprung mass, angle of the lower wishbone, and
 the two that the railway holds at zero, lateral position and roll about the carriages' midpoint. Every force f
@@ -7,16 +7,13 @@ two sums vanish along a motion; the last two are what the railway has to hold:
 
     F_Ny = -sum Q_y,        M_Nx = -sum Q_phi,
 
-so that the reactions come out of the same equations, not of a separate derivation.
+so that the reactions come out of the same equations, not of a separate derivation. The inertia forces are affine in
+(zdd_s + g, thetadd, thetad^2), so a 4 x 3 matrix says all about them.
 
-Everything of the rig that depends on the lower wishbone's angle alone.
-
-The pose of the linkage and the inertia of the unsprung bodies depend on one variable, theta_LW. A
-:class:`Section` holds them at one angle; :func:`section` computes it in closed form. Where many points share
-one parameter set, :class:`SectionCurves` does the same from polynomials through the closed form at Chebyshev
-nodes, to about 1e-12, at a tenth of the cost and still differentiable in every hardpoint.
-
-The inertia forces are affine in (zdd_s + g, thetadd, thetad^2), so a 4 x 3 matrix says all about them.
+This matrix, like the pose of the linkage, depends on theta_LW alone. A :class:`Section` holds both at one angle;
+:func:`section` computes it in closed form. Where many points share one parameter set, :class:`SectionCurves` does the
+same from polynomials through the closed form at Chebyshev nodes, to about 1e-12, at a tenth of the cost and still
+differentiable in every hardpoint.
 """
 
 from typing import NamedTuple

@@ -1,11 +1,10 @@
 """The forces on the mechanism: the strut, which is spring and damper, and the tyre on its plate.
 
-The strut acts between the eye on the lower wishbone and the crank pin of the single link.
-
-Its damper is a measured force-velocity table as a monotone C1 curve, scaled as one. The curve through the table is
-the monotone piecewise cubic of Fritsch and Carlson (PCHIP). The identified damping ``c_sd`` [N s/m] scales the whole
-curve: it is the coefficient of the viscous damper that takes the same energy out of a sinusoidal strut velocity of
-0.15 m/s amplitude,
+The strut acts between the eye on the lower wishbone and the crank pin of the single link. Its damper is a measured
+force-velocity table as a monotone C1 curve, scaled as one: the curve through the table is the monotone piecewise
+cubic of Fritsch and Carlson (PCHIP). The identified damping ``c_sd`` [N s/m] scales the whole curve: it is the
+coefficient of the viscous damper that takes the same energy out of a sinusoidal strut velocity of 0.15 m/s
+amplitude,
 
     c_eq = 1/(pi V) * integral_0^{2 pi} F(V sin tau) sin tau d tau.
 

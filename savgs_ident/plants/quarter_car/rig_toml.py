@@ -1,13 +1,12 @@
-"""From a parsed TOML document to the parts of a rig, with every fault named by its key.
+"""The form of a rig file, and from a parsed TOML document to the parts of a rig, with every fault named by its key.
+
+A rig file has one section for every part of the rig: :data:`SECTIONS` are its parameters, each with the one unit it
+is given in. Names are unique over the whole file, so that the model takes them flat; the section says where a
+reader finds them. Everything is SI: a number in millimetres is refused rather than converted, so that a file means
+the same to everybody who reads it.
 
 Nothing is guessed: a key that the form does not know, a unit other than the form's, a missing parameter are
 errors, each with its remedy. The file's name is added by the caller.
-
-The form of a rig file: its sections, the parameters of each, and the one unit each is given in.
-
-A rig file has one section for every part of the rig. Names are unique over the whole file, so that the model
-takes them flat; the section says where a reader finds them. Everything is SI: a number in millimetres is
-refused rather than converted, so that a file means the same to everybody who reads it.
 """
 
 from collections.abc import Mapping

@@ -19,13 +19,13 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.result import Diagnosis, DriveForces, Responses
-from savgs_ident.fit.residuals import measured_points
+from savgs_ident.fit.result import measured_points
 from savgs_ident.report.bode import LINES, draw_magnitude, draw_phase
 from savgs_ident.report.diagnosis.text import model_label
 from savgs_ident.report.text import channel_labels
 from savgs_ident.report.theme import GREY, INK, PALE, frequency_axis, magnitude_axis, new_figure, styled
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.frequency_response import ModelCurve, model_curve
+from savgs_ident.simulate.public import ModelCurve, model_curve
 
 _MARKERS = ("o", "s", "^")
 

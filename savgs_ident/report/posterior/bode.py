@@ -12,12 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from savgs_ident.fit.residuals import measured_points
+from savgs_ident.fit.result import measured_points
 from savgs_ident.inference.result import Posterior
 from savgs_ident.report.bode import draw_magnitude, draw_phase, phase_deg
 from savgs_ident.report.text import channel_labels
 from savgs_ident.report.theme import BLUE, INK, ORANGE, frequency_axis, new_figure, styled
-from savgs_ident.simulate.frequency_response import ModelCurve
+from savgs_ident.simulate.public import ModelCurve
 
 _ENDS = (0.025, 0.975)
 _LEAST_SHOWN = 2.0
