@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from savgs_ident.control.describing_function import ELEMENTS
 from savgs_ident.control.linear_study import (
     SMALL,
     WISHBONE_DEG,
@@ -20,6 +19,7 @@ from savgs_ident.control.linear_study import (
     LinearStudy,
     SmallMotions,
 )
+from savgs_ident.control.linearisation import ELEMENTS
 from savgs_ident.core.presentation import Origin
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.report.control.linear_text import (
