@@ -41,8 +41,8 @@ from savgs_ident.plants.quarter_car.inputs import nominal_test
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.recordings.recording import RecordedChannel, Recording, TestKind
-from savgs_ident.validation.sensor_chain import Sensors
-from savgs_ident.validation.virtual_rig import Bench, Steady, steady_dwells, sweep_readings
+from savgs_ident.validation.virtual_motions import Steady, steady_dwells, sweep_readings
+from savgs_ident.validation.virtual_rig import Bench, Sensors
 
 Drawn = Literal["none", "effect", "two", "unknown", "foreign"]
 """What a trial's rig has beyond its model: nothing, an effect, two, one that the catalogue then lacks, or one whose

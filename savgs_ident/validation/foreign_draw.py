@@ -10,7 +10,7 @@ Parameters are off the sheet by their tolerances, as in any trial. Besides, in e
 An effect changes the response by 3 to 25 % somewhere. Nothing is drawn again because it is hard to see or easily
 imitated: how far it stands out is recorded. Only where no size gives the change that was drawn is there another draw.
 
-The recording is integrated with a fixed step (:mod:`savgs_ident.validation.fixed_step`) and passes anti-aliasing
+The recording is integrated with a fixed step (:mod:`savgs_ident.validation.virtual_motions`) and passes anti-aliasing
 filters and converters.
 """
 

@@ -16,7 +16,7 @@ from savgs_ident.recordings.recording import RecordedChannel, Recording
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import SweepResponse
 from savgs_ident.responses.sweeps import estimate_sweep_response
-from savgs_ident.validation.virtual_rig import sweep_readings
+from savgs_ident.validation.virtual_motions import sweep_readings
 
 from .conftest import rig_problem
 

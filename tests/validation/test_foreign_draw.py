@@ -26,9 +26,9 @@ from savgs_ident.validation.foreign_draw import (
     true_bench,
 )
 from savgs_ident.validation.foreign_laws import FOREIGN
-from savgs_ident.validation.sensor_chain import RANGES, Sensors
 from savgs_ident.validation.trials import code_version
-from savgs_ident.validation.virtual_rig import Bench, Programme, change_of, steady_dwells
+from savgs_ident.validation.virtual_motions import steady_dwells
+from savgs_ident.validation.virtual_rig import RANGES, Bench, Programme, Sensors, change_of
 
 from ..relaxed import with_kept_programs
 
