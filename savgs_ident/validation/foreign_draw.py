@@ -23,11 +23,11 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.effects.effect import Effect
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.validation.blind_draw import ATTEMPTS, Drawing, Present, Shares, draw_rig, drawing_of
-from savgs_ident.validation.blind_record import Answer, SmallErrors
+from savgs_ident.validation.blind_answer import Answer, SmallErrors
+from savgs_ident.validation.blind_draw import ATTEMPTS, Drawing, Present, Shares, drawing_of
 from savgs_ident.validation.foreign_laws import FOREIGN, foreign_laws
 from savgs_ident.validation.lookalikes import closest, rows_of
-from savgs_ident.validation.virtual_rig import Bench
+from savgs_ident.validation.virtual_rig import Bench, draw_rig
 
 DAMPER_ERROR = (0.005, 0.02)
 """Least and largest rms error of the damper's table [1]."""

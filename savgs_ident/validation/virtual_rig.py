@@ -222,6 +222,24 @@ class Bench:
         return np.asarray(harmonics(self.model(effects), self.values(given), solution, ORDERS))
 
 
+OFF = 0.1
+"""Relative standard deviation of parameters that are to be identified and have no tolerance."""
+
+
+def draw_rig(bench: Bench, random: np.random.Generator) -> dict[str, float]:
+    """Parameters of the rig [SI] that are not those of the sheet: normal about them, within their bounds."""
+    drawn = {}
+    for each in bench.rig.parameters.entries:
+        spread = each.tolerance or (OFF * abs(each.value) if each.name in bench.free else 0.0)
+        if spread == 0.0:
+            continue
+        value = each.value + spread * random.standard_normal()
+        while not each.lower <= value <= each.upper:
+            value = each.value + spread * random.standard_normal()
+        drawn[each.name] = float(value)
+    return drawn
+
+
 def change_of(there: NDArray[np.complex128], without: NDArray[np.complex128]) -> float:
     """By how much a response differs from the one without an effect, relative; (D, 2, K) each.
 
