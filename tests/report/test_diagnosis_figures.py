@@ -22,11 +22,12 @@ from savgs_ident.report.diagnosis.figures import (
     gap_channels,
     gap_map_figure,
     gap_table,
+    regime_figure,
+    regime_picture,
     shrink_figure,
     shrink_rows,
     spread_loops,
 )
-from savgs_ident.report.diagnosis.regimes import regime_figure, regime_picture
 from savgs_ident.report.diagnosis.text import law_label
 from savgs_ident.report.html import embed
 
