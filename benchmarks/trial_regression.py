@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
 from savgs_ident.diagnosis.model_selection import recalibrate
-from savgs_ident.diagnosis.quarter_car import SIMTR, quarter_car_problem
+from savgs_ident.diagnosis.public import SIMTR, quarter_car_problem
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import bounds_of
 from savgs_ident.plants.quarter_car.plant import QuarterCar

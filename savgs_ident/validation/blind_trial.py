@@ -21,7 +21,7 @@ import numpy as np
 
 from savgs_ident.core.errors import InputError, blamed_on
 from savgs_ident.core.files import is_begun, prepare_folder, record_of, write_json
-from savgs_ident.diagnosis.quarter_car import SIMTR, diagnose_response
+from savgs_ident.diagnosis.public import SIMTR, diagnose_response
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, parse_rig

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from numpy.testing import assert_allclose
 
-from savgs_ident.diagnosis.result import Diagnosis, MapCell
+from savgs_ident.diagnosis.gap import MapCell
+from savgs_ident.diagnosis.result import Diagnosis
 from savgs_ident.report.diagnosis.compared import compared_channels, diagnosis_bode_figure, first_harmonic_gap
 from savgs_ident.report.diagnosis.drawing import rig_figure
 from savgs_ident.report.diagnosis.figures import (

@@ -27,7 +27,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
-from savgs_ident.diagnosis.result import Diagnosis, ForceLoop, MapCell
+from savgs_ident.diagnosis.gap import MapCell
+from savgs_ident.diagnosis.result import Diagnosis, ForceLoop
 from savgs_ident.report.diagnosis.text import (
     LEVEL,
     law_label,

@@ -13,13 +13,8 @@ import numpy as np
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.presentation import Origin
-from savgs_ident.diagnosis.result import (
-    CyclePosition,
-    Diagnosis,
-    ForceLoop,
-    PortShare,
-    Shrink,
-)
+from savgs_ident.diagnosis.gap import CyclePosition, Shrink
+from savgs_ident.diagnosis.result import Diagnosis, ForceLoop, PortShare
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.report.diagnosis.compared import bode_picture, compared_channels, drive_picture
 from savgs_ident.report.diagnosis.drawing import rig_figure
