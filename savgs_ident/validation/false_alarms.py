@@ -2,9 +2,8 @@
 
 The recalibrated baseline is the truth of every one of them: parameters drawn from what the recorded campaign leaves
 open about them, the noise of the record, which a diagnosis knows no better than that of a record, nothing else. Each
-is diagnosed as any other. The share of those in which
-something is said to be missing is the false-alarm rate of this campaign, and their odds are what its own odds are to
-be compared with.
+is diagnosed as any other. The share of those in which something is said to be missing is the false-alarm rate of this
+campaign, and their odds are what its own odds are to be compared with.
 """
 
 from collections.abc import Mapping, Sequence
