@@ -219,12 +219,6 @@ _ELEMENT_LOOKS: tuple[Mapping[str, Any], ...] = (
 )
 
 
-def linear_figures(study: LinearStudy) -> dict[str, Figure]:
-    """The figures of a study by the names of their files."""
-    figures = {"alpha": alpha_figure(study.equivalents), "responses": responses_figure(study.small)}
-    return figures if study.at_test is None else figures | {"described": described_figure(study.at_test)}
-
-
 def alpha_figure(study: EquivalentStudy) -> Figure:
     """k_eq, c_eq and the magnitude of alpha over the link angle, with what stands for them: Fig. 7 of the paper."""
     itself = sign_of_alpha(study)
