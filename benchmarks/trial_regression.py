@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
 from savgs_ident.diagnosis.model_selection import recalibrate
-from savgs_ident.diagnosis.quarter_car import SIMTR, quarter_car_problem
+from savgs_ident.diagnosis.public import SIMTR, quarter_car_problem
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import bounds_of
 from savgs_ident.plants.quarter_car.plant import QuarterCar
@@ -31,8 +31,7 @@ from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, parse_rig,
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_response
-from savgs_ident.validation.blind_record import Answer, Seal, envelope_of, opened
-from savgs_ident.validation.blind_score import Score, score_of
+from savgs_ident.validation.blind_answer import Answer, Score, Seal, envelope_of, opened, score_of
 from savgs_ident.validation.trials import rig_marks
 
 SAME = 1.0 - 1e-6

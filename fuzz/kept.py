@@ -27,12 +27,12 @@ from savgs_ident.report.campaigns.record import campaigns_columns, campaigns_rec
 from savgs_ident.report.validation import alarms_record, calibration_record
 from savgs_ident.validation.blind import Job as BlindJob
 from savgs_ident.validation.blind import plan_of
-from savgs_ident.validation.blind_record import FILE, Answer, Envelope, sealed
-from savgs_ident.validation.blind_score import Interval, Score, score_from
+from savgs_ident.validation.blind_answer import Answer, Envelope, Interval, Score, score_from, sealed
 from savgs_ident.validation.blind_trial import Drawn, Plan, run_trial
 from savgs_ident.validation.calibration import CalibrationStudy, Trial, trial_reader
 from savgs_ident.validation.false_alarms import AlarmStudy, NullDraw, read_draw
 from savgs_ident.validation.trials import known_trials
+from savgs_ident.validation.virtual_campaign import FILE
 from savgs_ident.validation.virtual_rig import Bench
 
 CASE = "case"

@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from savgs_ident.validation.blind import BlindStudy, blind
     from savgs_ident.validation.calibration import CalibrationStudy, calibrate
     from savgs_ident.validation.false_alarms import AlarmStudy, false_alarms
-    from savgs_ident.validation.public import draw_truth, simulate_campaign, write_campaign
+    from savgs_ident.validation.virtual_campaign import draw_truth, simulate_campaign, write_campaign
 
 _PLACES = {
     # What there is to work on.
@@ -109,9 +109,9 @@ _PLACES = {
     "plot_bode": "report.presenters",
     # Campaigns of rigs whose truth is known.
     "DWELLS": "simulate.public",
-    "draw_truth": "validation.public",
-    "simulate_campaign": "validation.public",
-    "write_campaign": "validation.public",
+    "draw_truth": "validation.virtual_campaign",
+    "simulate_campaign": "validation.virtual_campaign",
+    "write_campaign": "validation.virtual_campaign",
     "simulate_dwells": "simulate.public",
     # What comes out.
     "Result": "core.presentation",

@@ -5,15 +5,14 @@ A file is a campaign. A folder is one too, or holds several: a campaign in each 
 - its files together are one campaign if any is named after a test (``dwell_2.35Hz.csv``, ``standstill.csv``);
 - otherwise each file is a campaign of its own.
 
-The table that an earlier run wrote is none, and results are not written where recordings are.
-
-Names are made of the file's or folder's own, of characters that every file system takes:
+The table that an earlier run wrote is no campaign, and results are not written where recordings are. A campaign is
+called as its file or folder, in characters that every file system takes:
 
 >>> safe_name("../../etc/pass wd"), safe_name("Run 7"), safe_name("..")
 ('etc_pass_wd', 'Run_7', 'campaign')
 
-The result of a campaign is whole, with the digest of what it was made from, or not there. In the folder of a
-campaign, ``done.json`` is written last and holds the digests of the other two files, so that a folder without it, or
+Each has a folder of this name for its result, which is there whole, with the digest of what it was made from, or not
+at all: ``done.json`` is written last and holds the digests of the other two files, so that a folder without it, or
 with a file that is not the one it names, counts as nothing.
 """
 

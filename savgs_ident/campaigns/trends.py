@@ -1,7 +1,7 @@
-"""Whether estimates from many campaigns agree, and whether they change with time.
+"""Estimates of one parameter from many campaigns: whether they agree, and whether they change with time.
 
-Each campaign k gives an estimate y_k with its standard error s_k at x_k (a time, or a number in order). Asked is,
-first, whether all are one number: the weighted mean, and the chi2 of the estimates about it. Second, the line
+Each campaign k gives an estimate y_k with its standard error s_k at x_k (a time, or a number in order). All of them
+give their weighted mean, with the chi2 of the estimates about it, and the line
 
     y = value + slope (x - centre),   centre the weighted mean of x, so that value and slope are uncorrelated
 
@@ -13,21 +13,16 @@ chance in less than 5 % of cases), something else differs from campaign to campa
 the scatter, by sqrt(chi2/dof), and since that is known from these few estimates only, intervals are Student's. The
 line is compared with the scatter about the line: the chi2 about the mean would count the trend itself as scatter.
 
-Errors here are those that differ from campaign to campaign. What all have in common
-(:mod:`savgs_ident.campaigns.trends`) moves all estimates alike: it is in the error of the mean in full, and in
-no slope
-and no scatter.
-
-Which part of an estimate's error is the campaign's own, and which is the same in every campaign of one rig.
-
-Parameters known to a tolerance are estimated along under their priors. What such a part really is differs from its
-drawing by an amount that is the same in all campaigns, and shifts what is identified in each by the same. To first
-order, with the covariance C of the estimates and the precision P of the priors (zero for identified parameters),
+The errors s_k are those that differ from campaign to campaign. What all campaigns of a rig have in common moves all
+estimates alike: parameters known to a tolerance are estimated along under their priors, and what such a part really
+is differs from its drawing by the same amount in every campaign. To first order, with the covariance C of the
+estimates and the precision P of the priors (zero for identified parameters),
 
     C = (C - C P C) + C P C
 
 where the first term comes from the noise of the recordings and the second from the priors. Campaigns are compared by
-the first alone; their mean has the second in full, however many they are.
+the first alone. The second (:func:`common_share`) is in the error of the mean in full, however many campaigns there
+are, and in no slope and no scatter.
 
 >>> round(common_share([0.6, 0.0], [0.5, 2.0], [1.0, 2.0]), 3)
 0.09

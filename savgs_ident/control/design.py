@@ -1,11 +1,9 @@
 """The design as a whole: from an identified rig to a controller that runs, with the evidence for it.
 
-:func:`design_controller` synthesises, checks and discretises a controller and tries it on other rigs.
-:func:`controller_record` and :func:`read_controller` are the controller as a file: everything that a computer
-needs to run it, with units, as JSON.
-
-The other rigs (:class:`Rigs`) are parameter sets that are compatible with the recordings: drawn from the samples of a
-posterior, or from the covariance of an identified rig, or, for a drawing, from its tolerances.
+:func:`design_controller` synthesises, checks and discretises a controller and tries it on other rigs (:class:`Rigs`):
+parameter sets that are compatible with the recordings, drawn from the samples of a posterior, or from the covariance
+of an identified rig, or, for a drawing, from its tolerances. :func:`controller_record` and :func:`read_controller`
+are the controller as a file: everything that a computer needs to run it, with units, as JSON.
 """
 
 import json

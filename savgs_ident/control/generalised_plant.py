@@ -6,20 +6,20 @@
     u  ------------------------>  +-----+  ------------------------------------------------>  y
           lin_command                       sprung_accel, susp_deflection, lin_position, with noise
 
-Inside: eq. (8), the drive as a first-order lag of 17.8 Hz, the weights. Two things keep the problem regular.
+Inside are eq. (8), the drive as a first-order lag of 17.8 Hz, and the weights. Two things keep the problem regular.
 Every measurement has noise of its own, so that D21 has full rank. The integrator from the actuator's velocity to
 z_lin would be neither disturbed nor penalised at zero frequency: ``drift`` disturbs it, and the weight of the
 position penalises it.
 
 Every weight is the inverse of an acceptable size, so that a closed loop with gamma = 1 keeps every signal within its
 bound under disturbances of their assumed size. The paper's weights (9)-(11) are not printed with all their numbers;
-these have the same purpose and were chosen for the rig as it is, friction included.
+these have the same purpose and were chosen for the rig as it is, friction included. A file changes some of them, the
+others keep their defaults:
 
     weights = read_weights("weights.toml")         # or DEFAULT_WEIGHTS
     weights["accel_bound"].value
 
-A file changes some of them, the others keep their defaults:
-
+    # weights.toml
     accel_bound = { value = 2.0, unit = "m/s^2" }
 """
 

@@ -1,27 +1,27 @@
 """The linear equivalent of the suspension: equations (4)-(8) of the paper, by differentiation of the kinematics.
 
 At the wheel, a strut that pushes with F_SD and shortens by R = -dl_SD/dl_s per suspension deflection acts as a spring
-and a damper between the masses,
+and a damper between the masses, and a rotation of the single link as a displacement z_lin of their upper end at
+constant strut length (:class:`Equivalent`):
 
-    k_eq = d(R F_SD)/dl_s,      c_eq = R^2 c_sd,
+    k_eq = d(R F_SD)/dl_s,      c_eq = R^2 c_sd,      dz_lin/dtheta_SL = alpha = (dl_SD/dtheta_SL) / R.
 
-and a rotation of the single link acts as a displacement z_lin of their upper end at constant strut length:
+k_eq includes the load: dR/dl_s times the static push is 5 % of it here. With l_s positive in bump, alpha is negative
+between 0 and 180 deg.
 
-    dz_lin/dtheta_SL = alpha = (dl_SD/dtheta_SL) / R.
-
-With l_s positive in bump, alpha is negative between 0 and 180 deg. k_eq includes the load: dR/dl_s times the static
-push is 5 % of it here. Equation (8) is the state space of two masses, the equivalent spring and damper between them,
-the tyre below, and a hypothetical linear actuator in series with spring and damper, whose velocity is the input:
+Equation (8) is the state space of two masses, the equivalent spring and damper between them, the tyre below, and a
+hypothetical linear actuator in series with spring and damper, whose velocity is the input
+(:func:`quarter_car_space`):
 
     m_s dzdot_s/dt = F,     m_u dzdot_u/dt = k_t l_t + c_t dl_t/dt - F,
     F = k_eq (l_s - z_lin) + c_eq d(l_s - z_lin)/dt
 
     states   zdot_s, zdot_u, l_s, l_t, z_lin      inputs  road_velocity, lin_velocity
 
-The paper lumps the unsprung mass at the wheel centre and gives the damper one coefficient. At small motions the
-rig differs in both: the wishbones and the upright rotate (the mass matrix [m_s, 0; 0, m_u] becomes full), and the
-damper has its slope at rest, not the coefficient that dissipates the same energy at 0.15 m/s.
-:func:`with_damper_at_rest` and :func:`with_distributed_masses` undo one simplification after the other.
+The paper lumps the unsprung mass at the wheel centre and gives the damper one coefficient. At small motions the rig
+differs in both: the wishbones and the upright rotate (the mass matrix [m_s, 0; 0, m_u] becomes full), and the damper
+has its slope at rest, not the coefficient that dissipates the same energy at 0.15 m/s. :func:`with_damper_at_rest`
+and :func:`with_distributed_masses` undo one simplification after the other.
 
 A controller commands a velocity of the equivalent actuator and needs its position; the rig has a link. With the
 wishbone at rest, alpha is a smooth function of the link angle (:class:`AlphaMap`), and its integral from the nominal

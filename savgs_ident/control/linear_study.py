@@ -15,13 +15,6 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
 
-from savgs_ident.control.describing_function import (
-    DescribingFunctions,
-    describe,
-    first_harmonic,
-    motions_on_cam,
-    quasi_linear_response,
-)
 from savgs_ident.control.linear_equivalent import (
     Equivalent,
     TwoMasses,
@@ -33,7 +26,15 @@ from savgs_ident.control.linear_equivalent import (
     with_damper_at_rest,
     with_distributed_masses,
 )
-from savgs_ident.control.linearisation import linearise, nominal_rest
+from savgs_ident.control.linearisation import (
+    DescribingFunctions,
+    describe,
+    first_harmonic,
+    linearise,
+    motions_on_cam,
+    nominal_rest,
+    quasi_linear_response,
+)
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Result
 from savgs_ident.core.values import Values

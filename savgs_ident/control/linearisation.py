@@ -1,7 +1,7 @@
-"""Exact linearisation of the rig at any state: the behaviour of the nonlinear model for small departures from it.
+"""Linearisation of the rig: exact at a state, and by describing functions in a steady motion on the cam.
 
-The implicit residual r(q, qd, qdd, s, sd, input) = 0 is differentiated with respect to all its arguments at once, and
-solved for the accelerations and the rates of the internal states:
+At a state, the implicit residual r(q, qd, qdd, s, sd, input) = 0 is differentiated with respect to all its arguments
+at once, and solved for the accelerations and the rates of the internal states:
 
     [dqdd; dsd] = -(dr/d[qdd, sd])^-1 (dr/dq dq + dr/dqd dqd + dr/ds ds + dr/dinput dinput).
 
@@ -9,8 +9,23 @@ solved for the accelerations and the rates of the internal states:
     space = linearise(model, p, at)                 # python-control, named signals
     space["sprung_accel", "road_velocity"]
 
-At a state where a friction sticks, this is the rig with its bristle as a spring. The linearisation of a motion is
-:mod:`savgs_ident.control.describing_function`.
+This holds for small departures. Where a friction sticks, the rig has its bristle as a spring.
+
+In a steady motion, friction and damper act as linear elements that depend on the amplitude. The first harmonic of an
+element's force over that of its velocity is a complex gain, the describing function
+
+    N(f, A) = F_1 / V_1 = -(c + k / (i w)),
+
+with a damping c [N s/m] and a stiffness k [N/m] that are valid at this frequency and amplitude. The rig with these in
+place of the friction of its rail, its damper and the friction of its tyre is linear; a control design for the
+amplitude of the test starts from it.
+
+    solution = simulate_periodic(model, p, cam_excitation(frequency, 0.0275, np.pi / 2))
+    described = describe(model, p, solution)
+    described.damping, described.stiffness                  # (D, 3): rail, strut, tyre_lateral
+    quasi_linear_response(model, p, described)              # complex (D, 2), per metre of road
+
+The first harmonics of the nonlinear rig, at any amplitude of the cam, are :func:`first_harmonic`.
 """
 
 from functools import partial
@@ -22,14 +37,26 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
 from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
+from savgs_ident.plants.quarter_car.inputs import cam_excitation
 from savgs_ident.plants.quarter_car.kinematics import suspension_travel
 from savgs_ident.plants.quarter_car.plant import QuarterCar, static_equilibrium
+from savgs_ident.simulate.collocation import Trajectory
+from savgs_ident.simulate.periodic import (
+    PeriodicSettings,
+    PeriodicSolution,
+    analyse,
+    harmonics,
+    simulate_periodic,
+    solve_on_mesh,
+)
+from savgs_ident.simulate.sensitivity import loads_at_nodes
 from savgs_ident.simulate.transient import solve_rates
 
 INPUTS = ("road_velocity", "link_velocity")
@@ -153,3 +180,191 @@ def linearise(model: QuarterCar, p: Values, at: OperatingPoint) -> control.State
         outputs=OUTPUTS,
         name="exact",
     )
+
+
+ELEMENTS = ("rail", "strut", "tyre_lateral")
+"""Ports of the elements: friction of the rail, damper, lateral friction of the tyre."""
+QUASI_LINEAR_OUTPUTS = ("sprung_accel", "susp_deflection")
+"""[m/s^2], [m]."""
+
+
+class DescribingFunctions(NamedTuple):
+    """Gains of the elements in D motions.
+
+    Attributes:
+        frequency: [Hz], (D,).
+        gain: complex, (D, 3), force over velocity [N s/m], elements as in :data:`ELEMENTS`.
+    """
+
+    frequency: NDArray[np.float64]
+    gain: NDArray[np.complex128]
+
+    @property
+    def damping(self) -> NDArray[np.float64]:
+        """c [N s/m], (D, 3)."""
+        return -self.gain.real
+
+    @property
+    def stiffness(self) -> NDArray[np.float64]:
+        """k [N/m], (D, 3)."""
+        return 2.0 * np.pi * self.frequency[:, None] * self.gain.imag
+
+
+@eqx.filter_jit
+def _first_harmonics(model: QuarterCar, p: Values, solution: PeriodicSolution) -> tuple[Array, Array]:
+    loads = loads_at_nodes(model, p, solution)
+    forces = jnp.stack([loads.rail, loads.ports["strut"].load, loads.lateral], axis=-1)
+    velocities = jnp.stack([loads.ports[port].velocity for port in ELEMENTS], axis=-1)
+    return analyse(forces, solution.mesh, 1)[:, :, 1], analyse(velocities, solution.mesh, 1)[:, :, 1]
+
+
+def describe(model: QuarterCar, p: Values, solution: PeriodicSolution) -> DescribingFunctions:
+    """The gains in converged periodic motions; zero where an element does not move."""
+    force, velocity = (np.asarray(each) for each in _first_harmonics(model, p, solution))
+    gain = np.divide(force, velocity, out=np.zeros_like(force), where=velocity != 0.0)
+    return DescribingFunctions(np.asarray(solution.excitation.frequency), gain)
+
+
+class _Bare(NamedTuple):
+    """The rig without the elements, near rest: residual (2,), outputs (2,) and velocities of the elements (3,).
+
+    Each along the coordinates, their rates, their accelerations, the road's height and velocity, and forces of the
+    elements.
+    """
+
+    residual: tuple[Array, ...]
+    output: tuple[Array, ...]
+    velocity: Array
+
+
+@eqx.filter_jit
+def _bare_slopes(model: QuarterCar, p: Values, at: OperatingPoint) -> _Bare:
+    bare = QuarterCar(model.damper)
+    rig = model.effective(p)
+    undamped = {**rig, "c_sd": jnp.zeros_like(rig["c_sd"])}
+    zero = jnp.zeros(())
+
+    def everything(q: Array, qd: Array, qdd: Array, road: Array, forces: Array) -> tuple[Array, Array, Array]:
+        given = {"rail": forces[0], "strut": forces[1], "tyre_lateral": forces[2]}
+        inputs = Inputs(Road(road[0], road[1]), Link(at.link.angle, zero), None, given)
+        motion = Motion(Coordinates(q[0], q[1]), Coordinates(qd[0], qd[1]), Coordinates(qdd[0], qdd[1]))
+        none = jnp.zeros(0)
+        loads = bare.loads(undamped, motion, none, none, inputs)
+        readings = jnp.stack(
+            [rig["accel_gain"] * qdd[0], rig["deflection_gain"] * suspension_travel(rig, q[1])]
+        )
+        return (
+            bare.residual(undamped, motion, none, none, inputs),
+            readings,
+            jnp.stack([loads.ports[port].velocity for port in ELEMENTS]),
+        )
+
+    still = jnp.zeros(2)
+    found = jax.jacfwd(everything, argnums=(0, 1, 2, 3, 4))(
+        jnp.stack([*at.q]), still, still, still, jnp.zeros(3)
+    )
+    return _Bare(found[0], found[1], found[2][1])
+
+
+def _bare(model: QuarterCar, p: Values) -> _Bare:
+    at = nominal_rest(QuarterCar(model.damper), model.effective(p))
+    return jax.tree.map(np.asarray, _bare_slopes(model, p, at))
+
+
+def quasi_linear_response(
+    model: QuarterCar, p: Values, described: DescribingFunctions
+) -> NDArray[np.complex128]:
+    """Response (D, 2) of the rig with the described elements.
+
+    Of :data:`QUASI_LINEAR_OUTPUTS`, per metre of road [unit/m].
+    """
+    rig = _bare(model, p)
+    position, velocity, acceleration, road, force = rig.residual
+    rows = []
+    for frequency, gain in zip(described.frequency, described.gain, strict=True):
+        iw = 2j * np.pi * frequency
+        # The residual is a sum of forces: an element's force enters with its gain times its velocity.
+        elements = force @ (gain[:, None] * rig.velocity)
+        dynamic = position + iw * (velocity + elements) + iw**2 * acceleration
+        q = np.linalg.solve(dynamic, -(road[:, 0] + iw * road[:, 1]))
+        rows.append((rig.output[0] + iw**2 * rig.output[2]) @ q)
+    return np.array(rows)
+
+
+def quasi_linear_space(
+    model: QuarterCar, p: Values, damping: Float[np.ndarray, " 3"], stiffness: Float[np.ndarray, " 3"]
+) -> control.StateSpace:
+    """The rig near rest with dampings [N s/m] and stiffnesses [N/m] in place of its elements, as a state space.
+
+    States are coordinates, their rates and the road's height [m]; the input is the road's velocity [m/s].
+    """
+    rig = _bare(model, p)
+    position, velocity, acceleration, road, force = rig.residual
+    stiff = position - force @ (stiffness[:, None] * rig.velocity)
+    damped = velocity - force @ (damping[:, None] * rig.velocity)
+    a, b = np.zeros((5, 5)), np.zeros((5, 1))
+    a[0, 2] = a[1, 3] = b[4, 0] = 1.0
+    a[2:4] = np.linalg.solve(-acceleration, np.hstack([stiff, damped, road[:, :1]]))
+    b[2:4] = np.linalg.solve(-acceleration, road[:, 1:])
+    shown = np.hstack([rig.output[0], rig.output[1], np.zeros((2, 1))])
+    c, d = shown + rig.output[2] @ a[2:4], rig.output[2] @ b[2:4]
+    states = ("sprung_position", "wishbone_angle", "sprung_velocity", "wishbone_velocity", "road_height")
+    return control.ss(
+        a,
+        b,
+        c,
+        d,
+        states=states,
+        inputs=("road_velocity",),
+        outputs=QUASI_LINEAR_OUTPUTS,
+        name="quasi_linear",
+    )
+
+
+_CONTINUED_FROM = 1e-4
+"""Peak to peak of the cam [m] from which smaller motions are continued: the static equilibrium may be millimetres off
+the drawing's, which is far for a motion of micrometres."""
+Complex = NDArray[np.complex128]
+
+
+def motions_on_cam(
+    model: QuarterCar, p: Values, frequency: NDArray[np.float64], peak_to_peak: float
+) -> PeriodicSolution:
+    """Periodic motions on a cam of height ``peak_to_peak`` [m] at frequencies [Hz], (D,).
+
+    Raises :class:`InputError` where one did not converge.
+    """
+    nominal = float(p["psi_nominal"])
+    size = max(peak_to_peak, _CONTINUED_FROM)
+    solution = simulate_periodic(model, p, cam_excitation(frequency, size, nominal))
+    if peak_to_peak < size:
+        excitation = cam_excitation(frequency, peak_to_peak, nominal)
+        start = _shrunk(solution, peak_to_peak / size)
+        limit = PeriodicSettings.iterations
+        solution = solve_on_mesh(model, p, excitation, solution.mesh, start, limit)
+    lost = [f"{at:g}" for at, status in zip(frequency, solution.status(), strict=True) if not status.ok]
+    if lost:
+        raise InputError(
+            f"the periodic motion was not found at {', '.join(lost)} Hz", remedy="check the rig's numbers"
+        )
+    return solution
+
+
+def first_harmonic(model: QuarterCar, p: Values, solution: PeriodicSolution, peak_to_peak: float) -> Complex:
+    """First harmonics of the channels per metre of road [unit/m], (D, 2), for a cam of ``peak_to_peak`` [m]."""
+    found = harmonics(model, p, solution, 1)[:, :, 1] / (peak_to_peak / 2.0)
+    return np.asarray(found, np.complex128)
+
+
+def _shrunk(solution: PeriodicSolution, share: float) -> Trajectory:
+    """The motions scaled by ``share`` about their means."""
+    layout, weight = solution.mesh.layout, np.asarray(solution.mesh.weight)
+
+    def shrunk(values: Array) -> Array:
+        rows = np.asarray(values)
+        total = np.add.reduceat(weight, layout.starts)
+        means = np.add.reduceat(rows * weight, layout.starts, axis=1) / total
+        mean = means[:, np.asarray(layout.dwell)]
+        return jnp.asarray(mean + share * (rows - mean))
+
+    return Trajectory(*(shrunk(part) for part in solution.trajectory))

@@ -1,12 +1,11 @@
-"""H-infinity synthesis, the check of its result, the controller as a computer runs it, and its stability margins.
+"""From a generalised plant to a controller that a computer runs: synthesis, its check, sampling, stability margins.
 
-The least gamma is found by bisection, every step verified on the loop that it closes; the controller is the
-central one at a gamma 2 % above the least. At the least gamma itself the Riccati equations are nearly singular
-and poles of the controller diverge, which no computer could follow. The check is independent of the synthesis:
-the largest singular value of the closed loop over frequency, refined around its peaks, must not exceed gamma.
+The least gamma is found by bisection, every step verified on the loop that it closes; the controller is the central
+one at a gamma 2 % above the least. At the least gamma itself the Riccati equations are nearly singular and poles of
+the controller diverge, which no computer could follow. The check is independent of the synthesis: the largest
+singular value of the closed loop over frequency, refined around its peaks, must not exceed gamma.
 
 For the computer the controller is discretised, its command is held, and its order is reduced where that is asked for.
-
 The margins are those of the loop broken at the controller's command: on one rig, and of one controller on many rigs.
 """
 

@@ -23,6 +23,7 @@ from savgs_ident.diagnosis.conclusion import CorrectedModel, FurtherRecording, c
 from savgs_ident.diagnosis.drift import drifting
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem
+from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint, sweep_shrink
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.model_selection import (
     recalibrate,
@@ -38,11 +39,9 @@ from savgs_ident.diagnosis.result import (
     DiagnosisSettings,
     Estimate,
     ForceLoop,
-    FurtherShrink,
     Learned,
     PortShare,
 )
-from savgs_ident.diagnosis.sweep import ModelPoint, sweep_shrink
 from savgs_ident.diagnosis.verdict import indistinguishable, most_probable
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned import coefficients_at

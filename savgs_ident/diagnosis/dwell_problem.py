@@ -23,14 +23,14 @@ from savgs_ident.core.status import joint_status
 from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.background import pieces_of_curve, with_background, without_drifts
 from savgs_ident.diagnosis.effect_sensitivities import columns_with_states, impose, node_loads, rehearse
-from savgs_ident.diagnosis.gap import cycle_positions, gap_map
+from savgs_ident.diagnosis.gap import CyclePosition, MapCell, cycle_positions, gap_map
 from savgs_ident.diagnosis.localisation import InputLocation, Localisation
 from savgs_ident.diagnosis.location_hypotheses import input_locations
 from savgs_ident.diagnosis.loops import force_loops
 from savgs_ident.diagnosis.next_test import next_tests
 from savgs_ident.diagnosis.problem import AbstractProblem, largest_with_margin, spans_of_force
 from savgs_ident.diagnosis.regimes import dwell_cycles, find_regimes
-from savgs_ident.diagnosis.result import CyclePosition, ForceLoop, MapCell, NextTest, Regime, Responses
+from savgs_ident.diagnosis.result import ForceLoop, NextTest, Regime, Responses
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Port, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect

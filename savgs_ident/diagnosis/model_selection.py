@@ -26,10 +26,11 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
+from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.problem import AbstractProblem
-from savgs_ident.diagnosis.result import NONE, UNKNOWN, Shrink
+from savgs_ident.diagnosis.result import NONE, UNKNOWN
 from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.search import (
     Findings,

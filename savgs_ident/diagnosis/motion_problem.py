@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values
+from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation
 from savgs_ident.diagnosis.location_hypotheses import force_port, ports_by_location
 from savgs_ident.diagnosis.port_functions import (
@@ -29,14 +30,7 @@ from savgs_ident.diagnosis.port_functions import (
 )
 from savgs_ident.diagnosis.problem import AbstractProblem, spans_of_force
 from savgs_ident.diagnosis.regimes import Cycles, find_regimes
-from savgs_ident.diagnosis.result import (
-    CyclePosition,
-    DriveForces,
-    ForceLoop,
-    FurtherShrink,
-    NextTest,
-    Regime,
-)
+from savgs_ident.diagnosis.result import DriveForces, ForceLoop, NextTest, Regime
 from savgs_ident.effects.base import Family, Port, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned import STRETCHES

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
+from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.model_selection import nearest_effect
-from savgs_ident.diagnosis.result import Shrink, Verdict
+from savgs_ident.diagnosis.result import Verdict
 from savgs_ident.diagnosis.search import hypothesis_of, left_over
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.diagnosis.verdict import alarm_odds, most_probable, probabilities

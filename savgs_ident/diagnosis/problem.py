@@ -25,16 +25,9 @@ from numpy.typing import NDArray
 from savgs_ident.core.parameter import Parameter, ParameterTable, merge_parameters
 from savgs_ident.core.transforms import known_to_tolerance
 from savgs_ident.core.values import Values, as_values
+from savgs_ident.diagnosis.gap import CyclePosition, MapCell
 from savgs_ident.diagnosis.localisation import InputLocation, Localisation
-from savgs_ident.diagnosis.result import (
-    CyclePosition,
-    DriveForces,
-    ForceLoop,
-    MapCell,
-    NextTest,
-    Regime,
-    Responses,
-)
+from savgs_ident.diagnosis.result import DriveForces, ForceLoop, NextTest, Regime, Responses
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import AbstractFrictionLimitLaw, Port, PortSignals
 from savgs_ident.effects.effect import Effect

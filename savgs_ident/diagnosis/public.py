@@ -1,4 +1,8 @@
-"""What ``import savgs_ident`` offers of diagnosis: what is missing in a model."""
+"""What is missing in a model: the diagnosis of any plant (``import savgs_ident`` offers it), and of the quarter car.
+
+A response of dwells is diagnosed by the periodic motions of the plant, a measured motion by the force of its drive.
+The rig brings its catalogue along, and what a diagnosis of it may ask for.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,15 +15,20 @@ from savgs_ident.diagnosis.diagnose import (
     diagnose_problem,
     offered_effects,
 )
+from savgs_ident.diagnosis.dwell_problem import DwellProblem
+from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint
 from savgs_ident.diagnosis.motion_problem import MotionProblem, further_motion, motion_problem
 from savgs_ident.diagnosis.problem import AbstractProblem
-from savgs_ident.diagnosis.quarter_car import diagnose_response
-from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings, FurtherShrink
-from savgs_ident.diagnosis.sweep import ModelPoint
+from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
+from savgs_ident.inference.observations import Data
 from savgs_ident.plants.model import Model
-from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
+from savgs_ident.plants.quarter_car.forces import damper_curve
+from savgs_ident.plants.quarter_car.model import FREE, RigModel
+from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.driven_motion import DrivenMotion
+from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
 from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep, measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
@@ -117,3 +126,42 @@ def _asked(
     """What the baseline is, and the values that it is given with [SI]."""
     free, values = (model.free(), {}) if model.is_drawing else model.identified
     return DiagnosisSettings(model.name, model.effects, free, orders, tuple(without)), values
+
+
+SIMTR = DiagnosisSettings("simtr", MODELS["simtr"], FREE)
+"""The paper's model as the baseline, with the parameters that the paper identifies."""
+
+
+def diagnose_response(
+    measured: HarmonicResponse,
+    rig: Rig,
+    settings: DiagnosisSettings | None = None,
+    values: Mapping[str, float] | None = None,
+    progress: Progress = no_progress,
+    sweep: SweepResponse | None = None,
+) -> Diagnosis:
+    """Diagnose the gap between a rig's baseline model and a measured response.
+
+    ``rig`` is the rig as known before any fit; ``values`` (SI, by name) are those that the baseline is given with,
+    the rig's own where left out. A ``sweep`` of the cam is no part of the diagnosis: it is predicted, and compared.
+
+    Look at ``converged`` of the result. Raises :class:`InputError` for a response that cannot be used, for names
+    that do not exist, and for a rig whose baseline has no periodic motion.
+    """
+    settings = settings or SIMTR
+    plant, data = quarter_car_problem(measured, rig, settings)
+    given = RigModel(rig, settings.baseline)
+    return diagnose_dwells(plant, data, measured, given, settings, values or {}, progress, sweep)
+
+
+def quarter_car_problem(
+    measured: HarmonicResponse, rig: Rig, settings: DiagnosisSettings
+) -> tuple[DwellProblem, Data]:
+    """The rig with its catalogue, less the effects that are left out, and the response as data.
+
+    Raises :class:`InputError` for effects that do not exist, for effects of the baseline that are to be left out, and
+    for a response that cannot be used.
+    """
+    return baseline_problem(
+        measured, QuarterCar(damper_curve(rig)), rig.parameters, CATALOGUE, settings, MODELS.values()
+    )

@@ -2,33 +2,32 @@
 
 A regime is a part of what was recorded. Within the cycle it is a third of the instants of every test, by the speed,
 the displacement or the load at a port, or the half in which the port moves in one direction; among tests it is a
-third of them, by frequency or by the size of the response. For a regime R of a residual waveform w (test d, channel
-c, instant i) the statistic is
+third of them, by frequency or by the size of the response. Regimes of which nine tenths coincide in a campaign cannot
+be told apart by it and are one: where the port moves like a sine, the instants of high speed are those of small
+stroke.
+
+For a regime R of a residual waveform w (test d, channel c, instant i) the statistic is
 
     T = log mean_R(w^2 / s^2) - log mean_elsewhere(w^2 / s^2),      s^2 = noise + d^2 power of the response (d, c)
 
-with the discrepancy d of the fit, and its p-value the share of residuals drawn from the fitted error model that are
-as concentrated. Such a residual is
+with the discrepancy d of the fit. Its p-value is the share of residuals drawn from the fitted error model that are as
+concentrated; all p-values are corrected together by Holm's method. A drawn residual is
 
     r = y - J P^-1 J' S^-1 y,      y = e + J x,
 
 e drawn with the noise scale and the discrepancy of the fit, x from the prior: what the parameters would take up is
-taken out of a draw as it is out of the residual (J slopes, P precision of the fit, S spread of the rows). A
-discrepancy that is beyond what its prior allows for small errors is a misfit, and no reference to hold it against:
-errors are drawn with no more than the prior's 95 % quantile.
+taken out of a draw as it is out of the residual (J slopes, P precision of the fit, S spread of the rows).
 
-Errors that rows share, of the background, are what a model may have, not what it must have, and have regimes of their
-own: a drift of the friction is greatest in slow tests. So there are two references, with them and without, and the
-p-value is the larger one of both.
+Two things must not make the reference too wide. A discrepancy beyond what its prior allows for small errors is itself
+a misfit: errors are drawn with no more than the prior's 95 % quantile. Errors that rows share, of the background, are
+what a model may have, not what it must have, and have regimes of their own: a drift of the friction is greatest in
+slow tests. So there are two references, with them and without, and the p-value is the larger one of both.
 
 The last regime is a drift: in every test the residual is projected on the slope in each identified parameter, and the
 coefficients are regressed on the time at which the tests were recorded. It must be a trend, and more than errors of
 the background look like: the largest |t| of the regressions is held against the draws without shared errors, the
 largest trend in standard deviations of the rows against those with them. Drifts that the background tolerates are
 left out of both: what is tolerated is no reason to call an effect missing, but it is where the model fails.
-
-Regimes of which nine tenths coincide in a campaign cannot be told apart by it and are one: where the port moves like
-a sine, the instants of high speed are those of small stroke. All p-values are corrected together by Holm's method.
 
 Source: Holm 1979, A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6(2).
 """

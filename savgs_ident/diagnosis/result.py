@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Result
+from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, MapCell, Shrink
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
@@ -118,27 +119,6 @@ class PortShare:
 
 
 @dataclass(frozen=True)
-class MapCell:
-    """The gap of one harmonic, recalibrated baseline: in per cent of the channel's response and in noise sd."""
-
-    channel: str
-    frequency_hz: float
-    order: int
-    gap_percent: float
-    gap_sigma: float
-
-
-@dataclass(frozen=True)
-class CyclePosition:
-    """Where in the cycle of the body's velocity the gap of a channel lies, as shares of its square."""
-
-    channel: str
-    reversal: float
-    mid_stroke: float
-    between: float
-
-
-@dataclass(frozen=True)
 class Regime:
     """The gap of the recalibrated baseline in a part of what was recorded.
 
@@ -224,55 +204,6 @@ class Candidate:
     def effects(self) -> tuple[str, ...]:
         """Names of its effects; none of them for none and unknown."""
         return self.hypothesis.effects
-
-
-@dataclass(frozen=True)
-class Shrink:
-    """Relative rms gap [1] over held-out tests (0.1 is 10 %): before, recalibrated, after, and of the noise alone.
-
-    ``share_closed`` is 1 - (after^2 - floor^2) / (before^2 - floor^2), ``interval`` its 95 % interval by
-    resampling the tests. It counts what calibration closes, too; the two shares apart are below, and
-    ``interval_by_effect`` is that of the second. All are NaN where there was nothing to close. ``scatter`` is the
-    standard deviation [1] of floor^2 in as many rows, by chance.
-    """
-
-    before: float
-    recalibrated: float
-    after: float
-    floor: float
-    share_closed: float
-    interval: tuple[float, float]
-    interval_by_effect: tuple[float, float] = (nan, nan)
-    scatter: float = 0.0
-
-    @property
-    def closed_by_calibration(self) -> float:
-        """1 - (recalibrated^2 - floor^2) / (before^2 - floor^2) [1]."""
-        return _closed(self.before, self.recalibrated, self.floor)
-
-    @property
-    def closed_by_effect(self) -> float:
-        """1 - (after^2 - floor^2) / (recalibrated^2 - floor^2) [1]."""
-        return _closed(self.recalibrated, self.after, self.floor)
-
-
-def _closed(before: float, after: float, floor: float) -> float:
-    whole = before**2 - floor**2
-    return 1.0 - max(after**2 - floor**2, 0.0) / whole if whole > 0.0 else nan
-
-
-@dataclass(frozen=True)
-class FurtherShrink:
-    """The same [1] of a recording that took no part: a sweep, another motion; NaN where nothing was computed.
-
-    ``name`` says in a few words what was recorded.
-    """
-
-    name: str
-    before: float
-    recalibrated: float
-    after: float
-    floor: float
 
 
 @dataclass(frozen=True)

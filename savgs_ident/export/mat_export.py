@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import savemat
 
-from savgs_ident.control.describing_function import first_harmonic, motions_on_cam
 from savgs_ident.control.linear_study import CHANNELS, FREQUENCY, TEST_FREQUENCY
+from savgs_ident.control.linearisation import first_harmonic, motions_on_cam
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import write_bytes
 from savgs_ident.core.values import as_values

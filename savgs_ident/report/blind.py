@@ -15,6 +15,7 @@ from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.report.html import embed, render_page
 from savgs_ident.report.text import DASH, decimal, percentage, plain, table
 from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, new_figure, printable, styled
+from savgs_ident.validation.blind_answer import Score, is_right, said_words, truth_words
 from savgs_ident.validation.blind_rates import (
     Rate,
     Reliability,
@@ -23,7 +24,6 @@ from savgs_ident.validation.blind_rates import (
     rates_of,
     reliability_of,
 )
-from savgs_ident.validation.blind_score import Score, is_right, said_words, truth_words
 from savgs_ident.validation.foreign_laws import FOREIGN
 
 RATE_WORDS: Mapping[str, str] = {

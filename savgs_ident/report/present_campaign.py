@@ -181,7 +181,7 @@ class _Posterior(AbstractPresenter["Posterior"]):
         return posterior_html(result, result.origin.with_versions(self.packages))
 
     def figures(self, result: "Posterior") -> Figures:
-        from savgs_ident.report.posterior.bode import predictive_figure
+        from savgs_ident.report.bode import predictive_figure
         from savgs_ident.report.posterior.figures import corner_figure, profile_figure, trace_figure
 
         identified = result.of_role("identified")
@@ -239,8 +239,12 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
     def figures(self, result: "Diagnosis") -> Figures:
         from savgs_ident.report.diagnosis.compared import diagnosis_bode_figure, drive_figure
         from savgs_ident.report.diagnosis.drawing import rig_figure
-        from savgs_ident.report.diagnosis.figures import force_figure, gap_map_figure, shrink_figure
-        from savgs_ident.report.diagnosis.regimes import regime_figure
+        from savgs_ident.report.diagnosis.figures import (
+            force_figure,
+            gap_map_figure,
+            regime_figure,
+            shrink_figure,
+        )
 
         shrink: Figures = {"shrink": lambda: shrink_figure(result)}
         if result.regimes:

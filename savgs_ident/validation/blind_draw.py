@@ -1,12 +1,11 @@
 """The secret draw: which rig stands there in a trial.
 
-Its parameters are off the sheet by their tolerances, those that are to be identified by a tenth. Then comes
-nothing, an effect, two at once, or one that is removed from the catalogue; each so large that the response
-changes by 3 to 25 %, and such that it stands out of what calibration and tolerances can do
-(:mod:`savgs_ident.validation.lookalikes`). What does not is drawn again. An effect that is removed must stand
-out of what is left in the catalogue, too, and each of two out of all others: nobody could name them else.
-
-A rig for which effects are drawn: how large they are made on it, and whether they can be seen there.
+Its parameters are off the sheet by their tolerances, those that are to be identified by a tenth. Then comes nothing,
+an effect, two at once, or one that is removed from the catalogue. An effect is made so large that the response
+changes by 3 to 25 % (:class:`Present`), and must stand out of what calibration and tolerances can do
+(:class:`Drawing`, by :mod:`savgs_ident.validation.lookalikes`). What does not is drawn again. An effect that is
+removed must stand out of what is left in the catalogue, too, and each of two out of all others: nobody could name
+them else.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +19,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.diagnosis.problem import term_of
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.simulate.periodic import PeriodicSolution
-from savgs_ident.validation.blind_record import Answer, Drawn
+from savgs_ident.validation.blind_answer import Answer, Drawn
 from savgs_ident.validation.lookalikes import (
     Hiding,
     Ways,
@@ -33,7 +32,7 @@ from savgs_ident.validation.lookalikes import (
     similar,
     ways_of,
 )
-from savgs_ident.validation.virtual_rig import Bench, change_of
+from savgs_ident.validation.virtual_rig import Bench, change_of, draw_rig
 
 SMALLEST, LARGEST = 0.03, 0.25
 """Change of the response by a drawn effect, relative; drawn evenly in its logarithm."""
@@ -233,9 +232,6 @@ def drawing_of(bench: Bench, rig: Mapping[str, float]) -> Drawing | None:
     return Drawing(bench, rig, response, hiding_at(bench, (), rig, solution), {(): solution})
 
 
-OFF = 0.1
-"""Relative standard deviation of parameters that are to be identified and have no tolerance."""
-
 INDISTINGUISHABLE = (frozenset({"accel_gain", "accel_tilt"}),)
 """Effects that do exactly the same: if one is removed from the catalogue, so are the others."""
 
@@ -266,20 +262,6 @@ class Shares:
         weights = np.array([self.none, self.effect, self.two, self.unknown])
         kinds: tuple[Drawn, ...] = ("none", "effect", "two", "unknown")
         return kinds[int(random.choice(4, p=weights / weights.sum()))]
-
-
-def draw_rig(bench: Bench, random: np.random.Generator) -> dict[str, float]:
-    """Parameters of the rig [SI] that are not those of the sheet: normal about them, within their bounds."""
-    drawn = {}
-    for each in bench.rig.parameters.entries:
-        spread = each.tolerance or (OFF * abs(each.value) if each.name in bench.free else 0.0)
-        if spread == 0.0:
-            continue
-        value = each.value + spread * random.standard_normal()
-        while not each.lower <= value <= each.upper:
-            value = each.value + spread * random.standard_normal()
-        drawn[each.name] = float(value)
-    return drawn
 
 
 def draw_answer(bench: Bench, shares: Shares, number: int, random: np.random.Generator) -> Answer:

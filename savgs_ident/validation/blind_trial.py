@@ -21,7 +21,7 @@ import numpy as np
 
 from savgs_ident.core.errors import InputError, blamed_on
 from savgs_ident.core.files import is_begun, prepare_folder, record_of, write_json
-from savgs_ident.diagnosis.quarter_car import SIMTR, diagnose_response
+from savgs_ident.diagnosis.public import SIMTR, diagnose_response
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, parse_rig
@@ -29,21 +29,21 @@ from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Recording
 from savgs_ident.simulate.excitation import first_sweep, measured_response
 from savgs_ident.simulate.public import DWELLS
-from savgs_ident.validation.blind_draw import Shares, draw_answer
-from savgs_ident.validation.blind_record import (
-    FILE,
+from savgs_ident.validation.blind_answer import (
     Answer,
     Envelope,
+    Score,
     Seal,
     envelope_of,
+    failed,
     opened,
-    record_campaign,
+    score_of,
     sealed,
-    write_campaign,
 )
-from savgs_ident.validation.blind_score import Score, failed, score_of
+from savgs_ident.validation.blind_draw import Shares, draw_answer
 from savgs_ident.validation.foreign_draw import draw_foreign, true_bench
 from savgs_ident.validation.trials import code_version, rig_marks
+from savgs_ident.validation.virtual_campaign import FILE, record_campaign, write_recordings
 from savgs_ident.validation.virtual_rig import Bench, Programme
 
 DRAWS = 5
@@ -221,7 +221,7 @@ def _record(folder: Path, plan: Plan, drawn: Drawn, number: int) -> None:
     """Write the campaign, the answer, and last the seal, in the place of what is there."""
     shutil.rmtree(folder)
     campaign = prepare_folder(folder / "campaign")
-    write_campaign(drawn.recordings, campaign)
+    write_recordings(drawn.recordings, campaign)
     envelope = Envelope(drawn.answer, drawn.salt)
     settings = {"trial": number, "settings": plan.marks()}
     write_json(folder / "answer.json", settings | asdict(envelope))

@@ -2,9 +2,8 @@
 
 The recalibrated baseline is the truth of every one of them: parameters drawn from what the recorded campaign leaves
 open about them, the noise of the record, which a diagnosis knows no better than that of a record, nothing else. Each
-is diagnosed as any other. The share of those in which
-something is said to be missing is the false-alarm rate of this campaign, and their odds are what its own odds are to
-be compared with.
+is diagnosed as any other. The share of those in which something is said to be missing is the false-alarm rate of this
+campaign, and their odds are what its own odds are to be compared with.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,8 +22,7 @@ from savgs_ident.core.files import prepare_folder, record_of
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
 from savgs_ident.diagnosis.model_selection import recalibrate, select_model
-from savgs_ident.diagnosis.public import baseline_of
-from savgs_ident.diagnosis.quarter_car import quarter_car_problem
+from savgs_ident.diagnosis.public import baseline_of, quarter_car_problem
 from savgs_ident.diagnosis.result import DiagnosisSettings
 from savgs_ident.diagnosis.verdict import alarm_odds
 from savgs_ident.inference.find_map import find_map, refine, search_of
@@ -140,7 +138,7 @@ def alarm_bench(
 ) -> AlarmBench:
     """Recalibrate the baseline on a measured response, and select a model for it.
 
-    Raises :class:`InputError` as :func:`savgs_ident.diagnosis.quarter_car.diagnose_response` does. ``values``
+    Raises :class:`InputError` as :func:`savgs_ident.diagnosis.public.diagnose_response` does. ``values``
     are parameters in SI.
     """
     with threadpool_limits(1, "blas"):

@@ -10,7 +10,7 @@ Parameters are off the sheet by their tolerances, as in any trial. Besides, in e
 An effect changes the response by 3 to 25 % somewhere. Nothing is drawn again because it is hard to see or easily
 imitated: how far it stands out is recorded. Only where no size gives the change that was drawn is there another draw.
 
-The recording is integrated with a fixed step (:mod:`savgs_ident.validation.fixed_step`) and passes anti-aliasing
+The recording is integrated with a fixed step (:mod:`savgs_ident.validation.virtual_motions`) and passes anti-aliasing
 filters and converters.
 """
 
@@ -23,11 +23,11 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.effects.effect import Effect
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.validation.blind_draw import ATTEMPTS, Drawing, Present, Shares, draw_rig, drawing_of
-from savgs_ident.validation.blind_record import Answer, SmallErrors
+from savgs_ident.validation.blind_answer import Answer, SmallErrors
+from savgs_ident.validation.blind_draw import ATTEMPTS, Drawing, Present, Shares, drawing_of
 from savgs_ident.validation.foreign_laws import FOREIGN, foreign_laws
 from savgs_ident.validation.lookalikes import closest, rows_of
-from savgs_ident.validation.virtual_rig import Bench
+from savgs_ident.validation.virtual_rig import Bench, draw_rig
 
 DAMPER_ERROR = (0.005, 0.02)
 """Least and largest rms error of the damper's table [1]."""

@@ -1,29 +1,23 @@
-"""Effects that do the same to a campaign: nothing in it shows which of them the rig has.
+"""How far a drawn effect stands out of a campaign, which others do the same to it, and how large it is made.
 
-To first order about the rig without any it is seen which ones may: effects without states by their derivatives, those
-with states by what they do along its motion, for several of their shapes.
-
-Whether an effect can be seen at all: what calibration and tolerances can do, it must not be.
-
-A spring that is 3 % stiffer than its sheet says, at a tolerance of 1.5 %, is no missing effect, and a tyre with
-10 % more friction is identified anyway. What an effect changes is therefore held against the best that the
-model without it can do:
+A spring that is 3 % stiffer than its sheet says, at a tolerance of 1.5 %, is no missing effect, and a tyre with 10 %
+more friction is identified anyway. What an effect changes is therefore held against the best that the model without
+it can do:
 
     sigma^2 = min_x  |(change - moved(x)) / noise|^2 + |x|^2
 
-with x the parameters that are identified or known to a tolerance, in units of what is known of them beforehand.
-The search takes damped Gauss-Newton steps within bounds.
+with x the parameters that are identified or known to a tolerance, in units of what is known of them beforehand. The
+search takes damped Gauss-Newton steps within bounds. It is not that of :mod:`savgs_ident.inference.find_map`: the
+noise is known exactly, so that no noise scale and no discrepancy may take up what stands out; the amplitudes of an
+effect beside have no prior; and what is known beforehand is centred on the drawn rig, within one e-fold for an
+identified parameter where a fit has three. Other widths could change what is drawn for a seed.
 
-It is not the search of :mod:`savgs_ident.inference.find_map`. The noise is known exactly, so that no noise scale and
-no discrepancy may take up what stands out; the amplitudes of an effect beside have no prior; and what is known
-beforehand is centred on the drawn rig, within one e-fold for an identified parameter where a fit has three. Other
-widths could change what is drawn for a seed.
-
-How large a drawn effect is made: by what it changes, not by its parameter's number.
+Which effects may do the same is seen to first order about the rig without any: effects without states by their
+derivatives, those with states by what they do along its motion, for several of their shapes.
 
 Newtons of friction and seconds of lag have no common size; what they do to the response has. The amplitude is
-searched for at which the clean response changes by what was drawn; how that is measured, see
-:func:`savgs_ident.validation.virtual_rig.change_of`.
+searched for at which the clean response changes by what was drawn
+(:func:`savgs_ident.validation.virtual_rig.change_of`).
 """
 
 from collections.abc import Callable, Mapping, Sequence

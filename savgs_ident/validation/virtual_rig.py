@@ -1,51 +1,31 @@
-"""The rig on which trials are drawn: its model with any effects, and what it answers to the programme.
+"""The rig on which trials are drawn: its sensors, its programme of tests, and its model with any effects.
 
-Effects without states are in every model, those that were not drawn at their null, so that one compiled program
-serves nearly all trials; an effect with states of its own asks for another.
+A :class:`Bench` is the rig as known beforehand with what it is put through. Effects without states are in every
+model, those that were not drawn at their null, so that one compiled program serves nearly all trials; an effect with
+states of its own asks for another.
 
-What is recorded in a trial: the programme of dwells, seen by the rig's sensors
-(:mod:`savgs_ident.validation.sensor_chain`).
-
-A steady cam by time integration: one period of the motion that a dwell comes to.
-
-The rig starts at rest; the cam's lift grows to its height during the first second, and then its speed changes
-from dwell to dwell, with the cam at its top each time. Every dwell runs until the states at the ends of two
-stretches agree; then one period is kept. What follows in a dwell repeats that period; the sensors' own dynamics,
-which are linear, act on its harmonics.
-
-A sweep of the cam from rest, by time integration.
+:class:`Sensors` are what is between the truth and what a logger writes: noise, filters, converters, and instants that
+jitter. Without colour, corner and bits, the noise is white and nothing else happens to the truth.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from math import ceil
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
-from diffrax import RESULTS
-from jaxtyping import Array
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.effects.base import AbstractSensorLaw
 from savgs_ident.effects.effect import Effect
-from savgs_ident.plants.base import Excitation, state_sizes
+from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.forces import damper_curve
 from savgs_ident.plants.quarter_car.inputs import (
-    ImposedLink,
-    RigSource,
-    RoadMotion,
     cam_excitation,
-    cam_road,
-    flat_road,
-    held_link,
     nominal_test,
-    sweep_road,
 )
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
@@ -58,15 +38,62 @@ from savgs_ident.simulate.periodic import (
 )
 from savgs_ident.simulate.program_cache import placed
 from savgs_ident.simulate.public import DWELLS
-from savgs_ident.simulate.transient import (
-    pack_state,
-    rest_state,
-    simulate_transient,
-    through_sensors,
-    unpack_state,
-)
-from savgs_ident.validation.fixed_step import integrate_fixed
-from savgs_ident.validation.sensor_chain import Sensors
+
+RANGES = (0.05, 50.0, 0.1)
+"""Largest road [m], acceleration [m/s^2] and deflection [m] that the logger's converters read."""
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What the sensors add to the truth, as the rig's sheet says.
+
+    Attributes:
+        rate: sampling rate [Hz].
+        jitter: rms error of the sampling instants [s]; the stamps give the true ones.
+        accel: rms noise of the acceleration [m/s^2].
+        deflection: of the deflection [m].
+        road: of the road's height [m].
+        hunting: rms by which a drive that holds the link moves it to and fro [rad].
+        counts: of the link's encoder per turn of the link [1].
+        colour: correlation of the noise from one sample to the next [1]; 0 for white noise.
+        phase: angle by which the road's signal leads the road [rad].
+        corner: of the logger's anti-aliasing filters, Butterworth of second order [Hz]; 0 for none.
+        bits: of the logger's converters, over the ranges of :data:`RANGES`; 0 for none.
+    """
+
+    rate: float = 500.0
+    jitter: float = 4e-5
+    accel: float = 0.05
+    deflection: float = 1e-4
+    road: float = 1e-5
+    hunting: float = 2.5e-6
+    counts: float = 65536.0 * 40.0
+    colour: float = 0.0
+    phase: float = 0.0
+    corner: float = 0.0
+    bits: int = 0
+
+    def filtered(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """What the anti-aliasing filters make of frequencies [Hz]."""
+        ratio = 1j * frequency / self.corner if self.corner > 0.0 else np.zeros_like(frequency)
+        return np.asarray(1.0 / (1.0 + np.sqrt(2.0) * ratio + ratio**2), dtype=np.complex128)
+
+    def noise(self, shape: tuple[int, int], random: np.random.Generator) -> NDArray[np.float64]:
+        """Noise of unit variance: a row a channel, each of the first order of autoregression with ``colour``."""
+        white = random.standard_normal(shape)
+        if self.colour == 0.0:
+            return white
+        drive = np.sqrt(1.0 - self.colour**2)
+        coloured: NDArray[np.float64] = lfilter([drive], [1.0, -self.colour], white, axis=-1)
+        return coloured
+
+    def converted(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Road, acceleration and deflection, (3, n), as the converters read them."""
+        if self.bits == 0:
+            return values
+        ranges = np.array(RANGES)[:, None]
+        count = ranges / 2.0 ** (self.bits - 1)
+        return np.clip(count * np.round(values / count), -ranges, ranges - count)
 
 
 @dataclass(frozen=True)
@@ -195,6 +222,24 @@ class Bench:
         return np.asarray(harmonics(self.model(effects), self.values(given), solution, ORDERS))
 
 
+OFF = 0.1
+"""Relative standard deviation of parameters that are to be identified and have no tolerance."""
+
+
+def draw_rig(bench: Bench, random: np.random.Generator) -> dict[str, float]:
+    """Parameters of the rig [SI] that are not those of the sheet: normal about them, within their bounds."""
+    drawn = {}
+    for each in bench.rig.parameters.entries:
+        spread = each.tolerance or (OFF * abs(each.value) if each.name in bench.free else 0.0)
+        if spread == 0.0:
+            continue
+        value = each.value + spread * random.standard_normal()
+        while not each.lower <= value <= each.upper:
+            value = each.value + spread * random.standard_normal()
+        drawn[each.name] = float(value)
+    return drawn
+
+
 def change_of(there: NDArray[np.complex128], without: NDArray[np.complex128]) -> float:
     """By how much a response differs from the one without an effect, relative; (D, 2, K) each.
 
@@ -205,154 +250,3 @@ def change_of(there: NDArray[np.complex128], without: NDArray[np.complex128]) ->
     first = moved[..., 0] / size[..., 0]
     waveform = np.linalg.norm(moved, axis=-1) / np.linalg.norm(size, axis=-1)
     return float(np.max(np.maximum(first, waveform)))
-
-
-SAMPLES = 2048
-"""Instants of the period that is kept: a millisecond apart in the slowest dwell of the programme."""
-
-STRETCH = 1.0
-"""A stretch is so many whole periods that it lasts at least this long [s]."""
-
-CLOSED = 2e-4
-"""Two ends agree if no state differs by more than this of its typical size: a tenth of what the noise of a dwell
-leaves open, and about what the steps of the integration scatter by."""
-
-PATIENCE = 60.0
-"""A dwell that has not settled after so long [s] does not."""
-
-PRECISION = 1e-6
-"""Relative tolerance of a step of the integration."""
-
-
-@dataclass(frozen=True)
-class Steady:
-    """A steady dwell.
-
-    Attributes:
-        frequency: [Hz].
-        readings: what the sensors show over a period that begins with the cam at its top, noise apart: [m/s^2]
-            and [m], (2, SAMPLES).
-        settled: whether the motion had become periodic.
-    """
-
-    frequency: float
-    readings: NDArray[np.float64]
-    settled: bool
-
-
-def without_sensor_faults(model: QuarterCar) -> QuarterCar:
-    """The same rig with sensors that show what is there, gains apart."""
-    return QuarterCar(
-        model.damper,
-        effects=tuple(each for each in model.effects if not isinstance(each.law, AbstractSensorLaw)),
-    )
-
-
-def steady_dwells(
-    model: QuarterCar, during: Sequence[Values], frequencies: tuple[float, ...], step: float = 0.0
-) -> Iterator[Steady]:
-    """The steady motions of the rig in one dwell after the other [Hz], with a link held at its nominal angle.
-
-    ``during`` are the parameters [SI] in each; ``step`` [s] is that of a fixed-step integration, 0 for one that
-    controls its error.
-    """
-    mechanics = without_sensor_faults(model)
-    _, angle = nominal_test(during[0])
-    state, rise = _at_rest(mechanics, during[0], placed(held_link(angle))), STRETCH
-    for frequency, p in zip(frequencies, during, strict=True):
-        apart = np.inf
-        for _ in range(ceil(PATIENCE / STRETCH)):
-            periods = ceil(STRETCH * frequency)
-            before, state = state, _stretch(mechanics, p, state, frequency, periods, rise, step)[0]
-            apart, rise = _apart(mechanics, before, state), 0.0
-            if apart < CLOSED or np.isnan(apart):
-                break
-        state, truth = _stretch(mechanics, p, state, frequency, 1, rise, step)
-        yield Steady(frequency, _shown(model, p, frequency, truth), bool(apart < CLOSED))
-
-
-def _apart(model: QuarterCar, before: Array, after: Array) -> float:
-    """Largest difference of two packed states, of their typical sizes; NaN if one is not a number."""
-    scale = np.array(state_sizes(model))
-    return float(np.max(np.abs(np.asarray(after) - np.asarray(before)) / scale))
-
-
-def _stretch(
-    model: QuarterCar, p: Values, start: Array, frequency: float, periods: int, rise: float, step: float
-) -> tuple[Array, NDArray[np.float64]]:
-    """The packed state after so many periods, and what was read on the way, (2, SAMPLES).
-
-    The cam's lift grows to its height during the first ``rise`` [s].
-    """
-    lift, angle = nominal_test(p)
-    if step > 0.0:
-        source = placed(RigSource(cam_road(lift, frequency, rise), held_link(angle)))
-        found = integrate_fixed(model, p, start, source, periods / frequency, SAMPLES, step)
-        return found[0], np.asarray(found[1])
-    times = np.linspace(0.0, periods / frequency, SAMPLES + 1)
-    drive = (cam_road(lift, frequency, rise), held_link(angle), jnp.asarray(times))
-    end, readings = _integrated(model, p, start, *placed(drive))
-    return end, np.asarray(readings)
-
-
-@eqx.filter_jit
-def _at_rest(model: QuarterCar, p: Values, link: ImposedLink) -> Array:
-    return pack_state(rest_state(model, p, RigSource(flat_road(), link), jnp.zeros(())))
-
-
-# Compiled as a whole: what prepares an integration would take longer than the integration, step by step.
-@eqx.filter_jit
-def _integrated(
-    model: QuarterCar, p: Values, start: Array, road: RoadMotion, link: ImposedLink, times: Array
-) -> tuple[Array, Array]:
-    found = simulate_transient(model, p, RigSource(road, link), times, unpack_state(model, start), PRECISION)
-    return pack_state(found.state_at(-1)), jnp.stack(found.readings)[:, :-1]
-
-
-@eqx.filter_jit
-def _transfers(model: QuarterCar, p: Values, frequency: Array) -> Array:
-    return model.transfers(p, frequency)
-
-
-def _shown(model: QuarterCar, p: Values, frequency: float, truth: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What the sensors make of a period."""
-    order = jnp.arange(SAMPLES // 2 + 1, dtype=jnp.float64)
-    passed = np.asarray(_transfers(model, p, frequency * order))
-    return np.fft.irfft(np.fft.rfft(truth) * passed, SAMPLES)
-
-
-def sweep_readings(
-    model: QuarterCar, p: Values, duration: float, end: float, rate: float, step: float = 0.0
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Instants [s], (n,), and what the sensors show then, (2, n), from 0 to ``end`` [Hz] in ``duration`` [s].
-
-    ``step`` [s] is that of a fixed-step integration, 0 for one that controls its error.
-    Raises :class:`InputError` if the integration does not end well.
-    """
-    times = np.arange(round(duration * rate) + 1) / rate
-    lift, angle = nominal_test(p)
-    road, link = sweep_road(lift, 0.0, end, duration), held_link(angle)
-    if step > 0.0:
-        shown, ended = _swept_fixed(model, p, RigSource(road, link), times, step), jnp.asarray(True)
-    else:
-        shown, ended = _swept(model, p, *placed((road, link, jnp.asarray(times))))
-    if not np.isfinite(shown).all() or not bool(ended):
-        raise InputError("the sweep cannot be simulated", source="sweep", remedy="draw another rig")
-    return times, np.asarray(shown)
-
-
-def _swept_fixed(
-    model: QuarterCar, p: Values, source: RigSource, times: NDArray[np.float64], step: float
-) -> Array:
-    """Readings (2, n) at evenly spaced instants [s]."""
-    start, lasts = _at_rest(model, p, placed(source.link)), float(times[-1]) * times.size / (times.size - 1)
-    readings = integrate_fixed(model, p, start, placed(source), lasts, times.size, step)[1]
-    return through_sensors(partial(model.transfers, p), jnp.asarray(times), readings)
-
-
-@eqx.filter_jit
-def _swept(
-    model: QuarterCar, p: Values, road: RoadMotion, link: ImposedLink, times: Array
-) -> tuple[Array, Array]:
-    found = simulate_transient(model, p, RigSource(road, link), times, tolerance=PRECISION)
-    return jnp.stack(found.readings), jnp.asarray(found.result == RESULTS.successful)

@@ -12,7 +12,7 @@ from benchmarks.diagnosis_peers import choose, compare, marks_of, merit, scores_
 from benchmarks.figures import FIGURES
 from benchmarks.sparse_selection import PEERS, THRESHOLDS, by_frols, by_lasso, by_stlsq
 from benchmarks.trial_regression import VARIANTS, Regression, Trial, merged, trial_folders
-from savgs_ident.validation.blind_record import Answer, SmallErrors
+from savgs_ident.validation.blind_answer import Answer, SmallErrors
 
 ROWS = 600
 NAMES = ("accel_lag", "accel_gain|accel_tilt", "sprung_mass", "joint_friction", "rail_stribeck")

@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 
 from savgs_ident.control import linear_study
-from savgs_ident.control.describing_function import (
+from savgs_ident.control.linear_study import TEST_FREQUENCY, SmallMotions
+from savgs_ident.control.linearisation import (
     ELEMENTS,
-    OUTPUTS,
+    QUASI_LINEAR_OUTPUTS,
     DescribingFunctions,
     describe,
+    linearise,
     quasi_linear_response,
     quasi_linear_space,
+    resting,
 )
-from savgs_ident.control.linear_study import TEST_FREQUENCY, SmallMotions
-from savgs_ident.control.linearisation import linearise, resting
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.quarter_car.catalogue import build_model, model_parameters
 from savgs_ident.plants.quarter_car.inputs import cam_excitation
@@ -132,7 +133,7 @@ def test_its_state_space_is_its_response_at_its_own_frequency(
 ) -> None:
     iw = 2j * np.pi * at_test.described.frequency[place]
     space = _space(friction, numbers, at_test.described, place)
-    assert tuple(space.output_labels) == OUTPUTS
+    assert tuple(space.output_labels) == QUASI_LINEAR_OUTPUTS
     assert space(iw)[:, 0] * iw == pytest.approx(at_test.quasi_linear[place], rel=1e-9)
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.validation.blind_record import Answer, Drawn
+from savgs_ident.validation.blind_answer import Answer, Drawn
 
 BLANK = Answer(1, "none", (), (), {}, {}, (), {}, {"m_s": 319.0}, ())
 

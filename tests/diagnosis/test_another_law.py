@@ -16,7 +16,7 @@ from jaxtyping import Array, Complex, Float
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.diagnosis.quarter_car import diagnose_response
+from savgs_ident.diagnosis.public import diagnose_response
 from savgs_ident.effects.base import (
     AbstractFrictionLimitLaw,
     AbstractInputLaw,

@@ -11,8 +11,7 @@ from savgs_ident.diagnosis.background import pieces_of_curve, relative_change, w
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence
 from savgs_ident.diagnosis.localisation import InputLocation, Law
 from savgs_ident.diagnosis.model_selection import recalibrate, select_model
-from savgs_ident.diagnosis.public import baseline_of
-from savgs_ident.diagnosis.quarter_car import quarter_car_problem
+from savgs_ident.diagnosis.public import baseline_of, quarter_car_problem
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.model import RigModel

@@ -12,7 +12,7 @@ from savgs_ident.report.blind import (
     blind_text,
     confusion_figure,
 )
-from savgs_ident.validation.blind_score import Score, failed, score_of
+from savgs_ident.validation.blind_answer import Score, failed, score_of
 
 from .blind_answers import answer, diagnosis
 

@@ -12,6 +12,7 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
+from savgs_ident.validation.blind_answer import Answer
 from savgs_ident.validation.blind_draw import (
     LARGEST,
     SMALLEST,
@@ -20,11 +21,10 @@ from savgs_ident.validation.blind_draw import (
     Present,
     Shares,
     draw_answer,
-    draw_rig,
     drawing_of,
 )
-from savgs_ident.validation.blind_record import Answer, record_campaign, write_campaign
-from savgs_ident.validation.virtual_rig import ORDERS, Bench, Programme, change_of
+from savgs_ident.validation.virtual_campaign import record_campaign, write_recordings
+from savgs_ident.validation.virtual_rig import ORDERS, Bench, Programme, change_of, draw_rig
 
 from .blind_answers import BLANK, answer
 
@@ -184,7 +184,7 @@ def truth(drawing: Drawing) -> Answer:
 @pytest.fixture(scope="module")
 def campaign(bench: Bench, truth: Answer, tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     folder = tmp_path_factory.mktemp("campaign")
-    write_campaign(record_campaign(bench, truth, np.random.default_rng(4)), folder)
+    write_recordings(record_campaign(bench, truth, np.random.default_rng(4)), folder)
     return load_campaign(folder)
 
 
@@ -242,6 +242,6 @@ def test_the_same_draw_gives_the_same_bytes(bench: Bench, tmp_path: Path) -> Non
     for place, seed in (("one", 9), ("same", 9), ("other", 8)):
         (tmp_path / place).mkdir()
         recordings = record_campaign(short, BLANK, np.random.default_rng(seed))
-        files.append(write_campaign(recordings, tmp_path / place).read_bytes())
+        files.append(write_recordings(recordings, tmp_path / place).read_bytes())
     assert files[0] == files[1]
     assert files[0] != files[2]

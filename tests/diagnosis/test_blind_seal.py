@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.validation.blind_record import (
+from savgs_ident.validation.blind_answer import (
     Answer,
     Envelope,
     Seal,

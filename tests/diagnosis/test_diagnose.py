@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.diagnosis.quarter_car import SIMTR, diagnose_response
+from savgs_ident.diagnosis.public import SIMTR, diagnose_response
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.plants.quarter_car.rig import Rig
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from savgs_ident.diagnosis.quarter_car import SIMTR
+from savgs_ident.diagnosis.public import SIMTR
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.periodic import PeriodicSettings

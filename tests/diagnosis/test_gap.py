@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from savgs_ident.diagnosis.gap import Rows, shrinks
-from savgs_ident.diagnosis.result import Shrink
+from savgs_ident.diagnosis.gap import Rows, Shrink, shrinks
 from savgs_ident.inference.observations import Data
 
 TESTS, ROWS = 30, 40

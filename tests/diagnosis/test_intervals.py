@@ -9,7 +9,7 @@ from scipy.stats import chi2
 from savgs_ident.diagnosis.candidates import WITHIN
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
 from savgs_ident.diagnosis.model_selection import recalibrate
-from savgs_ident.diagnosis.quarter_car import SIMTR, quarter_car_problem
+from savgs_ident.diagnosis.public import SIMTR, quarter_car_problem
 from savgs_ident.inference.find_map import LaplaceFit, find_map, refine
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import AbstractCoordinate

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from savgs_ident.diagnosis import sweep as module
-from savgs_ident.diagnosis.sweep import along, first_harmonic, frequencies_of, sweep_shrink
+from savgs_ident.diagnosis import gap as module
+from savgs_ident.diagnosis.gap import along, first_harmonic, frequencies_of, sweep_shrink
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
@@ -16,7 +16,7 @@ from savgs_ident.recordings.recording import RecordedChannel, Recording
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import SweepResponse
 from savgs_ident.responses.sweeps import estimate_sweep_response
-from savgs_ident.validation.virtual_rig import sweep_readings
+from savgs_ident.validation.virtual_motions import sweep_readings
 
 from .conftest import rig_problem
 

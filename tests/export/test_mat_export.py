@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from savgs_ident.control.describing_function import first_harmonic, motions_on_cam
+from savgs_ident.control.linearisation import first_harmonic, motions_on_cam
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import Parameter, ParameterTable
 from savgs_ident.core.values import as_values

@@ -10,25 +10,22 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, MapCell, Shrink
 from savgs_ident.diagnosis.result import (
     NONE,
     UNKNOWN,
     Candidate,
     Confusable,
-    CyclePosition,
     Diagnosis,
     Estimate,
     ForceLoop,
-    FurtherShrink,
     Hypothesis,
     Kind,
-    MapCell,
     NextTest,
     NotJudgeable,
     PortShare,
     Regime,
     Responses,
-    Shrink,
     Verdict,
 )
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE

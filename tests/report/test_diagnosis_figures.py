@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from numpy.testing import assert_allclose
 
-from savgs_ident.diagnosis.result import Diagnosis, MapCell
+from savgs_ident.diagnosis.gap import MapCell
+from savgs_ident.diagnosis.result import Diagnosis
 from savgs_ident.report.diagnosis.compared import compared_channels, diagnosis_bode_figure, first_harmonic_gap
 from savgs_ident.report.diagnosis.drawing import rig_figure
 from savgs_ident.report.diagnosis.figures import (
@@ -22,11 +23,12 @@ from savgs_ident.report.diagnosis.figures import (
     gap_channels,
     gap_map_figure,
     gap_table,
+    regime_figure,
+    regime_picture,
     shrink_figure,
     shrink_rows,
     spread_loops,
 )
-from savgs_ident.report.diagnosis.regimes import regime_figure, regime_picture
 from savgs_ident.report.diagnosis.text import law_label
 from savgs_ident.report.html import embed
 

@@ -1,16 +1,16 @@
 """Terminal and page of a diagnosis say its numbers, the verdict first, and hostile names as text."""
 
 import base64
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from savgs_ident.core.presentation import Origin
+from savgs_ident.core.files import to_json
+from savgs_ident.core.presentation import Origin, no_progress
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Diagnosis, Estimate, NotJudgeable
-from savgs_ident.report.diagnosis.page import diagnosis_html, parameter_table, write_diagnosis
+from savgs_ident.report.diagnosis.page import diagnosis_html, parameter_table
 from savgs_ident.report.diagnosis.text import (
     closed_words,
     estimate_words,
@@ -20,6 +20,7 @@ from savgs_ident.report.diagnosis.text import (
     shown_candidates,
     smallest_words,
 )
+from savgs_ident.report.present_campaign import DIAGNOSIS
 from savgs_ident.report.text import DASH
 
 from .diagnosis_reading import ORIGIN, SHOWN, record_of, rendered
@@ -225,12 +226,13 @@ def test_numbers_are_told_to_the_digits_that_they_justify() -> None:
 
 
 def test_both_files_are_written_and_the_same_diagnosis_gives_the_same_page(
-    diagnosis: Diagnosis, source: str, tmp_path: Path
+    diagnosis: Diagnosis, tmp_path: Path
 ) -> None:
-    files = write_diagnosis(diagnosis, ORIGIN, tmp_path)
+    shown = replace(diagnosis, origin=ORIGIN)
+    files = tuple(DIAGNOSIS.write(shown, tmp_path, no_progress))
     assert [file.name for file in files] == ["diagnosis.json", "diagnosis.html"]
-    assert json.loads(files[0].read_text()) == record_of(diagnosis)
-    assert files[1].read_text(encoding="utf-8") == source
+    assert files[0].read_text() == to_json(DIAGNOSIS.record(shown))
+    assert files[1].read_text(encoding="utf-8") == DIAGNOSIS.page(shown)
 
 
 def test_the_text_shows_the_warnings_about_the_data(diagnosis: Diagnosis) -> None:

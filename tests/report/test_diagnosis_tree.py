@@ -9,15 +9,16 @@ from hypothesis import strategies as st
 
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Candidate, Diagnosis, Hypothesis, Verdict
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.report.diagnosis.page import candidate_row, diagnosis_html
-from savgs_ident.report.diagnosis.tree import (
+from savgs_ident.report.diagnosis.hypotheses import (
     Branch,
     NestedBar,
     actions_of,
+    candidate_row,
     hypothesis_tree,
     named_hypotheses,
     nested_bars,
 )
+from savgs_ident.report.diagnosis.page import diagnosis_html
 
 from .diagnosis_reading import ORIGIN, SHOWN
 from .diagnosis_synthetic import candidate_of

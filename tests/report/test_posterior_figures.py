@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from scipy.stats import norm
 
 from savgs_ident.inference.result import Posterior
+from savgs_ident.report.bode import predictive_band, predictive_figure
 from savgs_ident.report.html import embed
-from savgs_ident.report.posterior.bode import predictive_band, predictive_figure
 from savgs_ident.report.posterior.figures import (
     MOST_TRACES,
     axis_limits,

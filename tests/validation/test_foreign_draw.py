@@ -13,8 +13,8 @@ from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
 from savgs_ident.plants.quarter_car.model import FREE
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, rig_content
 from savgs_ident.validation.blind import FOREIGN_SHARES, Job, check_shares, record_trials
+from savgs_ident.validation.blind_answer import Answer
 from savgs_ident.validation.blind_draw import LARGEST, SMALLEST, Shares
-from savgs_ident.validation.blind_record import Answer
 from savgs_ident.validation.blind_trial import Plan, draw_and_record
 from savgs_ident.validation.foreign_draw import (
     COLOUR,
@@ -26,9 +26,9 @@ from savgs_ident.validation.foreign_draw import (
     true_bench,
 )
 from savgs_ident.validation.foreign_laws import FOREIGN
-from savgs_ident.validation.sensor_chain import RANGES, Sensors
 from savgs_ident.validation.trials import code_version
-from savgs_ident.validation.virtual_rig import Bench, Programme, change_of, steady_dwells
+from savgs_ident.validation.virtual_motions import steady_dwells
+from savgs_ident.validation.virtual_rig import RANGES, Bench, Programme, Sensors, change_of
 
 from ..relaxed import with_kept_programs
 

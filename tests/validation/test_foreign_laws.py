@@ -14,8 +14,7 @@ from savgs_ident.effects.base import (
 from savgs_ident.effects.effect import LAWS, Effect
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.ports import LOCATION_WORDS
-from savgs_ident.validation.foreign_laws import FOREIGN, foreign_laws
-from savgs_ident.validation.foreign_signals import HighPass, SecondOrderFilter
+from savgs_ident.validation.foreign_laws import FOREIGN, HighPass, SecondOrderFilter, foreign_laws
 
 from ..effects.cycles import along_a_cycle
 from ..effects.kinds import FOREIGN_EFFECTS, MECHANISMS, outcomes, seen_by, slopes

@@ -7,21 +7,22 @@ from typing import Any
 import pytest
 
 from savgs_ident.report.blind import blind_html, blind_record, blind_text, reliability_figure
+from savgs_ident.validation.blind_answer import (
+    Answer,
+    Score,
+    SmallErrors,
+    failed,
+    is_right,
+    said_right,
+    score_from,
+    score_of,
+)
 from savgs_ident.validation.blind_rates import (
     EDGES,
     confusion_of,
     median_closed,
     rates_of,
     reliability_of,
-)
-from savgs_ident.validation.blind_record import Answer, SmallErrors
-from savgs_ident.validation.blind_score import (
-    Score,
-    failed,
-    is_right,
-    said_right,
-    score_from,
-    score_of,
 )
 from savgs_ident.validation.foreign_laws import FOREIGN
 

@@ -1,14 +1,15 @@
 """The tests of a closed loop and their evaluation: what the road does, for how long, and what is measured of a run.
 
-Every test ends with a road at standstill, so that a motion which does not decay is seen. Roads are the cam (harmonic,
-sweep), a speed bump, and random roads after ISO 8608: a road of class A to H has the displacement spectrum
+Roads are the cam (harmonic, sweep), a speed bump, and random roads after ISO 8608. A road of class A to H has the
+displacement spectrum
 
     G_d(n) = G_d(n_0) (n / n_0)^-2,     n_0 = 0.1 cycles/m,
 
 between 0.011 and 2.83 cycles/m. A wheel at speed v meets it as a sum of sines with random phases; the contact patch
 filters out anything faster.
 
-A run is evaluated over the time that its test names: comfort, road holding, and the use of the drive.
+Every test ends with a road at standstill, so that a motion which does not decay is seen. A run is evaluated over the
+time that its test names: comfort, road holding (:class:`Ride`), and the use of the drive (:class:`DriveUse`).
 """
 
 from collections.abc import Mapping

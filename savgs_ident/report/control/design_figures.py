@@ -47,17 +47,6 @@ _WEIGHT_LOOKS: tuple[Mapping[str, Any], ...] = (
 )
 
 
-def design_figures(design: Design) -> dict[str, Figure]:
-    """All figures by the names of their files."""
-    return {
-        "gamma": gamma_figure(design),
-        "loop": sensitivity_figure(design),
-        "ride": ride_figure(design),
-        "robustness": robustness_figure(design),
-        "regularisation": regularisation_figure(design),
-    }
-
-
 def gamma_figure(design: Design) -> Figure:
     """Singular values of the closed loop from disturbances to penalties, against gamma; near gamma on the right."""
     synthesis = design.synthesis

@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from savgs_ident.control.describing_function import ELEMENTS
 from savgs_ident.control.linear_study import (
     SMALL,
     WISHBONE_DEG,
@@ -20,6 +19,7 @@ from savgs_ident.control.linear_study import (
     LinearStudy,
     SmallMotions,
 )
+from savgs_ident.control.linearisation import ELEMENTS
 from savgs_ident.core.presentation import Origin
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.report.control.linear_text import (
@@ -217,12 +217,6 @@ _ELEMENT_LOOKS: tuple[Mapping[str, Any], ...] = (
     MappingProxyType({"color": ORANGE, "linestyle": (0, (5, 2)), "marker": "s"}),
     MappingProxyType({"color": GREY, "linestyle": (0, (1, 1.2)), "marker": "^"}),
 )
-
-
-def linear_figures(study: LinearStudy) -> dict[str, Figure]:
-    """The figures of a study by the names of their files."""
-    figures = {"alpha": alpha_figure(study.equivalents), "responses": responses_figure(study.small)}
-    return figures if study.at_test is None else figures | {"described": described_figure(study.at_test)}
 
 
 def alpha_figure(study: EquivalentStudy) -> Figure:

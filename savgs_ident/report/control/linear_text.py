@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Group, RenderableType
 
-from savgs_ident.control.describing_function import ELEMENTS
 from savgs_ident.control.linear_equivalent import INPUTS, OUTPUTS, STATES, quarter_car_space
 from savgs_ident.control.linear_study import (
     CHANNELS,
@@ -20,6 +19,7 @@ from savgs_ident.control.linear_study import (
     LinearStudy,
     SmallMotions,
 )
+from savgs_ident.control.linearisation import ELEMENTS
 from savgs_ident.core.presentation import Origin
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.report.text import decimal, fixed, numeral, percentage, plain, signed, significant, table

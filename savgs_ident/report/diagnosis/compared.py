@@ -22,6 +22,7 @@ from savgs_ident.diagnosis.result import Diagnosis, DriveForces, Responses
 from savgs_ident.fit.result import measured_points
 from savgs_ident.report.bode import LINES, draw_magnitude, draw_phase
 from savgs_ident.report.diagnosis.text import model_label
+from savgs_ident.report.html import Picture, embed
 from savgs_ident.report.text import channel_labels
 from savgs_ident.report.theme import GREY, INK, PALE, frequency_axis, magnitude_axis, new_figure, styled
 from savgs_ident.responses.harmonic_response import HarmonicResponse
@@ -97,6 +98,22 @@ def diagnosis_bode_figure(diagnosis: Diagnosis, c: int) -> Figure:
             axes.yaxis.set_label_coords(-0.135, 0.5)
         _explain_models(figure, magnitude)
         return figure
+
+
+def bode_picture(diagnosis: Diagnosis, c: int) -> Picture:
+    """The Bode figure of the plant's channel ``c`` for the page, with its words."""
+    gap = first_harmonic_gap(diagnosis, c)
+    largest = [
+        f"{name} {np.max(values[np.isfinite(values)], initial=0.0):.3g} %"
+        for name, values in (
+            ("before", gap.before),
+            ("recalibrated", gap.recalibrated),
+            ("after", gap.after),
+        )
+    ]
+    title = tuple(channel_labels(diagnosis.given).values())[c].title
+    words = f"Magnitude, phase and gap of the {title} over frequency; largest gap {', '.join(largest)}."
+    return embed(diagnosis_bode_figure(diagnosis, c), words)
 
 
 def _explain_models(figure: Figure, axes: Axes) -> None:
@@ -188,6 +205,13 @@ def drive_words(diagnosis: Diagnosis) -> str:
         f"Force of the drive over time, measured and as three models need it; rms left: {left(forces.before)} before,"
         f" {left(forces.recalibrated)} recalibrated, {left(forces.after)} after."
     )
+
+
+def drive_picture(diagnosis: Diagnosis) -> Picture | None:
+    """The force along a motion for the page, with its words; there is none of dwells."""
+    if not isinstance(diagnosis.responses, DriveForces):
+        return None
+    return embed(drive_figure(diagnosis), drive_words(diagnosis))
 
 
 def _explain_lines(figure: Figure, axes: Axes) -> None:

@@ -359,12 +359,8 @@ def _draw_marks(axes: Axes, marks: Sequence[PortMark]) -> None:
 
 
 def _draw_place(axes: Axes, mark: PortMark, place: Point) -> None:
-    left = mark.name_at[0] < 0.0
-    start = (
-        (mark.name_at[0] + _BAR + 0.012, mark.name_at[1])
-        if left
-        else (mark.name_at[0] - 0.012, mark.name_at[1])
-    )
+    y, z = mark.name_at
+    start = (y + _BAR + 0.012 if y < 0.0 else y - 0.012, z)
     colour = ORANGE if mark.named else GREY
     across, up = zip(start, place, strict=True)
     axes.plot(across, up, color="white", lw=2.6, zorder=4.0)

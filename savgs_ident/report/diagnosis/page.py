@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one page that an engineer reads from the top down, and its files.
+"""The report of a diagnosis: one page that an engineer reads from the top down.
 
 Whether the verdict may be used comes first, then the verdict in one sentence, the port on the rig, the response, the
 signal inferred at the port, the other hypotheses, the gap by model, the next tests, and the data behind all this.
@@ -8,63 +8,43 @@ Every cell of a table is a text that was rounded here.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite, nan
-from pathlib import Path
 
 import numpy as np
 
-from savgs_ident.core.files import write_bytes, write_json
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.presentation import Origin
-from savgs_ident.diagnosis.result import (
-    Candidate,
-    CyclePosition,
-    Diagnosis,
-    DriveForces,
-    ForceLoop,
-    PortShare,
-    Shrink,
-)
+from savgs_ident.diagnosis.gap import CyclePosition, Shrink
+from savgs_ident.diagnosis.result import Diagnosis, ForceLoop, PortShare
 from savgs_ident.plants.quarter_car.model import RigModel
-from savgs_ident.report.diagnosis.compared import (
-    compared_channels,
-    diagnosis_bode_figure,
-    drive_figure,
-    drive_words,
-    first_harmonic_gap,
-)
+from savgs_ident.report.diagnosis.compared import bode_picture, compared_channels, drive_picture
 from savgs_ident.report.diagnosis.drawing import rig_figure
 from savgs_ident.report.diagnosis.figures import (
     force_figure,
     gap_channels,
     gap_map_figure,
     gap_table,
+    regime_note,
+    regime_picture,
     shrink_figure,
     spread_loops,
 )
-from savgs_ident.report.diagnosis.record import diagnosis_record
-from savgs_ident.report.diagnosis.regimes import regime_note, regime_picture
+from savgs_ident.report.diagnosis.hypotheses import candidate_row, nested_bars
 from savgs_ident.report.diagnosis.text import (
     KIND_WORDS,
-    about_candidate,
     alarm,
     baseline_sentence,
     closed_words,
-    estimate_words,
-    gain_words,
     gap_percentage,
     port_words,
     probability_words,
     references,
     shown_candidates,
-    sigma_words,
     smallest_words,
 )
-from savgs_ident.report.diagnosis.tree import named_hypotheses, nested_bars
 from savgs_ident.report.html import Picture, embed, render_page
 from savgs_ident.report.text import (
     DASH,
     channel_label,
-    channel_labels,
     decimal,
     numeral,
     per_input_words,
@@ -82,21 +62,6 @@ class Bar:
 
     length: float
     words: str
-
-
-@dataclass(frozen=True)
-class CandidateRow:
-    """A hypothesis; ``parameters`` are pairs of name and value with interval."""
-
-    name: str
-    about: str
-    named: bool
-    probability: str
-    score: str
-    gain: str
-    closed: str
-    evaluated: str
-    parameters: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
@@ -145,21 +110,6 @@ class ParameterRow:
     identified: str
     moved: str
     unit: str
-
-
-def candidate_row(each: Candidate, diagnosis: Diagnosis) -> CandidateRow:
-    """One line of the table of hypotheses."""
-    return CandidateRow(
-        name=str(each.hypothesis),
-        about=about_candidate(diagnosis, each),
-        named=bool(each.ports) and each.hypothesis in named_hypotheses(diagnosis.verdict),
-        probability=probability_words(each.probability),
-        score=sigma_words(each.score_sigma),
-        gain=gain_words(each.heldout_gain),
-        closed=percentage(each.share_closed),
-        evaluated="full fit" if each.refitted else "score only",
-        parameters=tuple((estimate.name, estimate_words(estimate)) for estimate in each.parameters),
-    )
 
 
 def port_row(each: PortShare, diagnosis: Diagnosis) -> PortRow:
@@ -279,8 +229,8 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "warnings": diagnosis.warnings,
             "rig_picture": _rig(diagnosis),
             "ports": [port_row(each, diagnosis) for each in diagnosis.ports],
-            "drive": _drive(diagnosis),
-            "bode": [_bode(diagnosis, c) for c in compared_channels(diagnosis)],
+            "drive": drive_picture(diagnosis),
+            "bode": [bode_picture(diagnosis, c) for c in compared_channels(diagnosis)],
             "loops": [_loop(diagnosis, each) for each in spread_loops(diagnosis.loops)],
             "lawful": any(each.law.size for each in diagnosis.loops),
             "tree": nested_bars(diagnosis),
@@ -364,28 +314,6 @@ def _rig(diagnosis: Diagnosis) -> Picture | None:
     return embed(rig_figure(diagnosis), words)
 
 
-def _drive(diagnosis: Diagnosis) -> Picture | None:
-    """The force along a motion; there is none of dwells."""
-    if not isinstance(diagnosis.responses, DriveForces):
-        return None
-    return embed(drive_figure(diagnosis), drive_words(diagnosis))
-
-
-def _bode(diagnosis: Diagnosis, c: int) -> Picture:
-    gap = first_harmonic_gap(diagnosis, c)
-    largest = [
-        f"{name} {np.max(values[np.isfinite(values)], initial=0.0):.3g} %"
-        for name, values in (
-            ("before", gap.before),
-            ("recalibrated", gap.recalibrated),
-            ("after", gap.after),
-        )
-    ]
-    title = tuple(channel_labels(diagnosis.given).values())[c].title
-    words = f"Magnitude, phase and gap of the {title} over frequency; largest gap {', '.join(largest)}."
-    return embed(diagnosis_bode_figure(diagnosis, c), words)
-
-
 def _loop(diagnosis: Diagnosis, loop: ForceLoop) -> Picture:
     largest = float(np.max(np.abs(loop.inferred), initial=0.0))
     words = (
@@ -411,15 +339,3 @@ def _map(diagnosis: Diagnosis, channel: str) -> Picture:
     k, d = np.unravel_index(np.argmax(known), known.shape)
     words += f" Largest: {known[k, d]:.0f} standard deviations in order {orders[k]} at {frequency[d]:.3g} Hz."
     return embed(gap_map_figure(diagnosis, channel), words)
-
-
-def write_diagnosis(diagnosis: Diagnosis, origin: Origin, out: Path) -> tuple[Path, ...]:
-    """Write diagnosis.json and diagnosis.html to the folder ``out``, each whole or not at all; their paths.
-
-    Raises :class:`InputError` if a file cannot be written.
-    """
-    page = diagnosis_html(diagnosis, origin).encode()
-    return (
-        write_json(out / "diagnosis.json", diagnosis_record(diagnosis, origin)),
-        write_bytes(out / "diagnosis.html", page),
-    )

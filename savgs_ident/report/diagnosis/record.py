@@ -4,7 +4,8 @@ from collections.abc import Iterable
 
 from savgs_ident.core.files import warning_record
 from savgs_ident.core.presentation import Origin
-from savgs_ident.diagnosis.result import Candidate, Diagnosis, Estimate, FurtherShrink, Learned, Shrink
+from savgs_ident.diagnosis.gap import FurtherShrink, Shrink
+from savgs_ident.diagnosis.result import Candidate, Diagnosis, Estimate, Learned
 
 
 def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:

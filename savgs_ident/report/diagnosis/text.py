@@ -9,15 +9,8 @@ from types import MappingProxyType
 
 from rich.console import Group, RenderableType
 
-from savgs_ident.diagnosis.result import (
-    NONE,
-    Candidate,
-    Diagnosis,
-    DriveForces,
-    Estimate,
-    NotJudgeable,
-    Shrink,
-)
+from savgs_ident.diagnosis.gap import Shrink
+from savgs_ident.diagnosis.result import NONE, Candidate, Diagnosis, DriveForces, Estimate, NotJudgeable
 from savgs_ident.effects.base import PortKind
 from savgs_ident.report.text import (
     DASH,

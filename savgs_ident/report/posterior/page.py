@@ -12,8 +12,8 @@ import numpy as np
 from savgs_ident.core.files import warning_record
 from savgs_ident.core.presentation import Origin
 from savgs_ident.inference.result import Marginal, Posterior
+from savgs_ident.report.bode import predictive_band, predictive_figure
 from savgs_ident.report.html import Picture, embed, render_page
-from savgs_ident.report.posterior.bode import predictive_band, predictive_figure
 from savgs_ident.report.posterior.figures import (
     MOST_TRACES,
     SURPLUS_SHOWN,

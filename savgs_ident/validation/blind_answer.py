@@ -1,9 +1,19 @@
-"""How well a diagnosis did: its ``diagnosis.json`` against the answer. Pure functions.
+"""The answer of a blind trial: what was drawn, its seal, and the marks of a diagnosis against it. Pure functions.
 
-An effect counts as named by its own name. Where the draw found that another effect does the same to the campaign,
-so that nothing shows which it is, naming that one counts too, if the verdict says that it cannot distinguish the two.
-The port of something unknown counts as found, too, where the verdict says that it cannot distinguish it from the one
-that it names. Marks that do not apply to a kind of trial are None.
+The :class:`Answer` is the truth that the diagnosis must not see. Its seal shows whether it, or the recordings, were
+changed after these were handed over. Beside the recordings stands a digest of the answer together with a salt, so
+that it reveals nothing of the answer; answer and salt lie elsewhere, and are opened when the diagnosis has spoken.
+The seal holds the digest of the recordings, too.
+
+    seal = sealed(envelope, digest_of_recordings)
+    ...
+    opened(seal, envelope, digest_of_recordings)      # the answer, or an error
+
+The marks (:class:`Score`) hold a ``diagnosis.json`` against the answer. An effect counts as named by its own name.
+Where the draw found that another effect does the same to the campaign, so that nothing shows which it is, naming that
+one counts too, if the verdict says that it cannot distinguish the two. The port of something unknown counts as found,
+too, where the verdict says that it cannot distinguish it from the one that it names. Marks that do not apply to a
+kind of trial are None.
 
 In a foreign trial no name can be right, for no catalogue has the law. A port is right where an engineer would rightly
 put the effect, a family where it would rightly be called that, at such a port
@@ -12,15 +22,124 @@ put the effect, a family where it would rightly be called that, at such a port
 What many trials say together is in :mod:`savgs_ident.validation.blind_rates`.
 """
 
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import isfinite
-from typing import Any
+from typing import Any, Literal
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import record_of
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.validation.blind_record import Answer, Drawn
 from savgs_ident.validation.foreign_laws import FOREIGN
+
+Drawn = Literal["none", "effect", "two", "unknown", "foreign"]
+"""What a trial's rig has beyond its model: nothing, an effect, two, one that the catalogue then lacks, or one whose
+law no catalogue has."""
+
+
+@dataclass(frozen=True)
+class SmallErrors:
+    """What no real rig is without, and no diagnosis is to take for an effect.
+
+    Attributes:
+        damper: relative errors of the damper's table, point by point [1].
+        drift: relative change of the rail's friction over the campaign, about its mean [1].
+        colour: correlation of the sensors' noise from one sample to the next [1].
+        phase: angle by which the road's signal leads the road [rad].
+    """
+
+    damper: tuple[float, ...]
+    drift: float
+    colour: float
+    phase: float
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The truth of a trial.
+
+    Attributes:
+        number: of the trial.
+        kind: what was drawn.
+        effects: names of the effects that the rig has beyond the baseline.
+        ports: where they act, in the same order.
+        changes: by how much each alone changes the clean response, relative; by effect.
+        sigmas: by how many standard deviations each stands out of what noise, calibration and tolerances can do,
+            the other one projected out; by effect.
+        imitators: of a single effect, others of the catalogue that do the same to this campaign, to first order
+            within the noise.
+        parameters: true values of the effects' parameters, SI.
+        rig: true values of the rig's own parameters that are not those of the sheet, SI.
+        without: effects that are removed from the catalogue for this trial.
+        accepted: of a foreign effect, the ports that are right.
+        families: of a foreign effect, the families that are right.
+        small_errors: of a foreign trial; None in a trial of the catalogue's own effects, which has none.
+    """
+
+    number: int
+    kind: Drawn
+    effects: tuple[str, ...]
+    ports: tuple[str, ...]
+    changes: Mapping[str, float]
+    sigmas: Mapping[str, float]
+    imitators: tuple[str, ...]
+    parameters: Mapping[str, float]
+    rig: Mapping[str, float]
+    without: tuple[str, ...]
+    accepted: tuple[str, ...] = ()
+    families: tuple[str, ...] = ()
+    small_errors: SmallErrors | None = None
+
+
+_FOREIGN_ONLY = ("accepted", "families", "small_errors")
+
+_REMEDY = "record the trial again: remove its folder"
+
+
+@dataclass(frozen=True)
+class Seal:
+    """Digests (SHA-256, hexadecimal) of the salted answer and of the recordings."""
+
+    answer: str
+    recordings: str
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """The answer and its salt (hexadecimal)."""
+
+    answer: Answer
+    salt: str
+
+
+def sealed(envelope: Envelope, recordings: str) -> Seal:
+    """The seal of an answer and of recordings with this digest."""
+    return Seal(_digest(envelope), recordings)
+
+
+def opened(seal: Seal, envelope: Envelope, recordings: str) -> Answer:
+    """The answer; raises :class:`InputError` if it or the recordings are not those that were sealed."""
+    if _digest(envelope) != seal.answer:
+        raise InputError("the answer is not the one that was sealed", remedy=_REMEDY)
+    if recordings != seal.recordings:
+        raise InputError("the recordings are not those that were sealed", remedy=_REMEDY)
+    return envelope.answer
+
+
+def envelope_of(record: Mapping[str, Any]) -> Envelope:
+    """The envelope from what ``dataclasses.asdict`` and JSON made of it; ``ValueError`` for something else."""
+    return record_of(Envelope, {name: record.get(name) for name in ("answer", "salt")})
+
+
+def _digest(envelope: Envelope) -> str:
+    # What only foreign trials have is left out of the others: seals of earlier versions hold.
+    answer = asdict(envelope.answer)
+    given = {name: value for name, value in answer.items() if name not in _FOREIGN_ONLY or value}
+    text = json.dumps(given, sort_keys=True, ensure_ascii=False)
+    return hashlib.sha256(f"{envelope.salt}\n{text}".encode("utf-8", "surrogatepass")).hexdigest()
+
 
 FAILED = "failed"
 """The verdict of a diagnosis that ended with an error."""

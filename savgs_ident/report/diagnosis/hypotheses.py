@@ -1,4 +1,4 @@
-"""The hypotheses of a diagnosis as a tree of nested bars: where, what kind of thing, which law.
+"""The hypotheses of a diagnosis: a row each, and a tree of nested bars: where, what kind of thing, which law.
 
     rail                 98.2 %   ====================
       friction           98.2 %   ====================
@@ -19,7 +19,46 @@ from typing import NamedTuple
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Candidate, Diagnosis, Hypothesis, Verdict
 from savgs_ident.effects.base import Family
 from savgs_ident.effects.effect import Effect
-from savgs_ident.report.diagnosis.text import SMALL, port_words, probability_words
+from savgs_ident.report.diagnosis.text import (
+    SMALL,
+    about_candidate,
+    estimate_words,
+    gain_words,
+    port_words,
+    probability_words,
+    sigma_words,
+)
+from savgs_ident.report.text import percentage
+
+
+@dataclass(frozen=True)
+class CandidateRow:
+    """A hypothesis; ``parameters`` are pairs of name and value with interval."""
+
+    name: str
+    about: str
+    named: bool
+    probability: str
+    score: str
+    gain: str
+    closed: str
+    evaluated: str
+    parameters: tuple[tuple[str, str], ...]
+
+
+def candidate_row(each: Candidate, diagnosis: Diagnosis) -> CandidateRow:
+    """One line of the table of hypotheses."""
+    return CandidateRow(
+        name=str(each.hypothesis),
+        about=about_candidate(diagnosis, each),
+        named=bool(each.ports) and each.hypothesis in named_hypotheses(diagnosis.verdict),
+        probability=probability_words(each.probability),
+        score=sigma_words(each.score_sigma),
+        gain=gain_words(each.heldout_gain),
+        closed=percentage(each.share_closed),
+        evaluated="full fit" if each.refitted else "score only",
+        parameters=tuple((estimate.name, estimate_words(estimate)) for estimate in each.parameters),
+    )
 
 
 class Action(NamedTuple):

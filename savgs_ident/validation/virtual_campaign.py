@@ -1,106 +1,97 @@
-"""A campaign as the stand's controller logs it: samples, stamps that jitter, noise.
+"""Campaigns as a rig with known parameters would record them.
 
-A dwell repeats its steady period for as long as the programme says; the noise of every sample is its own, so
-that what is estimated from the record is as well known as on the rig. Stamps are the true instants, to the
-hundredth of a millisecond in which they are logged.
+    truth = draw_truth(model, seed=3) | {"mount_compliance": 1.5e-6, "mount_damping": 400.0}
+    campaign = simulate_campaign(model, truth, effects=("mount_compliance",), seed=3)
 
-What was drawn for a trial: the truth that the diagnosis must not see.
+The motions are integrated in time, by another method than the one that models are fitted with
+(:mod:`savgs_ident.validation.virtual_motions`), and recorded as the stand's controller logs them. A dwell repeats its
+steady period for as long as the programme says. The noise of every sample is its own, so that what is estimated from
+the record is as well known as on the rig. Stamps jitter; they are the true instants, to the hundredth of a
+millisecond in which they are logged.
 
-A campaign on disk, in the form in which the rig's own is shipped: one table, gzipped.
-
-The same recordings give the same bytes. Numbers are written to what the logger resolves.
-
-The seal: nobody can change the answer of a trial after its recordings were handed over and go unnoticed.
-
-Beside the recordings stands a digest of the answer together with a salt, so that it reveals nothing of the answer;
-answer and salt lie elsewhere, and are opened when the diagnosis has spoken. The seal holds the digest of the
-recordings, too.
-
-    seal = sealed(answer, salt, digest_of_recordings)
-    ...
-    opened(seal, envelope, digest_of_recordings)      # the answer, or an error
+On disk a campaign has the form in which the rig's own is shipped: one table, gzipped, in which numbers are written to
+what the logger resolves. The same recordings give the same bytes.
 """
 
 import gzip
-import hashlib
 import io
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.files import record_of, write_bytes
+from savgs_ident.core.files import prepare_folder, write_bytes
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.inputs import nominal_test
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
-from savgs_ident.recordings.recording import RecordedChannel, Recording, TestKind
-from savgs_ident.validation.sensor_chain import Sensors
-from savgs_ident.validation.virtual_rig import Bench, Steady, steady_dwells, sweep_readings
+from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording, TestKind
+from savgs_ident.simulate.program_cache import use_persistent_cache
+from savgs_ident.simulate.public import DWELLS
+from savgs_ident.validation.blind_answer import Answer
+from savgs_ident.validation.virtual_motions import Steady, steady_dwells, sweep_readings
+from savgs_ident.validation.virtual_rig import Bench, Programme, Sensors, draw_rig
 
-Drawn = Literal["none", "effect", "two", "unknown", "foreign"]
-"""What a trial's rig has beyond its model: nothing, an effect, two, one that the catalogue then lacks, or one whose
-law no catalogue has."""
+
+def draw_truth(model: RigModel, seed: int | np.random.Generator = 1) -> dict[str, float]:
+    """Parameters of a rig [SI] that is off its drawing: normal about the drawing's, by their tolerances."""
+    return draw_rig(_bench(model, Programme()), np.random.default_rng(seed))
 
 
-@dataclass(frozen=True)
-class SmallErrors:
-    """What no real rig is without, and no diagnosis is to take for an effect.
+def simulate_campaign(
+    model: RigModel,
+    truth: Mapping[str, float],
+    effects: Sequence[str] = (),
+    *,
+    dwells: Sequence[float] = DWELLS,
+    sweep: float = 0.0,
+    seed: int | np.random.Generator = 1,
+    start: datetime | None = None,
+) -> Campaign:
+    """The campaign that a rig would have recorded: dwells, a sweep if asked for, a standstill.
 
-    Attributes:
-        damper: relative errors of the damper's table, point by point [1].
-        drift: relative change of the rail's friction over the campaign, about its mean [1].
-        colour: correlation of the sensors' noise from one sample to the next [1].
-        phase: angle by which the road's signal leads the road [rad].
+    Args:
+        model: the rig with the effects that are known.
+        truth: the parameters that differ from the model's, those of ``effects`` among them [SI].
+        effects: what acts on the rig besides.
+        dwells: frequencies of the cam [Hz].
+        sweep: length of a sweep [s]; none if zero.
+        seed: of the noise.
+        start: when the recording begins; its clock counts from zero if left out.
+
+    Raises :class:`InputError` for a rig that does not come to a steady motion.
     """
+    use_persistent_cache()
+    bench = _bench(model, Programme(dwells=tuple(dwells), sweep=sweep))
+    answer = Answer(1, "none", tuple(effects), (), {}, {}, (), {}, truth, ())
+    recordings = record_campaign(bench, answer, np.random.default_rng(seed))
+    if start is not None:
+        recordings = tuple(_begun(each, start.timestamp()) for each in recordings)
+    return Campaign("simulated", recordings, (), "", RIG_LAYOUT)
 
-    damper: tuple[float, ...]
-    drift: float
-    colour: float
-    phase: float
 
+def write_campaign(campaign: Campaign, folder: str | Path) -> Path:
+    """Write a campaign to ``campaign.csv.gz`` in a folder, as the shipped one is written; its path.
 
-@dataclass(frozen=True)
-class Answer:
-    """The truth of a trial.
-
-    Attributes:
-        number: of the trial.
-        kind: what was drawn.
-        effects: names of the effects that the rig has beyond the baseline.
-        ports: where they act, in the same order.
-        changes: by how much each alone changes the clean response, relative; by effect.
-        sigmas: by how many standard deviations each stands out of what noise, calibration and tolerances can do,
-            the other one projected out; by effect.
-        imitators: of a single effect, others of the catalogue that do the same to this campaign, to first order
-            within the noise.
-        parameters: true values of the effects' parameters, SI.
-        rig: true values of the rig's own parameters that are not those of the sheet, SI.
-        without: effects that are removed from the catalogue for this trial.
-        accepted: of a foreign effect, the ports that are right.
-        families: of a foreign effect, the families that are right.
-        small_errors: of a foreign trial; None in a trial of the catalogue's own effects, which has none.
+    Raises :class:`InputError` if it cannot be written.
     """
+    return write_recordings(campaign.recordings, prepare_folder(Path(folder)))
 
-    number: int
-    kind: Drawn
-    effects: tuple[str, ...]
-    ports: tuple[str, ...]
-    changes: Mapping[str, float]
-    sigmas: Mapping[str, float]
-    imitators: tuple[str, ...]
-    parameters: Mapping[str, float]
-    rig: Mapping[str, float]
-    without: tuple[str, ...]
-    accepted: tuple[str, ...] = ()
-    families: tuple[str, ...] = ()
-    small_errors: SmallErrors | None = None
+
+def _bench(model: RigModel, programme: Programme) -> Bench:
+    return Bench(model.rig, model.effects, model.free(), programme)
+
+
+def _begun(recording: Recording, start: float) -> Recording:
+    """The recording with a clock that has the date, ``start`` being its first instant [s since 1970]."""
+    channels = {name: replace(each, time=each.time + start) for name, each in recording.channels.items()}
+    return replace(recording, channels=channels)
 
 
 STAMP = 1e-5
@@ -220,7 +211,7 @@ DECIMALS = {
 """Decimals of each column in its SI unit."""
 
 
-def write_campaign(recordings: Sequence[Recording], folder: Path) -> Path:
+def write_recordings(recordings: Sequence[Recording], folder: Path) -> Path:
     """Write ``campaign.csv.gz`` into a folder, whole or not at all; its path.
 
     Raises :class:`InputError` if it cannot be written.
@@ -235,51 +226,3 @@ def write_campaign(recordings: Sequence[Recording], folder: Path) -> Path:
         np.savetxt(text, table, fmt=",".join([each.name, *form]))
     packed = gzip.compress(text.getvalue().encode(), compresslevel=6, mtime=0)
     return write_bytes(folder / FILE, packed)
-
-
-_FOREIGN_ONLY = ("accepted", "families", "small_errors")
-
-_REMEDY = "record the trial again: remove its folder"
-
-
-@dataclass(frozen=True)
-class Seal:
-    """Digests (SHA-256, hexadecimal) of the salted answer and of the recordings."""
-
-    answer: str
-    recordings: str
-
-
-@dataclass(frozen=True)
-class Envelope:
-    """The answer and its salt (hexadecimal)."""
-
-    answer: Answer
-    salt: str
-
-
-def sealed(envelope: Envelope, recordings: str) -> Seal:
-    """The seal of an answer and of recordings with this digest."""
-    return Seal(_digest(envelope), recordings)
-
-
-def opened(seal: Seal, envelope: Envelope, recordings: str) -> Answer:
-    """The answer; raises :class:`InputError` if it or the recordings are not those that were sealed."""
-    if _digest(envelope) != seal.answer:
-        raise InputError("the answer is not the one that was sealed", remedy=_REMEDY)
-    if recordings != seal.recordings:
-        raise InputError("the recordings are not those that were sealed", remedy=_REMEDY)
-    return envelope.answer
-
-
-def envelope_of(record: Mapping[str, Any]) -> Envelope:
-    """The envelope from what ``dataclasses.asdict`` and JSON made of it; ``ValueError`` for something else."""
-    return record_of(Envelope, {name: record.get(name) for name in ("answer", "salt")})
-
-
-def _digest(envelope: Envelope) -> str:
-    # What only foreign trials have is left out of the others: seals of earlier versions hold.
-    answer = asdict(envelope.answer)
-    given = {name: value for name, value in answer.items() if name not in _FOREIGN_ONLY or value}
-    text = json.dumps(given, sort_keys=True, ensure_ascii=False)
-    return hashlib.sha256(f"{envelope.salt}\n{text}".encode("utf-8", "surrogatepass")).hexdigest()

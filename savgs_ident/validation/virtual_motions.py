@@ -1,0 +1,288 @@
+"""Motions of the rig by integration in time, from rest: steady dwells of the cam, and a sweep.
+
+What a trial records comes from here, not from the collocation that models are fitted with. The cam's lift grows to
+its height during the first second, and then its speed changes from dwell to dwell, with the cam at its top each time.
+Every dwell runs until the states at the ends of two stretches agree; then one period is kept. What follows in a dwell
+repeats that period; the sensors' own dynamics, which are linear, act on its harmonics.
+
+The integration controls its error, or has a fixed step: the truth of foreign trials is integrated by the classical
+method of Runge and Kutta (:func:`integrate_fixed`), the accelerations at every stage being the root of the plant's
+residual. So it shares no method with the diagnosis nor with other virtual campaigns.
+
+Source: Kutta 1901, Zeitschrift fuer Mathematik und Physik 46.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import ceil
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from diffrax import RESULTS
+from jaxtyping import Array, Float
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.values import Values
+from savgs_ident.effects.base import AbstractSensorLaw
+from savgs_ident.plants.base import (
+    AbstractPlant,
+    AbstractSource,
+    Motion,
+    nominal_readings,
+    state_sizes,
+)
+from savgs_ident.plants.quarter_car.inputs import (
+    ImposedLink,
+    RigSource,
+    RoadMotion,
+    cam_road,
+    flat_road,
+    held_link,
+    nominal_test,
+    sweep_road,
+)
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.simulate.program_cache import placed
+from savgs_ident.simulate.transient import (
+    PlantState,
+    pack_state,
+    rest_state,
+    simulate_transient,
+    state_rates,
+    through_sensors,
+    unpack_state,
+)
+
+SAMPLES = 2048
+"""Instants of the period that is kept: a millisecond apart in the slowest dwell of the programme."""
+
+STRETCH = 1.0
+"""A stretch is so many whole periods that it lasts at least this long [s]."""
+
+CLOSED = 2e-4
+"""Two ends agree if no state differs by more than this of its typical size: a tenth of what the noise of a dwell
+leaves open, and about what the steps of the integration scatter by."""
+
+PATIENCE = 60.0
+"""A dwell that has not settled after so long [s] does not."""
+
+PRECISION = 1e-6
+"""Relative tolerance of a step of the integration."""
+
+
+@dataclass(frozen=True)
+class Steady:
+    """A steady dwell.
+
+    Attributes:
+        frequency: [Hz].
+        readings: what the sensors show over a period that begins with the cam at its top, noise apart: [m/s^2]
+            and [m], (2, SAMPLES).
+        settled: whether the motion had become periodic.
+    """
+
+    frequency: float
+    readings: NDArray[np.float64]
+    settled: bool
+
+
+def without_sensor_faults(model: QuarterCar) -> QuarterCar:
+    """The same rig with sensors that show what is there, gains apart."""
+    return QuarterCar(
+        model.damper,
+        effects=tuple(each for each in model.effects if not isinstance(each.law, AbstractSensorLaw)),
+    )
+
+
+def steady_dwells(
+    model: QuarterCar, during: Sequence[Values], frequencies: tuple[float, ...], step: float = 0.0
+) -> Iterator[Steady]:
+    """The steady motions of the rig in one dwell after the other [Hz], with a link held at its nominal angle.
+
+    ``during`` are the parameters [SI] in each; ``step`` [s] is that of a fixed-step integration, 0 for one that
+    controls its error.
+    """
+    mechanics = without_sensor_faults(model)
+    _, angle = nominal_test(during[0])
+    state, rise = _at_rest(mechanics, during[0], placed(held_link(angle))), STRETCH
+    for frequency, p in zip(frequencies, during, strict=True):
+        apart = np.inf
+        for _ in range(ceil(PATIENCE / STRETCH)):
+            periods = ceil(STRETCH * frequency)
+            before, state = state, _stretch(mechanics, p, state, frequency, periods, rise, step)[0]
+            apart, rise = _apart(mechanics, before, state), 0.0
+            if apart < CLOSED or np.isnan(apart):
+                break
+        state, truth = _stretch(mechanics, p, state, frequency, 1, rise, step)
+        yield Steady(frequency, _shown(model, p, frequency, truth), bool(apart < CLOSED))
+
+
+def _apart(model: QuarterCar, before: Array, after: Array) -> float:
+    """Largest difference of two packed states, of their typical sizes; NaN if one is not a number."""
+    scale = np.array(state_sizes(model))
+    return float(np.max(np.abs(np.asarray(after) - np.asarray(before)) / scale))
+
+
+def _stretch(
+    model: QuarterCar, p: Values, start: Array, frequency: float, periods: int, rise: float, step: float
+) -> tuple[Array, NDArray[np.float64]]:
+    """The packed state after so many periods, and what was read on the way, (2, SAMPLES).
+
+    The cam's lift grows to its height during the first ``rise`` [s].
+    """
+    lift, angle = nominal_test(p)
+    if step > 0.0:
+        source = placed(RigSource(cam_road(lift, frequency, rise), held_link(angle)))
+        found = integrate_fixed(model, p, start, source, periods / frequency, SAMPLES, step)
+        return found[0], np.asarray(found[1])
+    times = np.linspace(0.0, periods / frequency, SAMPLES + 1)
+    drive = (cam_road(lift, frequency, rise), held_link(angle), jnp.asarray(times))
+    end, readings = _integrated(model, p, start, *placed(drive))
+    return end, np.asarray(readings)
+
+
+@eqx.filter_jit
+def _at_rest(model: QuarterCar, p: Values, link: ImposedLink) -> Array:
+    return pack_state(rest_state(model, p, RigSource(flat_road(), link), jnp.zeros(())))
+
+
+# Compiled as a whole: what prepares an integration would take longer than the integration, step by step.
+@eqx.filter_jit
+def _integrated(
+    model: QuarterCar, p: Values, start: Array, road: RoadMotion, link: ImposedLink, times: Array
+) -> tuple[Array, Array]:
+    found = simulate_transient(model, p, RigSource(road, link), times, unpack_state(model, start), PRECISION)
+    return pack_state(found.state_at(-1)), jnp.stack(found.readings)[:, :-1]
+
+
+@eqx.filter_jit
+def _transfers(model: QuarterCar, p: Values, frequency: Array) -> Array:
+    return model.transfers(p, frequency)
+
+
+def _shown(model: QuarterCar, p: Values, frequency: float, truth: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What the sensors make of a period."""
+    order = jnp.arange(SAMPLES // 2 + 1, dtype=jnp.float64)
+    passed = np.asarray(_transfers(model, p, frequency * order))
+    return np.fft.irfft(np.fft.rfft(truth) * passed, SAMPLES)
+
+
+def sweep_readings(
+    model: QuarterCar, p: Values, duration: float, end: float, rate: float, step: float = 0.0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Instants [s], (n,), and what the sensors show then, (2, n), from 0 to ``end`` [Hz] in ``duration`` [s].
+
+    ``step`` [s] is that of a fixed-step integration, 0 for one that controls its error.
+    Raises :class:`InputError` if the integration does not end well.
+    """
+    times = np.arange(round(duration * rate) + 1) / rate
+    lift, angle = nominal_test(p)
+    road, link = sweep_road(lift, 0.0, end, duration), held_link(angle)
+    if step > 0.0:
+        shown, ended = _swept_fixed(model, p, RigSource(road, link), times, step), jnp.asarray(True)
+    else:
+        shown, ended = _swept(model, p, *placed((road, link, jnp.asarray(times))))
+    if not np.isfinite(shown).all() or not bool(ended):
+        raise InputError("the sweep cannot be simulated", source="sweep", remedy="draw another rig")
+    return times, np.asarray(shown)
+
+
+def _swept_fixed(
+    model: QuarterCar, p: Values, source: RigSource, times: NDArray[np.float64], step: float
+) -> Array:
+    """Readings (2, n) at evenly spaced instants [s]."""
+    start, lasts = _at_rest(model, p, placed(source.link)), float(times[-1]) * times.size / (times.size - 1)
+    readings = integrate_fixed(model, p, start, placed(source), lasts, times.size, step)[1]
+    return through_sensors(partial(model.transfers, p), jnp.asarray(times), readings)
+
+
+@eqx.filter_jit
+def _swept(
+    model: QuarterCar, p: Values, road: RoadMotion, link: ImposedLink, times: Array
+) -> tuple[Array, Array]:
+    found = simulate_transient(model, p, RigSource(road, link), times, tolerance=PRECISION)
+    return jnp.stack(found.readings), jnp.asarray(found.result == RESULTS.successful)
+
+
+State = Float[Array, " x"]
+
+
+def substeps_for(duration: float, samples: int, step: float) -> int:
+    """Steps from one of the ``samples`` of a ``duration`` [s] to the next, none longer than ``step`` [s]."""
+    return max(1, ceil(duration / samples / step))
+
+
+def integrate_fixed(
+    model: AbstractPlant,
+    p: Values,
+    start: State,
+    source: AbstractSource,
+    duration: float,
+    samples: int,
+    step: float,
+) -> tuple[State, Float[Array, "C n"]]:
+    """The packed state after a ``duration`` [s], and the readings at the n ``samples`` that begin it, in SI.
+
+    No step is longer than ``step`` [s]; no number is finite where there is no motion.
+    """
+    inner = substeps_for(duration, samples, step)
+    interval, steps = placed((jnp.asarray(duration / samples), jnp.asarray(inner)))
+    return _stepped(model, p, start, source, interval, steps, samples)
+
+
+@eqx.filter_jit
+def _stepped(
+    model: AbstractPlant,
+    p: Values,
+    start: State,
+    source: AbstractSource,
+    interval: Array,
+    inner: Array,
+    samples: int,
+) -> tuple[State, Array]:
+    prepared, size = model.prepare(p), len(model.coordinates)
+    zeros, h = nominal_readings(model, p, prepared), interval / inner.astype(interval.dtype)
+
+    def rate(t: Array, x: State, near: Array) -> tuple[State, Array]:
+        """Rates of the packed state, and the accelerations and rates from which the next are found sooner."""
+        now = state_rates(model, p, source, t, unpack_state(model, x), prepared, near)
+        return pack_state(now), jnp.concatenate([pack_state(now)[size : 2 * size], now.s])
+
+    def advance(t: Array, x: State, near: Array) -> tuple[State, Array]:
+        k1, near = rate(t, x, near)
+        k2, near = rate(t + h / 2.0, x + h / 2.0 * k1, near)
+        k3, near = rate(t + h / 2.0, x + h / 2.0 * k2, near)
+        k4, near = rate(t + h, x + h * k3, near)
+        return x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), near
+
+    def sample(carried: tuple[State, Array], i: Array) -> tuple[tuple[State, Array], Array]:
+        t = i * interval
+        near = rate(t, *carried)[1]
+        shown = _readings(model, p, source, t, unpack_state(model, carried[0]), near, prepared)
+        steps = (carried[0], near)
+        end = jax.lax.fori_loop(0, inner, lambda k, at: advance(t + k.astype(h.dtype) * h, *at), steps)
+        return end, shown - jnp.stack(zeros)
+
+    guess = jnp.zeros(size + len(model.states))
+    (end, _), readings = jax.lax.scan(sample, (start, guess), jnp.arange(samples, dtype=jnp.float64))
+    return end, readings.T
+
+
+def _readings(
+    model: AbstractPlant,
+    p: Values,
+    source: AbstractSource,
+    t: Array,
+    now: PlantState,
+    rates: Array,
+    prepared: object,
+) -> Float[Array, " C"]:
+    """What the sensors show if none has dynamics; ``rates`` are accelerations and rates of internal states."""
+    size = len(model.coordinates)
+    motion = Motion(now.q, now.qd, model.coordinate_type(*jnp.unstack(rates[:size])))
+    u = source.inputs(model, t, now.source)
+    return jnp.stack(model.read(p, motion, now.s, rates[size:], u, prepared))
