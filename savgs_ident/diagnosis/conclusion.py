@@ -1,11 +1,11 @@
 """The conclusion of a diagnosis: what is named found again, tests held out, and what these leave of the evidence.
 
 Model selection has seen all tests. Here the named hypothesis and its rivals predict tests that were left out, and
-these have the last word (:func:`~savgs_ident.diagnosis.model_selection.settle`); the gap that is reported is theirs.
+these have the last word (:func:`settle`); the gap that is reported is theirs.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +17,12 @@ from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, 
 from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint, Rows, Shrink, shrinks
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out, select_in_folds
 from savgs_ident.diagnosis.learning import LearnedLaw
-from savgs_ident.diagnosis.model_selection import (
-    refit_named,
-    settle,
-)
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, NextTest
 from savgs_ident.diagnosis.search import hypothesis_of
-from savgs_ident.diagnosis.thresholds import DecisionConstants
-from savgs_ident.inference.find_map import LaplaceFit
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.diagnosis.verdict import UnknownEvidence, WeighedHypothesis
+from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
 
 FurtherRecording = Callable[[AbstractProblem, Sequence[ModelPoint]], FurtherShrink | None]
 """Predicts a recording that takes no part, by two or three models: as given, recalibrated, with what is named."""
@@ -109,6 +106,80 @@ def conclude(
         gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
         apart = _predict_further(refitted, evidence, law, values, further)
     return Conclusion(refitted, evidence, law, model, held, gap, by_channel, apart, tests)
+
+
+def settle(
+    evidence: DiagnosisEvidence, gap: Shrink, fitted: float, constants: DecisionConstants = DEFAULTS
+) -> DiagnosisEvidence:
+    """The evidence as tests that were held out allow it to be said: their ``gap`` has the last word.
+
+    ``fitted`` is the gap [1] that the recalibrated baseline leaves where it was fitted to all tests: few or noisy
+    tests predict others badly though nothing is missing.
+
+    Where what is named predicts them no better than the recalibrated baseline, nothing may be named, unless the
+    baseline predicts them by parameters that are far off their sheet. And where the baseline misses them by more than
+    is small, something is missing, whether anything explains it or not. A tolerance that does not hold is in the
+    recalibrated baseline already.
+    """
+    if evidence.kind == "unknown" and evidence.unknown.reason == "tolerance":
+        return evidence
+    least = constants.material_share**2 + constants.sure_of_gap * gap.scatter
+    small = min(gap.recalibrated, fitted) ** 2 - gap.floor**2 <= least
+    supported = gap.after < gap.recalibrated or (small and evidence.prior_gain >= constants.alarm_log_odds)
+    if evidence.kind == "none":
+        return evidence if small else _unexplained(evidence)
+    if supported or (evidence.kind == "unknown" and not small):
+        return evidence
+    if not small:
+        return _unexplained(evidence)
+    none = next(each for each in evidence.weighed if each.hypothesis == NONE)
+    return replace(evidence, kind="none", chosen=none, named_law=None, unsupported=True)
+
+
+def _unexplained(evidence: DiagnosisEvidence) -> DiagnosisEvidence:
+    """The evidence where the baseline is not complete, though nothing explains what it misses.
+
+    A baseline with a discrepancy that is not small is no model with nothing missing: its weight is that of something
+    unknown.
+    """
+    weights = [each.weight for each in evidence.weighed if each.hypothesis in (NONE, UNKNOWN)]
+    unknown = WeighedHypothesis(UNKNOWN, float(np.logaddexp.reduce(weights)), None)
+    others = [
+        replace(each, weight=-np.inf) if each.hypothesis == NONE else each
+        for each in evidence.weighed
+        if each.hypothesis != UNKNOWN
+    ]
+    weighed = tuple(sorted((unknown, *others), key=lambda each: -each.weight))
+    law = replace(evidence, kind="unknown", chosen=unknown, weighed=weighed, named_law=None)
+    return replace(law, unknown=UnknownEvidence(unknown.weight, "law"))
+
+
+def refit_named(
+    problem: DiagnosisProblem, evidence: DiagnosisEvidence, progress: Progress
+) -> tuple[DiagnosisProblem, DiagnosisEvidence]:
+    """The problem and its evidence with the named effects found again, free of the mesh's discretisation error."""
+    mode = evidence.chosen.mode
+    if evidence.kind not in ("effect", "several") or mode is None or evidence.named_law is not None:
+        return problem, evidence
+    progress(f"refitting {evidence.chosen.hypothesis}")
+    plant = problem.plant.corrected(mode.terms, mode.values, mode.prediction.warm_start)
+    if plant is problem.plant:
+        return problem, replace(evidence, refit_failed=True)
+    search = search_of(plant, problem.data)
+    found = find_map(
+        search, problem.terms(evidence.chosen.hypothesis), mode.values, mode.prediction.warm_start
+    )
+    if not found.solved:
+        return problem, replace(evidence, refit_failed=True)
+    chosen = replace(evidence.chosen, mode=found)
+    weighed = tuple(chosen if each is evidence.chosen else each for each in evidence.weighed)
+    modes = tuple(found if each is mode else each for each in evidence.findings.modes)
+    return replace(problem, plant=plant, search=search), replace(
+        evidence,
+        findings=replace(evidence.findings, modes=modes),
+        weighed=weighed,
+        chosen=chosen,
+    )
 
 
 def _fitted_gap(problem: DiagnosisProblem) -> float:

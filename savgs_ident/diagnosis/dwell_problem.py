@@ -136,12 +136,9 @@ class DwellProblem(AbstractProblem):
         """
         model, p = self.model(()), self.values(values)
         solution = simulate_periodic(model, p, self.excitation, self.settings, self.layout)
-        if not all(status.ok for status in solution.status()):
-            lost = [
-                f"{f:.4g} Hz"
-                for f, status in zip(np.asarray(self.excitation.frequency), solution.status(), strict=True)
-                if not status.ok
-            ]
+        status = zip(np.asarray(self.excitation.frequency), solution.status(), strict=True)
+        lost = [f"{frequency:.4g} Hz" for frequency, each in status if not each.ok]
+        if lost:
             raise InputError(
                 "the baseline has no periodic motion at " + ", ".join(lost),
                 remedy="leave these dwells out with --max-frequency, or mend the parameters",
@@ -354,10 +351,8 @@ class DwellProblem(AbstractProblem):
         """The motions of ``warm_start`` with as many states as ``model`` has, further ones at rest."""
         x, y = warm_start.trajectory
         lacking = 2 * len(model.coordinates) + len(model.states) - x.shape[0]
-        if lacking == 0:
-            return warm_start.trajectory
-        if lacking < 0:
-            return Trajectory(x[:lacking], y[:lacking])
+        if lacking <= 0:
+            return Trajectory(x[: len(x) + lacking], y[: len(y) + lacking])
         rest = jnp.zeros((lacking, x.shape[1]))
         return Trajectory(jnp.concatenate([x, rest]), jnp.concatenate([y, rest]))
 

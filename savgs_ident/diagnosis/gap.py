@@ -179,7 +179,7 @@ def _shrink(
 
 def _scatter(scatter: NDArray[np.float64], power: NDArray[np.float64], channels: list[int]) -> float:
     """Standard deviation [1] of a relative mean square that is that of the noise."""
-    variances, powers = scatter[:, channels].sum(axis=1), power[:, channels].sum(axis=1)
+    variances, powers = scatter[:, channels].sum(axis=0), power[:, channels].sum(axis=0)
     measured = powers > 0.0
     return float(np.sqrt(np.sum(variances[measured] / powers[measured] ** 2)) / measured.sum())
 

@@ -1,18 +1,16 @@
 """Model selection: the baseline recalibrated, hypotheses and ports compared, and what kind of verdict they allow.
 
-Four stages, each of which returns a whole record:
+Two stages, each of which returns a whole record:
 
 1. :func:`recalibrate`: the baseline at its own best, a :class:`DiagnosisProblem`.
 2. :func:`select_model`: all hypotheses fitted and weighed, what a law at each port would explain, and the kind of the
    verdict, a :class:`DiagnosisEvidence`.
-3. Where no formula of the catalogue explains the data, the flexible members of the ports that explain most, fitted on
-   the nonlinear plant (below).
-4. :func:`refit_named`: the named effects found again, free of the discretisation error of the mesh.
 
 No rig follows the catalogue's formulas to the letter: the rise of a Stribeck friction falls off as a bell or
 exponentially, a stop is straight or progressive. Hypotheses are a tree: a port, a family of laws there, a law. Where
-the laws of the catalogue leave something, the flexible member of a port takes their place (:mod:`.learning`): its
-evidence says where, its functions say of which family, and the effect that comes nearest is named beside it.
+the laws of the catalogue leave something, the flexible member of a port takes their place (:mod:`.learning`), fitted
+on the nonlinear plant: its evidence says where, its functions say of which family, and the effect that comes nearest
+is named beside it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,7 +24,6 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
-from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.problem import AbstractProblem
@@ -45,7 +42,6 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
     BrokenTolerance,
     Change,
-    UnknownEvidence,
     WeighedHypothesis,
     broken_tolerance,
     decide,
@@ -188,80 +184,6 @@ def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: Fl
         return False
     change = _change(problem, member.law.mode.prediction.rows - problem.base.prediction.rows)
     return member.left <= constants.unexplained_share_flexible and change.matters(constants)
-
-
-def settle(
-    evidence: DiagnosisEvidence, gap: Shrink, fitted: float, constants: DecisionConstants = DEFAULTS
-) -> DiagnosisEvidence:
-    """The evidence as tests that were held out allow it to be said: their ``gap`` has the last word.
-
-    ``fitted`` is the gap [1] that the recalibrated baseline leaves where it was fitted to all tests: few or noisy
-    tests predict others badly though nothing is missing.
-
-    Where what is named predicts them no better than the recalibrated baseline, nothing may be named, unless the
-    baseline predicts them by parameters that are far off their sheet. And where the baseline misses them by more than
-    is small, something is missing, whether anything explains it or not. A tolerance that does not hold is in the
-    recalibrated baseline already.
-    """
-    if evidence.kind == "unknown" and evidence.unknown.reason == "tolerance":
-        return evidence
-    least = constants.material_share**2 + constants.sure_of_gap * gap.scatter
-    small = min(gap.recalibrated, fitted) ** 2 - gap.floor**2 <= least
-    supported = gap.after < gap.recalibrated or (small and evidence.prior_gain >= constants.alarm_log_odds)
-    if evidence.kind == "none":
-        return evidence if small else _unexplained(evidence)
-    if supported or (evidence.kind == "unknown" and not small):
-        return evidence
-    if not small:
-        return _unexplained(evidence)
-    none = next(each for each in evidence.weighed if each.hypothesis == NONE)
-    return replace(evidence, kind="none", chosen=none, named_law=None, unsupported=True)
-
-
-def _unexplained(evidence: DiagnosisEvidence) -> DiagnosisEvidence:
-    """The evidence where the baseline is not complete, though nothing explains what it misses.
-
-    A baseline with a discrepancy that is not small is no model with nothing missing: its weight is that of something
-    unknown.
-    """
-    weights = [each.weight for each in evidence.weighed if each.hypothesis in (NONE, UNKNOWN)]
-    unknown = WeighedHypothesis(UNKNOWN, float(np.logaddexp.reduce(weights)), None)
-    others = [
-        replace(each, weight=-np.inf) if each.hypothesis == NONE else each
-        for each in evidence.weighed
-        if each.hypothesis != UNKNOWN
-    ]
-    weighed = tuple(sorted((unknown, *others), key=lambda each: -each.weight))
-    law = replace(evidence, kind="unknown", chosen=unknown, weighed=weighed, named_law=None)
-    return replace(law, unknown=UnknownEvidence(unknown.weight, "law"))
-
-
-def refit_named(
-    problem: DiagnosisProblem, evidence: DiagnosisEvidence, progress: Progress
-) -> tuple[DiagnosisProblem, DiagnosisEvidence]:
-    """The problem and its evidence with the named effects found again, free of the mesh's discretisation error."""
-    mode = evidence.chosen.mode
-    if evidence.kind not in ("effect", "several") or mode is None or evidence.named_law is not None:
-        return problem, evidence
-    progress(f"refitting {evidence.chosen.hypothesis}")
-    plant = problem.plant.corrected(mode.terms, mode.values, mode.prediction.warm_start)
-    if plant is problem.plant:
-        return problem, replace(evidence, refit_failed=True)
-    search = search_of(plant, problem.data)
-    found = find_map(
-        search, problem.terms(evidence.chosen.hypothesis), mode.values, mode.prediction.warm_start
-    )
-    if not found.solved:
-        return problem, replace(evidence, refit_failed=True)
-    chosen = replace(evidence.chosen, mode=found)
-    weighed = tuple(chosen if each is evidence.chosen else each for each in evidence.weighed)
-    modes = tuple(found if each is mode else each for each in evidence.findings.modes)
-    return replace(problem, plant=plant, search=search), replace(
-        evidence,
-        findings=replace(evidence.findings, modes=modes),
-        weighed=weighed,
-        chosen=chosen,
-    )
 
 
 def _flexible_members(

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis import narrative
+from savgs_ident.diagnosis.conclusion import settle
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, FlexibleMember
 from savgs_ident.diagnosis.gap import Shrink
-from savgs_ident.diagnosis.model_selection import settle
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
 from savgs_ident.diagnosis.score_test import PriorConflict
