@@ -206,6 +206,7 @@ def _diagnose(
         converged=all(each.status.ok for each in _decisive_fits(problem, selected, evidence, found.law)),
         warnings=write_warnings(found.problem, evidence, model.fit, beyond),
         learned=None if found.law is None else _offered(found.law),
+        drifts=problem.drifts,
         wall_s=time.perf_counter() - began,
     )
 

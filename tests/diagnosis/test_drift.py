@@ -35,9 +35,11 @@ def _diagnosed(fading: float) -> Diagnosis:
 def test_a_damper_that_fades_by_more_than_is_tolerated(fading: float, word: str) -> None:
     found = _diagnosed(fading)
     assert found.verdict.kind == "none"
+    assert set(found.drifts) == {"c"}
+    assert found.drifts["c"] == pytest.approx(-2.0 * fading, rel=0.04)
     ((said, percent),) = re.findall(r"`c` (fell|rose) by ([0-9.]+) %", found.verdict.sentence)
     assert said == word
-    assert float(percent) == pytest.approx(50.0, rel=0.04)
+    assert float(percent) == pytest.approx(100.0 * abs(found.drifts["c"]), rel=0.02)
     by_chance = DEFAULTS.sure_of_gap * found.shrink.scatter
     assert found.shrink.recalibrated**2 - found.shrink.floor**2 < DEFAULTS.material_share**2 + by_chance
 
@@ -45,4 +47,5 @@ def test_a_damper_that_fades_by_more_than_is_tolerated(fading: float, word: str)
 def test_a_damper_that_stays_is_not_said_to_fade() -> None:
     found = _diagnosed(0.0)
     assert found.verdict.kind == "none"
+    assert not found.drifts
     assert "While the campaign went on" not in found.verdict.sentence

@@ -76,6 +76,7 @@ CONTRACT: dict[str, object] = {
         "by_channel": {"sprung_accel": {"before": NUMBER}, "susp_deflection": {"before": NUMBER}},
     },
     "next_test": [{"test": str, "separates": [str], "expected_sigma": NUMBER}],
+    "drifts": {},
 }
 """The object of diagnosis.json."""
 

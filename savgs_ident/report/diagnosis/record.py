@@ -55,6 +55,7 @@ def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
         "further": diagnosis.further and {"recording": diagnosis.further.name} | _further(diagnosis.further),
         "identified": dict(diagnosis.identified),
         "intervals": _parameters(diagnosis.intervals),
+        "drifts": dict(diagnosis.drifts),
         "learned": diagnosis.learned and _learned(diagnosis.learned),
         "converged": diagnosis.converged,
         "warnings": diagnosis.warnings,
