@@ -76,7 +76,6 @@ CONTRACT: dict[str, object] = {
         "by_channel": {"sprung_accel": {"before": NUMBER}, "susp_deflection": {"before": NUMBER}},
     },
     "next_test": [{"test": str, "separates": [str], "expected_sigma": NUMBER}],
-    "drifts": {},
 }
 """The object of diagnosis.json."""
 
@@ -108,6 +107,8 @@ def test_the_record_holds_the_numbers_of_the_diagnosis(diagnosis: Diagnosis) -> 
     assert record["identified"]["c_sd"] == 5386.1
     assert record["intervals"] == {"mu_r": {"value": 0.03, "lo": 0.0297, "hi": 0.0303, "unit": "1"}}
     assert record["verdict"]["effects"] == ["rail_stribeck"]
+    assert record["drifts"] == {}
+    assert record_of(replace(diagnosis, drifts={"mu_r": -0.2}))["drifts"] == {"mu_r": -0.2}
     assert record["verdict"]["confusable_with"] == ["rail_preload"]
     assert {entry["port"]: (entry["share"], entry["reach"]) for entry in record["where"]["ports"]} == SHARES
     # 28 dwells, two channels, nine orders: none is left out where all were measured.
