@@ -3,6 +3,7 @@
 import json
 import re
 import runpy
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -152,8 +153,10 @@ def test_friction_of_the_guide_is_diagnosed_and_reported_without_a_word_of_the_q
 
 @pytest.mark.slow
 def test_the_example_of_a_plant_of_ones_own_is_sampled_and_diagnosed(
-    capsys: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """With fewer draws than by default."""
+    monkeypatch.setattr(si, "sample", partial(si.sample, target_ess=150.0, patience=0.0))
     runpy.run_path(str(PENDULUM), run_name="__main__")
     printed = capsys.readouterr().out
     assert printed.startswith("The model lacks something at the pivot: ")

@@ -27,11 +27,9 @@ def _slow_but(name: str) -> tuple[pytest.MarkDecorator, ...]:
 @pytest.mark.parametrize(
     ("name", "more", "room", "refused", "kept"),
     [
-        ("inspect", (), 2_000, "inspect.json", []),
         ("inspect", (), 30_000, "inspect.png", ["inspect.json"]),
         ("simulate", ("--frequency", "2"), 20_000, "simulate.png", ["simulate.csv", "simulate.json"]),
         ("fit", QUICK, 30_000, "bode.png", ["fit.json", "model.toml"]),
-        ("design", ("--rigs", "1"), 6_000, "design.json", ["controller.json"]),
         ("campaign", (*QUICK, "--workers", "1"), 1_000, "o/short", []),
     ],
 )

@@ -15,10 +15,7 @@ WRITTEN = ["inspect.json", "inspect.pdf", "inspect.png"]
     "line",
     [
         '"$@" | head -1; exit ${PIPESTATUS[0]}',
-        '"$@" | true; exit ${PIPESTATUS[0]}',
         '"$@" 2>&1 | true; exit ${PIPESTATUS[0]}',
-        '"$@" >&-',
-        '"$@" 2>&-',
         '"$@" >&- 2>&-',
         '"$@" 2>/dev/full',
     ],
@@ -73,12 +70,11 @@ def test_a_full_disk_under_standard_output_is_told(
 @pytest.mark.parametrize(
     "told",
     [
-        {"PYTHONIOENCODING": "ascii"},
         {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
         {"PYTHONIOENCODING": "latin-1", "NO_COLOR": "1", "COLUMNS": "20"},
     ],
 )
-def test_without_unicode_tables_are_spelled_out_and_json_is_what_it_is(
+def test_without_unicode_tables_are_spelled_out(
     installed: Installed, short_campaign: Path, told: dict[str, str]
 ) -> None:
     campaign = installed.folder / "Prüfstand.csv"
@@ -87,7 +83,13 @@ def test_without_unicode_tables_are_spelled_out_and_json_is_what_it_is(
     assert shown.returncode == 0, shown.stderr
     assert "Written: o/inspect.json" in shown.stdout
     assert "²" not in shown.stdout
-    handed = installed.run("inspect", campaign, "--out", "o", "--json", **told)
+
+
+@pytest.mark.slow
+def test_without_unicode_json_is_what_it_is(installed: Installed, short_campaign: Path) -> None:
+    campaign = installed.folder / "Prüfstand.csv"
+    campaign.symlink_to(short_campaign)
+    handed = installed.run("inspect", campaign, "--out", "o", "--json", PYTHONIOENCODING="ascii")
     assert handed.returncode == 0, handed.stderr
     assert handed.stdout == (installed.folder / "o" / "inspect.json").read_text("utf-8")
     assert json.loads(handed.stdout)["source"].endswith("fstand.csv")

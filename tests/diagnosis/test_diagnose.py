@@ -1,10 +1,11 @@
 """Whole diagnoses of the laboratory's labelled campaigns: named, located, closed, within intervals.
 
-On all dwells a mount, nothing, and something that the catalogue lacks; the others on few dwells.
+Nothing is missing on all dwells; the others are found on few.
 """
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from savgs_ident.core.errors import InputError
@@ -12,6 +13,7 @@ from savgs_ident.diagnosis.public import SIMTR, diagnose_response
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.plants.quarter_car.rig import Rig
 
+from ..fit.bench import only
 from .conftest import Measure
 
 TRUTH = {
@@ -72,8 +74,10 @@ def test_a_lag_is_found_in_a_few_dwells(measure_few: Measure, rig: Rig) -> None:
 
 
 @pytest.mark.slow
-def test_a_mount_is_found_in_all_dwells(measure: Measure, rig: Rig) -> None:
-    _check(diagnose_response(measure("mount_compliance"), rig), "mount_compliance")
+def test_a_mount_is_found_in_every_third_dwell(measure: Measure, rig: Rig) -> None:
+    response = measure("mount_compliance")
+    third = only(response, np.arange(len(response.tests)) % 3 == 1)
+    _check(diagnose_response(third, rig), "mount_compliance")
 
 
 @pytest.mark.slow
@@ -93,8 +97,9 @@ def test_both_frictions_are_found_from_the_frictionless_baseline(measure_few: Me
 
 
 @pytest.mark.slow
-def test_what_the_catalogue_lacks_is_named_by_port_and_family(measure: Measure, rig: Rig) -> None:
-    diagnosis = diagnose_response(measure("stribeck_rail"), rig, replace(SIMTR, without=("rail_stribeck",)))
+def test_what_the_catalogue_lacks_is_named_by_port_and_family(measure_few: Measure, rig: Rig) -> None:
+    settings = replace(SIMTR, without=("rail_stribeck",))
+    diagnosis = diagnose_response(measure_few("stribeck_rail"), rig, settings)
     assert diagnosis.verdict.kind == "effect"
     assert diagnosis.verdict.ports == ("rail",)
     assert diagnosis.verdict.families == ("rail/friction",)

@@ -214,7 +214,7 @@ def test_corrected_rows_are_those_of_many_nodes(plant_and_data: Case, start: Per
     better = plant.corrected(terms, values, coarse.warm_start).predict(
         terms, values, ["m_s"], coarse.warm_start
     )
-    fine = replace(plant, settings=replace(plant.settings, nodes=2048))
+    fine = replace(plant, settings=replace(plant.settings, nodes=1024))
     truth = fine.predict(terms, values, ["m_s"], _near(fine, terms, values, fine.start({})))
     truth = fine.predict(terms, values, ["m_s"], fine.refined(terms, values, truth.warm_start))
     assert coarse.solved

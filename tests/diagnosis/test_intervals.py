@@ -55,7 +55,6 @@ def _drop(problem: DiagnosisProblem, mode: LaplaceFit, term: Term, place: int, x
     [
         ("stribeck_rail", "rail_stribeck"),
         ("mount_compliance", "mount_compliance"),
-        ("accel_lag", "accel_lag"),
     ],
 )
 def test_the_profile_falls_at_the_ends_of_an_interval_as_it_should(

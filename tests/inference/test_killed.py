@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
-KILLS = 5
+KILLS = 3
 """How often a run is killed; each time a process is started, which compiles."""
 
 

@@ -81,17 +81,6 @@ def test_without_a_cache_the_numbers_are_the_same(first: tuple[Path, str], tmp_p
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("left", [0.5, 0.0], ids=["half", "empty"])
-def test_a_file_that_is_not_whole_is_made_anew(first: tuple[Path, str], left: float) -> None:
-    folder, numbers = first
-    (file,) = folder.glob("traced-*")
-    whole = file.read_bytes()
-    file.write_bytes(whole[: int(left * len(whole))])
-    assert _run(folder) == (True, numbers)
-    assert len(file.read_bytes()) == len(whole)
-
-
 @pytest.fixture
 def folder(tmp_path: Path) -> Iterator[Path]:
     """An empty folder for programs."""

@@ -135,21 +135,20 @@ def test_draws_can_be_repeated_and_change_the_response_by_what_was_drawn(bench: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["joint_bouc_wen", "damper_end_play", "body_hardening_oscillator"])
-def test_the_fixed_step_comes_to_the_periodic_motion(bench: Bench, name: str) -> None:
+def test_the_fixed_step_comes_to_the_periodic_motion(bench: Bench) -> None:
     """Laws with states of their own, by the integration that is recorded and by collocation."""
+    names = ("joint_bouc_wen", "damper_end_play", "body_hardening_oscillator")
     with with_kept_programs():
-        effect = FOREIGN[name].effect
-        parameters = {each.name: each.value for each in effect.parameters}
+        parameters = {each.name: each.value for name in names for each in FOREIGN[name].effect.parameters}
         errors = draw_small_errors(bench.rig, np.random.default_rng(2))
-        truth = _answer(effects=(name,), parameters=parameters, small_errors=replace(errors, drift=0.0))
+        truth = _answer(effects=names, parameters=parameters, small_errors=replace(errors, drift=0.0))
         true = true_bench(bench, truth)
-        steady = steady_dwells(true.model((name,)), true.values_during(parameters), DWELLS, true.step)
+        steady = steady_dwells(true.model(names), true.values_during(parameters), DWELLS, true.step)
         found = [np.fft.rfft(each.readings)[:, :10] / 1024 for each in steady if each.settled]
-        solution = true.solve((name,), parameters)
+        solution = true.solve(names, parameters)
         assert solution is not None
         assert len(found) == len(DWELLS)
-        assert change_of(np.stack(found), true.response((name,), parameters, solution)) < 5e-3
+        assert change_of(np.stack(found), true.response(names, parameters, solution)) < 5e-3
 
 
 @pytest.mark.slow
