@@ -99,7 +99,8 @@ def conclude(
         law = None
     model = _corrected_model(refitted, evidence, law)
     gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
-    settled = settle(evidence, gap, _fitted_gap(problem), problem.constants)
+    named = problem.locations(evidence.chosen.hypothesis) if member is None else (member.location,)
+    settled = settle(evidence, gap, _fitted_gap(problem), problem.constants, named)
     if settled is not evidence:
         evidence, law = settled, None
         model = _corrected_model(refitted, evidence, law)
@@ -109,12 +110,16 @@ def conclude(
 
 
 def settle(
-    evidence: DiagnosisEvidence, gap: Shrink, fitted: float, constants: DecisionConstants = DEFAULTS
+    evidence: DiagnosisEvidence,
+    gap: Shrink,
+    fitted: float,
+    constants: DecisionConstants = DEFAULTS,
+    named: tuple[str, ...] = (),
 ) -> DiagnosisEvidence:
     """The evidence as tests that were held out allow it to be said: their ``gap`` has the last word.
 
     ``fitted`` is the gap [1] that the recalibrated baseline leaves where it was fitted to all tests: few or noisy
-    tests predict others badly though nothing is missing.
+    tests predict others badly though nothing is missing. ``named`` are the locations of what is named.
 
     Where what is named predicts them no better than the recalibrated baseline, nothing may be named, unless the
     baseline predicts them by parameters that are far off their sheet. And where the baseline misses them by more than
@@ -131,27 +136,37 @@ def settle(
     if supported or (evidence.kind == "unknown" and not small):
         return evidence
     if not small:
-        return _unexplained(evidence)
+        return _unexplained(evidence, named[0] if len(named) == 1 else "")
     none = next(each for each in evidence.weighed if each.hypothesis == NONE)
     return replace(evidence, kind="none", chosen=none, named_law=None, unsupported=True)
 
 
-def _unexplained(evidence: DiagnosisEvidence) -> DiagnosisEvidence:
+def _unexplained(evidence: DiagnosisEvidence, location: str = "") -> DiagnosisEvidence:
     """The evidence where the baseline is not complete, though nothing explains what it misses.
 
-    A baseline with a discrepancy that is not small is no model with nothing missing: its weight is that of something
-    unknown.
+    A baseline with a discrepancy that is not small is no model with nothing missing, and a formula that does not
+    predict tests is not what is missing: the weights of both are those of something unknown. It acts at the
+    ``location`` of that formula, if there was one.
     """
-    weights = [each.weight for each in evidence.weighed if each.hypothesis in (NONE, UNKNOWN)]
+    gone = (NONE, UNKNOWN, evidence.chosen.hypothesis)
+    weights = [each.weight for each in evidence.weighed if each.hypothesis in gone]
     unknown = WeighedHypothesis(UNKNOWN, float(np.logaddexp.reduce(weights)), None)
     others = [
-        replace(each, weight=-np.inf) if each.hypothesis == NONE else each
+        replace(each, weight=-np.inf) if each.hypothesis in gone else each
         for each in evidence.weighed
         if each.hypothesis != UNKNOWN
     ]
     weighed = tuple(sorted((unknown, *others), key=lambda each: -each.weight))
-    law = replace(evidence, kind="unknown", chosen=unknown, weighed=weighed, named_law=None)
-    return replace(law, unknown=UnknownEvidence(unknown.weight, "law"))
+    known = location if location in evidence.weight_by_location else ""
+    return replace(
+        evidence,
+        kind="unknown",
+        chosen=unknown,
+        weighed=weighed,
+        named_law=None,
+        unsupported_at=known,
+        unknown=UnknownEvidence(unknown.weight, "law"),
+    )
 
 
 def refit_named(

@@ -137,6 +137,7 @@ class DiagnosisEvidence:
         named_law: the learned law that is named, where no formula of the catalogue explains the data.
         refit_failed: whether what is named could not be found again on a finer mesh.
         unsupported: whether what would be named predicts tests that were held out no better than the baseline.
+        unsupported_at: where it acts, if something is missing all the same; empty if not.
     """
 
     findings: Findings
@@ -151,11 +152,12 @@ class DiagnosisEvidence:
     named_law: FlexibleMember | None = None
     refit_failed: bool = False
     unsupported: bool = False
+    unsupported_at: str = ""
 
     @property
     def localisation(self) -> Localisation:
-        """The location at which a law of something unknown is most probable."""
-        first = next(iter(self.weight_by_location))
+        """The location of something unknown: where a law is most probable, or where one was named in vain."""
+        first = self.unsupported_at or next(iter(self.weight_by_location))
         return next(each for each in self.localisations if each.name == first)
 
     @property
@@ -202,12 +204,14 @@ class DiagnosisEvidence:
 
     def indistinguishable_ports(self, constants: DecisionConstants = DEFAULTS) -> tuple[str, ...]:
         """Other ports at which a law of something unknown is nearly as probable, the most probable first."""
-        (first, most), *others = self._weights.items()
+        first = self.localisation.name
         if self.port != first:
             return ()
+        most = self._weights[first]
         return tuple(
             name
-            for name, each in others
-            if uncertain_odds(most[0] - each[0], hypot(most[1], each[1]))
+            for name, each in self._weights.items()
+            if name != first
+            and uncertain_odds(most[0] - each[0], hypot(most[1], each[1]))
             < constants.indistinguishable_log_odds
         )

@@ -214,9 +214,10 @@ def _nearest(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> str:
     if not effects:
         return ""
     several, words = len(effects) > 1, " and ".join(_words(problem, name) for name in effects)
+    in_vain = ", but does not predict tests that were held out" if evidence.unsupported_at else ""
     return (
         f" The nearest effect{'s' if several else ''} of the catalogue, {words}, explain{'' if several else 's'} "
-        f"{_explained(evidence.left)} of the misfit beyond the noise."
+        f"{_explained(evidence.left)} of the misfit beyond the noise{in_vain}."
     )
 
 

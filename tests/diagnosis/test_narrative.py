@@ -97,6 +97,22 @@ def test_something_unknown_is_told_with_how_near_the_catalogue_comes() -> None:
     assert verdict.ports == ("rail",)
 
 
+def test_what_predicts_no_tests_is_unknown_at_its_port() -> None:
+    """A formula that fits all tests and predicts none: what is missing acts there, and follows another law."""
+    evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 500.0, "rail_viscous": 700.0})
+    strut: Any = SimpleNamespace(name="strut", share=0.9, evidence=60.0)
+    evidence = replace(evidence, kind="effect", localisations=(strut, RAIL))
+    gap = replace(GAP, after=0.05)
+    settled = settle(evidence, gap, gap.recalibrated, named=("rail",))
+    verdict = write_verdict(PROBLEM, settled, (), gap)
+    assert (verdict.kind, verdict.ports) == ("unknown", ("rail",))
+    # To first order a law at the strut explains more: it is not ruled out.
+    assert verdict.confusable_ports == ("strut",)
+    assert verdict.probability == pytest.approx(1.0)
+    assert "(`rail_viscous`)" in verdict.sentence
+    assert "but does not predict tests that were held out." in verdict.sentence
+
+
 @pytest.mark.parametrize(
     ("weights", "start"),
     [
@@ -212,7 +228,7 @@ def test_no_verdict_contradicts_its_numbers(
     gap = Shrink(before, recalibrated, after, floor, 0.9, (0.8, 1.0), scatter=scatter)
     # Tests that were held out are predicted worse than tests that were not.
     fitted = max((1.0 - worse) * recalibrated, floor)
-    settled = settle(replace(evidence, kind=kind, chosen=chosen), gap, fitted)
+    settled = settle(replace(evidence, kind=kind, chosen=chosen), gap, fitted, named=("rail",))
     verdict = write_verdict(PROBLEM, settled, (), gap)
     by_chance = DEFAULTS.sure_of_gap * scatter
     large = fitted**2 - floor**2 > DEFAULTS.material_share**2 + by_chance
