@@ -48,7 +48,7 @@ SCRATCH = ("SAVGS_IDENT_CACHE", "XDG_CACHE_HOME", "MPLCONFIGDIR", "HYPOTHESIS_ST
 """Variables that name folders of caches; all processes of a run share one that is removed in the end."""
 
 SHARING = {
-    **{folder: folder for folder in ("control", "diagnosis", "export", "fit", "inference", "simulate")},
+    **{folder: folder for folder in ("control", "export", "fit", "inference", "simulate")},
     **dict.fromkeys(("effects", "symbolic"), "laws"),
 }
 """Folders whose tests share expensive fixtures and compiled programs, and their room: one process takes all of it."""

@@ -198,9 +198,16 @@ def refit_named(
 
 
 def _fitted_gap(problem: DiagnosisProblem) -> float:
-    """The gap [1] that the recalibrated baseline leaves in the tests that it was fitted to."""
-    rows, plant = problem.base.prediction.rows, problem.plant
-    together, _ = shrinks(problem.data, Rows(problem.given, rows, rows, plant.channel, plant.channels))
+    """The gap [1] that the recalibrated baseline leaves in the tests that it was fitted to.
+
+    What is known to a tolerance as a curve, and what may drift, is taken at its most probable.
+    """
+    rows, data, base, plant = problem.base.prediction.rows, problem.data, problem.base, problem.plant
+    if data.tolerated is not None:
+        scales, turned = base.noise_scales, problem.search.turned(data.tolerated)
+        errors = scales.noise**2 * turned.T @ (problem.search.missed(base.prediction) / scales.spread)
+        rows = rows + data.tolerated @ errors
+    together, _ = shrinks(data, Rows(problem.given, rows, rows, plant.channel, plant.channels))
     return together.recalibrated
 
 

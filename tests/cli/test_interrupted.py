@@ -117,7 +117,7 @@ def test_a_stopped_campaign_keeps_what_is_finished_and_leaves_no_process(
     finished = [seal.parent for seal in out.glob("*/done.json")]
     assert 1 <= len(finished) < 6
     for folder in finished:
-        assert json.loads((folder / "fit.json").read_text())["trusted"]
+        assert json.loads((folder / "fit.json").read_text())["status"] == "converged"
         read_rig(folder / "model.toml")
     assert not (out / "campaign.json").exists()
 
