@@ -14,12 +14,15 @@ standard output is an error, for what is missing there is a part of the result.
 
 import io
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, ParamSpec, TextIO
 
 import typer
@@ -30,6 +33,8 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.report.text import plain
 
 if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
+
     from _typeshed import ReadableBuffer
 
     from savgs_ident.core.presentation import Result
@@ -41,6 +46,10 @@ INTERRUPTED = 130
 
 Arguments = ParamSpec("Arguments")
 
+_PRESSED = threading.Event()
+"""Ctrl-C in the command that runs. A library that is being imported may let no exception pass: the next line of
+progress raises it again."""
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -50,7 +59,9 @@ class Progress:
     status: Status | None
 
     def __call__(self, message: str) -> None:
-        """Say what is being done now."""
+        """Say what is being done now; raises ``KeyboardInterrupt`` once Ctrl-C was pressed."""
+        if _PRESSED.is_set():
+            raise KeyboardInterrupt
         if self.status is not None:
             self.status.update(_line(message))
         elif self.console is not None:
@@ -148,9 +159,44 @@ def mend_streams() -> None:
     sys.stderr = _mended(sys.stderr, 2, needed=False)
 
 
+def _press(number: int, frame: FrameType | None) -> None:
+    _PRESSED.set()
+    signal.default_int_handler(number, frame)
+
+
+@contextmanager
+def _ctrl_c_is_kept() -> Iterator[None]:
+    """Note Ctrl-C while a command runs, where Python raises it."""
+    _PRESSED.clear()
+    here = threading.current_thread() is threading.main_thread()
+    if not here or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, _press)
+    told, sys.unraisablehook = sys.unraisablehook, _without_ctrl_c(sys.unraisablehook)
+    try:
+        yield
+    finally:
+        sys.unraisablehook = told
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _without_ctrl_c(
+    hook: Callable[["UnraisableHookArgs"], object],
+) -> Callable[["UnraisableHookArgs"], object]:
+    """What tells of exceptions that could not be raised, but for Ctrl-C: the next line of progress raises that."""
+
+    def tell(found: "UnraisableHookArgs") -> None:
+        if not issubclass(found.exc_type, KeyboardInterrupt):
+            hook(found)
+
+    return tell
+
+
 def _code_of(work: Callable[[], int]) -> int:
     try:
-        return work()
+        with _ctrl_c_is_kept():
+            return work()
     except KeyboardInterrupt:
         print_error("Stopped by Ctrl-C; files that were finished are kept.")
         return INTERRUPTED
