@@ -54,6 +54,11 @@ SHARING = {
 """Folders whose tests share expensive fixtures and compiled programs, and their room: one process takes all of it."""
 
 
+LONGEST_FIRST = ("notebooks", "validation", "diagnosis", "docs", "browser", "cli")
+"""Folders with tests of a minute and more, in the order in which `make test-all` begins with them: what is left for
+the end must be short, or one process works alone."""
+
+
 UNOPTIMISED = "--xla_backend_optimization_level=0"
 """The compiler takes half the time with it. The fast tests compile more than they compute; `make test-all` compiles
 everything as in use."""
@@ -66,11 +71,26 @@ def pytest_configure(config: pytest.Config) -> None:
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
         os.environ.update({name: str(folder / name.lower()) for name in SCRATCH})
         flags = os.environ.get("XLA_FLAGS", "")
-        if config.getoption("markexpr") == "not slow" and "optimization_level" not in flags:
+        if _only_the_fast(config) and "optimization_level" not in flags:
             os.environ["XLA_FLAGS"] = f"{flags} {UNOPTIMISED}".strip()
     from savgs_ident.simulate.program_cache import spare_the_compiler
 
     spare_the_compiler()
+
+
+def _only_the_fast(config: pytest.Config) -> bool:
+    return bool(config.getoption("markexpr") == "not slow")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Where slow tests run, the folders that take longest come first."""
+    if not _only_the_fast(config):
+        place = {REPOSITORY / "tests" / name: number for number, name in enumerate(LONGEST_FIRST)}
+        items.sort(
+            key=lambda item: min(
+                (place[each] for each in item.path.parents if each in place), default=len(place)
+            )
+        )
 
 
 class _Rooms(LoadScopeScheduling):
@@ -83,7 +103,8 @@ class _Rooms(LoadScopeScheduling):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadScopeScheduling:
-    """Where tests run in several processes, spread them by room."""
+    """Where tests run in several processes, spread them by room; see LONGEST_FIRST."""
+    config.option.loadscopereorder = _only_the_fast(config)
     return _Rooms(config, log)
 
 

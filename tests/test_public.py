@@ -18,7 +18,7 @@ from savgs_ident.fit.public import fit as fit_call
 from savgs_ident.report import presenters
 
 from .in_one_test import over
-from .relaxed import as_users_have_it
+from .relaxed import with_kept_programs
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 HEAVY = ("jax", "numpy", "scipy", "pandas", "matplotlib", "control", "casadi", "rich", "typer")
@@ -141,7 +141,7 @@ def test_the_ten_lines_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.Mon
     assert set(re.findall(r"^(?:import|from) .*$", code, re.M)) == {"import savgs_ident as si"}
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    with as_users_have_it():
+    with with_kept_programs():
         exec(compile(code, "README.md", "exec"), names)
     fit, gap, loop = names["fit"], names["gap"], names["loop"]
     assert isinstance(fit, si.Fit)

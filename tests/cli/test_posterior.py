@@ -44,6 +44,12 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+def _short_run(model: Path, campaign: Path) -> list[str]:
+    """A chain of some seconds, ended by its effective draws alone."""
+    data = [str(model), str(campaign), "--fixed-tolerances"]
+    return ["posterior", *data, "--target-ess", "150", "--patience", "0"]
+
+
 @pytest.fixture(scope="module")
 def sampled(
     model: Path,
@@ -54,16 +60,7 @@ def sampled(
 ) -> tuple[Path, Result]:
     """A finished run on four dwells, tolerances held."""
     folder = tmp_path_factory.mktemp("posterior")
-    words = [
-        "posterior",
-        str(model),
-        str(short_campaign),
-        "--fixed-tolerances",
-        "--target-ess",
-        "150",
-        "--patience",
-        "0",
-    ]
+    words = _short_run(model, short_campaign)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SAVGS_IDENT_CACHE", str(cache))
         done = as_users_have_it([*words, "--json", "--out", str(folder)])
@@ -215,21 +212,8 @@ def test_killed_and_resumed_the_chain_is_the_same(
     """Killed with SIGKILL twice, at any moment, against a run that nobody disturbed."""
     from .conftest import COMMAND
 
-    words = [
-        *COMMAND,
-        "posterior",
-        str(model),
-        str(short_campaign),
-        "--fixed-tolerances",
-        "--target-ess",
-        "150",
-        "--patience",
-        "0",
-        "--quiet",
-        "--out",
-        str(tmp_path),
-        "--resume",
-    ]
+    run = _short_run(model, short_campaign)
+    words = [*COMMAND, *run, "--quiet", "--out", str(tmp_path), "--resume"]
     killed, random = tmp_path / "chain-emcee.h5", np.random.default_rng(5)
     for _ in range(2):
         before = _steps(killed)
