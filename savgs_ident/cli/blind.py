@@ -60,6 +60,12 @@ def blind(
         bool,
         typer.Option("--again", help="Diagnose the recordings in --out DIR anew; keep none of the marks."),
     ] = False,
+    sensitivity: Annotated[
+        bool,
+        typer.Option(
+            "--sensitivity", help="Judge every trial by decision constants halved and doubled, too."
+        ),
+    ] = False,
     out: OutOption = Path("out/blind"),
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -75,8 +81,7 @@ def blind(
     is off point by point, its friction drifts, noise is coloured, and the road's phase is slightly wrong.
 
     Writes blind.json, blind.html, confusion.png, confusion.pdf, reliability.png, reliability.pdf, trials.jsonl, and a
-    folder a trial. A run that was
-    stopped goes on where it was when it is started again.
+    folder a trial. A run that was stopped goes on where it was when it is started again.
 
     Exit code 1 if the diagnosis is not right as often as it should be.
 
@@ -101,6 +106,7 @@ def blind(
             sweep=sweep,
             foreign=foreign,
             again=again,
+            sensitivity=sensitivity,
             jobs=jobs,
             scheduler=scheduler,
             progress=progress,

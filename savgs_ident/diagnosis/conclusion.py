@@ -70,20 +70,43 @@ class Conclusion:
     next_tests: tuple[NextTest, ...]
 
 
-def conclude(
+@dataclass(frozen=True)
+class LeftOut:
+    """How hypotheses predict tests that were left out.
+
+    Attributes:
+        problem: the problem, free of discretisation error about what is named.
+        evidence: what is named found again.
+        law: the learned law that is named or offered, if one is.
+        held: predictions of tests left out, by hypothesis.
+        fitted: the gap [1] that the recalibrated baseline leaves where it was fitted to all tests.
+        further: that of a recording which took no part.
+        next_tests: tests that would separate what is named from what looks like it.
+    """
+
+    problem: DiagnosisProblem
+    evidence: DiagnosisEvidence
+    law: LearnedLaw | None
+    held: Mapping[Hypothesis, HeldOut]
+    fitted: float
+    further: FurtherShrink | None
+    next_tests: tuple[NextTest, ...]
+
+
+def leave_tests_out(
     problem: DiagnosisProblem,
     selected: DiagnosisEvidence,
     values: Mapping[str, float],
     progress: Progress,
     further: FurtherRecording | None,
-) -> Conclusion:
-    """What is named found again, tests held out, and what these leave of what was ``selected``."""
+) -> LeftOut:
+    """What is named found again, and tests predicted that were left out, by it and by its rivals."""
     others = [each for each in _compared(problem, selected) if each is not selected.chosen.mode]
     (refitted, evidence), (tests, held) = side_by_side(
         lambda: refit_named(problem, selected, progress),
         lambda: (_next_tests(problem, selected, progress), _held_out(problem, others, progress)),
     )
-    member = evidence.named_law or (evidence.offered if evidence.kind == "unknown" else None)
+    member = _member(evidence)
     law = None if member is None else member.law
     fits = [] if evidence.chosen.mode is None or law is not None else [evidence.chosen.mode]
     last, apart = side_by_side(
@@ -97,16 +120,28 @@ def conclude(
     held = {**held, UNKNOWN: _held_out_unknown(evidence, held[NONE])}
     if evidence.kind == "unknown" and member is not None and held[member.hypothesis].mean <= held[NONE].mean:
         law = None
-    model = _corrected_model(refitted, evidence, law)
+    return LeftOut(refitted, evidence, law, held, _fitted_gap(problem), apart, tests)
+
+
+def conclude(left_out: LeftOut, values: Mapping[str, float], further: FurtherRecording | None) -> Conclusion:
+    """What tests that were left out leave of what was selected, by the constants of the problem."""
+    problem, evidence, law, apart = left_out.problem, left_out.evidence, left_out.law, left_out.further
+    member, held = _member(evidence), left_out.held
+    model = _corrected_model(problem, evidence, law)
     gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
     named = problem.locations(evidence.chosen.hypothesis) if member is None else (member.location,)
-    settled = settle(evidence, gap, _fitted_gap(problem), problem.constants, named)
+    settled = settle(evidence, gap, left_out.fitted, problem.constants, named)
     if settled is not evidence:
         evidence, law = settled, None
-        model = _corrected_model(refitted, evidence, law)
+        model = _corrected_model(problem, evidence, law)
         gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
-        apart = _predict_further(refitted, evidence, law, values, further)
-    return Conclusion(refitted, evidence, law, model, held, gap, by_channel, apart, tests)
+        apart = _predict_further(problem, evidence, law, values, further)
+    return Conclusion(problem, evidence, law, model, held, gap, by_channel, apart, left_out.next_tests)
+
+
+def _member(evidence: DiagnosisEvidence) -> FlexibleMember | None:
+    """The learned law that is named, or offered for something unknown."""
+    return evidence.named_law or (evidence.offered if evidence.kind == "unknown" else None)
 
 
 def settle(

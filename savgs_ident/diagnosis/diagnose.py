@@ -3,7 +3,7 @@
 The stages in order, each a whole record:
 
 1. the baseline recalibrated (:func:`~savgs_ident.diagnosis.model_selection.recalibrate`);
-2. hypotheses and ports compared (:func:`~savgs_ident.diagnosis.model_selection.select_model`);
+2. hypotheses and ports compared (:func:`~savgs_ident.diagnosis.model_selection.compare_models`), and judged;
 3. what is named found again on a finer mesh, while the next tests are looked for and the rivals predict tests that
    were left out;
 4. the corrected model: the named effects, or a law learned at the port of something unknown;
@@ -11,7 +11,7 @@ The stages in order, each a whole record:
 """
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from threadpoolctl import threadpool_limits
 
@@ -19,15 +19,21 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.diagnosis.candidates import candidates_of, confusable_of, estimates_among, not_judgeable_of
-from savgs_ident.diagnosis.conclusion import CorrectedModel, FurtherRecording, conclude
+from savgs_ident.diagnosis.conclusion import (
+    CorrectedModel,
+    FurtherRecording,
+    conclude,
+    leave_tests_out,
+)
 from savgs_ident.diagnosis.drift import drifting
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
-from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem
+from savgs_ident.diagnosis.evidence import Comparison, DiagnosisEvidence, DiagnosisProblem
 from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint, sweep_shrink
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.model_selection import (
+    compare_models,
+    decide_among,
     recalibrate,
-    select_model,
 )
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
 from savgs_ident.diagnosis.problem import AbstractProblem
@@ -50,6 +56,14 @@ from savgs_ident.inference.observations import Data
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
+
+Watch = Callable[[DiagnosisProblem, Comparison], None]
+"""Is given the problem and its fitted hypotheses when the diagnosis is done."""
+
+
+def nobody(problem: DiagnosisProblem, comparison: Comparison) -> None:
+    """Watch nothing."""
+    del problem, comparison
 
 
 def baseline_problem(
@@ -108,12 +122,13 @@ def diagnose_dwells(
     values: Mapping[str, float],
     progress: Progress = no_progress,
     sweep: SweepResponse | None = None,
+    watch: Watch = nobody,
 ) -> Diagnosis:
     """Diagnose the gap between the baseline of a plant in dwells and the measured response.
 
     ``plant`` and ``data`` are what is compared, ``values`` (SI, by name) those that the baseline is given with. A
     ``sweep`` is no part of the diagnosis: it is predicted, and compared. ``given``, the model as known before any
-    fit, is handed on to the result.
+    fit, is handed on to the result; ``watch`` gets what the verdict was decided from.
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a plant whose baseline has no periodic motion.
     """
@@ -125,7 +140,7 @@ def diagnose_dwells(
         return sweep_shrink(problem, sweep, points)
 
     further = None if sweep is None else predict_sweep
-    return diagnose_problem(plant, data, given, settings, values, progress, further, measured)
+    return diagnose_problem(plant, data, given, settings, values, progress, further, measured, watch)
 
 
 def diagnose_problem(
@@ -137,37 +152,46 @@ def diagnose_problem(
     progress: Progress = no_progress,
     further: FurtherRecording | None = None,
     measured: HarmonicResponse | None = None,
+    watch: Watch = nobody,
 ) -> Diagnosis:
     """Diagnose the gap between a baseline and its data, of whatever kind these are.
 
     ``further`` predicts a recording that takes no part; ``measured``, the dwells that the data come from, is handed
-    on to the result like ``given``.
+    on to the result like ``given``; ``watch`` gets what the verdict was decided from.
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a baseline that has no solution.
     """
     # Threads of the linear algebra only get in each other's way: its matrices are small, and there are many.
     with threadpool_limits(1, "blas"):
-        return _diagnose(plant, data, measured, given, settings, values, progress, further)
+        began = time.perf_counter()
+        recalibrated = recalibrate(plant, data, values, progress, settings.constants)
+        problem, comparison = _compared(recalibrated, progress)
+        found = _concluded(problem, comparison, measured, given, settings, values, progress, further, began)
+        watch(problem, comparison)
+        return found
 
 
-def _diagnose(
-    plant: AbstractProblem,
-    data: Data,
+def _compared(problem: DiagnosisProblem, progress: Progress) -> tuple[DiagnosisProblem, Comparison]:
+    """The problem, with a baseline that drifts where that is most probable, and its hypotheses fitted."""
+    comparison = compare_models(problem, progress)
+    drifts = drifting(problem, decide_among(problem, comparison), progress)
+    return (problem, comparison) if drifts is None else (drifts, compare_models(drifts, progress))
+
+
+def _concluded(
+    problem: DiagnosisProblem,
+    comparison: Comparison,
     measured: HarmonicResponse | None,
     given: Model,
     settings: DiagnosisSettings,
     values: Mapping[str, float],
     progress: Progress,
     further: FurtherRecording | None,
+    began: float,
 ) -> Diagnosis:
-    began = time.perf_counter()
-    problem = recalibrate(plant, data, values, progress, settings.constants)
-    selected = select_model(problem, progress)
-    drifts = drifting(problem, selected, progress)
-    if drifts is not None:
-        problem = drifts
-        selected = select_model(problem, progress)
-    found = conclude(problem, selected, values, progress, further)
+    selected = decide_among(problem, comparison)
+    found = conclude(leave_tests_out(problem, selected, values, progress, further), values, further)
+    plant, data = problem.plant, problem.data
     base, evidence, model = problem.base, found.evidence, found.model
     # Before what is named was refitted: the alternatives were not.
     candidates = candidates_of(

@@ -1,8 +1,8 @@
 """What a model selection works on and what comes out of it, as records.
 
-A :class:`DiagnosisProblem` is a plant with its data and its baseline at its best. A :class:`DiagnosisEvidence` is
-what speaks for every hypothesis about what is missing, and what may be said; its :class:`FlexibleMember` are learned
-laws as hypotheses.
+A :class:`DiagnosisProblem` is a plant with its data and its baseline at its best. A :class:`Comparison` holds the
+fits of all hypotheses. A :class:`DiagnosisEvidence` is what speaks for every hypothesis about what is missing, and
+what may be said; its :class:`FlexibleMember` are learned laws as hypotheses.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,13 @@ from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import Hypothesis, Kind
 from savgs_ident.diagnosis.search import Findings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.diagnosis.verdict import BrokenTolerance, UnknownEvidence, WeighedHypothesis, uncertain_odds
+from savgs_ident.diagnosis.verdict import (
+    BrokenTolerance,
+    Change,
+    UnknownEvidence,
+    WeighedHypothesis,
+    uncertain_odds,
+)
 from savgs_ident.effects.base import Family, Port
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Term
@@ -87,6 +93,27 @@ class DiagnosisProblem:
     @cached_property
     def _candidates(self) -> Mapping[str, Term]:
         return {term.name: term for term in self.plant.candidates}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All hypotheses fitted, before they are weighed against each other.
+
+    Attributes:
+        findings: all that were scored and fitted.
+        localisations: what a law at each location would explain.
+        laws: learned laws that were fitted on the nonlinear plant.
+        beside: log evidence of a law beside the most probable effects.
+        best: the most probable fit when they were compared.
+        change: what its effects do to the response.
+    """
+
+    findings: Findings
+    localisations: tuple[Localisation, ...]
+    laws: tuple[LearnedLaw, ...]
+    beside: float
+    best: LaplaceFit
+    change: Change
 
 
 class FlexibleMember(NamedTuple):

@@ -1,10 +1,11 @@
 """Model selection: the baseline recalibrated, hypotheses and ports compared, and what kind of verdict they allow.
 
-Two stages, each of which returns a whole record:
+Three stages, each of which returns a whole record:
 
 1. :func:`recalibrate`: the baseline at its own best, a :class:`DiagnosisProblem`.
-2. :func:`select_model`: all hypotheses fitted and weighed, what a law at each port would explain, and the kind of the
-   verdict, a :class:`DiagnosisEvidence`.
+2. :func:`compare_models`: all hypotheses fitted, and what a law at each port would explain, a :class:`Comparison`.
+3. :func:`decide_among`: the hypotheses weighed and the kind of the verdict, a :class:`DiagnosisEvidence`. It takes no
+   time, so that the same comparison can be judged by other constants.
 
 No rig follows the catalogue's formulas to the letter: the rise of a Stribeck friction falls off as a bell or
 exponentially, a stop is straight or progressive. Hypotheses are a tree: a port, a family of laws there, a law. Where
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
-from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
+from savgs_ident.diagnosis.evidence import Comparison, DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.problem import AbstractProblem
@@ -40,7 +41,6 @@ from savgs_ident.diagnosis.search import (
 )
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
-    BrokenTolerance,
     Change,
     WeighedHypothesis,
     broken_tolerance,
@@ -87,7 +87,12 @@ def recalibrate(
 
 
 def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvidence:
-    """Hypotheses, ports and the kind of the verdict.
+    """Hypotheses, ports and the kind of the verdict."""
+    return decide_among(problem, compare_models(problem, progress))
+
+
+def compare_models(problem: DiagnosisProblem, progress: Progress) -> Comparison:
+    """All hypotheses fitted, and what a law at each port would explain.
 
     Single effects first; where none explains all, the flexible members of the ports, and pairs of effects; where
     these do not either, laws beside the best of all.
@@ -98,7 +103,8 @@ def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvid
         lambda: single_effects(search, base, plant.candidates, progress, plant.known, constants),
         lambda: _localised(problem, base),
     )
-    members = _flexible_members(problem, findings, localisations, progress)
+    laws = _learned_laws(problem, findings, localisations, progress)
+    members = _flexible_members(problem, laws, len(localisations))
     beside, least = -np.inf, -np.inf
     law_explains = _law_explains(members, localisations, constants)
     if law_explains:
@@ -107,13 +113,10 @@ def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvid
     if not law_explains:
         findings = _with_nearest(problem, findings, localisations, progress)
         findings, beside = _law_beside_best(problem, _material(problem, findings), progress)
-    broken = broken_tolerance(
-        findings,
-        lambda mode: prior_conflict(mode, plant.nuisances, constants),
-        problem.parameter_port,
-        constants,
+    best = most_probable(findings, constants)
+    return Comparison(
+        findings, tuple(localisations), laws, beside, best, change_without(problem, best, best.terms)
     )
-    return _decided(problem, findings, localisations, members, beside, broken)
 
 
 def _law_explains(
@@ -134,33 +137,35 @@ def _not_learned(
     return [each for each in localisations if each.name not in learned]
 
 
-def _decided(
-    problem: DiagnosisProblem,
-    findings: Findings,
-    localisations: Sequence[Localisation],
-    members: Sequence[FlexibleMember],
-    beside: float,
-    broken: BrokenTolerance,
-) -> DiagnosisEvidence:
-    """What the weights of all hypotheses allow to say; ``beside`` is the log evidence of a law beside effects."""
+def decide_among(problem: DiagnosisProblem, comparison: Comparison) -> DiagnosisEvidence:
+    """What the weights of all hypotheses allow to say, by the constants of the problem."""
     search, base, constants = problem.search, problem.base, problem.constants
+    findings, localisations = comparison.findings, comparison.localisations
+    members = _flexible_members(problem, comparison.laws, len(localisations))
+    broken = broken_tolerance(
+        findings,
+        lambda mode: prior_conflict(mode, problem.plant.nuisances, constants),
+        problem.parameter_port,
+        constants,
+    )
     best = most_probable(findings, constants)
+    change = comparison.change if best is comparison.best else change_without(problem, best, best.terms)
     left = left_over(search, base, best, constants)
     # A law that was learned on the nonlinear plant stands for itself.
     others = _not_learned(members, localisations)
     alone = -np.inf
     if others:
         first = max(others, key=lambda each: each.evidence)
-        change = _change(problem, first.held_out.rows - base.prediction.rows)
-        alone = anywhere(others) if change.matters(constants) else -np.inf
-    unknown = unknown_evidence(findings, alone, beside, broken.weight, constants)
+        moved = _change(problem, first.held_out.rows - base.prediction.rows)
+        alone = anywhere(others) if moved.matters(constants) else -np.inf
+    unknown = unknown_evidence(findings, alone, comparison.beside, broken.weight, constants)
     weighed = weigh(findings, unknown, constants)
-    kind, chosen = decide(weighed, change_without(problem, best, best.terms), left, constants)
+    kind, chosen = decide(weighed, change, left, constants)
     more = [WeighedHypothesis(each.hypothesis, each.weight, each.law.mode, each.sd) for each in members]
     weighed = tuple(sorted((*weighed, *more), key=lambda each: -each.weight))
     found = DiagnosisEvidence(
         findings=findings,
-        localisations=tuple(localisations),
+        localisations=localisations,
         flexible=tuple(members),
         weighed=weighed,
         unknown=unknown,
@@ -186,13 +191,13 @@ def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: Fl
     return member.left <= constants.unexplained_share_flexible and change.matters(constants)
 
 
-def _flexible_members(
+def _learned_laws(
     problem: DiagnosisProblem,
     findings: Findings,
     localisations: Sequence[Localisation],
     progress: Progress,
-) -> list[FlexibleMember]:
-    """Learned laws on the nonlinear plant at the ports that explain most, the most probable first.
+) -> tuple[LearnedLaw, ...]:
+    """Learned laws on the nonlinear plant at the ports that explain most.
 
     None where a single effect explains all, and more than a law to first order would, or where nothing seems to be
     missing.
@@ -200,25 +205,32 @@ def _flexible_members(
     constants, base = problem.constants, problem.base
     best, linear = most_probable(findings, constants), anywhere(localisations)
     if max(best.evidence, linear) < base.evidence + constants.alarm_log_odds:
-        return []
+        return ()
     count = len(findings.scores)
     weight = best.evidence + log_prior(hypothesis_of(best), count, constants)
     explained = left_over(problem.search, base, best, constants) <= constants.explained_share
     if explained and weight >= linear + log_prior(UNKNOWN, count, constants):
-        return []
+        return ()
 
     def fitted(port: Port) -> LearnedLaw | None:
         progress(f"learning a law at {port.location} ({port.name})")
         return learn(problem.plant, problem.data, base, port, constants)
 
     ports = _worth_learning(problem, findings, localisations)
-    laws = [each for each in in_parallel(fitted, ports) if each is not None and each.mode.solved]
-    prior = log(constants.prior_unknown / max(len(localisations), 1))
+    return tuple(each for each in in_parallel(fitted, ports) if each is not None and each.mode.solved)
+
+
+def _flexible_members(
+    problem: DiagnosisProblem, laws: Sequence[LearnedLaw], locations: int
+) -> list[FlexibleMember]:
+    """Learned laws as hypotheses among laws at so many ``locations``, the most probable first."""
+    constants = problem.constants
+    prior = log(constants.prior_unknown / max(locations, 1))
     members = [
         FlexibleMember(
             law,
             law.mode.evidence + prior,
-            left_over(law.search, base, law.mode, constants),
+            left_over(law.search, problem.base, law.mode, constants),
             constants.width_uncertainty * sqrt(law.identified),
         )
         for law in laws

@@ -10,9 +10,11 @@ from dataclasses import replace
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.diagnosis.diagnose import (
+    Watch,
     baseline_problem,
     diagnose_dwells,
     diagnose_problem,
+    nobody,
     offered_effects,
 )
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
@@ -139,11 +141,13 @@ def diagnose_response(
     values: Mapping[str, float] | None = None,
     progress: Progress = no_progress,
     sweep: SweepResponse | None = None,
+    watch: Watch = nobody,
 ) -> Diagnosis:
     """Diagnose the gap between a rig's baseline model and a measured response.
 
     ``rig`` is the rig as known before any fit; ``values`` (SI, by name) are those that the baseline is given with,
     the rig's own where left out. A ``sweep`` of the cam is no part of the diagnosis: it is predicted, and compared.
+    ``watch`` gets what the verdict was decided from.
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a response that cannot be used, for names
     that do not exist, and for a rig whose baseline has no periodic motion.
@@ -151,7 +155,7 @@ def diagnose_response(
     settings = settings or SIMTR
     plant, data = quarter_car_problem(measured, rig, settings)
     given = RigModel(rig, settings.baseline)
-    return diagnose_dwells(plant, data, measured, given, settings, values or {}, progress, sweep)
+    return diagnose_dwells(plant, data, measured, given, settings, values or {}, progress, sweep, watch)
 
 
 def quarter_car_problem(

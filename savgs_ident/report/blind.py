@@ -25,6 +25,7 @@ from savgs_ident.validation.blind_rates import (
     reliability_of,
 )
 from savgs_ident.validation.foreign_laws import FOREIGN
+from savgs_ident.validation.sensitivity import MovedMarks
 
 RATE_WORDS: Mapping[str, str] = {
     "named_right": "Effect named correctly",
@@ -137,7 +138,10 @@ PACKAGES = ("jax", "numpy", "scipy")
 
 
 def blind_record(
-    scores: Sequence[Score], settings: Mapping[str, Any], command: Sequence[str]
+    scores: Sequence[Score],
+    settings: Mapping[str, Any],
+    command: Sequence[str],
+    moved: Sequence[MovedMarks] = (),
 ) -> dict[str, Any]:
     """Rates with their 95 % intervals (Wilson) and bounds, the confusion matrix, and the marks of every trial.
 
@@ -161,6 +165,10 @@ def blind_record(
             "verdicts": confusion.verdicts,
             "counts": confusion.counts,
         },
+        "sensitivity": [
+            asdict(each) | {"rates": {name: _rate(rate) for name, rate in each.rates.items()}}
+            for each in moved
+        ],
         "settings": dict(settings),
         "scores": [
             asdict(score)
@@ -300,10 +308,16 @@ _FOREIGN_NOTE = (
 )
 
 
-def blind_html(scores: Sequence[Score], settings: Mapping[str, Any], command: Sequence[str]) -> str:
+def blind_html(
+    scores: Sequence[Score],
+    settings: Mapping[str, Any],
+    command: Sequence[str],
+    moved: Sequence[MovedMarks] = (),
+) -> str:
     """The page: one file, no network, nothing executed; the same trials give the same bytes."""
     rates, reliability, median = rates_of(scores), reliability_of(scores), median_closed(scores)
     foreign = any(score.foreign for score in scores)
+    facts = _FOREIGN_FACTS if foreign else _FACTS
     missed = [RATE_WORDS[name].lower() for name, rate in rates.items() if rate.met is False]
     words = (
         f"Confusion matrix of {len(scores)} trials: {sum(map(is_right, scores))} on its diagonal are right."
@@ -313,7 +327,7 @@ def blind_html(scores: Sequence[Score], settings: Mapping[str, Any], command: Se
         {
             "sentence": summary(scores),
             "alarm": f"Required rate missed: {', '.join(missed)}." if missed else "",
-            "facts": [_fact(name, rates[name]) for name in (_FOREIGN_FACTS if foreign else _FACTS)],
+            "facts": [_fact(name, rates[name]) for name in facts],
             "about": _FOREIGN_RIGS if foreign else _OWN_RIGS,
             "note": _FOREIGN_NOTE if foreign else _OWN_NOTE,
             "median": f"Median share of the recalibrated gap that is closed: {percentage(median)}."
@@ -324,6 +338,8 @@ def blind_html(scores: Sequence[Score], settings: Mapping[str, Any], command: Se
             "reliability_words": error_words(reliability),
             "reliability_picture": embed(reliability_figure(scores), error_words(reliability)),
             "rates": [(RATE_WORDS[name], *rate_words(rate), _met(rate)) for name, rate in rates.items()],
+            "moved_heads": ["Constant", "Value", "Verdicts changed", *(RATE_WORDS[name] for name in facts)],
+            "moved": [_moved_row(each, facts) for each in moved],
             "picture": embed(confusion_figure(scores), words),
             "scores": [
                 (
@@ -344,6 +360,12 @@ def blind_html(scores: Sequence[Score], settings: Mapping[str, Any], command: Se
             "versions": package_versions(PACKAGES),
         },
     )
+
+
+def _moved_row(moved: MovedMarks, names: Sequence[str]) -> tuple[str, ...]:
+    """A constant, its other value, the verdicts that change, and rates."""
+    counts = (f"{moved.rates[name].count} of {moved.rates[name].total}" for name in names)
+    return (moved.constant, f"{moved.value:g}", f"{moved.changed} of {moved.trials}", *counts)
 
 
 def _fact(name: str, rate: Rate) -> dict[str, object]:

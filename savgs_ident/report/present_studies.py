@@ -63,7 +63,7 @@ class _BlindStudy(AbstractPresenter["BlindStudy"]):
     def record(self, result: "BlindStudy") -> Mapping[str, Any]:
         from savgs_ident.report.blind import blind_record
 
-        return blind_record(result.scores, result.settings, result.origin.command)
+        return blind_record(result.scores, result.settings, result.origin.command, result.moved)
 
     def text(self, result: "BlindStudy") -> RenderableType:
         from savgs_ident.report.blind import blind_text
@@ -76,7 +76,7 @@ class _BlindStudy(AbstractPresenter["BlindStudy"]):
     def page(self, result: "BlindStudy") -> str:
         from savgs_ident.report.blind import blind_html
 
-        return blind_html(result.scores, result.settings, result.origin.command)
+        return blind_html(result.scores, result.settings, result.origin.command, result.moved)
 
     def figures(self, result: "BlindStudy") -> Figures:
         from savgs_ident.report.blind import confusion_figure, reliability_figure

@@ -27,11 +27,14 @@ from savgs_ident.validation.blind_trial import (
     Draw,
     Plan,
     check_trial_folder,
+    diagnose_by_other_constants,
     diagnose_folder,
     draw_and_record,
+    kept_trials,
     record_trial,
     run_trial,
 )
+from savgs_ident.validation.sensitivity import MovedMarks, moved_marks
 from savgs_ident.validation.trials import begin_trials, keep_trial, known_trials, marks_in, side_by_side
 
 FILE = "trials.jsonl"
@@ -46,12 +49,13 @@ FOREIGN_SHARES = (30.0, 70.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class BlindStudy(Result):
-    """The marks of blind trials, and what the trials have in common."""
+    """The marks of blind trials, and what the trials have in common; what they would be by other constants."""
 
     presenter: ClassVar[str] = "BLIND_STUDY"
 
     scores: tuple[Score, ...]
     settings: Mapping[str, Any]
+    moved: tuple[MovedMarks, ...] = ()
 
     @property
     def trusted(self) -> bool:
@@ -87,6 +91,7 @@ def blind(
     sweep: bool = False,
     foreign: bool = False,
     again: bool = False,
+    sensitivity: bool = False,
     jobs: int | None = None,
     scheduler: str | None = None,
     progress: Progress = no_progress,
@@ -111,6 +116,7 @@ def blind(
         sweep: record a sweep of a minute, too.
         foreign: effects follow laws that the diagnosis does not have, on rigs with small errors.
         again: diagnose the recordings in the folder anew; keep none of the marks.
+        sensitivity: judge every trial by decision constants halved and doubled, too: a tenth more time.
         jobs: trials at a time on this machine; one for each core if left out.
         scheduler: address of a Dask cluster to work on instead, whose workers see the folder under the same path.
         progress: called with a sentence on what is being done.
@@ -120,7 +126,8 @@ def blind(
     sheet = None if rig is None else Path(rig)
     given = shares or (FOREIGN_SHARES if foreign else SHARES)
     asked = Job(trials, seed, jobs, sheet, given, every, sweep, again, (), scheduler, foreign)
-    return run_blind(asked, draw_and_record, diagnose_folder, Path(folder), progress)
+    diagnose = diagnose_by_other_constants if sensitivity else diagnose_folder
+    return run_blind(asked, draw_and_record, diagnose, Path(folder), progress)
 
 
 def run_blind(
@@ -146,7 +153,8 @@ def run_blind(
     place = out if job.scheduler is None else out.absolute()
     scores = _run(job, partial(run_trial, plan, draw, diagnose, place), out, done, progress)
     origin = Origin(command=job.command, model=str(rig))
-    return BlindStudy(tuple(scores), plan.marks(), origin=origin)
+    moved = moved_marks(list(kept_trials(out, scores)))
+    return BlindStudy(tuple(scores), plan.marks(), moved, origin=origin)
 
 
 def check_shares(job: Job) -> None:

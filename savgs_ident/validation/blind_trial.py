@@ -11,7 +11,7 @@ The seal is written last: a folder with a seal is whole, and its recordings serv
 
 import json
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -21,6 +21,7 @@ import numpy as np
 
 from savgs_ident.core.errors import InputError, blamed_on
 from savgs_ident.core.files import is_begun, prepare_folder, record_of, write_json
+from savgs_ident.diagnosis.diagnose import Watch, nobody
 from savgs_ident.diagnosis.public import SIMTR, diagnose_response
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
@@ -42,6 +43,7 @@ from savgs_ident.validation.blind_answer import (
 )
 from savgs_ident.validation.blind_draw import Shares, draw_answer
 from savgs_ident.validation.foreign_draw import draw_foreign, true_bench
+from savgs_ident.validation.sensitivity import varied_into
 from savgs_ident.validation.trials import code_version, rig_marks
 from savgs_ident.validation.virtual_campaign import FILE, record_campaign, write_recordings
 from savgs_ident.validation.virtual_rig import Bench, Programme
@@ -171,16 +173,32 @@ def run_trial(plan: Plan, draw: Draw, diagnose: Diagnose, out: Path, number: int
     return score_of(answer, found, code_version())
 
 
-def diagnose_folder(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
+def diagnose_folder(
+    folder: Path, rig: Rig, without: tuple[str, ...], watch: Watch = nobody
+) -> Mapping[str, Any]:
     """The diagnosis of a recorded campaign as its ``diagnosis.json`` has it."""
     settings = replace(SIMTR, without=without)
     campaign = load_campaign(folder)
     measured = measured_response(campaign, QuarterCar, settings.orders)
     sweep, _ = first_sweep(campaign, QuarterCar)
-    diagnosis = diagnose_response(measured, rig, settings, sweep=sweep)
+    diagnosis = diagnose_response(measured, rig, settings, sweep=sweep, watch=watch)
     origin = RigModel(rig, settings.baseline).origin(campaign, measured.warnings)
     record: Mapping[str, Any] = json.loads(replace(diagnosis, origin=origin).to_json())
     return record
+
+
+def diagnose_by_other_constants(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
+    """The same, with the verdicts by decision constants halved and doubled."""
+    varied: dict[str, Any] = {}
+    return {**diagnose_folder(folder, rig, without, varied_into(varied)), **varied}
+
+
+def kept_trials(out: Path, scores: Sequence[Score]) -> Iterator[tuple[Score, Answer, Mapping[str, Any]]]:
+    """Trials that are done and whose files are still there: marks, answer, and what the diagnosis said."""
+    for score in scores:
+        answer, said = (_folder(out, score.number) / name for name in ("answer.json", "diagnosis.json"))
+        if answer.is_file() and said.is_file():
+            yield score, _read(answer, envelope_of).answer, _read(said, dict)
 
 
 def _diagnosed(diagnose: Diagnose, folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:

@@ -1,11 +1,14 @@
 """What people read of blind trials: the same numbers in the picture, on the page and in the terminal."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
 from rich.console import Console
 
+from savgs_ident.diagnosis.sensitivity import FACTORS, VARIED
+from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.report.blind import (
     blind_html,
     blind_record,
@@ -13,6 +16,7 @@ from savgs_ident.report.blind import (
     confusion_figure,
 )
 from savgs_ident.validation.blind_answer import Score, failed, score_of
+from savgs_ident.validation.sensitivity import KEY, moved_marks
 
 from .blind_answers import answer, diagnosis
 
@@ -90,6 +94,43 @@ def test_the_page_tells_every_trial_and_executes_nothing(scores: list[Score]) ->
     assert "script" not in cells.names
     assert "<b>rig.toml" not in page
     assert "Required rate missed" in page
+
+
+def test_marks_by_other_constants_are_counted() -> None:
+    """Two trials with an effect that is named; by twice the material share one of them is not, by half both are."""
+    truth = answer("effect", "accel_lag")
+    same, other = (
+        diagnosis(kind, *named)["verdict"] for kind, named in (("effect", ["accel_lag"]), ("none", []))
+    )
+    varied = {name: {"0.5": same, "2.0": same} for name in VARIED}
+    trials = []
+    for number, doubled in enumerate((same, other)):
+        said = diagnosis("effect", "accel_lag", intervals={"accel_lag_time": (0.0, 1.0)})
+        said[KEY] = varied | {"material_share": {"0.5": same, "2.0": doubled}}
+        drawn = replace(truth, number=number, parameters={"accel_lag_time": 0.5})
+        trials.append((score_of(drawn, said), drawn, said))
+    moved = {(each.constant, each.value): each for each in moved_marks(trials)}
+    halved, doubled = (moved["material_share", factor * DEFAULTS.material_share] for factor in FACTORS)
+    assert (halved.changed, halved.rates["named_right"].count) == (0, 2)
+    assert (doubled.changed, doubled.rates["named_right"].count, doubled.rates["named_right"].total) == (
+        1,
+        1,
+        2,
+    )
+    assert doubled.rates["intervals_hold"].total == 2
+    page = blind_html([score for score, _, _ in trials], SETTINGS, (), list(moved.values()))
+    cells = _Cells()
+    cells.feed(page)
+    assert [
+        "material_share",
+        "0.006",
+        "1 of 2",
+        "1 of 2",
+        "1 of 2",
+        "0 of 0",
+        "0 of 0",
+        "0 of 0",
+    ] in cells.rows
 
 
 def test_the_terminal_lists_what_was_wrong(scores: list[Score]) -> None:

@@ -9,8 +9,10 @@ import pytest
 
 from savgs_ident.core.parameter import Parameter, ParameterTable
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.diagnosis.diagnose import baseline_problem, diagnose_dwells
-from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
+from savgs_ident.diagnosis.diagnose import Watch, baseline_problem, diagnose_dwells, nobody
+from savgs_ident.diagnosis.evidence import Comparison, DiagnosisProblem
+from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings, Verdict
+from savgs_ident.diagnosis.sensitivity import vary_constants
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.effects.base import AbstractForceLaw, Family, Port, PortSignals, Role
 from savgs_ident.effects.effect import Effect, effect_at, generic_effects
@@ -94,13 +96,25 @@ def _recorded(*effects: Effect, miss: float = 0.0) -> HarmonicResponse:
     )
 
 
-def _diagnosed(response: HarmonicResponse) -> Diagnosis:
+def _diagnosed(response: HarmonicResponse, watch: Watch = nobody) -> Diagnosis:
     settings = DiagnosisSettings(
         "two_mass", free=("k", "c"), orders=ORDERS, periodic=PeriodicSettings(nodes=128, adaptations=0)
     )
     offered = {name: ALL[name] for name in OFFERED}
     problem, data = baseline_problem(response, TwoMass(), PARAMETERS, offered, settings)
-    return diagnose_dwells(problem, data, response, PlantModel(TwoMass(), PARAMETERS), settings, {})
+    return diagnose_dwells(
+        problem, data, response, PlantModel(TwoMass(), PARAMETERS), settings, {}, watch=watch
+    )
+
+
+def _varied() -> tuple[dict[str, dict[float, Verdict]], Watch]:
+    """Verdicts by other constants, filled by what watches a diagnosis."""
+    varied: dict[str, dict[float, Verdict]] = {}
+
+    def watch(problem: DiagnosisProblem, comparison: Comparison) -> None:
+        varied.update(vary_constants(problem, comparison, {}))
+
+    return varied, watch
 
 
 def _missing(found: Diagnosis) -> float:
@@ -109,11 +123,15 @@ def _missing(found: Diagnosis) -> float:
 
 
 def test_nothing_is_missing() -> None:
-    found = _diagnosed(_recorded())
+    varied, watch = _varied()
+    found = _diagnosed(_recorded(), watch)
     assert found.verdict.kind == "none"
     assert found.converged
     assert _missing(found) < DEFAULTS.material_share
     assert found.parameters["k"] == pytest.approx(TRUTH["k"], rel=0.01)
+    # That a tolerance does not hold, beside nothing, shares the prior; it is a hundredth.
+    odds = [np.log(each.probability / (1.0 - each.probability)) for each in varied["prior_none"].values()]
+    assert odds[1] - odds[0] == pytest.approx(np.log(4.0), rel=0.01)
 
 
 def test_an_effect_is_named() -> None:
@@ -125,8 +143,14 @@ def test_an_effect_is_named() -> None:
     assert damping.lo < ALL["guide_viscous"].parameters[0].value < damping.hi
 
 
-def test_two_effects_are_named() -> None:
-    found = _diagnosed(_recorded(ALL["guide_viscous"], ALL["potentiometer_delay"]))
+def test_two_effects_are_named_and_would_be_by_other_constants() -> None:
+    varied, watch = _varied()
+    found = _diagnosed(_recorded(ALL["guide_viscous"], ALL["potentiometer_delay"]), watch)
+    verdicts = [each for by_factor in varied.values() for each in by_factor.values()]
+    assert len(verdicts) == 30
+    assert {(each.kind, each.effects, each.ports) for each in verdicts} == {
+        (found.verdict.kind, found.verdict.effects, found.verdict.ports)
+    }
     assert found.verdict.kind == "several"
     assert set(found.verdict.effects) == {"guide_viscous", "potentiometer_delay"}
     assert found.shrink.closed_by_effect > 0.98
