@@ -8,7 +8,8 @@ A campaign is identified by itself, in whichever process and on whichever machin
 goes on where it was.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -117,7 +118,7 @@ Outcome = Kept | Failure
 """What becomes of a campaign."""
 
 Work = Callable[[Task], Outcome]
-Spread = Callable[[Work, Sequence[Task]], Iterator[tuple[int, Outcome | Lost]]]
+Spread = Callable[[Work, Sequence[Task]], Generator[tuple[int, Outcome | Lost]]]
 """Does the work on all tasks; gives their numbers and results as they come."""
 
 
@@ -206,9 +207,10 @@ def identify_all(
     rows, pending = _what_is_there(jobs.one.channels, found, rig, settings, out, progress)
     if pending:
         progress(f"identifying {_campaigns(len(pending))}")
-        for number, outcome in spread(work, [_task(jobs, each, rig) for each in pending]):
-            rows.append(_conclude(pending[number], outcome, out))
-            progress(f"{len(rows)} of {len(found)} done; {rows[-1]}")
+        with closing(spread(work, [_task(jobs, each, rig) for each in pending])) as outcomes:
+            for number, outcome in outcomes:
+                rows.append(_conclude(pending[number], outcome, out))
+                progress(f"{len(rows)} of {len(found)} done; {rows[-1]}")
     study = study_campaigns(rows, in_natural_order)
     return replace(study, settings=settings).made_by(jobs.one.command)
 

@@ -6,7 +6,7 @@ A file is a campaign. A folder is one too, or holds several: a campaign in each 
 - otherwise each file is a campaign of its own.
 
 The table that an earlier run wrote is no campaign, and results are not written where recordings are. A campaign is
-called as its file or folder, in characters that every file system takes:
+named after its file or folder, in characters that every file system takes:
 
 >>> safe_name("../../etc/pass wd"), safe_name("Run 7"), safe_name("..")
 ('etc_pass_wd', 'Run_7', 'campaign')

@@ -63,7 +63,7 @@ def blind(
     sensitivity: Annotated[
         bool,
         typer.Option(
-            "--sensitivity", help="Judge every trial by decision constants halved and doubled, too."
+            "--sensitivity", help="Judge every new trial by decision constants halved and doubled, too."
         ),
     ] = False,
     out: OutOption = Path("out/blind"),

@@ -173,24 +173,24 @@ def _ctrl_c_is_kept() -> Iterator[None]:
         yield
         return
     signal.signal(signal.SIGINT, _press)
-    told, sys.unraisablehook = sys.unraisablehook, _without_ctrl_c(sys.unraisablehook)
+    before, sys.unraisablehook = sys.unraisablehook, _without_ctrl_c(sys.unraisablehook)
     try:
         yield
     finally:
-        sys.unraisablehook = told
+        sys.unraisablehook = before
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _without_ctrl_c(
     hook: Callable[["UnraisableHookArgs"], object],
 ) -> Callable[["UnraisableHookArgs"], object]:
-    """What tells of exceptions that could not be raised, but for Ctrl-C: the next line of progress raises that."""
+    """The hook for exceptions that could not be raised, but for Ctrl-C: the next line of progress raises that."""
 
-    def tell(found: "UnraisableHookArgs") -> None:
+    def report(found: "UnraisableHookArgs") -> None:
         if not issubclass(found.exc_type, KeyboardInterrupt):
             hook(found)
 
-    return tell
+    return report
 
 
 def _code_of(work: Callable[[], int]) -> int:

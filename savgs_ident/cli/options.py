@@ -3,7 +3,6 @@
 Options that take several values at once are written ``--free mu_r c_sd`` for ``--free mu_r --free c_sd``.
 """
 
-import os
 import sys
 from collections.abc import Callable, Sequence
 from enum import StrEnum
@@ -106,11 +105,6 @@ QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress and no t
 def command_line() -> tuple[str, ...]:
     """The command as it was typed."""
     return ("savgs-ident", *sys.argv[1:])
-
-
-def cores() -> int:
-    """The cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def read_campaign(path: Path, channels: Path | None, progress: Progress) -> "Campaign":

@@ -274,10 +274,7 @@ def _bare(model: QuarterCar, p: Values) -> _Bare:
 def quasi_linear_response(
     model: QuarterCar, p: Values, described: DescribingFunctions
 ) -> NDArray[np.complex128]:
-    """Response (D, 2) of the rig with the described elements.
-
-    Of :data:`QUASI_LINEAR_OUTPUTS`, per metre of road [unit/m].
-    """
+    """:data:`QUASI_LINEAR_OUTPUTS` per metre of road [unit/m], (D, 2), of the rig with the described elements."""
     rig = _bare(model, p)
     position, velocity, acceleration, road, force = rig.residual
     rows = []

@@ -30,7 +30,7 @@ import threading
 import time
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -78,13 +78,16 @@ def run_tasks(
     workers: int,
     scheduler: str | None = None,
     each_does: int = 0,
-) -> Iterator[tuple[int, Result | Lost]]:
+) -> Generator[tuple[int, Result | Lost]]:
     """Numbers of tasks and what ``work`` made of them, as they come.
 
     They are done by ``workers`` processes at a time, each of which does ``each_does`` tasks (:data:`TASKS` if zero)
     before it makes room for a new one, or by the Dask cluster of a ``scheduler``. No workers is this process.
 
-    What the work raises is raised here and ends the others. Raises :class:`InputError` for a cluster that does not
+    What the work raises is raised here and ends the others. Whoever may be interrupted between two results closes the
+    iterator (:func:`contextlib.closing`): the processes wait for more until then.
+
+    Raises :class:`InputError` for a cluster that does not
     answer or has no worker.
     """
     attempt: Callable[[Task], Result | _Raised] = partial(_attempt, work)
@@ -122,7 +125,7 @@ class _Worker(Generic[Task, Result]):
         # Forked processes would share the threads of JAX.
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
-        self.process: SpawnProcess = context.Process(target=_serve, args=(theirs,))
+        self.process: SpawnProcess = context.Process(target=_serve, args=(theirs,), daemon=True)
         self.process.start()
         # With its own end closed here, the death of the process is the end of what can be read.
         theirs.close()

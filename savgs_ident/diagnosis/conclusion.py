@@ -35,7 +35,7 @@ class CorrectedModel:
     Attributes:
         hypothesis: what that is.
         fit: the fit of the named effects; of the baseline where none are named.
-        rows: of the response that it predicts [unit of each reading], (m,).
+        rows: of the response that it predicts [unit of each reading], (m,), with its most probable tolerated errors.
     """
 
     hypothesis: Hypothesis
@@ -133,6 +133,7 @@ def conclude(left_out: LeftOut, values: Mapping[str, float], further: FurtherRec
     settled = settle(evidence, gap, left_out.fitted, problem.constants, named)
     if settled is not evidence:
         evidence, law = settled, None
+        held = {**held, UNKNOWN: _held_out_unknown(evidence, held[NONE])}
         model = _corrected_model(problem, evidence, law)
         gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
         apart = _predict_further(problem, evidence, law, values, further)
@@ -172,8 +173,22 @@ def settle(
         return evidence
     if not small:
         return _unexplained(evidence, named[0] if len(named) == 1 else "")
+    return _nothing_named(evidence)
+
+
+def _nothing_named(evidence: DiagnosisEvidence) -> DiagnosisEvidence:
+    """The evidence where what would be named explains nothing: its weight is that of nothing."""
+    gone = (NONE, evidence.chosen.hypothesis)
+    weights = [each.weight for each in evidence.weighed if each.hypothesis in gone]
     none = next(each for each in evidence.weighed if each.hypothesis == NONE)
-    return replace(evidence, kind="none", chosen=none, named_law=None, unsupported=True)
+    chosen = replace(none, weight=float(np.logaddexp.reduce(weights)))
+    others = [
+        replace(each, weight=-np.inf) if each.hypothesis in gone else each
+        for each in evidence.weighed
+        if each is not none
+    ]
+    weighed = tuple(sorted((chosen, *others), key=lambda each: -each.weight))
+    return replace(evidence, kind="none", chosen=chosen, weighed=weighed, named_law=None, unsupported=True)
 
 
 def _unexplained(evidence: DiagnosisEvidence, location: str = "") -> DiagnosisEvidence:
@@ -200,6 +215,7 @@ def _unexplained(evidence: DiagnosisEvidence, location: str = "") -> DiagnosisEv
         weighed=weighed,
         named_law=None,
         unsupported_at=known,
+        refuted=evidence.chosen.hypothesis,
         unknown=UnknownEvidence(unknown.weight, "law"),
     )
 
@@ -214,6 +230,8 @@ def refit_named(
     progress(f"refitting {evidence.chosen.hypothesis}")
     plant = problem.plant.corrected(mode.terms, mode.values, mode.prediction.warm_start)
     if plant is problem.plant:
+        return problem, evidence
+    if plant is None:
         return problem, replace(evidence, refit_failed=True)
     search = search_of(plant, problem.data)
     found = find_map(
@@ -221,13 +239,19 @@ def refit_named(
     )
     if not found.solved:
         return problem, replace(evidence, refit_failed=True)
-    chosen = replace(evidence.chosen, mode=found)
-    weighed = tuple(chosen if each is evidence.chosen else each for each in evidence.weighed)
-    modes = tuple(found if each is mode else each for each in evidence.findings.modes)
-    return replace(problem, plant=plant, search=search), replace(
+    return replace(problem, plant=plant, search=search), with_named_fit(evidence, found)
+
+
+def with_named_fit(evidence: DiagnosisEvidence, found: LaplaceFit) -> DiagnosisEvidence:
+    """The evidence with another fit of what is named."""
+    chosen, mode = replace(evidence.chosen, mode=found), evidence.chosen.mode
+    return replace(
         evidence,
-        findings=replace(evidence.findings, modes=modes),
-        weighed=weighed,
+        findings=replace(
+            evidence.findings,
+            modes=tuple(found if each is mode else each for each in evidence.findings.modes),
+        ),
+        weighed=tuple(chosen if each is evidence.chosen else each for each in evidence.weighed),
         chosen=chosen,
     )
 
@@ -237,12 +261,8 @@ def _fitted_gap(problem: DiagnosisProblem) -> float:
 
     What is known to a tolerance as a curve, and what may drift, is taken at its most probable.
     """
-    rows, data, base, plant = problem.base.prediction.rows, problem.data, problem.base, problem.plant
-    if data.tolerated is not None:
-        scales, turned = base.noise_scales, problem.search.turned(data.tolerated)
-        errors = scales.noise**2 * turned.T @ (problem.search.missed(base.prediction) / scales.spread)
-        rows = rows + data.tolerated @ errors
-    together, _ = shrinks(data, Rows(problem.given, rows, rows, plant.channel, plant.channels))
+    rows, plant = problem.search.followed(problem.base), problem.plant
+    together, _ = shrinks(problem.data, Rows(problem.given, rows, rows, plant.channel, plant.channels))
     return together.recalibrated
 
 
@@ -307,11 +327,11 @@ def _corrected_model(
 ) -> CorrectedModel:
     if law is not None:
         member = next(each for each in evidence.flexible if each.law is law)
-        return CorrectedModel(member.hypothesis, law.mode, law.mode.prediction.rows)
+        return CorrectedModel(member.hypothesis, law.mode, law.search.followed(law.mode))
     if evidence.kind == "unknown":
         return CorrectedModel(UNKNOWN, problem.base, evidence.localisation.held_out.rows)
     fit = evidence.chosen.mode or problem.base
-    return CorrectedModel(hypothesis_of(fit), fit, fit.prediction.rows)
+    return CorrectedModel(hypothesis_of(fit), fit, problem.search.followed(fit))
 
 
 def _predict_further(

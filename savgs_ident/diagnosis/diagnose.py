@@ -3,7 +3,8 @@
 The stages in order, each a whole record:
 
 1. the baseline recalibrated (:func:`~savgs_ident.diagnosis.model_selection.recalibrate`);
-2. hypotheses and ports compared (:func:`~savgs_ident.diagnosis.model_selection.compare_models`), and judged;
+2. hypotheses and ports compared (:func:`~savgs_ident.diagnosis.model_selection.compare_models`), once more where a
+   baseline that drifts is more probable (:mod:`~savgs_ident.diagnosis.drift`), and judged;
 3. what is named found again on a finer mesh, while the next tests are looked for and the rivals predict tests that
    were left out;
 4. the corrected model: the named effects, or a law learned at the port of something unknown;
@@ -27,7 +28,7 @@ from savgs_ident.diagnosis.conclusion import (
 )
 from savgs_ident.diagnosis.drift import drifting
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
-from savgs_ident.diagnosis.evidence import Comparison, DiagnosisEvidence, DiagnosisProblem
+from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FittedHypotheses
 from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint, sweep_shrink
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.model_selection import (
@@ -57,13 +58,13 @@ from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
 
-Watch = Callable[[DiagnosisProblem, Comparison], None]
+Watch = Callable[[DiagnosisProblem, FittedHypotheses], None]
 """Is given the problem and its fitted hypotheses when the diagnosis is done."""
 
 
-def nobody(problem: DiagnosisProblem, comparison: Comparison) -> None:
+def nobody(problem: DiagnosisProblem, fitted: FittedHypotheses) -> None:
     """Watch nothing."""
-    del problem, comparison
+    del problem, fitted
 
 
 def baseline_problem(
@@ -165,22 +166,22 @@ def diagnose_problem(
     with threadpool_limits(1, "blas"):
         began = time.perf_counter()
         recalibrated = recalibrate(plant, data, values, progress, settings.constants)
-        problem, comparison = _compared(recalibrated, progress)
-        found = _concluded(problem, comparison, measured, given, settings, values, progress, further, began)
-        watch(problem, comparison)
+        problem, fitted = _compared(recalibrated, progress)
+        found = _concluded(problem, fitted, measured, given, settings, values, progress, further, began)
+        watch(problem, fitted)
         return found
 
 
-def _compared(problem: DiagnosisProblem, progress: Progress) -> tuple[DiagnosisProblem, Comparison]:
+def _compared(problem: DiagnosisProblem, progress: Progress) -> tuple[DiagnosisProblem, FittedHypotheses]:
     """The problem, with a baseline that drifts where that is most probable, and its hypotheses fitted."""
-    comparison = compare_models(problem, progress)
-    drifts = drifting(problem, decide_among(problem, comparison), progress)
-    return (problem, comparison) if drifts is None else (drifts, compare_models(drifts, progress))
+    fitted = compare_models(problem, progress)
+    drifts = drifting(problem, decide_among(problem, fitted), progress)
+    return (problem, fitted) if drifts is None else (drifts, compare_models(drifts, progress))
 
 
 def _concluded(
     problem: DiagnosisProblem,
-    comparison: Comparison,
+    fitted: FittedHypotheses,
     measured: HarmonicResponse | None,
     given: Model,
     settings: DiagnosisSettings,
@@ -189,9 +190,9 @@ def _concluded(
     further: FurtherRecording | None,
     began: float,
 ) -> Diagnosis:
-    selected = decide_among(problem, comparison)
+    selected = decide_among(problem, fitted)
     found = conclude(leave_tests_out(problem, selected, values, progress, further), values, further)
-    plant, data = problem.plant, problem.data
+    plant, data, recalibrated = problem.plant, problem.data, problem.search.followed(problem.base)
     base, evidence, model = problem.base, found.evidence, found.model
     # Before what is named was refitted: the alternatives were not.
     candidates = candidates_of(
@@ -214,8 +215,8 @@ def _concluded(
         intervals=estimates_among(model.fit, plant.free),
         verdict=verdict,
         ports=_port_shares(evidence, candidates),
-        map=plant.gap_map(data, base.prediction.rows),
-        cycle=plant.cycle_positions(data, base.prediction.rows),
+        map=plant.gap_map(data, recalibrated),
+        cycle=plant.cycle_positions(data, recalibrated),
         regimes=plant.regimes(problem.search.data, base),
         candidates=candidates,
         shrink=found.gap,
@@ -225,7 +226,7 @@ def _concluded(
         not_judgeable=not_judgeable_of(evidence.findings, problem.constants),
         confusable=confusable_of(evidence.findings, problem.constants),
         loops=_loops(found.problem, model, evidence, found.law, verdict.ports, progress),
-        responses=plant.responses(data, problem.given, base.prediction.rows, model.rows),
+        responses=plant.responses(data, problem.given, recalibrated, model.rows),
         measured=measured,
         converged=all(each.status.ok for each in _decisive_fits(problem, selected, evidence, found.law)),
         warnings=write_warnings(found.problem, evidence, model.fit, beyond),

@@ -4,7 +4,8 @@ The background takes up a drift of what is identified to first order: a friction
 x at the end of the campaign, -x at its beginning, and in proportion to the time between. A friction that falls by a
 fifth moves a dwell near its breakaway far beyond first order. So the drifts are estimated with a wide prior, the
 baseline is solved for them at a few times of the campaign, and what they do beyond first order is added to all its
-rows; that is repeated until it no longer changes.
+rows; that is repeated until it no longer changes. Unlike parameters, what drifts do beyond first order is that of
+all tests where some are left out.
 
 A baseline that drifts is a hypothesis like that of a tolerance that does not hold: where it is more probable than all
 others, it takes the place of the baseline, and what is missing is looked for beside it.
@@ -32,13 +33,10 @@ ROUNDS = 6
 """Most estimates of the drifts."""
 
 SETTLED = 0.02
-"""Change of the drifts from one estimate to the next, in their tolerances, from which on they count as known."""
+"""Change of the drifts from one estimate to the next, in their tolerances, from which on they are known."""
 
 LEAST_SHARE = 0.1
 """Share of its value to which a parameter may fall."""
-
-SIGNIFICANT = 3.0
-"""Standard deviations from which on a drift is told."""
 
 
 class _Drifts(NamedTuple):
@@ -73,18 +71,21 @@ def drifting(
         moved = float(np.abs(drifts.x - before.x).max())
         if not mode.solved or moved < SETTLED / width:
             break
-        search = search_of(_curved(plant, data, mode, drifts.x, width * constants.drift_tolerance), data)
+        curved = _curved(plant, data, mode, drifts.x, width * constants.drift_tolerance)
+        if curved is None:
+            return None
+        search = search_of(curved, data)
     weight = mode.evidence + log(constants.prior_none) + log(constants.prior_broken_tolerance)
     if not mode.solved or moved >= SETTLED / width or weight < best:
         return None
     assert isinstance(search.plant, DwellProblem)
     change = 2.0 * width * constants.drift_tolerance * drifts.x
-    told = {
+    certain = {
         name: float(each)
         for name, each, sure in zip(plant.free, change, np.abs(drifts.x) / drifts.sd, strict=True)
-        if sure > SIGNIFICANT
+        if sure > constants.significant_drift
     }
-    return replace(problem, plant=search.plant, data=data, search=search, base=mode, drifts=told)
+    return replace(problem, plant=search.plant, data=data, search=search, base=mode, drifts=certain)
 
 
 def _drifts(search: Search, mode: LaplaceFit, count: int) -> _Drifts:
@@ -96,13 +97,16 @@ def _drifts(search: Search, mode: LaplaceFit, count: int) -> _Drifts:
     information = moved.T @ weighted - cross.T @ np.linalg.solve(mode.precision, cross)
     covariance = np.eye(count) - information
     sd = noise * np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
-    return _Drifts(noise * weighted.T @ search.missed(mode.prediction), sd)
+    return _Drifts(search.tolerated_errors(mode)[-count:], sd)
 
 
 def _curved(
     plant: DwellProblem, data: Data, mode: LaplaceFit, x: NDArray[np.float64], tolerance: float
-) -> DwellProblem:
-    """The plant with what drifts ``x`` (n,), in their ``tolerance``, do to its rows beyond first order."""
+) -> DwellProblem | None:
+    """The plant with what drifts ``x`` (n,), in their ``tolerance``, do to its rows beyond first order.
+
+    None where the baseline has no solution on the way.
+    """
     centre, start = mode.values, mode.prediction.warm_start
     without = replace(plant, beyond=None)
     levels = []
@@ -111,7 +115,7 @@ def _curved(
         there = {name: centre[name] * float(each) for name, each in zip(plant.free, share, strict=True)}
         found = without.predict((), centre | there, (), start)
         if not found.solved:
-            return plant
+            return None
         levels.append(found.rows)
     at = time_of(plant.times)[data.test]
     drifted = sum(

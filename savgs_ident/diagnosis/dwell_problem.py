@@ -177,18 +177,18 @@ class DwellProblem(AbstractProblem):
 
     def corrected(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
-    ) -> "DwellProblem":
+    ) -> "DwellProblem | None":
         """The problem with rows as they would be on nodes without end, about ``values`` [SI].
 
-        The rule of the collocation is of second order: four thirds of what twice the nodes change. The problem as it
-        is where they do not lead to a motion.
+        The rule of the collocation is of second order: four thirds of what twice the nodes change. None where they do
+        not lead to a motion.
         """
         model, p, layout = self.model(terms), placed(self.values(values)), warm_start.mesh.layout
         doubled = Layout(tuple(2 * count for count in layout.counts))
         coarse = resolve(model, p, warm_start, ITERATIONS)
         fine = adapt(model, p, coarse, doubled, self.settings.iterations)
         if not all(status.ok for each in (coarse, fine) for status in each.status()):
-            return self
+            return None
         less, more = (
             np.asarray(rows_of(model, self.likelihood, p, each, self.orders)) for each in (coarse, fine)
         )

@@ -1,8 +1,8 @@
 """What a model selection works on and what comes out of it, as records.
 
-A :class:`DiagnosisProblem` is a plant with its data and its baseline at its best. A :class:`Comparison` holds the
-fits of all hypotheses. A :class:`DiagnosisEvidence` is what speaks for every hypothesis about what is missing, and
-what may be said; its :class:`FlexibleMember` are learned laws as hypotheses.
+A :class:`DiagnosisProblem` is a plant with its data and its baseline at its best. :class:`FittedHypotheses` are the
+fits of all. A :class:`DiagnosisEvidence` is what speaks for every hypothesis about what is missing, and what may be
+said; its :class:`FlexibleMember` are learned laws as hypotheses.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.problem import AbstractProblem
-from savgs_ident.diagnosis.result import Hypothesis, Kind
+from savgs_ident.diagnosis.result import NONE, Hypothesis, Kind
 from savgs_ident.diagnosis.search import Findings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
@@ -43,8 +43,8 @@ class DiagnosisProblem:
         given: rows of the baseline as given [unit of each reading], (m,).
         base: the baseline recalibrated.
         constants: what the verdict is decided by.
-        drifts: relative change of parameters from the first test of the campaign to the last [1], by name, where the
-            baseline drifts by more than is tolerated.
+        drifts: relative change of parameters from the first test of the campaign to the last [1], by name: those that
+            certainly change, where the baseline drifts by more than is tolerated.
     """
 
     plant: AbstractProblem
@@ -96,7 +96,7 @@ class DiagnosisProblem:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class FittedHypotheses:
     """All hypotheses fitted, before they are weighed against each other.
 
     Attributes:
@@ -160,11 +160,12 @@ class DiagnosisEvidence:
         broken: the tolerance that most probably does not hold.
         kind: what may be said.
         chosen: the hypothesis that it rests on.
-        left: share of the baseline's misfit that the most probable hypothesis leaves.
+        left: share of the baseline's misfit that the most probable effects leave.
         named_law: the learned law that is named, where no formula of the catalogue explains the data.
         refit_failed: whether what is named could not be found again on a finer mesh.
         unsupported: whether what would be named predicts tests that were held out no better than the baseline.
         unsupported_at: where it acts, if something is missing all the same; empty if not.
+        refuted: what was to be named then.
     """
 
     findings: Findings
@@ -180,12 +181,18 @@ class DiagnosisEvidence:
     refit_failed: bool = False
     unsupported: bool = False
     unsupported_at: str = ""
+    refuted: Hypothesis = NONE
 
     @property
     def localisation(self) -> Localisation:
         """The location of something unknown: where a law is most probable, or where one was named in vain."""
         first = self.unsupported_at or next(iter(self.weight_by_location))
         return next(each for each in self.localisations if each.name == first)
+
+    @property
+    def left_by_named(self) -> float:
+        """Share of the baseline's misfit that what is named leaves."""
+        return self.left if self.named_law is None else self.named_law.left
 
     @property
     def prior_gain(self) -> float:

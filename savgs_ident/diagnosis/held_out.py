@@ -48,6 +48,10 @@ def hold_out(
     def without(out: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         part = Search(search.plant, data, ~out)
         found = find_map(part, terms, mode.values, mode.prediction.warm_start, constants.held_out_steps)
+        if not found.solved:
+            # What has no solution predicts nothing.
+            count = int(out.sum())
+            return np.zeros(count), np.full(count, -np.inf), -np.inf
         rows, density = predict_left_out(
             part,
             out,

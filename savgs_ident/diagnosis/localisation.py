@@ -75,6 +75,7 @@ class Localisation:
         free_input_share: share that a free input explains.
         evidence: log evidence of the fit with a law, linearised, over all laws and widths of their priors.
         held_out: each test, predicted by the law and parameters that the others set.
+        moved: by how much the law moves these predictions, parameters estimated anew [unit of each row], (m,).
         free_input: coefficients of the free input by test [its unit], (tests, f).
         families: log weight of the laws of each family, prior included; those that mix several are under None.
         ports: the same of the laws at each port, by its name.
@@ -85,6 +86,7 @@ class Localisation:
     free_input_share: float
     evidence: float
     held_out: HeldOut
+    moved: NDArray[np.float64]
     free_input: NDArray[np.float64]
     families: Mapping[Family | None, float] = field(default_factory=dict)
     ports: Mapping[str, float] = field(default_factory=dict)
@@ -177,7 +179,10 @@ def _localisation(
     for each, one in zip(location.laws, weights.tolist(), strict=True):
         families[each.family] = float(np.logaddexp(families.get(each.family, -np.inf), one))
         ports[each.port] = float(np.logaddexp(ports.get(each.port, -np.inf), one))
-    return Localisation(location.name, share, free_share, evidence, held_out, free_input, families, ports)
+    moved = held_out.rows - without.rows
+    return Localisation(
+        location.name, share, free_share, evidence, held_out, moved, free_input, families, ports
+    )
 
 
 def _rms(search: Search, mode: LaplaceFit, columns: Matrix) -> NDArray[np.float64]:

@@ -3,9 +3,10 @@
 Three stages, each of which returns a whole record:
 
 1. :func:`recalibrate`: the baseline at its own best, a :class:`DiagnosisProblem`.
-2. :func:`compare_models`: all hypotheses fitted, and what a law at each port would explain, a :class:`Comparison`.
-3. :func:`decide_among`: the hypotheses weighed and the kind of the verdict, a :class:`DiagnosisEvidence`. It takes no
-   time, so that the same comparison can be judged by other constants.
+2. :func:`compare_models`: all hypotheses fitted, and what a law at each port would explain, as
+   :class:`FittedHypotheses`.
+3. :func:`decide_among`: the hypotheses weighed and the kind of the verdict, a :class:`DiagnosisEvidence`. It fits
+   nothing, so that the same fits can be judged by other constants.
 
 No rig follows the catalogue's formulas to the letter: the rise of a Stribeck friction falls off as a bell or
 exponentially, a stop is straight or progressive. Hypotheses are a tree: a port, a family of laws there, a law. Where
@@ -24,7 +25,12 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
-from savgs_ident.diagnosis.evidence import Comparison, DiagnosisEvidence, DiagnosisProblem, FlexibleMember
+from savgs_ident.diagnosis.evidence import (
+    DiagnosisEvidence,
+    DiagnosisProblem,
+    FittedHypotheses,
+    FlexibleMember,
+)
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.problem import AbstractProblem
@@ -91,7 +97,7 @@ def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvid
     return decide_among(problem, compare_models(problem, progress))
 
 
-def compare_models(problem: DiagnosisProblem, progress: Progress) -> Comparison:
+def compare_models(problem: DiagnosisProblem, progress: Progress) -> FittedHypotheses:
     """All hypotheses fitted, and what a law at each port would explain.
 
     Single effects first; where none explains all, the flexible members of the ports, and pairs of effects; where
@@ -114,7 +120,7 @@ def compare_models(problem: DiagnosisProblem, progress: Progress) -> Comparison:
         findings = _with_nearest(problem, findings, localisations, progress)
         findings, beside = _law_beside_best(problem, _material(problem, findings), progress)
     best = most_probable(findings, constants)
-    return Comparison(
+    return FittedHypotheses(
         findings, tuple(localisations), laws, beside, best, change_without(problem, best, best.terms)
     )
 
@@ -137,11 +143,11 @@ def _not_learned(
     return [each for each in localisations if each.name not in learned]
 
 
-def decide_among(problem: DiagnosisProblem, comparison: Comparison) -> DiagnosisEvidence:
+def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> DiagnosisEvidence:
     """What the weights of all hypotheses allow to say, by the constants of the problem."""
     search, base, constants = problem.search, problem.base, problem.constants
-    findings, localisations = comparison.findings, comparison.localisations
-    members = _flexible_members(problem, comparison.laws, len(localisations))
+    findings, localisations = fitted.findings, fitted.localisations
+    members = _flexible_members(problem, fitted.laws, len(localisations))
     broken = broken_tolerance(
         findings,
         lambda mode: prior_conflict(mode, problem.plant.nuisances, constants),
@@ -149,16 +155,15 @@ def decide_among(problem: DiagnosisProblem, comparison: Comparison) -> Diagnosis
         constants,
     )
     best = most_probable(findings, constants)
-    change = comparison.change if best is comparison.best else change_without(problem, best, best.terms)
+    change = fitted.change if best is fitted.best else change_without(problem, best, best.terms)
     left = left_over(search, base, best, constants)
     # A law that was learned on the nonlinear plant stands for itself.
     others = _not_learned(members, localisations)
     alone = -np.inf
     if others:
         first = max(others, key=lambda each: each.evidence)
-        moved = _change(problem, first.held_out.rows - base.prediction.rows)
-        alone = anywhere(others) if moved.matters(constants) else -np.inf
-    unknown = unknown_evidence(findings, alone, comparison.beside, broken.weight, constants)
+        alone = anywhere(others) if _change(problem, first.moved).matters(constants) else -np.inf
+    unknown = unknown_evidence(findings, alone, fitted.beside, broken.weight, constants)
     weighed = weigh(findings, unknown, constants)
     kind, chosen = decide(weighed, change, left, constants)
     more = [WeighedHypothesis(each.hypothesis, each.weight, each.law.mode, each.sd) for each in members]
@@ -177,7 +182,7 @@ def decide_among(problem: DiagnosisProblem, comparison: Comparison) -> Diagnosis
     if not members or not _is_named(problem, found, members[0]):
         return found
     chosen = next(each for each in weighed if each.mode is members[0].law.mode)
-    return replace(found, kind="effect", chosen=chosen, left=members[0].left, named_law=members[0])
+    return replace(found, kind="effect", chosen=chosen, named_law=members[0])
 
 
 def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: FlexibleMember) -> bool:
@@ -315,7 +320,7 @@ def _law_beside_best(
         findings = _material(problem, more)
         if hypothesis_of(most_probable(findings, constants)) != hypothesis_of(best):
             return _law_beside_best(problem, findings, progress)
-    change = _change(problem, localisations[0].held_out.rows - best.prediction.rows)
+    change = _change(problem, localisations[0].moved)
     return findings, anywhere(localisations) if change.matters(constants) else -np.inf
 
 

@@ -214,10 +214,11 @@ def _nearest(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> str:
     if not effects:
         return ""
     several, words = len(effects) > 1, " and ".join(_words(problem, name) for name in effects)
-    in_vain = ", but does not predict tests that were held out" if evidence.unsupported_at else ""
+    refuted = f", but do{'' if several else 'es'} not predict tests that were held out"
     return (
         f" The nearest effect{'s' if several else ''} of the catalogue, {words}, explain{'' if several else 's'} "
-        f"{_explained(evidence.left)} of the misfit beyond the noise{in_vain}."
+        f"{_explained(evidence.left)} of the misfit beyond the noise"
+        f"{refuted if evidence.refuted.effects == effects else ''}."
     )
 
 
@@ -294,11 +295,11 @@ def write_warnings(
             )
         else:
             found.append("Something more may be missing that is too small to be told what it is.")
-    if evidence.kind in ("effect", "several") and evidence.left > constants.reported_share:
+    if evidence.kind in ("effect", "several") and evidence.left_by_named > constants.reported_share:
         found.append(
-            f"The named effects leave {100.0 * evidence.left:.1f} % of the baseline's misfit beyond the noise: their "
-            "laws are not quite those of the plant, or a small effect is missing besides. The intervals of their "
-            "parameters contain the noise alone."
+            f"The named effects leave {100.0 * evidence.left_by_named:.1f} % of the baseline's misfit beyond the "
+            "noise: their laws are not quite those of the plant, or a small effect is missing besides. The intervals "
+            "of their parameters contain the noise alone."
         )
     if evidence.kind in ("effect", "several") and beyond <= 0.0:
         found.append(

@@ -224,8 +224,11 @@ class AbstractProblem(ABC):
         """What to start from nearby, made as precise as it can be. Values are in SI."""
         return warm_start
 
-    def corrected(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any) -> Self:
-        """The problem free of discretisation errors about ``values`` [SI]; as it is where it has none."""
+    def corrected(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any) -> Self | None:
+        """The problem free of discretisation errors about ``values`` [SI]: as it is where it has none.
+
+        None where the finer problem has no solution.
+        """
         return self
 
     def uncorrected(self) -> Self:

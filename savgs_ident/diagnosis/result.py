@@ -327,8 +327,8 @@ class Diagnosis(Result):
         wall_s: how long it took [s].
         learned: the correction for something unknown, where it is a force and could be fitted.
         regimes: where in speed, stroke, load, direction, tests and time it lies, the most significant first.
-        drifts: relative change of parameters from the first test to the last [1], by name, where it is more than is
-            tolerated.
+        drifts: relative change of parameters from the first test to the last [1], by name: those that certainly
+            change, where the baseline drifts by more than is tolerated.
     """
 
     presenter: ClassVar[str] = "DIAGNOSIS"

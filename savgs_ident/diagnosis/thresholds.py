@@ -54,6 +54,8 @@ class DecisionConstants:
     prior_broken_tolerance: float = 0.01
     """Prior probability that, beside what a hypothesis says, one tolerance of the sheet does not hold.
 
+    It is that of a baseline that drifts by more than is tolerated, too.
+
     Origin: by choice; before, it had the prior of something unknown, ten times as much. It bounds the
     probability of *unknown* from below where nothing is missing. Halved or doubled: log odds of a broken tolerance
     move by 0.7 nat.
@@ -106,6 +108,8 @@ class DecisionConstants:
     material_share: float = 0.003
     """Change of the response by an effect, as a share of it, from which on the effect matters.
 
+    A gap in held-out tests that exceeds the noise by as much is no small one: then the verdict is not *none*.
+
     Origin: by choice, for campaigns whose noise is 0.14 % of the response. Halved or doubled: not measured.
     """
 
@@ -154,6 +158,12 @@ class DecisionConstants:
 
     Origin: by choice, so that they stay below the noise of a campaign at the material size. Halved or doubled: not
     measured.
+    """
+
+    significant_drift: float = 3.0
+    """Standard deviations from zero from which on a parameter of a drifting baseline is reported as drifting.
+
+    Origin: by choice, the convention of three sigma. It changes no verdict.
     """
 
     # Thresholds on the misfit
@@ -240,7 +250,7 @@ class DecisionConstants:
     """
 
     broken_tolerance_width: float = 10.0
-    """Width of the prior of a parameter whose tolerance does not hold, in tolerances.
+    """Width of the prior of a parameter whose tolerance does not hold, in tolerances; of a drift, in its own.
 
     Origin: by choice. Halved or doubled: Occam's factor moves by 0.7 nat; the fit of a parameter that is several
     widths off its sheet moves the other way.

@@ -11,7 +11,7 @@ and the log evidence of the hypothesis, up to what all hypotheses share, is
 
 with the log density ``value`` at the mode and h the number of coordinates whose prior is cut in half there. Where no
 unit normal stands beside the rows, priors are rows themselves (:func:`spread_of`), and a direction along which
-nothing changes has no covariance: it is given the standard deviation ``longest`` instead, so that correlations stay
+nothing changes has no covariance: its standard deviation is :data:`LARGEST_SPREAD`, so that correlations stay
 meaningful.
 
 The best point of a linearised hypothesis (:func:`linearised_optimum`), rows r + J d with a unit-normal prior on x + d
@@ -263,6 +263,21 @@ class Search:
     def missed(self, prediction: Prediction) -> Array:
         """Measured less predicted, as independent rows."""
         return self.turned(self.residual(prediction))
+
+    def tolerated_errors(self, fit: "LaplaceFit") -> Array:
+        """The most probable errors within tolerances beside a fit, in their widths [1], (t,)."""
+        tolerated = self.data.tolerated
+        if tolerated is None:
+            return np.zeros(0)
+        scales = fit.noise_scales
+        missed = self.missed(fit.prediction) / scales.spread
+        return np.asarray(scales.noise**2 * self.turned(tolerated).T @ missed)
+
+    def followed(self, fit: "LaplaceFit") -> Array:
+        """The rows of a fit [their units], (m,), with its most probable errors within tolerances."""
+        if self.data.tolerated is None:
+            return fit.prediction.rows
+        return np.asarray(fit.prediction.rows + self.data.tolerated @ self.tolerated_errors(fit))
 
 
 def search_of(plant: Plant, data: Data, mask: NDArray[np.bool_] | None = None) -> Search:

@@ -62,7 +62,7 @@ class Anchor(eqx.Module):
 
 
 class Responses(NamedTuple):
-    """Harmonics (W, D, 2, K) of the model at W points, and whether all dwells were solved, (W,).
+    """Harmonics (W, D, C, K) of the model at W points, and whether all dwells were solved, (W,).
 
     Harmonics are in the unit of their reading.
     """

@@ -9,6 +9,7 @@ the draw to its marks is :mod:`savgs_ident.validation.blind_trial`.
 
 import secrets
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -34,7 +35,7 @@ from savgs_ident.validation.blind_trial import (
     record_trial,
     run_trial,
 )
-from savgs_ident.validation.sensitivity import MovedMarks, moved_marks
+from savgs_ident.validation.moved_marks import MovedMarks, moved_marks
 from savgs_ident.validation.trials import begin_trials, keep_trial, known_trials, marks_in, side_by_side
 
 FILE = "trials.jsonl"
@@ -116,7 +117,7 @@ def blind(
         sweep: record a sweep of a minute, too.
         foreign: effects follow laws that the diagnosis does not have, on rigs with small errors.
         again: diagnose the recordings in the folder anew; keep none of the marks.
-        sensitivity: judge every trial by decision constants halved and doubled, too: a tenth more time.
+        sensitivity: judge every new trial by decision constants halved and doubled, too.
         jobs: trials at a time on this machine; one for each core if left out.
         scheduler: address of a Dask cluster to work on instead, whose workers see the folder under the same path.
         progress: called with a sentence on what is being done.
@@ -181,9 +182,10 @@ def record_trials(job: Job, draw: Draw, out: Path, progress: Progress = no_progr
         begin_trials(out / FILE, plan.marks())
     found = {}
     work = partial(record_trial, plan, draw, out)
-    for each in side_by_side(work, range(1, job.trials + 1), job.jobs, job.scheduler):
-        found[each.number] = each.folder
-        progress(f"{len(found)} of {job.trials} trials recorded")
+    with closing(side_by_side(work, range(1, job.trials + 1), job.jobs, job.scheduler)) as recorded:
+        for each in recorded:
+            found[each.number] = each.folder
+            progress(f"{len(found)} of {job.trials} trials recorded")
     return [found[number] for number in sorted(found)]
 
 
@@ -215,9 +217,10 @@ def _run(
         progress(f"{len(done)} trials are there from an earlier run")
     if missing:
         progress(f"trial {missing[0]} of {job.trials}")
-    for score in side_by_side(work, missing, job.jobs, job.scheduler):
-        scores[score.number] = score
-        keep_trial(out / FILE, asdict(score))
-        there = sum(number <= job.trials for number in scores)
-        progress(f"{there} of {job.trials} trials done; {score}")
+    with closing(side_by_side(work, missing, job.jobs, job.scheduler)) as made:
+        for score in made:
+            scores[score.number] = score
+            keep_trial(out / FILE, asdict(score))
+            there = sum(number <= job.trials for number in scores)
+            progress(f"{there} of {job.trials} trials done; {score}")
     return [scores[number] for number in sorted(scores) if number <= job.trials]

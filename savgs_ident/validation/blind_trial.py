@@ -12,6 +12,7 @@ The seal is written last: a folder with a seal is whole, and its recordings serv
 import json
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -43,7 +44,7 @@ from savgs_ident.validation.blind_answer import (
 )
 from savgs_ident.validation.blind_draw import Shares, draw_answer
 from savgs_ident.validation.foreign_draw import draw_foreign, true_bench
-from savgs_ident.validation.sensitivity import varied_into
+from savgs_ident.validation.moved_marks import varied_into
 from savgs_ident.validation.trials import code_version, rig_marks
 from savgs_ident.validation.virtual_campaign import FILE, record_campaign, write_recordings
 from savgs_ident.validation.virtual_rig import Bench, Programme
@@ -197,7 +198,8 @@ def kept_trials(out: Path, scores: Sequence[Score]) -> Iterator[tuple[Score, Ans
     """Trials that are done and whose files are still there: marks, answer, and what the diagnosis said."""
     for score in scores:
         answer, said = (_folder(out, score.number) / name for name in ("answer.json", "diagnosis.json"))
-        if answer.is_file() and said.is_file():
+        # Files that were moved or damaged since do not take the marks with them.
+        with suppress(OSError, InputError):
             yield score, _read(answer, envelope_of).answer, _read(said, dict)
 
 

@@ -8,7 +8,8 @@ together.
 import hashlib
 import json
 import subprocess
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -190,17 +191,18 @@ def run_trials(
         begin_trials(kept.path, kept.marks)
     found = {_number(each): each for each in done}
     missing = [number for number in range(count) if number not in found]
-    for made in side_by_side(work, missing, jobs, scheduler):
-        found[_number(made)] = made
-        if kept is not None:
-            keep_trial(kept.path, asdict(made))
-        progress(f"{sum(number < count for number in found)} of {count} trials done")
+    with closing(side_by_side(work, missing, jobs, scheduler)) as results:
+        for made in results:
+            found[_number(made)] = made
+            if kept is not None:
+                keep_trial(kept.path, asdict(made))
+            progress(f"{sum(number < count for number in found)} of {count} trials done")
     return [found[number] for number in range(count)]
 
 
 def side_by_side(
     work: Callable[[int], Made], numbers: Sequence[int], jobs: int | None = None, scheduler: str | None = None
-) -> Iterator[Made]:
+) -> Generator[Made]:
     """The results of ``work``, defined at the top of a module, as they come.
 
     ``jobs`` at a time in processes of this machine, one for each core if None, or on the Dask cluster of a

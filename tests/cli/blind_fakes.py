@@ -104,7 +104,8 @@ def always_none(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str
 
 def slowly_right(seconds: float, folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
     """Right after some time; tells in which process."""
-    print(os.getpid(), flush=True)
+    # At once: lines of two processes would run into each other.
+    os.write(1, f"{os.getpid()}\n".encode())
     time.sleep(seconds)
     return always_right(folder, rig, without)
 

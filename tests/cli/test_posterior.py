@@ -234,7 +234,7 @@ def test_killed_and_resumed_the_chain_is_the_same(
 def test_both_samplers_find_the_same_posterior_of_eight_dwells_of_the_shipped_campaign(
     tmp_path: Path, outside: dict[str, str]
 ) -> None:
-    """Enough draws that Monte-Carlo error (sd of a difference of medians: 0.03) does not decide."""
+    """Enough draws that Monte-Carlo error (sd of a difference of medians: 0.035) does not decide."""
     from .conftest import COMMAND
 
     table, campaign = pd.read_csv(default_campaign_path()), str(tmp_path / "eight.csv")
@@ -250,7 +250,7 @@ def test_both_samplers_find_the_same_posterior_of_eight_dwells_of_the_shipped_ca
             "--sampler",
             sampler,
             "--target-ess",
-            "3500",
+            "2500",
         ]
         out = tmp_path / sampler
         subprocess.run([*COMMAND, *words, "--quiet", "--out", str(out)], env=outside, check=True)

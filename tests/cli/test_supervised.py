@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from multiprocessing.context import SpawnProcess
 
 import pytest
@@ -46,3 +48,20 @@ def test_where_ctrl_c_is_ignored_it_stays_so(monkeypatch: pytest.MonkeyPatch) ->
         assert list(on_processes(abs, [-1], 1)) == [(0, 1)]
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def test_a_program_that_ends_between_two_results_leaves_no_process() -> None:
+    """It still holds the results when it ends, as a traceback does, and nobody closes them."""
+    code = (
+        "from multiprocessing import active_children\n"
+        "from savgs_ident.core.executor import on_processes\n"
+        "held = on_processes(abs, [-1, -2, -3], 1)\n"
+        "print(next(held), *(each.pid for each in active_children()))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
+    *result, process = done.stdout.rsplit(maxsplit=1)
+    assert result == ["(0, 1)"]
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(process), 0)

@@ -100,6 +100,9 @@ def test_an_effect_by_another_law_is_named(measure_few: Measure, rig: Rig) -> No
     assert diagnosis.verdict.families == ("rail/friction",)
     assert "by a law that the catalogue does not have" in diagnosis.verdict.sentence
     assert diagnosis.shrink.closed_by_effect > 0.9
+    assert diagnosis.learned is not None
+    assert diagnosis.learned.effect == "learned_rail"
+    assert diagnosis.shrink.after < 2.0 * diagnosis.shrink.floor
 
 
 @pytest.mark.slow

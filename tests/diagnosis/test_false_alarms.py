@@ -43,10 +43,10 @@ def test_campaigns_with_nothing_missing_give_no_alarm_and_one_with_a_gap_does(
         for name in ("nominal", "stribeck_rail")
     }
     bench = alarm_bench(few["nominal"], rig, settings, {}, 3, _silent)
-    draws = [bench.draw(number) for number in range(6)]
+    draws = [bench.draw(number) for number in range(3)]
     assert not any(each.alarm for each in draws)
     assert all(each.odds is not None and each.odds < DEFAULTS.alarm_log_odds for each in draws)
-    assert bench.draw(4) == draws[4] != replace(bench, seed=4).draw(4)
+    assert bench.draw(2) == draws[2] != replace(bench, seed=4).draw(2)
     assert (
         alarm_bench(few["stribeck_rail"], rig, settings, {}, 3, _silent).odds > 10.0 * DEFAULTS.alarm_log_odds
     )

@@ -164,9 +164,7 @@ def test_where_nothing_is_missing_nothing_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("laws", "effects", "seed"),
     [
-        ({}, set(), 1),
         ({"coulomb": 12.0}, {"guide_saturating_friction"}, 2),
-        ({"coulomb": 12.0, "offset": 4.0}, {"guide_saturating_friction", "drive_offset"}, 3),
         ({"spring": 60.0}, {"screw_stiffness"}, 4),
         (
             {"coulomb": 8.0, "viscous_difference": 30.0},
@@ -174,7 +172,7 @@ def test_where_nothing_is_missing_nothing_is_named(tmp_path: Path) -> None:
             5,
         ),
     ],
-    ids=["nothing", "friction", "friction and offset", "spring", "friction and directed damping"],
+    ids=["friction", "spring", "friction and directed damping"],
 )
 def test_what_was_put_in_is_named_and_nothing_else(
     laws: dict[str, float], effects: set[str], seed: int

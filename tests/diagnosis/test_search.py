@@ -246,7 +246,9 @@ def test_excess_is_what_the_noise_does_not_explain() -> None:
 
 def test_a_law_anywhere_is_as_probable_as_its_places_are_on_average() -> None:
     places = [
-        Localisation(name, 0.0, 0.0, evidence, HeldOut(np.zeros(0), np.zeros(0)), np.zeros((0, 0)))
+        Localisation(
+            name, 0.0, 0.0, evidence, HeldOut(np.zeros(0), np.zeros(0)), np.zeros(0), np.zeros((0, 0))
+        )
         for name, evidence in (("strut", -700.0), ("rail", -701.0), ("link", -900.0))
     ]
     assert anywhere(places) == pytest.approx(-700.0 + np.log((1.0 + np.exp(-1.0)) / 3.0))

@@ -10,10 +10,10 @@ import pytest
 from savgs_ident.core.parameter import Parameter, ParameterTable
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.diagnosis.diagnose import Watch, baseline_problem, diagnose_dwells, nobody
-from savgs_ident.diagnosis.evidence import Comparison, DiagnosisProblem
+from savgs_ident.diagnosis.evidence import DiagnosisProblem, FittedHypotheses
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings, Verdict
-from savgs_ident.diagnosis.sensitivity import vary_constants
 from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.diagnosis.varied_constants import vary_constants
 from savgs_ident.effects.base import AbstractForceLaw, Family, Port, PortSignals, Role
 from savgs_ident.effects.effect import Effect, effect_at, generic_effects
 from savgs_ident.plants.base import Excitation
@@ -111,8 +111,8 @@ def _varied() -> tuple[dict[str, dict[float, Verdict]], Watch]:
     """Verdicts by other constants, filled by what watches a diagnosis."""
     varied: dict[str, dict[float, Verdict]] = {}
 
-    def watch(problem: DiagnosisProblem, comparison: Comparison) -> None:
-        varied.update(vary_constants(problem, comparison, {}))
+    def watch(problem: DiagnosisProblem, fitted: FittedHypotheses) -> None:
+        varied.update(vary_constants(problem, fitted, {}, (0.5, 1.0, 2.0)))
 
     return varied, watch
 
@@ -131,7 +131,7 @@ def test_nothing_is_missing() -> None:
     assert found.parameters["k"] == pytest.approx(TRUTH["k"], rel=0.01)
     # That a tolerance does not hold, beside nothing, shares the prior; it is a hundredth.
     odds = [np.log(each.probability / (1.0 - each.probability)) for each in varied["prior_none"].values()]
-    assert odds[1] - odds[0] == pytest.approx(np.log(4.0), rel=0.01)
+    assert odds[2] - odds[0] == pytest.approx(np.log(4.0), rel=0.01)
 
 
 def test_an_effect_is_named() -> None:
@@ -147,7 +147,8 @@ def test_two_effects_are_named_and_would_be_by_other_constants() -> None:
     varied, watch = _varied()
     found = _diagnosed(_recorded(ALL["guide_viscous"], ALL["potentiometer_delay"]), watch)
     verdicts = [each for by_factor in varied.values() for each in by_factor.values()]
-    assert len(verdicts) == 30
+    assert len(verdicts) == 48
+    assert {each[1.0] for each in varied.values()} == {found.verdict}
     assert {(each.kind, each.effects, each.ports) for each in verdicts} == {
         (found.verdict.kind, found.verdict.effects, found.verdict.ports)
     }
@@ -157,7 +158,9 @@ def test_two_effects_are_named_and_would_be_by_other_constants() -> None:
 
 
 def test_a_law_that_the_catalogue_does_not_have_is_learned_at_its_port() -> None:
-    found = _diagnosed(_recorded(FOREIGN))
+    varied, watch = _varied()
+    found = _diagnosed(_recorded(FOREIGN), watch)
+    assert {each[1.0] for each in varied.values()} == {found.verdict}
     assert (found.verdict.kind, found.verdict.ports) == ("effect", ("guide",))
     assert not found.verdict.law_known
     assert found.verdict.families == ("guide/damping",)

@@ -1,20 +1,18 @@
 """How the marks of blind trials move when a decision constant is halved or doubled.
 
 Every trial of a run with ``--sensitivity`` is judged again from its own fits
-(:mod:`savgs_ident.diagnosis.sensitivity`); what is said then stands in the ``diagnosis.json`` of the trial. Here it
-is marked, and counted.
+(:mod:`savgs_ident.diagnosis.varied_constants`); what is said then stands in its ``diagnosis.json``. Here it is
+marked, and counted.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from savgs_ident.core.files import record_of
 from savgs_ident.diagnosis.diagnose import Watch
-from savgs_ident.diagnosis.evidence import Comparison, DiagnosisProblem
-from savgs_ident.diagnosis.result import Verdict
-from savgs_ident.diagnosis.sensitivity import FACTORS, VARIED, vary_constants
+from savgs_ident.diagnosis.evidence import DiagnosisProblem, FittedHypotheses
 from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.diagnosis.varied_constants import FACTORS, VARIED, vary_constants
 from savgs_ident.validation.blind_answer import Answer, Score, score_of
 from savgs_ident.validation.blind_rates import Rate, rates_of
 
@@ -44,8 +42,8 @@ class MovedMarks:
 def varied_into(found: dict[str, Any]) -> Watch:
     """A watcher of a diagnosis that puts verdicts by other constants into ``found``, by constant and factor."""
 
-    def watch(problem: DiagnosisProblem, comparison: Comparison) -> None:
-        varied = vary_constants(problem, comparison, {})
+    def watch(problem: DiagnosisProblem, fitted: FittedHypotheses) -> None:
+        varied = vary_constants(problem, fitted, {})
         found[KEY] = {
             name: {str(factor): asdict(verdict) for factor, verdict in verdicts.items()}
             for name, verdicts in varied.items()
@@ -59,8 +57,16 @@ def moved_marks(trials: Sequence[tuple[Score, Answer, Mapping[str, Any]]]) -> tu
 
     Empty where none was judged by other constants.
     """
-    judged = [each for each in trials if KEY in each[2]]
+    judged = [each for each in trials if _is_judged(each[2])]
     return tuple(_moved(judged)) if judged else ()
+
+
+def _is_judged(diagnosis: Mapping[str, Any]) -> bool:
+    """Whether all verdicts by other constants are there: an earlier version may have had others."""
+    varied = diagnosis.get(KEY)
+    return isinstance(varied, dict) and all(
+        str(factor) in varied.get(name, {}) for name in VARIED for factor in FACTORS
+    )
 
 
 def _moved(judged: Sequence[tuple[Score, Answer, Mapping[str, Any]]]) -> Iterator[MovedMarks]:
@@ -76,8 +82,7 @@ def _moved(judged: Sequence[tuple[Score, Answer, Mapping[str, Any]]]) -> Iterato
 
 def _marked(score: Score, answer: Answer, diagnosis: Mapping[str, Any], name: str, factor: float) -> Score:
     """The score with another verdict; intervals and gaps, which were not computed again, are those of the trial."""
-    verdict = asdict(record_of(Verdict, diagnosis[KEY][name][str(factor)]))
-    other = score_of(answer, {**diagnosis, "verdict": verdict}, score.version)
+    other = score_of(answer, {**diagnosis, "verdict": diagnosis[KEY][name][str(factor)]}, score.version)
     return replace(
         other,
         share_closed=score.share_closed,
@@ -87,4 +92,4 @@ def _marked(score: Score, answer: Answer, diagnosis: Mapping[str, Any], name: st
 
 
 def _said(score: Score) -> tuple[object, ...]:
-    return score.verdict, score.said, score.families
+    return score.verdict, score.said, score.families, score.located_right, score.port_right
