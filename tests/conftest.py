@@ -54,9 +54,12 @@ SHARING = {
 """Folders whose tests share expensive fixtures and compiled programs, and their room: one process takes all of it."""
 
 
-LONGEST_FIRST = ("notebooks", "validation", "diagnosis", "docs", "browser", "cli")
-"""Folders with tests of a minute and more, in the order in which `make test-all` begins with them: what is left for
-the end must be short, or one process works alone."""
+LONGEST_FIRST = (
+    *("notebooks", "validation", "diagnosis", "docs", "browser", "cli"),
+    *("export", "simulate", "control", "inference", "effects", "symbolic", "fit"),
+)
+"""Folders with tests of a minute and more, and those that one process takes whole, in the order in which
+`make test-all` begins with them: what is left for the end must be short, or one process works alone."""
 
 
 UNOPTIMISED = "--xla_backend_optimization_level=0"

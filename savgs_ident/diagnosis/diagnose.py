@@ -166,13 +166,15 @@ def diagnose_problem(
     with threadpool_limits(1, "blas"):
         began = time.perf_counter()
         recalibrated = recalibrate(plant, data, values, progress, settings.constants)
-        problem, fitted = _compared(recalibrated, progress)
+        problem, fitted = fit_hypotheses(recalibrated, progress)
         found = _concluded(problem, fitted, measured, given, settings, values, progress, further, began)
         watch(problem, fitted)
         return found
 
 
-def _compared(problem: DiagnosisProblem, progress: Progress) -> tuple[DiagnosisProblem, FittedHypotheses]:
+def fit_hypotheses(
+    problem: DiagnosisProblem, progress: Progress
+) -> tuple[DiagnosisProblem, FittedHypotheses]:
     """The problem, with a baseline that drifts where that is most probable, and its hypotheses fitted."""
     fitted = compare_models(problem, progress)
     drifts = drifting(problem, decide_among(problem, fitted), progress)

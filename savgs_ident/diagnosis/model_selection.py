@@ -92,11 +92,6 @@ def recalibrate(
     return DiagnosisProblem(plant, data, search, given.rows, base, constants)
 
 
-def select_model(problem: DiagnosisProblem, progress: Progress) -> DiagnosisEvidence:
-    """Hypotheses, ports and the kind of the verdict."""
-    return decide_among(problem, compare_models(problem, progress))
-
-
 def compare_models(problem: DiagnosisProblem, progress: Progress) -> FittedHypotheses:
     """All hypotheses fitted, and what a law at each port would explain.
 

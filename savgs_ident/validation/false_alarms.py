@@ -20,8 +20,10 @@ from threadpoolctl import threadpool_limits
 
 from savgs_ident.core.files import prepare_folder, record_of
 from savgs_ident.core.presentation import Progress, Result, no_progress
-from savgs_ident.diagnosis.evidence import DiagnosisProblem
-from savgs_ident.diagnosis.model_selection import recalibrate, select_model
+from savgs_ident.diagnosis.conclusion import conclude, leave_tests_out
+from savgs_ident.diagnosis.diagnose import fit_hypotheses
+from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FittedHypotheses
+from savgs_ident.diagnosis.model_selection import decide_among, recalibrate
 from savgs_ident.diagnosis.public import baseline_of, quarter_car_problem
 from savgs_ident.diagnosis.result import DiagnosisSettings
 from savgs_ident.diagnosis.verdict import alarm_odds
@@ -83,7 +85,7 @@ class AlarmBench:
             problem = self._null_problem(np.random.default_rng((self.seed, number)))
             if problem is None:
                 return NullDraw(number, None, False, ())
-            evidence = select_model(problem, no_progress)
+            evidence = _judged(*fit_hypotheses(problem, no_progress))
         alarm = evidence.kind != "none"
         named = evidence.chosen.hypothesis.effects or (evidence.kind,) * alarm
         return NullDraw(number, alarm_odds(evidence.weighed), alarm, named)
@@ -128,6 +130,12 @@ class AlarmBench:
         )
 
 
+def _judged(problem: DiagnosisProblem, fitted: FittedHypotheses) -> DiagnosisEvidence:
+    """What a diagnosis says, with tests left out."""
+    selected = decide_among(problem, fitted)
+    return conclude(leave_tests_out(problem, selected, {}, no_progress, None), {}, None).evidence
+
+
 def alarm_bench(
     measured: HarmonicResponse,
     rig: Rig,
@@ -136,7 +144,7 @@ def alarm_bench(
     seed: int,
     progress: Progress,
 ) -> AlarmBench:
-    """Recalibrate the baseline on a measured response, and select a model for it.
+    """Recalibrate the baseline on a measured response, and weigh hypotheses against it.
 
     Raises :class:`InputError` as :func:`savgs_ident.diagnosis.public.diagnose_response` does. ``values``
     are parameters in SI.
@@ -144,7 +152,8 @@ def alarm_bench(
     with threadpool_limits(1, "blas"):
         plant, data = quarter_car_problem(measured, rig, settings)
         problem = recalibrate(plant, data, values, progress, settings.constants)
-        odds = alarm_odds(select_model(problem, progress).weighed)
+        problem, fitted = fit_hypotheses(problem, progress)
+        odds = alarm_odds(decide_among(problem, fitted).weighed)
     level = data.test * len(plant.channels) + plant.channel
     return AlarmBench(problem, odds, _degrees_of_freedom(measured, problem), level, seed)
 

@@ -10,7 +10,7 @@ from savgs_ident.core.presentation import no_progress
 from savgs_ident.diagnosis.background import pieces_of_curve, relative_change, with_background
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence
 from savgs_ident.diagnosis.localisation import InputLocation, Law
-from savgs_ident.diagnosis.model_selection import recalibrate, select_model
+from savgs_ident.diagnosis.model_selection import compare_models, decide_among, recalibrate
 from savgs_ident.diagnosis.public import baseline_of, quarter_car_problem
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.observations import Data
@@ -79,7 +79,8 @@ def _selected(rig: Rig, campaign: Path) -> DiagnosisEvidence:
     response = measured_response(load_campaign(campaign), model.plant, 9)
     response = only(response, np.isin(np.round(response.frequency, 2), FEW))
     plant, data = quarter_car_problem(response, *baseline_of(model)[:2])
-    return select_model(recalibrate(plant, data, {}, no_progress), no_progress)
+    problem = recalibrate(plant, data, {}, no_progress)
+    return decide_among(problem, compare_models(problem, no_progress))
 
 
 @pytest.mark.slow

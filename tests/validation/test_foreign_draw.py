@@ -121,7 +121,7 @@ def test_the_code_has_a_version() -> None:
 @pytest.mark.slow
 def test_draws_can_be_repeated_and_change_the_response_by_what_was_drawn(bench: Bench) -> None:
     with with_kept_programs():
-        shares = Shares(1.0, 0.0, 0.0, 0.0)
+        shares = Shares(0.0, 1.0, 0.0, 0.0)
         first, again = (draw_foreign(bench, shares, 3, np.random.default_rng(11)) for _ in range(2))
         assert first == again
         (name,) = first.effects
