@@ -63,7 +63,8 @@ def blind(
     sensitivity: Annotated[
         bool,
         typer.Option(
-            "--sensitivity", help="Judge every new trial by decision constants halved and doubled, too."
+            "--sensitivity",
+            help="Verdicts by decision constants halved and doubled, too, for every new trial.",
         ),
     ] = False,
     out: OutOption = Path("out/blind"),

@@ -6,7 +6,7 @@ Three stages, each of which returns a whole record:
 2. :func:`compare_models`: all hypotheses fitted, and what a law at each port would explain, as
    :class:`FittedHypotheses`.
 3. :func:`decide_among`: the hypotheses weighed and the kind of the verdict, a :class:`DiagnosisEvidence`. It fits
-   nothing, so that the same fits can be judged by other constants.
+   nothing, so that other constants can decide among the same fits.
 
 No rig follows the catalogue's formulas to the letter: the rise of a Stribeck friction falls off as a bell or
 exponentially, a stop is straight or progressive. Hypotheses are a tree: a port, a family of laws there, a law. Where

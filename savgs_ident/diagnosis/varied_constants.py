@@ -1,7 +1,7 @@
 """What a verdict would be with each decision constant halved and doubled, from the same fits.
 
-Constants are varied where they judge finished fits. What they change in the search, in the choice of a baseline that
-drifts, and in the fits, such as the widths of an effect's priors, is not.
+Constants are varied where they decide among finished fits. What they change in the search, in the choice of a
+baseline that drifts, and in the fits, such as the widths of an effect's priors, is not.
 """
 
 from collections.abc import Mapping, Sequence

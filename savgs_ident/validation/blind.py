@@ -117,7 +117,7 @@ def blind(
         sweep: record a sweep of a minute, too.
         foreign: effects follow laws that the diagnosis does not have, on rigs with small errors.
         again: diagnose the recordings in the folder anew; keep none of the marks.
-        sensitivity: judge every new trial by decision constants halved and doubled, too.
+        sensitivity: give every new trial its verdicts by decision constants halved and doubled, too.
         jobs: trials at a time on this machine; one for each core if left out.
         scheduler: address of a Dask cluster to work on instead, whose workers see the folder under the same path.
         progress: called with a sentence on what is being done.

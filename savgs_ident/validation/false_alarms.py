@@ -85,7 +85,7 @@ class AlarmBench:
             problem = self._null_problem(np.random.default_rng((self.seed, number)))
             if problem is None:
                 return NullDraw(number, None, False, ())
-            evidence = _judged(*fit_hypotheses(problem, no_progress))
+            evidence = _concluded(*fit_hypotheses(problem, no_progress))
         alarm = evidence.kind != "none"
         named = evidence.chosen.hypothesis.effects or (evidence.kind,) * alarm
         return NullDraw(number, alarm_odds(evidence.weighed), alarm, named)
@@ -130,7 +130,7 @@ class AlarmBench:
         )
 
 
-def _judged(problem: DiagnosisProblem, fitted: FittedHypotheses) -> DiagnosisEvidence:
+def _concluded(problem: DiagnosisProblem, fitted: FittedHypotheses) -> DiagnosisEvidence:
     """What a diagnosis says, with tests left out."""
     selected = decide_among(problem, fitted)
     return conclude(leave_tests_out(problem, selected, {}, no_progress, None), {}, None).evidence

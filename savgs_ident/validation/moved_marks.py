@@ -1,6 +1,6 @@
 """How the marks of blind trials move when a decision constant is halved or doubled.
 
-Every trial of a run with ``--sensitivity`` is judged again from its own fits
+Every trial of a run with ``--sensitivity`` gets further verdicts from its own fits
 (:mod:`savgs_ident.diagnosis.varied_constants`); what is said then stands in its ``diagnosis.json``. Here it is
 marked, and counted.
 """
@@ -22,7 +22,7 @@ KEY = "sensitivity"
 
 @dataclass(frozen=True)
 class MovedMarks:
-    """The marks of all trials that were judged by another constant, too.
+    """The marks of all trials with their verdicts by another constant.
 
     Attributes:
         constant: name of the constant.
@@ -55,13 +55,13 @@ def varied_into(found: dict[str, Any]) -> Watch:
 def moved_marks(trials: Sequence[tuple[Score, Answer, Mapping[str, Any]]]) -> tuple[MovedMarks, ...]:
     """The marks by every constant; each trial as its score, its answer and the object of its ``diagnosis.json``.
 
-    Empty where none was judged by other constants.
+    Empty where none has verdicts by other constants.
     """
-    judged = [each for each in trials if _is_judged(each[2])]
-    return tuple(_moved(judged)) if judged else ()
+    varied_trials = [each for each in trials if _has_verdicts(each[2])]
+    return tuple(_moved(varied_trials)) if varied_trials else ()
 
 
-def _is_judged(diagnosis: Mapping[str, Any]) -> bool:
+def _has_verdicts(diagnosis: Mapping[str, Any]) -> bool:
     """Whether all verdicts by other constants are there: an earlier version may have had others."""
     varied = diagnosis.get(KEY)
     return isinstance(varied, dict) and all(
@@ -69,12 +69,12 @@ def _is_judged(diagnosis: Mapping[str, Any]) -> bool:
     )
 
 
-def _moved(judged: Sequence[tuple[Score, Answer, Mapping[str, Any]]]) -> Iterator[MovedMarks]:
+def _moved(varied_trials: Sequence[tuple[Score, Answer, Mapping[str, Any]]]) -> Iterator[MovedMarks]:
     for name in VARIED:
         for factor in FACTORS:
-            scores = [_marked(*each, name, factor) for each in judged]
+            scores = [_marked(*each, name, factor) for each in varied_trials]
             changed = sum(
-                _said(one) != _said(other) for one, (other, _, _) in zip(scores, judged, strict=True)
+                _said(one) != _said(other) for one, (other, _, _) in zip(scores, varied_trials, strict=True)
             )
             value = factor * getattr(DEFAULTS, name)
             yield MovedMarks(name, value, len(scores), changed, rates_of(scores))
