@@ -64,11 +64,17 @@ class DiagnosisProblem:
         return tuple(dict.fromkeys(self.location(name) for name in hypothesis.effects))
 
     def families(self, hypothesis: Hypothesis) -> tuple[str, ...]:
-        """Where a hypothesis acts and of which kind it is, as location/family, each once."""
+        """Where a hypothesis acts and of which kind it is, as location/family, each once.
+
+        A number that is the linear part of a law beside it, as a tyre's rate of its stiffening, is one with it.
+        """
         if hypothesis.flexible:
             return (hypothesis.flexible,)
-        effects = (self.plant.catalogue[name] for name in hypothesis.effects)
-        return tuple(dict.fromkeys(f"{each.port.location}/{each.law.family.value}" for each in effects))
+        effects = [self.plant.catalogue[name] for name in hypothesis.effects]
+        laws = {(each.port.location, each.law.family) for each in effects}
+        wholes = ((each.port.location, each.linear_part_of, each.law.family) for each in effects)
+        found = ((place, whole if (place, whole) in laws else family) for place, whole, family in wholes)
+        return tuple(dict.fromkeys(f"{place}/{family.value}" for place, family in found))
 
     def words(self, location: str) -> str:
         """What a reader calls a location."""
@@ -124,12 +130,14 @@ class FlexibleMember(NamedTuple):
         weight: log evidence plus log prior.
         left: share of the baseline's misfit that it leaves.
         sd: standard deviation of the weight [nat].
+        unlisted: what of the weight is due to a family that the catalogue does not have there [nat].
     """
 
     law: LearnedLaw
     weight: float
     left: float
     sd: float = 0.0
+    unlisted: float = 0.0
 
     @property
     def location(self) -> str:
@@ -223,7 +231,7 @@ class DiagnosisEvidence:
         found = {each.name: (each.evidence, 0.0) for each in self.localisations}
         solved: dict[str, tuple[float, float]] = {}
         for each in self.flexible:
-            evidence = each.law.mode.evidence
+            evidence = each.law.mode.evidence + each.unlisted
             if each.location not in solved or evidence > solved[each.location][0]:
                 solved[each.location] = evidence, each.sd
         return dict(sorted((found | solved).items(), key=lambda item: -item[1][0]))
@@ -238,14 +246,13 @@ class DiagnosisEvidence:
 
     def indistinguishable_ports(self, constants: DecisionConstants = DEFAULTS) -> tuple[str, ...]:
         """Other ports at which a law of something unknown is nearly as probable, the most probable first."""
-        first = self.localisation.name
-        if self.port != first:
+        if self.named_law is None and self.port != self.localisation.name:
             return ()
-        most = self._weights[first]
+        most = self._weights[self.port]
         return tuple(
             name
             for name, each in self._weights.items()
-            if name != first
+            if name != self.port
             and uncertain_odds(most[0] - each[0], hypot(most[1], each[1]))
             < constants.indistinguishable_log_odds
         )

@@ -226,16 +226,20 @@ def _flexible_members(
     """Learned laws as hypotheses among laws at so many ``locations``, the most probable first."""
     constants = problem.constants
     prior = log(constants.prior_unknown / max(locations, 1))
-    members = [
-        FlexibleMember(
+    listed = {(each.port.location, each.law.family) for each in problem.plant.catalogue.values()}
+
+    def member(law: LearnedLaw) -> FlexibleMember:
+        known = (law.port.location, law.family) in listed
+        unlisted = 0.0 if known else log(constants.unlisted_family_prior)
+        return FlexibleMember(
             law,
-            law.mode.evidence + prior,
+            law.mode.evidence + prior + unlisted,
             left_over(law.search, problem.base, law.mode, constants),
             constants.width_uncertainty * sqrt(law.identified),
+            unlisted,
         )
-        for law in laws
-    ]
-    return sorted(members, key=lambda each: -each.weight)
+
+    return sorted(map(member, laws), key=lambda each: -each.weight)
 
 
 def _worth_learning(

@@ -121,8 +121,11 @@ def _law_missing(
 
 def _words(problem: DiagnosisProblem, effect: str) -> str:
     """What an effect is, with its name."""
-    law = problem.plant.catalogue[effect].law
-    return f"{law.words or _KINDS[law.family]} (`{effect}`)"
+    found = problem.plant.catalogue[effect]
+    words = found.law.words or _KINDS[found.law.family]
+    if found.linear_part_of is not found.law.family:
+        words = f"{_KINDS[found.linear_part_of]} that is larger or smaller than on the sheet"
+    return f"{words} (`{effect}`)"
 
 
 def _not_apart(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> str:

@@ -24,6 +24,7 @@ VARIED = (
     "prior_broken_tolerance",
     "broken_tolerance_width",
     "width_uncertainty",
+    "unlisted_family_prior",
     "alarm_log_odds",
     "indistinguishable_log_odds",
     "negligible_misfit",

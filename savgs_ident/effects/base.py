@@ -51,12 +51,37 @@ class PortKind(Enum):
     SENSOR = "sensor"
 
 
+class Family(Enum):
+    """What kind of thing a law is; several laws of a family say the same by other formulas."""
+
+    FRICTION = "friction"
+    DAMPING = "damping"
+    STIFFNESS = "stiffness"
+    STOP = "stop"
+    COMPLIANCE = "compliance"
+    PLAY = "play"
+    OSCILLATOR = "oscillator"
+    NUMBER = "number"
+    GAIN = "gain"
+    DYNAMICS = "dynamics"
+    SHAPE = "shape"
+    LEARNED = "learned"
+
+
 class Number(NamedTuple):
-    """A parameter of the plant that may be another than its sheet says; ``change`` is a typical one [``unit``]."""
+    """A parameter of the plant that may be another than its sheet says.
+
+    Attributes:
+        name: of the parameter.
+        unit: its own.
+        change: a typical one [``unit``].
+        of: the kind of law whose linear part the number is, as a spring's rate that of a stiffness; else a number.
+    """
 
     name: str
     unit: str
     change: float
+    of: Family = Family.NUMBER
 
 
 class Inertia(NamedTuple):
@@ -179,23 +204,6 @@ class InternalState(NamedTuple):
     unit: str
     scale: float
     slips: bool = False
-
-
-class Family(Enum):
-    """What kind of thing a law is; several laws of a family say the same by other formulas."""
-
-    FRICTION = "friction"
-    DAMPING = "damping"
-    STIFFNESS = "stiffness"
-    STOP = "stop"
-    COMPLIANCE = "compliance"
-    PLAY = "play"
-    OSCILLATOR = "oscillator"
-    NUMBER = "number"
-    GAIN = "gain"
-    DYNAMICS = "dynamics"
-    SHAPE = "shape"
-    LEARNED = "learned"
 
 
 class Role(NamedTuple):

@@ -26,6 +26,7 @@ from savgs_ident.effects.base import (
     AbstractNumberLaw,
     AbstractSensorLaw,
     AbstractSeriesLaw,
+    Family,
     FrictionLimit,
     Fundamental,
     InputSignal,
@@ -98,6 +99,12 @@ class Effect(eqx.Module):
         names = dict(self.numbers)
         found = {names[role.name]: role.null for role in self.law.roles if role.null is not None}
         return {name: null for name, null in found.items() if isinstance(name, str)}
+
+    @property
+    def linear_part_of(self) -> Family:
+        """What kind of law the number is the linear part of that it changes; else that of its own law."""
+        changed = dict(self.numbers).get("number")
+        return next((each.of for each in self.port.numbers if each.name == changed), self.law.family)
 
     @property
     def states(self) -> tuple[InternalState, ...]:

@@ -64,6 +64,9 @@ FALLING = (0.05, 0.2)
 GAPS = (0.3, 0.55)
 """Where stops begin, as shares of the stroke [1]."""
 
+SOFT_GAPS = (0.0, 0.4)
+"""Where stops begin that are touched softly, as shares of the stroke [1]."""
+
 STRETCHES = (0.01, 0.1)
 """How far a spring-slider gives before it slides, as shares of the port's typical displacement [1]."""
 
@@ -90,6 +93,10 @@ OF_THE_MOTION = (
     Function("max(x - 0.55, 0)", Family.STOP),
     Function("max(-x - 0.55, 0)", Family.STOP),
     Function("x^4", Family.STIFFNESS),
+    Function("max(x, 0)^2", Family.STOP),
+    Function("max(-x, 0)^2", Family.STOP),
+    Function("max(x - 0.4, 0)^2", Family.STOP),
+    Function("max(-x - 0.4, 0)^2", Family.STOP),
 )
 """Functions of x = (displacement - middle)/stroke and v = velocity/speed."""
 
@@ -165,8 +172,9 @@ def functions(
     falling = [sharp * jnp.exp(-((v / width) ** 2)) for width in FALLING]
     smooth = [v, v * jnp.abs(v), v**2, x, x**2, x**3, x * sharp, x * v, x**2 * v]
     stops = [jnp.maximum(side * x - gap, 0.0) for gap in GAPS for side in (1.0, -1.0)]
+    soft = [jnp.maximum(side * x - gap, 0.0) ** 2 for gap in SOFT_GAPS for side in (1.0, -1.0)]
     loaded = [n * sharp * jnp.exp(-jnp.abs(v) / width) for width in FALLING]
-    return [sharp, blunt, *smooth, *falling, jnp.abs(v), *stops, x**4, n * sharp, n * v, n, *loaded]
+    return [sharp, blunt, *smooth, *falling, jnp.abs(v), *stops, x**4, *soft, n * sharp, n * v, n, *loaded]
 
 
 def functions_at(port: Port) -> tuple[Function, ...]:

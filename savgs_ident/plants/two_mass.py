@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import Parameter, ParameterTable
 from savgs_ident.core.values import Values
-from savgs_ident.effects.base import Number, Port, PortKind, PortSignals
+from savgs_ident.effects.base import Family, Number, Port, PortKind, PortSignals
 from savgs_ident.effects.composition import EffectsAtInstant
 from savgs_ident.plants.base import AbstractPlant, Channel, Coordinate, Input, Inputs, Motion, Scalar
 
@@ -88,10 +88,16 @@ MOUNT = Port(
 ROAD = Port("road", PortKind.INPUT, "road", displacement=1e-4)
 NUMBERS = (
     Port(
-        "strut", PortKind.NUMBER, "suspension", numbers=(Number("k", "N/m", 3e3), Number("c", "N s/m", 100.0))
+        "strut",
+        PortKind.NUMBER,
+        "suspension",
+        numbers=(Number("k", "N/m", 3e3, Family.STIFFNESS), Number("c", "N s/m", 100.0, Family.DAMPING)),
     ),
     Port(
-        "wheel", PortKind.NUMBER, "tyre", numbers=(Number("k_t", "N/m", 1.5e4), Number("c_t", "N s/m", 30.0))
+        "wheel",
+        PortKind.NUMBER,
+        "tyre",
+        numbers=(Number("k_t", "N/m", 1.5e4, Family.STIFFNESS), Number("c_t", "N s/m", 30.0, Family.DAMPING)),
     ),
     Port(
         "inertia", PortKind.NUMBER, "inertia", numbers=(Number("m_s", "kg", 10.0), Number("m_u", "kg", 2.0))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis import narrative
 from savgs_ident.diagnosis.conclusion import settle
-from savgs_ident.diagnosis.evidence import DiagnosisEvidence, FlexibleMember
+from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
@@ -31,7 +31,7 @@ from savgs_ident.diagnosis.verdict import (
 from savgs_ident.effects.base import Family
 from savgs_ident.inference.prior import Linear
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.plants.quarter_car.ports import LOCATION_WORDS
+from savgs_ident.plants.quarter_car.ports import FORCE_PORTS, LOCATION_WORDS
 
 GAP = Shrink(0.3, 0.04, 0.002, 0.0015, 0.99, (0.98, 1.0))
 RAIL: Any = SimpleNamespace(name="rail", share=0.9, evidence=50.0)
@@ -111,6 +111,33 @@ def test_what_predicts_no_tests_is_unknown_at_its_port() -> None:
     assert verdict.probability == pytest.approx(1.0)
     assert "(`rail_viscous`)" in verdict.sentence
     assert "but does not predict tests that were held out." in verdict.sentence
+
+
+def test_ports_that_do_the_same_are_listed_where_a_prior_decides_between_them() -> None:
+    """The law in the joints fits a little better, but stops are no part of joints."""
+
+    def law(place: str, evidence: float, unlisted: float) -> FlexibleMember:
+        found: Any = SimpleNamespace(mode=SimpleNamespace(evidence=evidence), port=FORCE_PORTS[place])
+        return FlexibleMember(found, evidence + unlisted, 0.0, unlisted=unlisted)
+
+    laws = (law("strut", 990.0, 0.0), law("suspension", 992.0, np.log(0.1)))
+    evidence = _evidence("unknown", "law", {"none": 0.0, "unknown": 100.0}, flexible=laws)
+    named = replace(evidence, kind="effect", named_law=laws[0])
+    assert named.indistinguishable_ports() == ("suspension",)
+
+
+def test_a_number_is_one_with_a_law_of_which_it_is_the_linear_part() -> None:
+    absent: Any = None
+    plant: Any = SimpleNamespace(catalogue=CATALOGUE)
+    problem = DiagnosisProblem(plant, absent, absent, absent, absent)
+
+    def families(*effects: str) -> tuple[str, ...]:
+        return problem.families(Hypothesis(effects))
+
+    assert families("tyre_stiffening", "tyre_stiffness") == ("tyre_radial/stiffness",)
+    assert families("tyre_stiffening", "tyre_damping") == ("tyre_radial/stiffness", "tyre_radial/number")
+    assert families("tyre_stiffness") == ("tyre_radial/number",)
+    assert families("bushing_stiffness", "spring_rate") == ("suspension/stiffness", "strut/number")
 
 
 @pytest.mark.parametrize(

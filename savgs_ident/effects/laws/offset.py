@@ -26,7 +26,7 @@ class Offset(AbstractNumberLaw):
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
         """The typical change of the port's first number; its name is for whoever makes an effect of it."""
-        name, unit, change = port.numbers[0]
+        name, unit, change, _ = port.numbers[0]
         most, about = 10.0 * abs(change), f"{name} beyond the sheet's"
         return {"change": Parameter("change", change, unit, lower=-most, upper=most, about=about)}
 

@@ -32,7 +32,7 @@ frame     frame          plate and rail, up           force on the frame, up [N]
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from savgs_ident.effects.base import Inertia, Number, Port, PortKind
+from savgs_ident.effects.base import Family, Inertia, Number, Port, PortKind
 
 RAIL = Port(
     "rail",
@@ -138,7 +138,11 @@ STRUT_NUMBERS = Port(
     "strut_numbers",
     PortKind.NUMBER,
     "strut",
-    numbers=(Number("k_sd", "N/m", 8e3), Number("l_free", "m", 5e-3), Number("c_sd", "N s/m", 600.0)),
+    numbers=(
+        Number("k_sd", "N/m", 8e3, Family.STIFFNESS),
+        Number("l_free", "m", 5e-3),
+        Number("c_sd", "N s/m", 600.0, Family.DAMPING),
+    ),
 )
 LINK_NUMBERS = Port(
     "link_numbers",
@@ -150,7 +154,7 @@ TYRE_NUMBERS = Port(
     "tyre_numbers",
     PortKind.NUMBER,
     "tyre_radial",
-    numbers=(Number("k_t", "N/m", 3e4), Number("c_t", "N s/m", 1500.0)),
+    numbers=(Number("k_t", "N/m", 3e4, Family.STIFFNESS), Number("c_t", "N s/m", 1500.0, Family.DAMPING)),
 )
 INERTIA = Port(
     "inertia",
