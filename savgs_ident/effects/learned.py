@@ -88,15 +88,9 @@ OF_THE_MOTION = (
     Function("tanh(v/0.01) exp(-(v/0.05)^2)", Family.FRICTION),
     Function("tanh(v/0.01) exp(-(v/0.2)^2)", Family.FRICTION),
     Function("|v|", Family.DAMPING),
-    Function("max(x - 0.3, 0)", Family.STOP),
-    Function("max(-x - 0.3, 0)", Family.STOP),
-    Function("max(x - 0.55, 0)", Family.STOP),
-    Function("max(-x - 0.55, 0)", Family.STOP),
+    *(Function(f"max({side}x - {gap:g}, 0)", Family.STOP) for gap in GAPS for side in ("", "-")),
     Function("x^4", Family.STIFFNESS),
-    Function("max(x, 0)^2", Family.STOP),
-    Function("max(-x, 0)^2", Family.STOP),
-    Function("max(x - 0.4, 0)^2", Family.STOP),
-    Function("max(-x - 0.4, 0)^2", Family.STOP),
+    *(Function(f"max({side}x - {gap:g}, 0)^2", Family.STOP) for gap in SOFT_GAPS for side in ("", "-")),
 )
 """Functions of x = (displacement - middle)/stroke and v = velocity/speed."""
 

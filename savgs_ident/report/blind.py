@@ -25,7 +25,7 @@ from savgs_ident.validation.blind_rates import (
     reliability_of,
 )
 from savgs_ident.validation.foreign_laws import FOREIGN
-from savgs_ident.validation.moved_marks import MovedMarks
+from savgs_ident.validation.varied_constants import MovedMarks
 
 RATE_WORDS: Mapping[str, str] = {
     "named_right": "Effect named correctly",

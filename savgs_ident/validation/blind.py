@@ -35,8 +35,8 @@ from savgs_ident.validation.blind_trial import (
     record_trial,
     run_trial,
 )
-from savgs_ident.validation.moved_marks import MovedMarks, moved_marks
 from savgs_ident.validation.trials import begin_trials, keep_trial, known_trials, marks_in, side_by_side
+from savgs_ident.validation.varied_constants import MovedMarks, moved_marks
 
 FILE = "trials.jsonl"
 """The file in which marks are kept."""

@@ -44,8 +44,8 @@ from savgs_ident.validation.blind_answer import (
 )
 from savgs_ident.validation.blind_draw import Shares, draw_answer
 from savgs_ident.validation.foreign_draw import draw_foreign, true_bench
-from savgs_ident.validation.moved_marks import varied_into
 from savgs_ident.validation.trials import code_version, rig_marks
+from savgs_ident.validation.varied_constants import varied_into
 from savgs_ident.validation.virtual_campaign import FILE, record_campaign, write_recordings
 from savgs_ident.validation.virtual_rig import Bench, Programme
 

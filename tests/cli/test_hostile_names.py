@@ -62,12 +62,13 @@ def _harmless(page: Path) -> None:
 def test_a_file_of_any_name_is_read_and_nothing_is_written_elsewhere(
     installed: Installed, short_campaign: Path, name: bytes
 ) -> None:
+    """Its text names the file, as does its JSON: one each for half of the names."""
     shutil.copy(short_campaign, installed.folder / os.fsdecode(name))
-    for more in ((), ("--json",)):
-        done = installed.run("inspect", "--out", "o", *more, b"./" + name, LC_ALL="C.UTF-8")
-        assert done.returncode == 0, done.stderr
-        _sound(done.stdout + done.stderr)
-        assert done.stderr.splitlines()[1:] == ["estimating responses", "drawing"]
+    more = ("--json",) if FILES.index(name) % 2 else ()
+    done = installed.run("inspect", "--out", "o", *more, b"./" + name, LC_ALL="C.UTF-8")
+    assert done.returncode == 0, done.stderr
+    _sound(done.stdout + done.stderr)
+    assert done.stderr.splitlines()[1:] == ["estimating responses", "drawing"]
     record = json.loads((installed.folder / "o" / "inspect.json").read_text("utf-8"))
     assert record["source"] == os.fsdecode(name)
     assert files_in(installed.folder) == sorted(

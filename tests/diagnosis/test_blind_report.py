@@ -8,7 +8,6 @@ import pytest
 from rich.console import Console
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.diagnosis.varied_constants import FACTORS, VARIED
 from savgs_ident.report.blind import (
     blind_html,
     blind_record,
@@ -16,7 +15,7 @@ from savgs_ident.report.blind import (
     confusion_figure,
 )
 from savgs_ident.validation.blind_answer import Score, failed, score_of
-from savgs_ident.validation.moved_marks import KEY, moved_marks
+from savgs_ident.validation.varied_constants import FACTORS, KEY, VARIED, moved_marks
 
 from .blind_answers import answer, diagnosis
 

@@ -36,17 +36,17 @@ def _silent(line: str) -> None:
 def test_campaigns_with_nothing_missing_give_no_alarm_and_one_with_a_gap_does(
     measure: Measure, rig: Rig
 ) -> None:
-    """On six dwells; the same number draws the same campaign."""
+    """On six dwells; the same number draws the same campaign, and is diagnosed alike."""
     settings = replace(SIMTR, periodic=PeriodicSettings(nodes=128, adaptations=1))
     few = {
         name: only(measure(name), np.isin(np.round(measure(name).frequency, 2), DWELLS))
         for name in ("nominal", "stribeck_rail")
     }
     bench = alarm_bench(few["nominal"], rig, settings, {}, 3, _silent)
-    draws = [bench.draw(number) for number in range(3)]
+    draws = [bench.draw(number) for number in range(2)]
     assert not any(each.alarm for each in draws)
     assert all(each.odds is not None and each.odds < DEFAULTS.alarm_log_odds for each in draws)
-    assert bench.draw(2) == draws[2] != replace(bench, seed=4).draw(2)
+    assert bench.draw(1) == draws[1] != draws[0]
     assert (
         alarm_bench(few["stribeck_rail"], rig, settings, {}, 3, _silent).odds > 10.0 * DEFAULTS.alarm_log_odds
     )

@@ -13,7 +13,6 @@ from savgs_ident.diagnosis.diagnose import Watch, baseline_problem, diagnose_dwe
 from savgs_ident.diagnosis.evidence import DiagnosisProblem, FittedHypotheses
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings, Verdict
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.diagnosis.varied_constants import VARIED, vary_constants
 from savgs_ident.effects.base import AbstractForceLaw, Family, Port, PortSignals, Role
 from savgs_ident.effects.effect import Effect, effect_at, generic_effects
 from savgs_ident.plants.base import Excitation
@@ -21,6 +20,7 @@ from savgs_ident.plants.model import PlantModel
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
+from savgs_ident.validation.varied_constants import VARIED, vary_constants
 
 from ..relaxed import as_users_have_it
 
