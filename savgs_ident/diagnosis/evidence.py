@@ -130,14 +130,14 @@ class FlexibleMember(NamedTuple):
         weight: log evidence plus log prior.
         left: share of the baseline's misfit that it leaves.
         sd: standard deviation of the weight [nat].
-        unlisted: what of the weight is due to a family that the catalogue does not have there [nat].
+        relative_prior: what of the weight is due to the prior of its functions and of its family there [nat].
     """
 
     law: LearnedLaw
     weight: float
     left: float
     sd: float = 0.0
-    unlisted: float = 0.0
+    relative_prior: float = 0.0
 
     @property
     def location(self) -> str:
@@ -174,6 +174,9 @@ class DiagnosisEvidence:
         unsupported: whether what would be named predicts tests that were held out no better than the baseline.
         unsupported_at: where it acts, if something is missing all the same; empty if not.
         refuted: what was to be named then.
+        immaterial: fitted hypotheses that change the response by too little to matter: nothing that counts is missing
+            if they are right.
+        insufficient: fitted hypotheses that leave much: if they are right, something unknown is missing besides.
     """
 
     findings: Findings
@@ -190,6 +193,8 @@ class DiagnosisEvidence:
     unsupported: bool = False
     unsupported_at: str = ""
     refuted: Hypothesis = NONE
+    immaterial: tuple[Hypothesis, ...] = ()
+    insufficient: tuple[Hypothesis, ...] = ()
 
     @property
     def localisation(self) -> Localisation:
@@ -231,7 +236,7 @@ class DiagnosisEvidence:
         found = {each.name: (each.evidence, 0.0) for each in self.localisations}
         solved: dict[str, tuple[float, float]] = {}
         for each in self.flexible:
-            evidence = each.law.mode.evidence + each.unlisted
+            evidence = each.law.mode.evidence + each.relative_prior
             if each.location not in solved or evidence > solved[each.location][0]:
                 solved[each.location] = evidence, each.sd
         return dict(sorted((found | solved).items(), key=lambda item: -item[1][0]))

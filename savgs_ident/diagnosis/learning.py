@@ -6,12 +6,13 @@ parameters, as those of any effect: with a prior, a null and an evidence. So the
 catalogue's formulas, solved, simulated and exported.
 
 Which family the law is of follows from the fit: its functions of all other families are taken away, to first order
-about the fit, and what remains is weighed. The best family is fitted again by itself; where its functions alone are
-more probable than all together, the law is made of them.
+about the fit, and one by one those of the family that are not needed; what remains is weighed. The likely families
+are fitted again by themselves; where the functions of one are more probable than all, the law is made of them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from math import comb, log
 from typing import NamedTuple
 
 import numpy as np
@@ -58,7 +59,8 @@ class LearnedLaw:
         search: that, and the data.
         mode: the best point of both.
         spans: the range of the port's signals that it knows, by name, SI.
-        families: log evidence of the functions of each family alone, to first order about the best point.
+        families: log weight of the functions of each family alone, to first order about the best point.
+        log_prior: log prior probability of its functions, if they are some of a family; 0 for all functions.
     """
 
     name: str
@@ -69,6 +71,12 @@ class LearnedLaw:
     mode: LaplaceFit
     spans: Mapping[str, float]
     families: Mapping[Family, float]
+    log_prior: float = 0.0
+
+    @property
+    def weight(self) -> float:
+        """Its log evidence, with the prior probability of its functions."""
+        return self.mode.evidence + self.log_prior
 
     @property
     def effect(self) -> Effect:
@@ -139,10 +147,16 @@ def learn(
     if not mode.solved:
         return law
     found = _families(search, mode, port)
-    law = replace(law, families={family: each.evidence for family, each in found.items()})
-    kept = {name: columns[name] for name in coefficients_of(port, law.family)}
-    alone = _with_amplitudes(blank, effect, search, base, kept, constants)
-    return _of_one_family(law, alone, found[law.family].start)
+    law = replace(law, families={family: each.weight for family, each in found.items()})
+    least = base.evidence + constants.alarm_log_odds
+    # To first order about all functions together the families are not known well enough to take the first.
+    likely = sorted(found, key=lambda family: -found[family].weight)[: constants.likely_families]
+    for family in likely:
+        if family is likely[0] or found[family].weight > least:
+            kept = {name: columns[name] for name in found[family].functions}
+            alone = _with_amplitudes(blank, effect, search, base, kept, constants)
+            law = _of_one_family(law, family, alone, found[family])
+    return law
 
 
 def _with_amplitudes(
@@ -167,42 +181,74 @@ def _with_amplitudes(
     return replace(term, amplitudes=amplitudes)
 
 
-def _of_one_family(law: LearnedLaw, term: Term, start: Mapping[str, float]) -> LearnedLaw:
-    """The law with the functions of its best family alone, those of ``term``, where that is more probable.
-
-    It is looked for from ``start`` [SI], by name.
-    """
-    alone = find_map(law.search, (term,), start, law.mode.prediction.warm_start, STEPS)
-    if not alone.solved or alone.evidence <= law.mode.evidence:
-        return law
-    families = {**law.families, law.family: alone.evidence}
-    return replace(law, term=term, mode=alone, families=families)
-
-
 class _FamilyAlone(NamedTuple):
-    """The functions of one family without those of the others: log evidence, and the best point [SI], by name."""
+    """Functions of one family without those of the others, and without those that are not needed.
 
-    evidence: float
+    Attributes:
+        functions: names of their coefficients.
+        weight: log evidence, with the log prior probability of these functions among all as many of the family.
+        log_prior: that.
+        start: the best point [SI], by name.
+    """
+
+    functions: tuple[str, ...]
+    weight: float
+    log_prior: float
     start: Mapping[str, float]
+
+
+def _of_one_family(law: LearnedLaw, family: Family, term: Term, found: _FamilyAlone) -> LearnedLaw:
+    """The law with functions of one family alone, those of ``term``, where that is more probable.
+
+    It is looked for from where it was ``found`` to first order.
+    """
+    alone = find_map(law.search, (term,), found.start, law.mode.prediction.warm_start, STEPS)
+    if not alone.solved:
+        return law
+    weight = alone.evidence + found.log_prior
+    families = {**law.families, family: weight}
+    if weight <= law.weight:
+        return replace(law, families=families)
+    return replace(law, term=term, mode=alone, families=families, log_prior=found.log_prior)
 
 
 def _families(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, _FamilyAlone]:
     """Each family's functions without those of the others, to first order about the fit."""
-    names = [each.name for each in mode.coordinates]
-    of_all = set(coefficients_at(port))
+    seen = {each.name for each in mode.coordinates}
     found = {}
     for family in dict.fromkeys(each.family for each in functions_at(port)):
-        mine = set(coefficients_of(port, family))
-        kept = np.array([name in mine or name not in of_all for name in names])
-        found[family] = _alone(search, mode, kept)
+        mine = tuple(name for name in coefficients_of(port, family) if name in seen)
+        if mine:
+            found[family] = _needed(search, mode, port, mine)
     return found
 
 
-def _alone(search: Search, mode: LaplaceFit, kept: NDArray[np.bool_]) -> _FamilyAlone:
-    """The fit with the coordinates that are not ``kept`` (n,) at zero, to first order."""
+def _needed(search: Search, mode: LaplaceFit, port: Port, family: tuple[str, ...]) -> _FamilyAlone:
+    """Those of a family's functions without which the law is less probable; one at least."""
+    of_all = set(coefficients_at(port))
+
+    def alone(functions: tuple[str, ...]) -> _FamilyAlone:
+        return _alone(search, mode, of_all.difference(functions), functions, len(family))
+
+    # The number of choices rises before it falls: the best may lie beyond worse ones.
+    found = [alone(family)]
+    while len(found[-1].functions) > 1:
+        left = found[-1].functions
+        fewer = [alone(tuple(each for each in left if each != gone)) for gone in left]
+        found.append(max(fewer, key=lambda each: each.weight))
+    return max(found, key=lambda each: each.weight)
+
+
+def _alone(
+    search: Search, mode: LaplaceFit, gone: Collection[str], functions: tuple[str, ...], count: int
+) -> _FamilyAlone:
+    """The fit with the coordinates that are ``gone`` at zero, to first order; of ``count`` functions some remain."""
+    kept = np.array([each.name not in gone for each in mode.coordinates])
     missed, slopes = search.missed(mode.prediction), search.turned(mode.slopes)
     coordinates = tuple(each for each, keep in zip(mode.coordinates, kept, strict=True) if keep)
     without = missed + slopes[:, ~kept] @ mode.x[~kept]
     top = linearised_optimum(search.rows, without, slopes[:, kept], mode.x[kept], bounds_of(coordinates))
     start = {each.name: each.value(float(x)) for each, x in zip(coordinates, top.x, strict=True)}
-    return _FamilyAlone(log_evidence(top.value, top.precision, coordinates), start)
+    log_prior = -log(comb(count, len(functions)))
+    evidence = log_evidence(top.value, top.precision, coordinates)
+    return _FamilyAlone(functions, evidence + log_prior, log_prior, start)

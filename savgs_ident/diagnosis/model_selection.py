@@ -34,7 +34,7 @@ from savgs_ident.diagnosis.evidence import (
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.problem import AbstractProblem
-from savgs_ident.diagnosis.result import NONE, UNKNOWN
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
 from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.search import (
     Findings,
@@ -173,11 +173,38 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
         kind=kind,
         chosen=chosen,
         left=left,
+        immaterial=_immaterial(problem, findings, members),
+        insufficient=_insufficient(problem, findings, members),
     )
     if not members or not _is_named(problem, found, members[0]):
         return found
     chosen = next(each for each in weighed if each.mode is members[0].law.mode)
     return replace(found, kind="effect", chosen=chosen, named_law=members[0])
+
+
+def _immaterial(
+    problem: DiagnosisProblem, findings: Findings, members: Sequence[FlexibleMember]
+) -> tuple[Hypothesis, ...]:
+    """Hypotheses, fitted and more probable than nothing, that do too little to matter."""
+    constants, base = problem.constants, problem.base
+    fits = [(hypothesis_of(mode), mode) for mode in findings.modes]
+    fits += [(each.hypothesis, each.law.mode) for each in members]
+
+    def matters(mode: LaplaceFit) -> bool:
+        return _change(problem, mode.prediction.rows - base.prediction.rows).matters(constants)
+
+    return tuple(each for each, mode in fits if mode.evidence > base.evidence and not matters(mode))
+
+
+def _insufficient(
+    problem: DiagnosisProblem, findings: Findings, members: Sequence[FlexibleMember]
+) -> tuple[Hypothesis, ...]:
+    """Fitted hypotheses that leave more of the misfit than what is named may leave."""
+    constants = problem.constants
+    lefts = [(mode, left_over(problem.search, problem.base, mode, constants)) for mode in findings.modes]
+    effects = [hypothesis_of(mode) for mode, left in lefts if left > constants.unexplained_share]
+    laws = [each.hypothesis for each in members if each.left > constants.unexplained_share_flexible]
+    return (*effects, *laws)
 
 
 def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: FlexibleMember) -> bool:
@@ -230,13 +257,13 @@ def _flexible_members(
 
     def member(law: LearnedLaw) -> FlexibleMember:
         known = (law.port.location, law.family) in listed
-        unlisted = 0.0 if known else log(constants.unlisted_family_prior)
+        relative = law.log_prior + (0.0 if known else log(constants.unlisted_family_prior))
         return FlexibleMember(
             law,
-            law.mode.evidence + prior + unlisted,
+            law.mode.evidence + prior + relative,
             left_over(law.search, problem.base, law.mode, constants),
             constants.width_uncertainty * sqrt(law.identified),
-            unlisted,
+            relative,
         )
 
     return sorted(map(member, laws), key=lambda each: -each.weight)

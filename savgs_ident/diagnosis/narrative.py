@@ -8,7 +8,7 @@ import numpy as np
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.model_selection import nearest_effect
-from savgs_ident.diagnosis.result import Verdict
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Verdict
 from savgs_ident.diagnosis.search import hypothesis_of, left_over
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.diagnosis.verdict import alarm_odds, most_probable, probabilities
@@ -43,7 +43,8 @@ def _verdict(
 ) -> Verdict:
     if evidence.kind == "none":
         sentence = _nothing_missing(problem, evidence, gap)
-        return Verdict("none", (), (), (), sentence, probability=_probability(evidence, "none"))
+        nothing = sum(_probability(evidence, str(each)) for each in (NONE, *evidence.immaterial))
+        return Verdict("none", (), (), (), sentence, probability=nothing)
     if evidence.kind == "unknown":
         ports = evidence.indistinguishable_ports(problem.constants)
         sentence = _something_unknown(problem, evidence, gap)
@@ -58,7 +59,7 @@ def _verdict(
             ports,
             families=families,
             law_known=False,
-            probability=_probability(evidence, "unknown"),
+            probability=sum(_probability(evidence, str(each)) for each in (UNKNOWN, *evidence.insufficient)),
         )
     member = evidence.named_law
     if member is not None:

@@ -318,6 +318,9 @@ class DecisionConstants:
     Origin: computing time. Fewer may miss the port of something strong, which explains little to first order.
     """
 
+    likely_families: int = 2
+    """Families of a learned law that are fitted by themselves on the nonlinear plant. Origin: computing time."""
+
     # Held-out tests
 
     held_out_folds: int = 3

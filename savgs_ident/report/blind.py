@@ -40,6 +40,7 @@ RATE_WORDS: Mapping[str, str] = {
     "port_right": "Foreign effect put at a right port",
     "port_listed": "The same, or a right port listed as not distinguishable",
     "family_right": "Foreign effect given a right family",
+    "hidden_left_alone": "Nothing named where calibration leaves too little of the effect to matter",
     "closed_by_effect_90": "Nine tenths of the recalibrated gap closed",
 }
 """What each rate counts."""

@@ -17,7 +17,8 @@ kind of trial are None.
 
 In a foreign trial no name can be right, for no catalogue has the law. A port is right where an engineer would rightly
 put the effect, a family where it would rightly be called that, at such a port
-(:mod:`savgs_ident.validation.foreign_laws`). "Unknown" at a right port has the port, not the family.
+(:mod:`savgs_ident.validation.foreign_laws`). "Unknown" at a right port has the port, not the family. Of an effect of
+which calibration leaves too little to matter "none" is right: it has no port then.
 
 What many trials say together is in :mod:`savgs_ident.validation.blind_rates`.
 """
@@ -76,6 +77,7 @@ class Answer:
         accepted: of a foreign effect, the ports that are right.
         families: of a foreign effect, the families that are right.
         small_errors: of a foreign trial; None in a trial of the catalogue's own effects, which has none.
+        hidden: of a foreign effect, whether calibration leaves too little of it to matter.
     """
 
     number: int
@@ -91,9 +93,10 @@ class Answer:
     accepted: tuple[str, ...] = ()
     families: tuple[str, ...] = ()
     small_errors: SmallErrors | None = None
+    hidden: bool = False
 
 
-_FOREIGN_ONLY = ("accepted", "families", "small_errors")
+_FOREIGN_ONLY = ("accepted", "families", "small_errors", "hidden")
 
 _REMEDY = "record the trial again: remove its folder"
 
@@ -196,6 +199,7 @@ class Score:
         probability: that the verdict states; None if it states none.
         closed_by_effect: share of the recalibrated gap that what is named closes, on tests held out; None as above.
         version: of the code that made the diagnosis.
+        hidden: whether calibration leaves too little of a foreign effect to matter.
     """
 
     number: int
@@ -223,6 +227,12 @@ class Score:
     probability: float | None = None
     closed_by_effect: float | None = None
     version: str = ""
+    hidden: bool = False
+
+    @property
+    def left_alone(self) -> bool:
+        """Whether an effect that calibration hides is not named."""
+        return self.hidden and self.verdict == "none"
 
     def __str__(self) -> str:
         right = "right" if is_right(self) else "wrong"
@@ -250,7 +260,7 @@ def said_words(score: Score) -> str:
 def is_right(score: Score) -> bool:
     """Whether the verdict is right altogether."""
     marks = (score.named_right, score.unknown_recognised, score.both_named, score.family_right)
-    return any(marks) or (score.kind == "none" and score.verdict == "none")
+    return any(marks) or score.left_alone or (score.kind == "none" and score.verdict == "none")
 
 
 def said_right(score: Score) -> bool:
@@ -271,6 +281,7 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any], version: str = "") ->
     beside = verdict["kind"] == "unknown" and set(answer.ports) <= {*verdict["confusable_ports"]}
     kind, families = answer.kind, tuple(verdict.get("families", ()))
     cataloguing, foreign = kind not in ("none", "foreign"), answer.small_errors is not None
+    placed = kind == "foreign" and not (answer.hidden and verdict["kind"] == "none")
     own = _intervals(answer, diagnosis) if right and verdict.get("law_known", True) else {}
     return Score(
         number=answer.number,
@@ -292,12 +303,13 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any], version: str = "") ->
         foreign=foreign,
         families=families,
         sigmas=tuple(answer.sigmas[name] for name in answer.effects if name in answer.sigmas),
-        port_right=_port_right(answer, verdict) if kind == "foreign" else None,
-        port_listed=_port_listed(answer, verdict) if kind == "foreign" else None,
-        family_right=_family_right(answer, verdict, families) if kind == "foreign" else None,
+        port_right=_port_right(answer, verdict) if placed else None,
+        port_listed=_port_listed(answer, verdict) if placed else None,
+        family_right=_family_right(answer, verdict, families) if placed else None,
         probability=_number_or_none(verdict.get("probability")),
         closed_by_effect=_number_or_none(diagnosis["shrink"].get("closed_by_effect")),
         version=version,
+        hidden=answer.hidden,
     )
 
 

@@ -79,7 +79,8 @@ def rates_of(scores: Sequence[Score]) -> dict[str, Rate]:
 
 def _foreign_rates(scores: Sequence[Score]) -> dict[str, Rate]:
     held = [interval.holds for score in scores for interval in score.intervals.values()]
-    closed = [(score.closed_by_effect or 0.0) >= 0.9 for score in scores if score.kind == "foreign"]
+    effects = [score for score in scores if score.kind == "foreign" and not score.left_alone]
+    closed = [(score.closed_by_effect or 0.0) >= 0.9 for score in effects]
     return {
         "port_right": _rate([score.port_right for score in scores], least=0.92),
         "family_right": _rate([score.family_right for score in scores], least=0.88),
@@ -87,15 +88,17 @@ def _foreign_rates(scores: Sequence[Score]) -> dict[str, Rate]:
         "intervals_hold": _rate(held, least=0.92, most=0.98),
         "closed_by_effect_90": _rate(closed),
         "port_listed": _rate([score.port_listed for score in scores]),
+        "hidden_left_alone": _rate([score.left_alone for score in scores if score.hidden]),
     }
 
 
 def median_closed(scores: Sequence[Score]) -> float | None:
-    """Median share of the recalibrated gap that was closed, of all trials with an effect.
+    """Median share of the recalibrated gap that was closed, of all trials with an effect that is no hidden one.
 
     A gap of which the diagnosis does not say counts as not closed. None where there is no such trial.
     """
-    closed = [score.closed_by_effect or 0.0 for score in scores if score.kind != "none"]
+    effects = [score for score in scores if score.kind != "none" and not score.left_alone]
+    closed = [score.closed_by_effect or 0.0 for score in effects]
     return float(np.median(closed)) if closed else None
 
 

@@ -8,7 +8,8 @@ Parameters are off the sheet by their tolerances, as in any trial. Besides, in e
 * the road's signal leads or lags by up to 0.5 mrad.
 
 An effect changes the response by 3 to 25 % somewhere. Nothing is drawn again because it is hard to see or easily
-imitated: how far it stands out is recorded. Only where no size gives the change that was drawn is there another draw.
+imitated: how far it stands out is recorded, and whether calibration leaves so little of it that it does not matter.
+Only where no size gives the change that was drawn is there another draw.
 
 The recording is integrated with a fixed step (:mod:`savgs_ident.validation.virtual_motions`) and passes anti-aliasing
 filters and converters.
@@ -18,8 +19,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.diagnosis.verdict import Change
 from savgs_ident.effects.effect import Effect
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.rig import Rig
@@ -106,18 +109,29 @@ def _with_effect(nothing: Answer, drawing: Drawing, present: Present) -> Answer:
     foreign = FOREIGN[present.name]
     change = rows_of(present.response) - rows_of(drawing.response)
     # To first order: what calibration and tolerances can do taken off.
-    sigma = closest(drawing.hiding, change, np.zeros((change.size, 0))).sigma
+    nearest = closest(drawing.hiding, change, np.zeros((change.size, 0)))
     return replace(
         nothing,
         kind="foreign",
         effects=(present.name,),
         ports=(foreign.effect.port.location,),
         changes={present.name: present.change},
-        sigmas={present.name: sigma},
+        sigmas={present.name: nearest.sigma},
         parameters=dict(present.parameters),
         accepted=foreign.ports,
         families=foreign.families,
+        hidden=not _share_of(nearest.left, present.response).matters(),
     )
+
+
+def _share_of(left: NDArray[np.float64], response: NDArray[np.complex128]) -> Change:
+    """Rows (m,) as a share of a response (D, 2, K), in the channel where they are most; both in its units."""
+    dwells, channels, _ = response.shape
+    parts, whole = (
+        np.sum(rows.reshape(dwells, channels, -1) ** 2, axis=-1) for rows in (left, rows_of(response))
+    )
+    overall = np.max(parts.sum(axis=0) / whole.sum(axis=0))
+    return Change(float(np.sqrt(overall)), float(np.sqrt(np.max(parts / whole))))
 
 
 def _present(drawing: Drawing, name: str, random: np.random.Generator) -> Present | None:

@@ -132,11 +132,13 @@ def _step(
 class Closest(NamedTuple):
     """How far a change stands out of the nearest that can be done, and the sizes (k,) of free columns there.
 
-    ``sigma`` is in standard deviations, sizes are in units of the columns.
+    ``sigma`` is in standard deviations, sizes are in units of the columns; ``left`` (m,) is what is left of the
+    change, in its units.
     """
 
     sigma: float
     sizes: Real
+    left: Real
 
 
 def closest(hiding: Hiding, change: Real, flat: Real) -> Closest:
@@ -147,8 +149,9 @@ def closest(hiding: Hiding, change: Real, flat: Real) -> Closest:
     columns, known = np.concatenate([hiding.columns, flat], axis=1), hiding.columns.shape[1]
     miss = change / hiding.noise
     x = _step(columns, miss, np.zeros(columns.shape[1]), known)
-    sigma = float(np.sqrt(np.sum((miss - columns @ x) ** 2) + np.sum(x[:known] ** 2)))
-    return Closest(sigma, x[known:])
+    left = miss - columns @ x
+    sigma = float(np.sqrt(np.sum(left**2) + np.sum(x[:known] ** 2)))
+    return Closest(sigma, x[known:], left * hiding.noise)
 
 
 def sigma_of(

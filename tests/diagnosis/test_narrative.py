@@ -116,14 +116,35 @@ def test_what_predicts_no_tests_is_unknown_at_its_port() -> None:
 def test_ports_that_do_the_same_are_listed_where_a_prior_decides_between_them() -> None:
     """The law in the joints fits a little better, but stops are no part of joints."""
 
-    def law(place: str, evidence: float, unlisted: float) -> FlexibleMember:
+    def law(place: str, evidence: float, relative: float) -> FlexibleMember:
         found: Any = SimpleNamespace(mode=SimpleNamespace(evidence=evidence), port=FORCE_PORTS[place])
-        return FlexibleMember(found, evidence + unlisted, 0.0, unlisted=unlisted)
+        return FlexibleMember(found, evidence + relative, 0.0, relative_prior=relative)
 
     laws = (law("strut", 990.0, 0.0), law("suspension", 992.0, np.log(0.1)))
     evidence = _evidence("unknown", "law", {"none": 0.0, "unknown": 100.0}, flexible=laws)
     named = replace(evidence, kind="effect", named_law=laws[0])
     assert named.indistinguishable_ports() == ("suspension",)
+
+
+def test_nothing_that_counts_is_missing_where_what_is_more_probable_does_too_little() -> None:
+    evidence = _evidence("none", "law", {"none": 0.0, "unknown": -5.0, "rail_viscous": 6.0, "accel_lag": 1.0})
+    plain = write_verdict(PROBLEM, evidence, (), GAP)
+    assert plain.probability == pytest.approx(1.0 / (1.0 + np.exp(6.0) + np.exp(1.0) + np.exp(-5.0)))
+    small = replace(evidence, immaterial=(Hypothesis(("rail_viscous",)),))
+    more = np.exp(6.0) / (1.0 + np.exp(6.0) + np.exp(1.0) + np.exp(-5.0))
+    assert write_verdict(PROBLEM, small, (), GAP).probability == pytest.approx(plain.probability + more)
+
+
+def test_what_explains_little_speaks_for_something_unknown() -> None:
+    evidence = _evidence(
+        "unknown", "law", {"none": 0.0, "unknown": 2.0, "rail_viscous": 6.0, "accel_lag": 1.0}
+    )
+    plain = write_verdict(PROBLEM, evidence, (), GAP)
+    whole = sum(np.exp([0.0, 2.0, 6.0, 1.0]))
+    assert plain.probability == pytest.approx(np.exp(2.0) / whole)
+    little = replace(evidence, insufficient=(Hypothesis(("rail_viscous",)),))
+    found = write_verdict(PROBLEM, little, (), GAP)
+    assert found.probability == pytest.approx((np.exp(2.0) + np.exp(6.0)) / whole)
 
 
 def test_a_number_is_one_with_a_law_of_which_it_is_the_linear_part() -> None:

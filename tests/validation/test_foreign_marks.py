@@ -90,6 +90,27 @@ def test_a_right_port_may_be_listed_beside_the_one_that_is_named() -> None:
     assert score_of(foreign("strut_buffer"), said("none", beside=["strut"])).port_listed is False
 
 
+def test_what_calibration_hides_may_be_left_alone_and_not_be_put_elsewhere() -> None:
+    hidden = replace(foreign("strut_digressive"), hidden=True)
+    alone = score_of(hidden, said("none", closed=None))
+    assert (alone.port_right, alone.family_right, is_right(alone), said_right(alone)) == (
+        None,
+        None,
+        True,
+        True,
+    )
+    wrong = score_of(hidden, said("effect", "suspension/friction"))
+    assert (wrong.port_right, wrong.family_right, is_right(wrong)) == (False, False, False)
+    right = score_of(hidden, said("effect", "strut/damping", closed=0.4))
+    assert (right.port_right, right.family_right) == (True, True)
+    rates = rates_of([alone, wrong, right])
+    assert (rates["hidden_left_alone"].count, rates["hidden_left_alone"].total) == (1, 3)
+    assert (rates["port_right"].count, rates["port_right"].total) == (1, 2)
+    assert rates["closed_by_effect_90"].total == 2
+    assert median_closed([alone, right]) == 0.4
+    assert not is_right(score_of(foreign("strut_digressive"), said("none")))
+
+
 def test_what_swings_on_the_body_may_be_put_at_the_masses() -> None:
     truth = foreign("body_hardening_oscillator")
     assert score_of(truth, said("effect", "inertia/oscillator")).family_right is True
