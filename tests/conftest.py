@@ -63,7 +63,8 @@ LONGEST_FIRST = (
 
 
 UNOPTIMISED = "--xla_backend_optimization_level=0"
-"""The compiler takes half the time with it: the tests compile more than they compute."""
+"""The compiler takes half the time with it. The fast tests compile more than they compute; `make test-all` compiles
+everything as in use."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -72,23 +73,12 @@ def pytest_configure(config: pytest.Config) -> None:
         folder = Path(tempfile.mkdtemp(prefix="savgs-ident-tests-"))
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
         os.environ.update({name: str(folder / name.lower()) for name in SCRATCH})
+        flags = os.environ.get("XLA_FLAGS", "")
+        if _only_the_fast(config) and "optimization_level" not in flags:
+            os.environ["XLA_FLAGS"] = f"{flags} {UNOPTIMISED}".strip()
     from savgs_ident.simulate.program_cache import spare_the_compiler
 
     spare_the_compiler()
-    as_in_use = os.environ.get("XLA_FLAGS", "")
-    if "optimization_level" not in as_in_use:
-        os.environ["XLA_FLAGS"] = f"{as_in_use} {UNOPTIMISED}".strip()
-    if not _only_the_fast(config):
-        _begin_the_compiler()
-        # Programs, notebooks and workers that slow tests start compile as in use.
-        os.environ["XLA_FLAGS"] = as_in_use
-
-
-def _begin_the_compiler() -> None:
-    """Have it read its flags."""
-    import jax
-
-    jax.devices()
 
 
 def _only_the_fast(config: pytest.Config) -> bool:

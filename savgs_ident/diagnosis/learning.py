@@ -59,7 +59,8 @@ class LearnedLaw:
         search: that, and the data.
         mode: the best point of both.
         spans: the range of the port's signals that it knows, by name, SI.
-        families: log weight of the functions of each family alone, to first order about the best point.
+        families: log weight of the functions of each family alone; of a law that needs several families, minus the
+            log evidence without them, to first order about the best point.
         log_prior: log prior probability of its functions, if they are some of a family; 0 for all functions.
     """
 
@@ -103,7 +104,7 @@ class LearnedLaw:
 
     @property
     def family(self) -> Family:
-        """The family that explains most."""
+        """The family that explains most, or can be spared least."""
         return max(self.families, key=lambda family: self.families[family])
 
     def held_out(self, constants: DecisionConstants = DEFAULTS) -> HeldOut:
@@ -156,7 +157,7 @@ def learn(
             kept = {name: columns[name] for name in found[family].functions}
             alone = _with_amplitudes(blank, effect, search, base, kept, constants)
             law = _of_one_family(law, family, alone, found[family])
-    return law
+    return law if law.mode is not mode else replace(law, families=_spared(search, mode, port))
 
 
 def _with_amplitudes(
@@ -221,6 +222,12 @@ def _families(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, _Fam
         if mine:
             found[family] = _needed(search, mode, port, mine)
     return found
+
+
+def _spared(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, float]:
+    """Minus the log evidence of the law without the functions of each family."""
+    gone = {each.family: coefficients_of(port, each.family) for each in functions_at(port)}
+    return {family: -_alone(search, mode, names, (), 0).weight for family, names in gone.items()}
 
 
 def _needed(search: Search, mode: LaplaceFit, port: Port, family: tuple[str, ...]) -> _FamilyAlone:

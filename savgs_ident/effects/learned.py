@@ -93,7 +93,6 @@ OF_THE_MOTION = (
     *(Function(f"max({side}x - {gap:g}, 0)^2", Family.STOP) for gap in SOFT_GAPS for side in ("", "-")),
     Function("x^5", Family.STIFFNESS),
     Function("x^9", Family.STIFFNESS),
-    Function("v/(v^2 + 0.0004)^(1/4)", Family.DAMPING),
     Function("v/(v^2 + 0.01)^(1/4)", Family.DAMPING),
 )
 """Functions of x = (displacement - middle)/stroke and v = velocity/speed."""
@@ -171,7 +170,7 @@ def functions(
     smooth = [v, v * jnp.abs(v), v**2, x, x**2, x**3, x * sharp, x * v, x**2 * v]
     stops = [jnp.maximum(side * x - gap, 0.0) for gap in GAPS for side in (1.0, -1.0)]
     soft = [jnp.maximum(side * x - gap, 0.0) ** 2 for gap in SOFT_GAPS for side in (1.0, -1.0)]
-    further = [x**4, *soft, x**5, x**9, *(v / (v**2 + least) ** 0.25 for least in (0.0004, 0.01))]
+    further = [x**4, *soft, x**5, x**9, v / (v**2 + 0.01) ** 0.25]
     loaded = [n * sharp, n * v, n, *(n * sharp * jnp.exp(-jnp.abs(v) / width) for width in FALLING)]
     return [sharp, blunt, *smooth, *falling, jnp.abs(v), *stops, *further, *loaded]
 
