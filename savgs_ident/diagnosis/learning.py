@@ -62,6 +62,7 @@ class LearnedLaw:
         families: log weight of the functions of each family alone; of a law that needs several families, minus the
             log evidence without them, to first order about the best point.
         log_prior: log prior probability of its functions, if they are some of a family; 0 for all functions.
+        only: the family of all its functions; None where it has several.
     """
 
     name: str
@@ -73,6 +74,7 @@ class LearnedLaw:
     spans: Mapping[str, float]
     families: Mapping[Family, float]
     log_prior: float = 0.0
+    only: Family | None = None
 
     @property
     def weight(self) -> float:
@@ -105,7 +107,7 @@ class LearnedLaw:
     @property
     def family(self) -> Family:
         """The family that explains most, or can be spared least."""
-        return max(self.families, key=lambda family: self.families[family])
+        return self.only or max(self.families, key=lambda family: self.families[family])
 
     def held_out(self, constants: DecisionConstants = DEFAULTS) -> HeldOut:
         """What it predicts of tests left out."""
@@ -157,7 +159,7 @@ def learn(
             kept = {name: columns[name] for name in found[family].functions}
             alone = _with_amplitudes(blank, effect, search, base, kept, constants)
             law = _of_one_family(law, family, alone, found[family])
-    return law if law.mode is not mode else replace(law, families=_spared(search, mode, port))
+    return law if law.only else replace(law, families=_spared(search, mode, port))
 
 
 def _with_amplitudes(
@@ -210,7 +212,7 @@ def _of_one_family(law: LearnedLaw, family: Family, term: Term, found: _FamilyAl
     families = {**law.families, family: weight}
     if weight <= law.weight:
         return replace(law, families=families)
-    return replace(law, term=term, mode=alone, families=families, log_prior=found.log_prior)
+    return replace(law, term=term, mode=alone, families=families, log_prior=found.log_prior, only=family)
 
 
 def _families(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, _FamilyAlone]:

@@ -166,6 +166,8 @@ def test_a_law_that_the_catalogue_does_not_have_is_learned_at_its_port() -> None
     assert found.verdict.families == ("guide/damping",)
     assert found.shrink.closed_by_effect > 0.9
     assert found.learned is not None
+    # What a force with the cube of the velocity does not need is not in the law.
+    assert 1 <= sum(each.value != 0.0 for each in found.learned.parameters) <= 4
 
 
 def test_what_follows_no_law_is_unknown() -> None:
