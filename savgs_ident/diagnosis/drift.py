@@ -63,7 +63,7 @@ def drifting(
     progress("looking for parameters that drift")
     width = constants.broken_tolerance_width
     data = with_wider_drifts(problem.data, len(plant.free), width)
-    search, mode = search_of(plant, data), problem.base
+    search, mode = search_of(plant, data, problem.search.given), problem.base
     drifts, moved = _Drifts(np.zeros(len(plant.free)), np.zeros(len(plant.free))), np.inf
     for _ in range(ROUNDS):
         mode = find_map(search, (), mode.values, mode.prediction.warm_start)
@@ -74,7 +74,7 @@ def drifting(
         curved = _curved(plant, data, mode, drifts.x, width * constants.drift_tolerance)
         if curved is None:
             return None
-        search = search_of(curved, data)
+        search = search_of(curved, data, problem.search.given)
     weight = mode.evidence + log(constants.prior_none) + log(constants.prior_broken_tolerance)
     if not mode.solved or moved >= SETTLED / width or weight < best:
         return None

@@ -8,13 +8,17 @@ catalogue's formulas, solved, simulated and exported.
 Which family the law is of follows from the fit: its functions of all other families are taken away, to first order
 about the fit, and one by one those of the family that are not needed; what remains is weighed. The likely families
 are fitted again by themselves; where the functions of one are more probable than all, the law is made of them.
+
+How large coefficients may be is unknown before the data: their prior is one of several widths, first the one that is
+the most probable to first order about the baseline, for each family then the one that is so about the fit.
 """
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from math import comb, log
+from math import log
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,13 +27,21 @@ from savgs_ident.diagnosis.held_out import HeldOut, hold_out
 from savgs_ident.diagnosis.localisation import widths_of
 from savgs_ident.diagnosis.problem import AbstractProblem, term_of
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.effects.base import Family, Port
+from savgs_ident.effects.base import Family, Port, PortKind
 from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.learned import coefficients_at, coefficients_of, functions_at, learned_effect
+from savgs_ident.effects.learned import (
+    coefficients_at,
+    coefficients_of,
+    functions_at,
+    learned_effect,
+    what_gives,
+)
 from savgs_ident.inference.find_map import (
     LaplaceFit,
     Search,
+    Start,
     find_map,
+    find_map_from_both,
     linearised_optimum,
     log_evidence,
     search_of,
@@ -45,6 +57,9 @@ SEEN = 1e-3
 
 Data that hardly see a function, as a constant force, would let its coefficient be of any size.
 """
+
+WIDTHS = (0.1, 1.0, 10.0)
+"""Widths of the prior of the functions of a family, over that of all functions."""
 
 
 @dataclass(frozen=True)
@@ -120,10 +135,11 @@ def learn(
     base: LaplaceFit,
     port: Port,
     constants: DecisionConstants = DEFAULTS,
+    given: Start | None = None,
 ) -> LearnedLaw | None:
     """The law at a port; ``base`` is the recalibrated baseline. None where nothing can be learned.
 
-    Look at the status of its mode.
+    It is looked for from there and from the plant as ``given``. Look at the status of its mode.
     """
     spans = problem.learned_spans(port, base.values, base.prediction.warm_start)
     if spans is None:
@@ -136,7 +152,7 @@ def learn(
         parameters=merge_parameters(problem.parameters, table),
         catalogue={**there, effect.name: effect},
     ).uncorrected()
-    search, names = search_of(mine, data), coefficients_at(port)
+    search, names = search_of(mine, data, given), coefficients_at(port)
     start = base.prediction.warm_start
     there_now = mine.predict((effect.name,), base.values, names, start)
     if not there_now.solved:
@@ -145,21 +161,30 @@ def learn(
     blank = Term(effect.name, port.location, (), shapes)
     columns = dict(zip(names, there_now.slopes.T, strict=True))
     term = _with_amplitudes(blank, effect, search, base, columns, constants)
-    mode = find_map(search, (term,), base.values, there_now.warm_start, STEPS)
+    mode = find_map_from_both(search, (term,), base.values, there_now.warm_start, STEPS)
     law = LearnedLaw(effect.name, port, term, mine, search, mode, spans, {})
     if not mode.solved:
         return law
-    found = _families(search, mode, port)
+    found = _families(search, mode, port, constants)
     law = replace(law, families={family: each.weight for family, each in found.items()})
     least = base.evidence + constants.alarm_log_odds
     # To first order about all functions together the families are not known well enough to take the first.
     likely = sorted(found, key=lambda family: -found[family].weight)[: constants.likely_families]
     for family in likely:
         if family is likely[0] or found[family].weight > least:
-            kept = {name: columns[name] for name in found[family].functions}
-            alone = _with_amplitudes(blank, effect, search, base, kept, constants)
-            law = _of_one_family(law, family, alone, found[family])
-    return law if law.only else replace(law, families=_spared(search, mode, port))
+            law = _of_one_family(law, family, _some_of(term, found[family]), found[family])
+    law = law if law.only else replace(law, families=_spared(search, mode, port))
+    return None if _is_impossible(law) else law
+
+
+def _is_impossible(law: LearnedLaw) -> bool:
+    """Whether what gives way moves against its load: no part does that by itself, however well it fits."""
+    there = [each.port.name for name, each in law.problem.catalogue.items() if name != law.name]
+    if law.port.kind is not PortKind.SERIES or law.port.name in there:
+        return False
+    n = np.linspace(-1.0, 1.0, 201)
+    columns = np.stack(what_gives(jnp.asarray(n), jnp.asarray(n), jnp.zeros(n.size)))
+    return float([law.values[name] for name in law.units] @ columns @ n) < 0.0
 
 
 def _with_amplitudes(
@@ -189,15 +214,23 @@ class _FamilyAlone(NamedTuple):
 
     Attributes:
         functions: names of their coefficients.
-        weight: log evidence, with the log prior probability of these functions among all as many of the family.
+        width: of their prior, over that of all functions.
+        weight: log evidence, with the log prior probability that these functions of the family are needed.
         log_prior: that.
         start: the best point [SI], by name.
     """
 
     functions: tuple[str, ...]
+    width: float
     weight: float
     log_prior: float
     start: Mapping[str, float]
+
+
+def _some_of(term: Term, found: _FamilyAlone) -> Term:
+    """The term of all functions with those of a family alone."""
+    kept = [each for each in term.amplitudes if each.name in found.functions]
+    return replace(term, amplitudes=tuple(replace(each, scale=found.width * each.scale) for each in kept))
 
 
 def _of_one_family(law: LearnedLaw, family: Family, term: Term, found: _FamilyAlone) -> LearnedLaw:
@@ -215,49 +248,76 @@ def _of_one_family(law: LearnedLaw, family: Family, term: Term, found: _FamilyAl
     return replace(law, term=term, mode=alone, families=families, log_prior=found.log_prior, only=family)
 
 
-def _families(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, _FamilyAlone]:
+def _families(
+    search: Search, mode: LaplaceFit, port: Port, constants: DecisionConstants
+) -> dict[Family, _FamilyAlone]:
     """Each family's functions without those of the others, to first order about the fit."""
     seen = {each.name for each in mode.coordinates}
     found = {}
     for family in dict.fromkeys(each.family for each in functions_at(port)):
         mine = tuple(name for name in coefficients_of(port, family) if name in seen)
         if mine:
-            found[family] = _needed(search, mode, port, mine)
+            found[family] = _needed(search, mode, port, mine, constants.function_prior)
     return found
 
 
 def _spared(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, float]:
     """Minus the log evidence of the law without the functions of each family."""
     gone = {each.family: coefficients_of(port, each.family) for each in functions_at(port)}
-    return {family: -_alone(search, mode, names, (), 0).weight for family, names in gone.items()}
+    return {family: -_alone(search, mode, names, (), 1.0, 0.0).weight for family, names in gone.items()}
 
 
-def _needed(search: Search, mode: LaplaceFit, port: Port, family: tuple[str, ...]) -> _FamilyAlone:
-    """Those of a family's functions without which the law is less probable; one at least."""
+def _needed(
+    search: Search, mode: LaplaceFit, port: Port, family: tuple[str, ...], prior: float
+) -> _FamilyAlone:
+    """Those of a family's functions without which the law is less probable; one at least.
+
+    ``prior`` is the probability that one of them is needed.
+    """
     of_all = set(coefficients_at(port))
 
-    def alone(functions: tuple[str, ...]) -> _FamilyAlone:
-        return _alone(search, mode, of_all.difference(functions), functions, len(family))
+    def alone(functions: tuple[str, ...], width: float) -> _FamilyAlone:
+        gone = len(family) - len(functions)
+        log_prior = len(functions) * log(prior) + gone * log(1.0 - prior)
+        return _alone(search, mode, of_all.difference(functions), functions, width, log_prior)
 
-    # The number of choices rises before it falls: the best may lie beyond worse ones.
-    found = [alone(family)]
+    def at_its_width(functions: tuple[str, ...]) -> _FamilyAlone:
+        return max((alone(functions, width) for width in WIDTHS), key=lambda each: each.weight)
+
+    # Of functions that do nearly the same, one alone is needed: the best may lie beyond worse ones.
+    found = [at_its_width(family)]
     while len(found[-1].functions) > 1:
         left = found[-1].functions
-        fewer = [alone(tuple(each for each in left if each != gone)) for gone in left]
+        fewer = [alone(tuple(each for each in left if each != gone), found[-1].width) for gone in left]
         found.append(max(fewer, key=lambda each: each.weight))
-    return max(found, key=lambda each: each.weight)
+    return at_its_width(max(found, key=lambda each: each.weight).functions)
 
 
 def _alone(
-    search: Search, mode: LaplaceFit, gone: Collection[str], functions: tuple[str, ...], count: int
+    search: Search,
+    mode: LaplaceFit,
+    gone: Collection[str],
+    functions: tuple[str, ...],
+    width: float,
+    log_prior: float,
 ) -> _FamilyAlone:
-    """The fit with the coordinates that are ``gone`` at zero, to first order; of ``count`` functions some remain."""
+    """The fit with the coordinates that are ``gone`` at zero, to first order.
+
+    The coefficients of the ``functions`` have a prior that is ``width`` times as wide as in the fit.
+    """
     kept = np.array([each.name not in gone for each in mode.coordinates])
     missed, slopes = search.missed(mode.prediction), search.turned(mode.slopes)
-    coordinates = tuple(each for each, keep in zip(mode.coordinates, kept, strict=True) if keep)
+    coordinates = tuple(
+        replace(each, scale=width * each.scale)
+        if each.name in functions and isinstance(each, Linear)
+        else each
+        for each, keep in zip(mode.coordinates, kept, strict=True)
+        if keep
+    )
+    wider = np.array([width if each.name in functions else 1.0 for each in coordinates])
     without = missed + slopes[:, ~kept] @ mode.x[~kept]
-    top = linearised_optimum(search.rows, without, slopes[:, kept], mode.x[kept], bounds_of(coordinates))
+    here = mode.x[kept] / wider
+    top = linearised_optimum(search.rows, without, slopes[:, kept] * wider, here, bounds_of(coordinates))
     start = {each.name: each.value(float(x)) for each, x in zip(coordinates, top.x, strict=True)}
-    log_prior = -log(comb(count, len(functions)))
     evidence = log_evidence(top.value, top.precision, coordinates)
-    return _FamilyAlone(functions, evidence + log_prior, log_prior, start)
+    return _FamilyAlone(functions, width, evidence + log_prior, log_prior, start)

@@ -59,7 +59,7 @@ from savgs_ident.diagnosis.verdict import (
     without_immaterial_members,
 )
 from savgs_ident.effects.base import Port
-from savgs_ident.inference.find_map import LaplaceFit, find_map, refine, search_of
+from savgs_ident.inference.find_map import LaplaceFit, Start, find_map, refine, search_of
 from savgs_ident.inference.observations import Data
 
 
@@ -84,10 +84,13 @@ def recalibrate(
         raise InputError("the baseline cannot be recalibrated", remedy="mend the rig file")
     fine = refine(search, base, ())
     data = plant.with_background(data, fine.values, fine.prediction.warm_start)
+    start = Start(
+        {each.name: values.get(each.name, each.value(0.0)) for each in plant.nuisances}, given.warm_start
+    )
     if data is search.data:
-        return DiagnosisProblem(plant, data, search, given.rows, fine, constants)
+        return DiagnosisProblem(plant, data, replace(search, given=start), given.rows, fine, constants)
     progress("recalibrating with a background of small errors")
-    search = search_of(plant, data)
+    search = search_of(plant, data, start)
     base = replace(find_map(search, (), fine.values, fine.prediction.warm_start), precise=True)
     return DiagnosisProblem(plant, data, search, given.rows, base, constants)
 
@@ -241,7 +244,7 @@ def _learned_laws(
 
     def fitted(port: Port) -> LearnedLaw | None:
         progress(f"learning a law at {port.location} ({port.name})")
-        return learn(problem.plant, problem.data, base, port, constants)
+        return learn(problem.plant, problem.data, base, port, constants, problem.search.given)
 
     ports = _worth_learning(problem, findings, localisations)
     return tuple(each for each in in_parallel(fitted, ports) if each is not None and each.mode.solved)

@@ -190,12 +190,10 @@ def motion_functions(
     displacement: Signal, velocity: Signal, load: Signal, held: Sequence[Signal] = ()
 ) -> Functions:
     """Functions of what a port sees, each of about unit size, and what its spring-sliders carry, ``held``."""
-    x = displacement - displacement.mean()
-    x = x / max(float(np.abs(x).max()), np.finfo(float).tiny)
-    v = velocity / max(float(np.abs(velocity).max()), np.finfo(float).tiny)
+    seen = (displacement - displacement.mean(), displacement, velocity, load)
     loaded = bool(np.any(load))
-    n = load / np.abs(load).max() if loaded else load
-    found = [np.asarray(each) for each in functions(jnp.asarray(x), jnp.asarray(v), jnp.asarray(n))]
+    x, d, v, n = (jnp.asarray(each / max(float(np.abs(each).max()), np.finfo(float).tiny)) for each in seen)
+    found = [np.asarray(each) for each in functions(x, d, v, n)]
     if not loaded:
         found = found[: -len(OF_THE_LOAD)]
     families = [each.family for each in (*OF_THE_MOTION, *OF_THE_LOAD)][: len(found)]

@@ -24,7 +24,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import Score, cosine, prior_conflict, score_terms, scores_of
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, refine
+from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, find_map_from_both, refine
 from savgs_ident.inference.observations import Term
 
 
@@ -244,7 +244,9 @@ class _Fits:
         chosen, typical = tuple(self.terms[name] for name in names), self.constants.typical_coordinate
         start = {each.name: each.value(typical) for term in chosen for each in term.amplitudes}
         start |= {each.name: each.centre for term in chosen for each in term.shapes}
-        return find_map(self.search, chosen, self.base.values | start, self.base.prediction.warm_start)
+        return find_map_from_both(
+            self.search, chosen, self.base.values | start, self.base.prediction.warm_start
+        )
 
     def fitted_alone(self, name: str, pair: LaplaceFit) -> LaplaceFit:
         """The fit of one member of a pair, from where it is beside the other."""
@@ -258,7 +260,9 @@ class _Fits:
         def fit(score: Score) -> LaplaceFit:
             self.progress(f"fitting {hypothesis_of(parent).with_effect(score.term.name)}")
             start = parent.values | score.start
-            return find_map(self.search, (*inherited, score.term), start, parent.prediction.warm_start)
+            return find_map_from_both(
+                self.search, (*inherited, score.term), start, parent.prediction.warm_start
+            )
 
         return in_parallel(fit, scores)
 

@@ -318,6 +318,12 @@ class DecisionConstants:
     Origin: computing time. Fewer may miss the port of something strong, which explains little to first order.
     """
 
+    function_prior: float = 0.2
+    """Prior probability that a learned law of a family needs one of its functions, each independent of the others.
+
+    Origin: by choice: laws are simple. Halved or doubled: not measured.
+    """
+
     likely_families: int = 2
     """Families of a learned law that are fitted by themselves on the nonlinear plant. Origin: computing time."""
 

@@ -58,6 +58,9 @@ class Function(NamedTuple):
 SHARP = (0.01, 0.1)
 """Velocities over which friction-like functions turn round, as shares of the largest [1]."""
 
+TURN = 0.03
+"""The same where it is estimated along: what it begins with [1]."""
+
 FALLING = (0.05, 0.2)
 """Velocities over which a friction falls, as shares of the largest [1]."""
 
@@ -94,8 +97,16 @@ OF_THE_MOTION = (
     Function("x^5", Family.STIFFNESS),
     Function("x^9", Family.STIFFNESS),
     Function("v/(v^2 + 0.01)^(1/4)", Family.DAMPING),
+    Function("tanh(v/w)", Family.FRICTION),
+    Function("tanh(v/0.01)^2", Family.FRICTION),
+    Function("tanh(v/w)^2", Family.FRICTION),
+    *(Function(f"d^{power}", Family.STIFFNESS) for power in (2, 3, 5)),
+    Function("v/(v^2 + 0.0001)^(1/4)", Family.DAMPING),
 )
-"""Functions of x = (displacement - middle)/stroke and v = velocity/speed."""
+"""Functions of x = (displacement - middle)/stroke, v = velocity/speed and d = displacement/(|middle| + stroke).
+
+The width w of a reversal is estimated along.
+"""
 
 OF_SLIDERS = tuple(
     Function(f"a spring-slider that gives by {width:g} typical displacements", Family.FRICTION)
@@ -162,15 +173,24 @@ SMALLEST = 1e-9
 
 
 def functions(
-    x: Float[Array, "*n"], v: Float[Array, "*n"], n: Float[Array, "*n"]
+    x: Float[Array, "*n"],
+    d: Float[Array, "*n"],
+    v: Float[Array, "*n"],
+    n: Float[Array, "*n"],
+    turn: Float[Array, ""] | float = TURN,
 ) -> list[Float[Array, "*n"]]:
-    """The values of all functions [1] that have no past, those of the motion first, then those of the load."""
-    sharp, blunt = (jnp.tanh(v / width) for width in SHARP)
+    """The values of all functions [1] that have no past, those of the motion first, then those of the load.
+
+    ``turn`` is the width w of a reversal.
+    """
+    sharp, blunt, turned = (jnp.tanh(v / width) for width in (*SHARP, turn))
     falling = [sharp * jnp.exp(-((v / width) ** 2)) for width in FALLING]
     smooth = [v, v * jnp.abs(v), v**2, x, x**2, x**3, x * sharp, x * v, x**2 * v]
     stops = [jnp.maximum(side * x - gap, 0.0) for gap in GAPS for side in (1.0, -1.0)]
     soft = [jnp.maximum(side * x - gap, 0.0) ** 2 for gap in SOFT_GAPS for side in (1.0, -1.0)]
-    further = [x**4, *soft, x**5, x**9, v / (v**2 + 0.01) ** 0.25]
+    directed = [turned, sharp**2, turned**2]
+    late, early = (v / (v**2 + width**2) ** 0.25 for width in (0.1, 0.01))
+    further = [x**4, *soft, x**5, x**9, late, *directed, d**2, d**3, d**5, early]
     loaded = [n * sharp, n * v, n, *(n * sharp * jnp.exp(-jnp.abs(v) / width) for width in FALLING)]
     return [sharp, blunt, *smooth, *falling, jnp.abs(v), *stops, *further, *loaded]
 
@@ -224,7 +244,7 @@ class LearnedForce(AbstractForceLaw):
     name: ClassVar[str] = "learned"
     family: ClassVar[Family] = Family.LEARNED
     roles: ClassVar[tuple[Role, ...]] = _roles(
-        ("middle", "stroke", "speed", "carried"), len((*OF_THE_MOTION, *OF_SLIDERS, *OF_THE_LOAD))
+        ("middle", "stroke", "speed", "carried", "turn"), len((*OF_THE_MOTION, *OF_SLIDERS, *OF_THE_LOAD))
     )
     port: Port = eqx.field(static=True)
 
@@ -232,11 +252,13 @@ class LearnedForce(AbstractForceLaw):
         """Nothing learned yet."""
         unit, force = port.displacement_unit, port.force_unit
         carried = Parameter("carried", 1.0, force, lower=SMALLEST, about="largest load seen")
+        turn = "velocity over which a friction turns round, over the largest seen"
         spans = {
             "middle": Parameter("middle", 0.0, unit, about="displacement in the middle of what was seen"),
             "stroke": Parameter("stroke", 1.0, unit, lower=SMALLEST, about="largest displacement from there"),
             "speed": Parameter("speed", 1.0, f"{unit}/s", lower=SMALLEST, about="largest velocity seen"),
             "carried": carried if port.loaded else 1.0,
+            "turn": Parameter("turn", TURN, "1", lower=0.1 * TURN, upper=10.0 * TURN, about=turn),
         }
         return {role.name: 0.0 for role in self.roles} | spans | _coefficients(port, force)
 
@@ -256,7 +278,9 @@ class LearnedForce(AbstractForceLaw):
         x = jnp.clip((signals.displacement - v["middle"]) / v["stroke"], -1.0, 1.0)
         speed = jnp.clip(signals.velocity / v["speed"], -1.0, 1.0)
         n = jnp.clip(signals.load / v["carried"], -1.0, 1.0) if self.port.loaded else jnp.zeros_like(x)
-        found = functions(x, speed, n)
+        whole = jnp.abs(v["middle"]) + v["stroke"]
+        d = jnp.clip(signals.displacement / whole, -1.0, 1.0)
+        found = functions(x, d, speed, n, v["turn"])
         motion, load = found[: len(OF_THE_MOTION)], found[len(OF_THE_MOTION) :]
         sliders = [-each.force for each in self._sliders(signals, state)]
         return self.port.sense * _sum(v, [*motion, *sliders, *(load if self.port.loaded else [])])

@@ -234,13 +234,25 @@ class LaplaceFit:
         return np.asarray(np.linalg.inv(self.precision), np.float64)
 
 
+class Start(NamedTuple):
+    """Where a search begins: parameters by name, SI, and what the plant is solved from there."""
+
+    values: Mapping[str, float]
+    warm_start: Any
+
+
 @dataclass(frozen=True)
 class Search:
-    """A plant, what it is held against, and which rows count, (m,)."""
+    """A plant, what it is held against, and which rows count, (m,).
+
+    Attributes:
+        given: the parameters of the plant before the data, where hypotheses may be looked for from there, too.
+    """
 
     plant: Plant
     data: Data
     mask: NDArray[np.bool_]
+    given: Start | None = None
 
     def residual(self, prediction: Prediction) -> Array:
         """Measured less predicted [unit of the row], (m,)."""
@@ -280,9 +292,103 @@ class Search:
         return np.asarray(fit.prediction.rows + self.data.tolerated @ self.tolerated_errors(fit))
 
 
-def search_of(plant: Plant, data: Data, mask: NDArray[np.bool_] | None = None) -> Search:
-    """All rows count unless ``mask`` (m,) says which."""
-    return Search(plant, data, np.ones(data.measured.size, bool) if mask is None else mask)
+def search_of(plant: Plant, data: Data, given: Start | None = None) -> Search:
+    """The search for which all rows count."""
+    return Search(plant, data, np.ones(data.measured.size, bool), given)
+
+
+class _Point(NamedTuple):
+    """A point of a search.
+
+    Attributes:
+        x: its coordinates [1], (n,).
+        prediction: the plant there.
+        value: log density of rows and prior there.
+        status: how the search ended there; None where it goes on.
+    """
+
+    x: Array
+    prediction: Prediction
+    value: float
+    status: Status | None = None
+
+
+class _Ascent:
+    """Steps to the mode of a hypothesis."""
+
+    def __init__(self, search: Search, terms: tuple[Term, ...], held: Mapping[str, float], level: float):
+        self._search, self._held, self._level = search, held, level
+        self._names = tuple(term.name for term in terms)
+        self._coordinates = search.plant.nuisances + tuple(c for term in terms for c in term.coordinates)
+
+    def start(self, values: Mapping[str, float], warm_start: Any) -> _Point:
+        """The point at ``values`` [SI], at the centre of what is not given, within the bounds."""
+        given = {**values, **self._held}
+        x = [c.at(given[c.name]) if c.name in given else 0.0 for c in self._coordinates]
+        return self._at(np.clip(x, *bounds_of(self._coordinates)), warm_start)
+
+    def step(self, point: _Point) -> _Point:
+        """The point one step on; the same, with the status, where there is no step that rises."""
+        if not point.prediction.solved or point.status is not None:
+            return point
+        bounds = tuple(np.where(self._fixed, point.x, each) for each in bounds_of(self._coordinates))
+        search, here = self._search, point.prediction
+        slopes = search.turned(here.slopes * slopes_at(self._coordinates, point.x))
+        accuracy = min(1e-3, 0.1 * self._level)
+        top = linearised_optimum(
+            search.rows, search.missed(here), slopes, point.x, (bounds[0], bounds[1]), accuracy
+        )
+        promised = top.value - point.value
+        if promised < self._level:
+            return point._replace(status=Status.CONVERGED if top.converged else Status.STALLED)
+        for halving in range(HALVINGS):
+            there = self._at(point.x + 0.5**halving * (top.x - point.x), here.warm_start)
+            if there.value > point.value:
+                return there
+        return point._replace(status=Status.CONVERGED if promised < ROUGH else Status.STALLED)
+
+    def mode(self, point: _Point, steps: int, progress: Progress | None = None) -> LaplaceFit:
+        """The fit where at most so many further steps lead to."""
+        for count in range(1, steps + 1):
+            if point.status is not None or not point.prediction.solved:
+                break
+            if progress:
+                progress(f"looking for the mode, step {count}: log density {point.value:.2f}")
+            point = self.step(point)
+        return self._fit(point)
+
+    @property
+    def _fixed(self) -> NDArray[np.bool_]:
+        return np.array([each.name in self._held for each in self._coordinates], bool)
+
+    def _at(self, x: Array, warm_start: Any) -> _Point:
+        wanted = [each.name for each in self._coordinates]
+        found = self._search.plant.predict(self._names, values_at(self._coordinates, x), wanted, warm_start)
+        if found.solved and not (np.isfinite(found.rows).all() and np.isfinite(found.slopes).all()):
+            found = found._replace(status=Status.NOT_FINITE)
+        if not found.solved:
+            return _Point(x, found, -np.inf)
+        scales = noise_scales(self._search.rows, self._search.missed(found))
+        return _Point(x, found, scales.value - 0.5 * float(x @ x))
+
+    def _fit(self, point: _Point) -> LaplaceFit:
+        search, coordinates, here = self._search, self._coordinates, point.prediction
+        slopes = here.slopes * slopes_at(coordinates, point.x)
+        misfit = noise_scales(search.rows, search.missed(here))
+        precision = precision_of(search.turned(slopes), misfit.spread)
+        evidence = log_evidence(point.value, precision, coordinates) if here.solved else -np.inf
+        return LaplaceFit(
+            self._names,
+            coordinates,
+            point.x,
+            here,
+            slopes,
+            misfit,
+            point.value,
+            precision,
+            evidence,
+            point.status or Status.MAX_ITERATIONS if here.solved else here.status,
+        )
 
 
 def find_map(
@@ -300,73 +406,26 @@ def find_map(
     The parameters ``held`` (SI, by name) stay where they are said to be. The mode is found where a step promises a
     rise of less than ``level``. ``progress`` is called with the density at every step.
     """
-    coordinates = search.plant.nuisances + tuple(c for term in terms for c in term.coordinates)
-    names = tuple(term.name for term in terms)
-    start, fixed = {**start, **(held or {})}, np.array([c.name in (held or {}) for c in coordinates])
-    lower, upper = bounds_of(coordinates)
-    x = np.clip([c.at(start[c.name]) if c.name in start else 0.0 for c in coordinates], lower, upper)
-    lower, upper = np.where(fixed, x, lower), np.where(fixed, x, upper)
+    ascent = _Ascent(search, terms, held or {}, level)
+    return ascent.mode(ascent.start(start, warm_start), steps, progress)
 
-    def at(x: Array, warm_start: Any) -> Prediction:
-        wanted = [coordinate.name for coordinate in coordinates]
-        found = search.plant.predict(names, values_at(coordinates, x), wanted, warm_start)
-        if found.solved and not (np.isfinite(found.rows).all() and np.isfinite(found.slopes).all()):
-            return found._replace(status=Status.NOT_FINITE)
-        return found
 
-    here, status = at(x, warm_start), Status.MAX_ITERATIONS
-    value = _value(search, here, x)
-    for count in range(1, steps + 1):
-        if not here.solved:
-            break
-        if progress:
-            progress(f"looking for the mode, step {count}: log density {value:.2f}")
-        slopes = search.turned(here.slopes * slopes_at(coordinates, x))
-        top = linearised_optimum(
-            search.rows, search.missed(here), slopes, x, (lower, upper), min(1e-3, 0.1 * level)
-        )
-        if top.value - value < level:
-            status = Status.CONVERGED if top.converged else Status.STALLED
-            break
-        for halving in range(HALVINGS):
-            there = x + 0.5**halving * (top.x - x)
-            tried = at(there, here.warm_start)
-            found = _value(search, tried, there)
-            if found > value:
-                break
-        else:
-            rough = top.value - value < ROUGH
-            status = Status.CONVERGED if rough else Status.STALLED
-            break
-        x, here, value = there, tried, found
-    return _mode(search, names, coordinates, x, here, value, status)
+def find_map_from_both(
+    search: Search, terms: tuple[Term, ...], start: Mapping[str, float], warm_start: Any, steps: int = STEPS
+) -> LaplaceFit:
+    """The mode of the baseline with ``terms``, from ``start`` or from the plant as it was given.
+
+    What calibration makes of a plant that lacks something may be so far from it that no step leads back. The search
+    goes on from where one step leads higher. What ``start`` says of the terms holds for both.
+    """
+    ascent = _Ascent(search, terms, {}, LEVEL)
+    points = [ascent.step(ascent.start(start, warm_start))]
+    if search.given is not None:
+        points.append(ascent.step(ascent.start({**start, **search.given.values}, search.given.warm_start)))
+    return ascent.mode(max(points, key=lambda each: each.value), steps - 1)
 
 
 def refine(search: Search, mode: LaplaceFit, terms: tuple[Term, ...]) -> LaplaceFit:
     """The mode again, with the plant made as precise there as it can be."""
     warm_start = search.plant.refined(mode.terms, mode.values, mode.prediction.warm_start)
     return replace(find_map(search, terms, mode.values, warm_start), precise=True)
-
-
-def _value(search: Search, prediction: Prediction, x: Array) -> float:
-    """Log density of rows and prior; minus infinity where the plant was not solved."""
-    if not prediction.solved:
-        return -np.inf
-    return noise_scales(search.rows, search.missed(prediction)).value - 0.5 * float(x @ x)
-
-
-def _mode(
-    search: Search,
-    names: tuple[str, ...],
-    coordinates: Coordinates,
-    x: Array,
-    here: Prediction,
-    value: float,
-    status: Status,
-) -> LaplaceFit:
-    slopes = here.slopes * slopes_at(coordinates, x)
-    misfit = noise_scales(search.rows, search.missed(here))
-    precision = precision_of(search.turned(slopes), misfit.spread)
-    evidence = log_evidence(value, precision, coordinates) if here.solved else -np.inf
-    status = status if here.solved else here.status
-    return LaplaceFit(names, coordinates, x, here, slopes, misfit, value, precision, evidence, status)

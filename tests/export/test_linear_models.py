@@ -96,14 +96,14 @@ def _steepness(model: ExportedModel, effect: Effect, p: Values) -> float:
 
 @over("name", [name for name in LEARNED if isinstance(LEARNED[name].law, LearnedForce)])
 def test_what_turns_round_in_a_learned_force_is_left_out(rig: Rig, name: str) -> None:
-    """Of coefficients of 100 N over 0.5 m/s, the dampings among them make 2e3 N s/m at most, the frictions 1e4."""
+    """Of coefficients of 100 N over 0.5 m/s, the dampings among them make 4e3 N s/m at most, the frictions 1e4."""
     effect = LEARNED[name]
     spans = {f"{name}_middle": 0.0, f"{name}_stroke": 0.03, f"{name}_speed": 0.5}
     model = _with(rig, name, dict.fromkeys(effect.null, 100.0) | spans)
     (kept,) = without_friction(model.equations.model).effects
     assert kept.name == name
     assert _steepness(model, effect, as_values(model.table.as_dict())) > 1e4
-    assert 200.0 < _steepness(model, effect, values_without_friction(model)) < 2e3
+    assert 200.0 < _steepness(model, effect, values_without_friction(model)) < 4e3
 
 
 DAMPING, SPEED = 150.0, 0.5
