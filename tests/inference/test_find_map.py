@@ -1,0 +1,60 @@
+"""The search for the mode from two starts: from where calibration ended and from the parameters as given."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.inference.find_map import Start, find_map, find_map_from_both, search_of
+from savgs_ident.inference.prior import Coordinates, sheet_coordinate
+
+from ..diagnosis.toy import TERMS, ToyPlant, draw
+
+BEND = TERMS[0]
+TRUTH = {"a": 0.0, "s": 0.5, "w": 6.0, "c": 0.3}
+FAR = {"w": 17.0, "c": 0.0}
+
+
+class WavyPlant(ToyPlant):
+    """A wave of known size and unknown number: to other numbers no step leads higher."""
+
+    @property
+    def nuisances(self) -> Coordinates:
+        return (sheet_coordinate(Parameter("w", 6.0, "1", tolerance=1.0)),)
+
+    def rows(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+        return super().rows({"a": 0.0, "s": 0.5} | dict(values))
+
+
+PLANT = WavyPlant()
+GIVEN = Start({"w": 6.0}, None)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_from_where_calibration_ended_far_off_it_is_the_parameters_as_given_that_lead_to_the_mode(
+    seed: int,
+) -> None:
+    search = search_of(PLANT, draw(PLANT, TRUTH, 0.02, seed), GIVEN)
+    astray = find_map(search, (BEND,), FAR, None)
+    found = find_map_from_both(search, (BEND,), FAR, None)
+    assert astray.values["w"] > 12.0
+    assert found.status.ok
+    assert found.values["w"] == pytest.approx(6.0, abs=0.1)
+    assert found.values["c"] == pytest.approx(0.3, abs=0.02)
+    assert found.evidence > astray.evidence + 100.0
+
+
+def test_where_nothing_was_given_it_is_the_search_from_one_start() -> None:
+    search = search_of(PLANT, draw(PLANT, TRUTH, 0.02, 1))
+    one, both = (each(search, (BEND,), {"w": 5.0}, None) for each in (find_map, find_map_from_both))
+    assert both.evidence == one.evidence
+    np.testing.assert_array_equal(both.x, one.x)
+
+
+def test_the_better_start_is_kept_where_the_given_one_is_the_worse() -> None:
+    far = Start({"w": 17.0}, None)
+    search = search_of(PLANT, draw(PLANT, TRUTH, 0.02, 2), far)
+    found = find_map_from_both(search, (BEND,), {"w": 5.0}, None)
+    assert found.values["w"] == pytest.approx(6.0, abs=0.1)
