@@ -1,11 +1,13 @@
 # Needs python3 (3.11 or newer, with venv) and make; everything else goes into .venv.
 #   make demo        the main job on the shipped recordings
 #   make test        lint, types, import contracts, tests: at most five minutes on two cores
-#   make test-all    the same with every test: processes, browsers, notebooks, documents, FMUs, long simulations
+#   make test-all    lint and what make test leaves out: processes, browsers, notebooks, documents, FMUs, long
+#                    simulations; and the property tests once more, with more examples
 #   make bench       the benchmark table
 #   make docs        the guide and the reference, in build/docs
 #   make fuzz        every loader on damaged files, counted in docs/fuzzing.md
 #   make clean       remove .venv and caches
+# Before a change is called done: make test and make test-all.
 # Another interpreter: make demo PYTHON=python3.12. Options for pytest: make test PYTEST_ARGS="-k rig".
 
 PYTHON ?= python3
@@ -29,7 +31,7 @@ lint: $(VENV)/.installed-test
 	$(BIN)/lint-imports
 
 test-all: lint
-	HYPOTHESIS_PROFILE=thorough $(BIN)/python -m pytest -m "" $(PYTEST_ARGS)
+	HYPOTHESIS_PROFILE=thorough $(BIN)/python -m pytest -m "slow or hypothesis" $(PYTEST_ARGS)
 
 bench: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks

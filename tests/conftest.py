@@ -18,6 +18,7 @@ from hypothesis import settings
 from threadpoolctl import threadpool_limits
 from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
+from xdist.workermanage import WorkerController
 
 from savgs_ident.plants.quarter_car.rig import Rig, default_campaign_path, default_rig_path, read_rig
 
@@ -50,21 +51,37 @@ SCRATCH = ("SAVGS_IDENT_CACHE", "XDG_CACHE_HOME", "MPLCONFIGDIR", "HYPOTHESIS_ST
 SHARING = {
     **{folder: folder for folder in ("control", "export", "fit", "inference", "simulate")},
     **dict.fromkeys(("effects", "symbolic"), "laws"),
+    **{
+        f"diagnosis/test_{name}.py": "diagnoses of few dwells"
+        for name in ("another_law", "background", "diagnose", "intervals")
+    },
+    **{f"cli/test_{name}.py": "diagnoses of two dwells" for name in ("exit_codes", "false_alarms")},
 }
-"""Folders whose tests share expensive fixtures and compiled programs, and their room: one process takes all of it."""
+"""Folders and modules whose tests share expensive fixtures and compiled programs, and their room: one process takes
+all of it. Two that began at the same time would compile the same."""
 
+APART = ("tests/notebooks/test_notebooks.py",)
+"""Modules whose tests share nothing and take minutes: each test is a room of its own."""
 
 LONGEST_FIRST = (
-    *("notebooks", "validation", "diagnosis", "docs", "browser", "cli"),
+    *(
+        "notebooks",
+        "test_public.py",
+        "validation",
+        "diagnosis",
+        "test_any_plant.py",
+        "docs",
+        "browser",
+        "cli",
+    ),
     *("export", "simulate", "control", "inference", "effects", "symbolic", "fit"),
 )
-"""Folders with tests of a minute and more, and those that one process takes whole, in the order in which
-`make test-all` begins with them: what is left for the end must be short, or one process works alone."""
-
+"""Folders and modules with tests of a minute and more, and folders that one process takes whole, in the order in
+which `make test-all` begins with them: what is left for the end must be short, or one process works alone."""
 
 UNOPTIMISED = "--xla_backend_optimization_level=0"
 """The compiler takes half the time with it. The fast tests compile more than they compute; `make test-all` compiles
-everything as in use."""
+as in use."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -86,22 +103,34 @@ def _only_the_fast(config: pytest.Config) -> bool:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Where slow tests run, the folders that take longest come first."""
+    """Where slow tests run, those that take longest come first."""
     if not _only_the_fast(config):
         place = {REPOSITORY / "tests" / name: number for number, name in enumerate(LONGEST_FIRST)}
         items.sort(
             key=lambda item: min(
-                (place[each] for each in item.path.parents if each in place), default=len(place)
+                (place[each] for each in (item.path, *item.path.parents) if each in place),
+                default=len(place),
             )
         )
 
 
 class _Rooms(LoadScopeScheduling):
-    """One process takes all tests of a module, or of a folder where these share what is expensive."""
+    """One process takes all tests of a module, or of a folder where these share what is expensive.
+
+    It gets its next room when one test is left of the last, not two: until then another one may be free for it.
+    """
+
+    def _reschedule(self, node: WorkerController) -> None:
+        if not self.workqueue or self._pending_of(self.assigned_work[node]) < 2:
+            super()._reschedule(node)
 
     def _split_scope(self, nodeid: str) -> str:
         path = Path(nodeid.partition("::")[0])
-        return SHARING.get(path.parts[1], str(path)) if path.parts[0] == "tests" else str(path)
+        if str(path) in APART:
+            return nodeid
+        if path.parts[0] != "tests":
+            return str(path)
+        return SHARING.get(path.parts[1]) or SHARING.get("/".join(path.parts[1:]), str(path))
 
 
 @pytest.hookimpl(optionalhook=True)

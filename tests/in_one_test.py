@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import pytest
+from hypothesis import is_hypothesis_test
 
 
 def over(
@@ -37,11 +38,11 @@ def over(
                 with subtests.test(msg=", ".join(map(str, shown))):
                     check(**given, **others, **dict(zip(arguments, case_values, strict=True)))
 
-        # What hypothesis has left on the check is not true of the test around it.
+        # What hypothesis has left on the check is not true of the test around it, but that it has examples.
         test.__dict__ = {name: value for name, value in vars(test).items() if "hypothesis" not in name}
         del test.__wrapped__  # type: ignore[attr-defined]
         reporter = inspect.Parameter("subtests", inspect.Parameter.POSITIONAL_OR_KEYWORD)
         test.__signature__ = inspect.Signature([reporter, *fixtures])  # type: ignore[attr-defined]
-        return test
+        return pytest.mark.hypothesis(test) if is_hypothesis_test(check) else test
 
     return decorate

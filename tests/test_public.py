@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from dataclasses import is_dataclass
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -136,6 +137,8 @@ def test_a_result_shows_itself_and_writes_what_the_command_writes(tmp_path: Path
 
 @pytest.mark.slow
 def test_the_ten_lines_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With fewer draws than by default."""
+    monkeypatch.setattr(si, "sample", partial(si.sample, target_ess=150.0, patience=0.0))
     section = (REPOSITORY / "README.md").read_text().split("## From Python")[1]
     code = section.split("```python\n")[1].split("```")[0]
     assert set(re.findall(r"^(?:import|from) .*$", code, re.M)) == {"import savgs_ident as si"}
@@ -143,11 +146,14 @@ def test_the_ten_lines_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.Mon
     names: dict[str, object] = {}
     with with_kept_programs():
         exec(compile(code, "README.md", "exec"), names)
-    fit, gap, loop = names["fit"], names["gap"], names["loop"]
+    fit, post, gap, loop = (names[name] for name in ("fit", "post", "gap", "loop"))
     assert isinstance(fit, si.Fit)
+    assert isinstance(post, si.Posterior)
     assert isinstance(gap, si.Diagnosis)
     assert isinstance(loop, si.LoopStudy)
     assert fit.trusted
+    assert (post.sampler, post.convergence.converged) == ("nuts", True)
+    assert abs(post["mu_r"].median - fit["mu_r"].value) < fit["mu_r"].stderr
     assert (gap.verdict.kind, gap.verdict.effects, gap.converged) == ("none", (), True)
     assert loop.stable
     assert (tmp_path / "gap.html").stat().st_size > 100_000

@@ -13,9 +13,12 @@ from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
 from savgs_ident.validation.false_alarms import read_draw
 from savgs_ident.validation.trials import known_trials, marks_of
 
+from .conftest import Program
+
 RIG = read_rig(default_rig_path())
 
-DRAWS = ("false-alarms", "--orders", "3", "--quiet", "--out", "o")
+DRAWS = ("false-alarms", "--max-frequency", "2.5", "--orders", "3", "--quiet", "--out", "o")
+"""Dwells and orders as in :mod:`.test_exit_codes`: the programs are the same."""
 
 
 @pytest.mark.parametrize("edited", ["rig file", "campaign", "channel map"])
@@ -38,18 +41,20 @@ def test_draws_from_files_that_were_edited_are_refused(edited: str, tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_draws_are_kept_gone_on_with_and_counted(program, short_campaign: Path, tmp_path: Path) -> None:
+def test_draws_are_kept_gone_on_with_and_counted(
+    program: Program, inside: Program, short_campaign: Path, tmp_path: Path
+) -> None:
     first = program(*DRAWS, short_campaign, "--draws", "2")
     assert first.returncode == 0, first.stderr
     lines = (tmp_path / "o" / "draws.jsonl").read_text().splitlines()
     assert len(lines) == 3
-    again = program(*DRAWS, short_campaign, "--draws", "3", "--resume", "--json")
+    again = inside(*DRAWS, short_campaign, "--draws", "3", "--resume", "--json")
     assert again.returncode == 0, again.stderr
     record = json.loads(again.stdout)
     assert record == json.loads((tmp_path / "o" / "false_alarms.json").read_text())
     assert (record["drawn"], record["alarms"]) == (3, 0)
     assert (tmp_path / "o" / "draws.jsonl").read_text().splitlines()[:3] == lines
     assert (tmp_path / "o" / "false_alarms.png").stat().st_size > 10_000
-    other = program(*DRAWS, short_campaign, "--resume", "--seed", "2")
+    other = inside(*DRAWS, short_campaign, "--resume", "--seed", "2")
     assert other.returncode == 2
     assert "holds trials of another seed" in other.stderr

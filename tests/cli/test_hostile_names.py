@@ -3,9 +3,9 @@
 import json
 import os
 import shutil
-from collections.abc import Sequence
+import subprocess
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 import pytest
@@ -14,6 +14,7 @@ from mcap.writer import Writer
 from savgs_ident.plants.quarter_car.rig import default_rig_path
 
 from ..report.page_reader import Reader
+from .conftest import Program
 from .installed import Installed, files_in
 
 FILES = (
@@ -34,14 +35,22 @@ TESTS = (
 )
 EVIL = "<script>alert(1)</script><img src=x onerror=alert(2)>[bold]\"'&\x1b[31m../../x"
 
+TOPICS = (EVIL, "/" + "t" * 5000, "two\nlines\x1b[31m")
 
-NOW = 1
-"""Of each kind so many are tried every time, the others with the slow tests."""
+STARTED = 2
+"""So many names of each kind are given to the installed program, the others to the same commands in this process."""
+
+Started = Callable[[int], Program]
 
 
-def some_now(names: Sequence[str | bytes]) -> list[Any]:
-    """Parameters of a test: the first few, and the others marked as slow."""
-    return [*names[:NOW], *(pytest.param(name, marks=pytest.mark.slow) for name in names[NOW:])]
+@pytest.fixture
+def started(installed: Installed, inside: Program) -> Started:
+    """What runs the program for the name at some place among those of its kind."""
+
+    def as_process(*words: object) -> "subprocess.CompletedProcess[str]":
+        return installed.run(*words, LC_ALL="C.UTF-8")
+
+    return lambda place: as_process if place < STARTED else inside
 
 
 def _sound(text: str) -> None:
@@ -58,55 +67,57 @@ def _harmless(page: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", some_now(FILES), ids=range(len(FILES)))
+@pytest.mark.parametrize("place", range(len(FILES)))
 def test_a_file_of_any_name_is_read_and_nothing_is_written_elsewhere(
-    installed: Installed, short_campaign: Path, name: bytes
+    started: Started, short_campaign: Path, tmp_path: Path, place: int
 ) -> None:
     """Its text names the file, as does its JSON: one each for half of the names."""
-    shutil.copy(short_campaign, installed.folder / os.fsdecode(name))
-    more = ("--json",) if FILES.index(name) % 2 else ()
-    done = installed.run("inspect", "--out", "o", *more, b"./" + name, LC_ALL="C.UTF-8")
+    name = os.fsdecode(FILES[place])
+    shutil.copy(short_campaign, tmp_path / name)
+    more = ("--json",) if place % 2 else ()
+    done = started(place)("inspect", "--out", "o", *more, f"./{name}")
     assert done.returncode == 0, done.stderr
     _sound(done.stdout + done.stderr)
     assert done.stderr.splitlines()[1:] == ["estimating responses", "drawing"]
-    record = json.loads((installed.folder / "o" / "inspect.json").read_text("utf-8"))
-    assert record["source"] == os.fsdecode(name)
-    assert files_in(installed.folder) == sorted(
-        [os.fsdecode(name), "o/inspect.json", "o/inspect.pdf", "o/inspect.png"]
-    )
+    record = json.loads((tmp_path / "o" / "inspect.json").read_text("utf-8"))
+    assert record["source"] == name
+    assert files_in(tmp_path) == sorted([name, "o/inspect.json", "o/inspect.pdf", "o/inspect.png"])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("test", some_now(TESTS), ids=range(len(TESTS)))
-def test_a_test_and_a_column_of_any_name(installed: Installed, short_campaign: Path, test: str) -> None:
+@pytest.mark.parametrize("place", range(len(TESTS)))
+def test_a_test_and_a_column_of_any_name(
+    started: Started, short_campaign: Path, tmp_path: Path, place: int
+) -> None:
     table = pd.read_csv(short_campaign)
-    table["test"] = table["test"].replace({"dwell_2.35Hz": test})
-    table[f"{test} [m]"] = 0.0
-    table.to_csv(installed.folder / "run.csv", index=False)
-    done = installed.run("inspect", "run.csv", "--out", "o")
+    table["test"] = table["test"].replace({"dwell_2.35Hz": TESTS[place]})
+    table[f"{TESTS[place]} [m]"] = 0.0
+    table.to_csv(tmp_path / "run.csv", index=False)
+    done = started(place)("inspect", "run.csv", "--out", "o")
     assert done.returncode in (0, 2)
     _sound(done.stdout + done.stderr)
-    assert set(files_in(installed.folder)) <= {
+    assert set(files_in(tmp_path)) <= {
         "run.csv", "o/inspect.json", "o/inspect.pdf", "o/inspect.png"
     }  # fmt: skip
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("topic", [EVIL, "/" + "t" * 5000, "two\nlines\x1b[31m"])
-def test_a_topic_of_any_name(installed: Installed, topic: str) -> None:
-    with (installed.folder / "run.mcap").open("wb") as stream:
+@pytest.mark.parametrize("place", range(len(TOPICS)))
+def test_a_topic_of_any_name(started: Started, tmp_path: Path, place: int) -> None:
+    topic = TOPICS[place]
+    with (tmp_path / "run.mcap").open("wb") as stream:
         writer = Writer(stream)
         writer.start()
         channel = writer.register_channel(topic, "json", 0)
         for number in range(3):
             writer.add_message(channel, 10**9 * number, json.dumps({topic: 1.0}).encode(), 10**9 * number)
         writer.finish()
-    done = installed.run("inspect", "run.mcap", "--out", "o", "--quiet")
+    done = started(place)("inspect", "run.mcap", "--out", "o", "--quiet")
     assert done.returncode == 2
     _sound(done.stderr)
     (line,) = done.stderr.splitlines()
     assert line.startswith("Error: run.mcap")
-    assert files_in(installed.folder) == ["run.mcap"]
+    assert files_in(tmp_path) == ["run.mcap"]
 
 
 @pytest.mark.slow
@@ -154,14 +165,14 @@ def test_the_report_on_campaigns_shows_their_names(installed: Installed, short_c
         (("export", "--to", "json", "mat", "python-control", "casadi", "c"), None),
     ],
 )
-def test_a_rig_of_any_name(installed: Installed, words: tuple[str, ...], page: str | None) -> None:
+def test_a_rig_of_any_name(inside: Program, tmp_path: Path, words: tuple[str, ...], page: str | None) -> None:
     text = default_rig_path().read_text("utf-8")
     assert 'name = "gt_rear"' in text
-    rig = installed.folder / "rig.toml"
+    rig = tmp_path / "rig.toml"
     rig.write_text(text.replace('name = "gt_rear"', f"name = {json.dumps(EVIL)}", 1), "utf-8")
-    done = installed.run(*words[:1], "rig.toml", *words[1:], "--out", "o")
+    done = inside(*words[:1], "rig.toml", *words[1:], "--out", "o")
     assert done.returncode == 0, done.stderr
     _sound(done.stdout + done.stderr)
     if page is not None:
-        _harmless(installed.folder / "o" / page)
-    assert {path.name for path in installed.folder.iterdir()} == {"rig.toml", "o"}
+        _harmless(tmp_path / "o" / page)
+    assert {path.name for path in tmp_path.iterdir()} == {"rig.toml", "o"}
