@@ -42,10 +42,10 @@ def input_of(loader: Loader, seed: int, number: int) -> Damaged:
 
 
 def run_trial(loader: Loader, seed: int, number: int, folder: Path, seconds: float = SECONDS) -> Outcome:
-    """Make the input in an empty ``folder``, read it, judge; the file stays there."""
+    """Make the input in an empty ``folder``, read it, classify; the file stays there."""
     damaged = input_of(loader, seed, number)
     path = place(loader, damaged.content, folder)
-    kind, reason, trace = judge(loader, path, seconds)
+    kind, reason, trace = classify(loader, path, seconds)
     return Outcome(loader.name, number, kind, damaged.how, reason, trace)
 
 
@@ -57,7 +57,7 @@ def place(loader: Loader, content: bytes, folder: Path) -> Path:
     return folder / loader.file
 
 
-def judge(loader: Loader, path: Path, seconds: float = SECONDS) -> tuple[Kind, str, str]:
+def classify(loader: Loader, path: Path, seconds: float = SECONDS) -> tuple[Kind, str, str]:
     """Read a file within so much time of the processor: how that ended, why, and where it failed."""
     small, begin = path.stat().st_size < 100_000, begin_peak()
     try:

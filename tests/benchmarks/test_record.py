@@ -114,7 +114,7 @@ def test_record_is_flat_and_holds_what_was_measured(
     assert "mcap_peak_mb" in capsys.readouterr().out
 
 
-def test_everything_runs_unless_told_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_everything_runs_unless_asked_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
     monkeypatch.setattr(program, "run_suite", lambda *each: asked.append(each[:2]) or Outcome())
     program.main([])

@@ -55,11 +55,11 @@ def read_number(task: Task) -> Outcome:
     """What is in the file, as the result of a fit."""
     path = task.job.campaign
     files = sorted(path.iterdir()) if path.is_dir() else [path]
-    told = json.loads(files[0].read_text())
-    if "failure" in told:
-        return Failure(told["failure"], told.get("unreadable", False))
+    reported = json.loads(files[0].read_text())
+    if "failure" in reported:
+        return Failure(reported["failure"], reported.get("unreadable", False))
     numbers = {
-        "mu_r": (told["value"], STDERR, "1"),
+        "mu_r": (reported["value"], STDERR, "1"),
         "c_sd": (5792.0, 12.0, "N s/m"),
         "m_s": (320.0, 1.0, "kg"),
     }
@@ -77,12 +77,12 @@ def read_number(task: Task) -> Outcome:
         },
         "correlation": {"mu_r": {"m_s": 0.0}, "c_sd": {"m_s": 0.6}},
         "chi2_per_dof": 1.05,
-        "trusted": told.get("trusted", True),
+        "trusted": reported.get("trusted", True),
         "converged": True,
         "status": "converged",
         "advice": "converged",
     }
-    return Kept(json.dumps(record), f"name = {json.dumps(task.source)}\n", told["start"])
+    return Kept(json.dumps(record), f"name = {json.dumps(task.source)}\n", reported["start"])
 
 
 def never(*_: object) -> Any:

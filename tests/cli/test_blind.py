@@ -66,7 +66,7 @@ def test_again_diagnoses_the_same_recordings(tmp_path: Path) -> None:
     assert {score["verdict"] for score in record["scores"]} == {"none"}
 
 
-def test_what_is_told_is_what_was_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_reported_is_what_was_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert concluded(job(trials=8), draw, always_right, Reporter(True, False), tmp_path) == OK
     printed = json.loads(capsys.readouterr().out)
     assert printed == _record(tmp_path)
@@ -145,9 +145,9 @@ def test_a_diagnosis_that_ends_with_an_error_counts_as_wrong(error: Exception, t
     assert concluded(job(trials=1), draw, broken, SILENT, tmp_path) == NOT_TRUSTED
     (score,) = _record(tmp_path)["scores"]
     assert (score["verdict"], score["named_right"], score["located_right"]) == ("failed", False, False)
-    told = json.loads((tmp_path / "trial_0001" / "diagnosis.json").read_text())
-    assert told["verdict"]["sentence"].startswith(f"{type(error).__name__}: ")
-    assert "no good" in told["verdict"]["sentence"]
+    reported = json.loads((tmp_path / "trial_0001" / "diagnosis.json").read_text())
+    assert reported["verdict"]["sentence"].startswith(f"{type(error).__name__}: ")
+    assert "no good" in reported["verdict"]["sentence"]
 
 
 def test_a_disk_that_is_full_is_no_mark_of_a_diagnosis(tmp_path: Path) -> None:

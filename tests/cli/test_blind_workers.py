@@ -30,7 +30,7 @@ def test_what_a_killed_process_had_in_hand_is_done_again(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_what_is_killed_each_time_is_told_when_the_others_are_done(tmp_path: Path) -> None:
+def test_what_is_killed_each_time_is_reported_when_the_others_are_done(tmp_path: Path) -> None:
     found: list[int] = []
     said = r"trial 3: its process was killed by signal 9, 3 times\. Remedy: run again"
     with pytest.raises(InputError, match=said):

@@ -93,7 +93,7 @@ def test_campaigns_that_scatter_widen_the_errors_and_it_is_said(
     assert "c_sd scatters" not in said
 
 
-def test_a_failed_campaign_is_told_and_the_rest_is_finished(
+def test_a_failed_campaign_is_reported_and_the_rest_is_finished(
     week: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     campaign_file(week / "bad.csv", 0.0, failure="ValueError: no good")
@@ -237,7 +237,7 @@ def test_bad_arguments_are_code_2_with_a_reason(
     assert "Traceback" not in done.stderr
 
 
-def test_dask_that_is_not_installed_is_told_with_the_remedy(
+def test_dask_that_is_not_installed_is_reported_with_the_remedy(
     invoke: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)

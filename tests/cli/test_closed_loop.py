@@ -88,9 +88,9 @@ def test_the_table_holds_the_signals_behind_the_figures(run: Any) -> None:
     folder, done, study = run
     record = json.loads(done.stdout)
     table = pd.read_csv(folder / "closed-loop.csv")
-    judged = table[table["time [s]"].between(study.test.start, study.test.end, inclusive="left")]
+    evaluated = table[table["time [s]"].between(study.test.start, study.test.end, inclusive="left")]
     for prefix, ride in (("", "active"), ("passive_", "passive")):
-        rms = judged[f"{prefix}sprung_accel [m/s^2]"].std(ddof=0)
+        rms = evaluated[f"{prefix}sprung_accel [m/s^2]"].std(ddof=0)
         assert rms == pytest.approx(record[ride]["sprung_accel_rms_m_per_s2"], rel=1e-6)
 
 
@@ -105,7 +105,7 @@ def test_friction_is_what_stands_between_the_linear_prediction_and_the_rig(run: 
     assert unlimited["sprung_accel"] == pytest.approx(as_it_is["sprung_accel"], rel=1e-3)
 
 
-def test_every_failure_is_survived_and_told(run: Any) -> None:
+def test_every_failure_is_survived_and_reported(run: Any) -> None:
     failures = json.loads(run[1].stdout)["failures"]
     assert set(failures) == set(KINDS) - {NOTHING}
     for failure in failures.values():

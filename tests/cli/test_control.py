@@ -255,7 +255,7 @@ def test_an_unstable_loop_is_code_1_with_the_reason(again: Any, designed: Any) -
 
 
 @pytest.mark.slow
-def test_a_reduced_controller_is_told_with_its_own_peak(again: Any, designed: Any) -> None:
+def test_a_reduced_controller_is_reported_with_its_own_peak(again: Any, designed: Any) -> None:
     design: Design = designed[2]
     reduced = replace(design, controller=reduce_order(design.controller, 4))
     record = json.loads(again(reduced, "--json").stdout)

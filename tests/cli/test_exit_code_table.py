@@ -20,8 +20,8 @@ SAID = _rows("What 2 says")
 
 
 def _code_1_in_help(name: str) -> str:
-    told = " ".join((COMMANDS[name].help or "").split())
-    found = re.search(r"Exit code 1 if (.+?)\. Example:", told)
+    reported = " ".join((COMMANDS[name].help or "").split())
+    found = re.search(r"Exit code 1 if (.+?)\. Example:", reported)
     return found[1] if found else "never"
 
 
@@ -36,8 +36,8 @@ def test_what_1_means_is_what_the_help_says(name: str) -> None:
 
 
 def test_the_codes_are_those_of_the_help_of_the_program(inside: Program) -> None:
-    told = " ".join(inside("--help").stdout.split())
-    listed = re.search(r"Exit codes: (.+?stopped)", told)
+    reported = " ".join(inside("--help").stdout.split())
+    listed = re.search(r"Exit codes: (.+?stopped)", reported)
     assert listed is not None
     assert re.findall(r"(\d+) ", listed[1]) == re.findall(r"^\| (\d+) \|", PAGE, re.MULTILINE)
 

@@ -75,7 +75,7 @@ def test_without_its_argument_a_command_is_code_2(inside: Program, name: str) ->
         ),
     ],
 )  # fmt: skip
-def test_what_was_typed_is_told_in_one_line(inside: Program, words: tuple[str, ...], said: str) -> None:
+def test_what_was_typed_is_reported_in_one_line(inside: Program, words: tuple[str, ...], said: str) -> None:
     done = inside(*words)
     assert _refused(done, "").endswith(said)
     assert "\x1b" not in done.stderr

@@ -54,7 +54,7 @@ def _diagnosis(document: dict[str, Any]) -> Path:
     return path
 
 
-def test_files_and_record_are_written_and_told(invoke: Invoke) -> None:
+def test_files_and_record_are_written_and_reported(invoke: Invoke) -> None:
     done = invoke(
         "export", _identified(), "--to", "json", "--posterior", _posterior(), "--samples", 20, "--json"
     )
@@ -91,13 +91,13 @@ def test_a_drawing_is_exported_with_the_model_asked_for(invoke: Invoke) -> None:
     assert read_model_json("o/model.json").effects == ()
 
 
-def test_another_model_than_the_identified_one_is_told(invoke: Invoke) -> None:
+def test_another_model_than_the_identified_one_is_reported(invoke: Invoke) -> None:
     done = invoke("export", _identified(), "--to", "json", "--model", "simqc", "--out", "o")
     assert done.exit_code == 0, done.stderr
     said = "identified with rail_coulomb and tyre_friction and is taken with no friction"
     assert said in " ".join(done.stdout.split())
-    (told,) = json.loads(Path("o/export.json").read_text())["said"]
-    assert said in told
+    (reported,) = json.loads(Path("o/export.json").read_text())["said"]
+    assert said in reported
 
 
 def test_a_diagnosed_effect_joins_and_the_output_says_with_which_numbers(invoke: Invoke) -> None:
@@ -245,11 +245,11 @@ def test_a_format_that_cannot_hold_the_model_is_code_2(
 
 
 def test_the_help_names_every_format(invoke: Invoke) -> None:
-    told = " ".join(invoke("export", "--help").output.split())
+    reported = " ".join(invoke("export", "--help").output.split())
     for name in public.EXPORTS:
-        assert name in told
+        assert name in reported
 
 
 def test_the_help_says_what_becomes_of_something_unknown(invoke: Invoke) -> None:
-    told = " ".join(invoke("export", "--help").output.split())
-    assert "so does the force that it learned for something unknown" in told
+    reported = " ".join(invoke("export", "--help").output.split())
+    assert "so does the force that it learned for something unknown" in reported

@@ -96,12 +96,12 @@ def test_the_model_file_is_a_rig_with_its_provenance(fitted: Any, short_campaign
     folder, _, fit = fitted
     rig = read_rig(folder / "model.toml")
     assert rig.parameters["mu_r"].value == fit.by_name["mu_r"].value
-    told = tomllib.loads((folder / "model.toml").read_text())["provenance"]
-    assert told["data"] == str(short_campaign)
-    assert told["free"] == ["mu_r", "c_sd"]
-    assert told["chi2"] == fit.chi2
-    assert set(told["versions"]) >= {"savgs_ident", "jax", "numpy", "python"}
-    assert told["covariance"]["matrix"][0][0] == fit.covariance[0, 0]
+    reported = tomllib.loads((folder / "model.toml").read_text())["provenance"]
+    assert reported["data"] == str(short_campaign)
+    assert reported["free"] == ["mu_r", "c_sd"]
+    assert reported["chi2"] == fit.chi2
+    assert set(reported["versions"]) >= {"savgs_ident", "jax", "numpy", "python"}
+    assert reported["covariance"]["matrix"][0][0] == fit.covariance[0, 0]
 
 
 def test_bode_of_the_model_finds_the_gap_of_the_fit(
@@ -134,7 +134,7 @@ def test_a_fit_that_did_not_converge_is_code_1_with_the_reason(again: Any, fitte
     assert done.stderr == f"Not to be trusted: {Status.MAX_ITERATIONS.advice}.\n"
 
 
-def test_data_that_cannot_tell_are_code_1_with_the_verdict(again: Any, fitted: Any) -> None:
+def test_data_that_identify_too_little_are_code_1_with_the_verdict(again: Any, fitted: Any) -> None:
     blind = Verdict(False, ("mu_t and ydot_Hth cannot be distinguished.",), (("mu_t", "ydot_Hth"),))
     done = again(replace(fitted[2], verdict=blind))
     assert done.exit_code == 1
@@ -142,7 +142,7 @@ def test_data_that_cannot_tell_are_code_1_with_the_verdict(again: Any, fitted: A
 
 
 def test_a_sound_fit_is_code_0(again: Any, fitted: Any) -> None:
-    sound = replace(fitted[2], verdict=Verdict(True, ("All is told.",)), status=Status.CONVERGED)
+    sound = replace(fitted[2], verdict=Verdict(True, ("All is reported.",)), status=Status.CONVERGED)
     assert again(sound, "--quiet").exit_code == 0
 
 

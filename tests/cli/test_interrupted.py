@@ -36,8 +36,8 @@ def _until(true: Callable[[], bool], process: "subprocess.Popen[str]") -> None:
 
 
 def _children(process: "subprocess.Popen[str]") -> list[int]:
-    told = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
-    return [int(number) for number in told.split()]
+    reported = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
+    return [int(number) for number in reported.split()]
 
 
 def _gone(number: int) -> bool:

@@ -45,8 +45,8 @@ def test_a_result_that_began_at_no_time_of_this_century_is_none_or_has_no_time(
 def _lines(original: Original, change: Callable[[dict[str, Any]], object]) -> bytes:
     """The kept file with its second line changed."""
     lines = original.contents[0].decode().splitlines()
-    told = change(json.loads(lines[1]))
-    lines[1] = told if isinstance(told, str) else json.dumps(told)
+    reported = change(json.loads(lines[1]))
+    lines[1] = reported if isinstance(reported, str) else json.dumps(reported)
     return ("\n".join(lines) + "\n").encode()
 
 

@@ -15,14 +15,14 @@ IDENTIFIED = {"effects": ["rail_coulomb"], "status": "stalled", "trusted": False
 DRAWING = read_rig(default_rig_path())
 
 
-@pytest.mark.parametrize(("trusted", "told"), [(True, False), (False, True)])
-def test_a_rig_whose_fit_is_doubtful_is_told_of(
-    rig: Rig, tmp_path: Path, capsys: pytest.CaptureFixture[str], trusted: bool, told: bool
+@pytest.mark.parametrize(("trusted", "reported"), [(True, False), (False, True)])
+def test_a_rig_whose_fit_is_doubtful_is_reported_of(
+    rig: Rig, tmp_path: Path, capsys: pytest.CaptureFixture[str], trusted: bool, reported: bool
 ) -> None:
     path = _file(replace(rig, provenance=IDENTIFIED | {"trusted": trusted}), tmp_path)
     assert read_model(path, None).effects == ("rail_coulomb",)
     said = capsys.readouterr().err
-    assert ("its own fit is not to be trusted (stalled)" in said) is told
+    assert ("its own fit is not to be trusted (stalled)" in said) is reported
     assert read_model(path, ModelName.simqc).effects == ()
 
 

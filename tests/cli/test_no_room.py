@@ -33,7 +33,7 @@ def _slow_but(name: str) -> tuple[pytest.MarkDecorator, ...]:
         ("campaign", (*QUICK, "--workers", "1"), 1_000, "o/short", []),
     ],
 )
-def test_a_full_disk_is_told_with_the_file_and_leaves_whole_files_only(
+def test_a_full_disk_is_reported_with_the_file_and_leaves_whole_files_only(
     installed: Installed,
     short_campaign: Path,
     name: str,
@@ -59,7 +59,7 @@ def test_a_full_disk_is_told_with_the_file_and_leaves_whole_files_only(
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=_slow_but(name)) for name in ROWS])
 @pytest.mark.parametrize("out", ["taken", "taken/below", "/proc/nowhere/below"])
-def test_an_output_folder_that_cannot_be_is_told_before_any_work(
+def test_an_output_folder_that_cannot_be_is_reported_before_any_work(
     inside: Program, tmp_path: Path, short_campaign: Path, name: str, out: str
 ) -> None:
     (tmp_path / "taken").write_text("mine")
@@ -97,7 +97,7 @@ def test_a_full_cache_is_no_concern_of_the_user(installed: Installed) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_a_temporary_folder_without_room_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_temporary_folder_without_room_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(files, "_LEAST_FREE_SPACE", 1 << 62)
     with pytest.raises(InputError, match=r"the disk is full\. Remedy: .*TMPDIR"), scratch_folder():
         pass

@@ -97,7 +97,7 @@ def test_the_truth_is_not_far(sampled: tuple[Path, Result]) -> None:
 
 
 @pytest.mark.slow
-def test_progress_tells_the_effective_sample_size(sampled: tuple[Path, Result]) -> None:
+def test_progress_says_the_effective_sample_size(sampled: tuple[Path, Result]) -> None:
     assert "effective sample size" in sampled[1].stderr
 
 

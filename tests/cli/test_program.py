@@ -22,7 +22,7 @@ COMMANDS = (
 HEAVY = ("jax", "matplotlib", "pandas", "scipy", "numpy")
 
 
-def test_the_version_is_told(program) -> None:
+def test_the_version_is_reported(program) -> None:
     done = program("--version")
     assert (done.returncode, done.stdout) == (0, f"savgs-ident {__version__}\n")
 

@@ -54,7 +54,7 @@ def test_nobody_who_listens_changes_no_code(installed: Installed, line: str, cod
         pytest.param(("inspect", "{campaign}", "--json"), marks=pytest.mark.slow),
     ],
 )
-def test_a_full_disk_under_standard_output_is_told(
+def test_a_full_disk_under_standard_output_is_reported(
     installed: Installed, short_campaign: Path, words: tuple[str, ...]
 ) -> None:
     done = installed.shell('"$@" >/dev/full', *(word.format(campaign=short_campaign) for word in words))
@@ -68,18 +68,18 @@ def test_a_full_disk_under_standard_output_is_told(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "told",
+    "reported",
     [
         {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
         {"PYTHONIOENCODING": "latin-1", "NO_COLOR": "1", "COLUMNS": "20"},
     ],
 )
 def test_without_unicode_tables_are_spelled_out(
-    installed: Installed, short_campaign: Path, told: dict[str, str]
+    installed: Installed, short_campaign: Path, reported: dict[str, str]
 ) -> None:
     campaign = installed.folder / "Prüfstand.csv"
     campaign.symlink_to(short_campaign)
-    shown = installed.run("inspect", campaign, "--out", "o", **told)
+    shown = installed.run("inspect", campaign, "--out", "o", **reported)
     assert shown.returncode == 0, shown.stderr
     assert "Written: o/inspect.json" in shown.stdout
     assert "²" not in shown.stdout

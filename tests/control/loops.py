@@ -52,8 +52,8 @@ def ran(model: QuarterCar, p: Values, test: LoopTest, loop: Loop) -> ClosedLoopR
     return run
 
 
-def judged(signals: Signals, test: LoopTest) -> Signals:
-    """What happened while the test was judged."""
+def evaluated(signals: Signals, test: LoopTest) -> Signals:
+    """What happened while the test was evaluated."""
     inside = (np.asarray(signals.time) >= test.start - 1e-9) & (np.asarray(signals.time) < test.end - 1e-9)
     return Signals(*(np.asarray(each)[inside] for each in signals))
 

@@ -112,7 +112,7 @@ def _study(**given: Any) -> Any:
     return SimpleNamespace(**usual | {"doubted_from": None, "on_rigs": ()} | given)
 
 
-def test_what_is_wrong_is_told_in_its_own_words() -> None:
+def test_what_is_wrong_is_reported_in_its_own_words() -> None:
     lost, moving = SimpleNamespace(status=Status.NOT_FINITE), SimpleNamespace(stable=False)
     assert alarm(_study()) == ""
     assert alarm(_study(passive=lost, passive_ride=moving)).startswith("The passive rig leaves the travel")

@@ -23,7 +23,7 @@ from savgs_ident.plants.quarter_car.drive import Drive, VelocityReference
 from savgs_ident.plants.quarter_car.forces import strut_at_rest
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 
-from .loops import NO_FRICTION, cam, harmonics_of, ideal, judged, ran, with_changed
+from .loops import NO_FRICTION, cam, evaluated, harmonics_of, ideal, ran, with_changed
 
 pytestmark = pytest.mark.slow
 
@@ -88,7 +88,9 @@ def plant(frictionless: QuarterCar, smooth: Values) -> Plant:
     return Plant(a, road, np.concatenate([np.zeros(n), by_asked]), c, rig.D[measured, ROAD])
 
 
-def foretold(plant: Plant, controller: DigitalController, frequency: float, delay: int = 1) -> Complex:
+def predicted_response(
+    plant: Plant, controller: DigitalController, frequency: float, delay: int = 1
+) -> Complex:
     """Measured signals per metre of road in the steady state of the sampled loop, (3,)."""
     n, w = plant.a.shape[0], 2j * np.pi * frequency
     z = np.exp(w * SAMPLE)
@@ -103,9 +105,9 @@ def foretold(plant: Plant, controller: DigitalController, frequency: float, dela
 
 @pytest.fixture(scope="module")
 def steady(friction: QuarterCar, smooth: Values, loop: Loop) -> dict[float, Signals]:
-    """The loop's motions on the small road by frequency, while they are judged."""
+    """The loop's motions on the small road by frequency, while they are evaluated."""
     tests = {frequency: cam(frequency, SMALL) for frequency in FREQUENCIES}
-    return {f: judged(ran(friction, smooth, test, ideal(loop)).signals, test) for f, test in tests.items()}
+    return {f: evaluated(ran(friction, smooth, test, ideal(loop)).signals, test) for f, test in tests.items()}
 
 
 def gains(signals: Signals, frequency: float, names: tuple[str, ...]) -> Complex:
@@ -119,7 +121,10 @@ def test_the_loop_does_what_the_linear_loop_foretells(
     steady: dict[float, Signals], plant: Plant, controller: DigitalController, frequency: float
 ) -> None:
     """In amplitude and phase. What is left is the second order of steps of a millisecond."""
-    found, wanted = gains(steady[frequency], frequency, MEASURED), foretold(plant, controller, frequency)
+    found, wanted = (
+        gains(steady[frequency], frequency, MEASURED),
+        predicted_response(plant, controller, frequency),
+    )
     assert np.max(np.abs(found / wanted - 1.0)) < 5e-4
 
 
@@ -129,7 +134,7 @@ def test_the_sample_of_delay_is_seen(
     """With none, or with one more, the prediction at 3.5 Hz is off by far more."""
     found = gains(steady[3.5], 3.5, MEASURED)
     for delay in (0, 2):
-        wrong = foretold(plant, controller, 3.5, delay)
+        wrong = predicted_response(plant, controller, 3.5, delay)
         assert np.max(np.abs(found / wrong - 1.0)) > 0.015
 
 

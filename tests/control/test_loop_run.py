@@ -17,7 +17,7 @@ from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.simulate.periodic import harmonics, simulate_periodic
 from savgs_ident.simulate.transient import simulate_transient
 
-from .loops import CAM, NO_FRICTION, along, cam, harmonics_of, ideal, judged, passive, ran, with_changed
+from .loops import CAM, NO_FRICTION, along, cam, evaluated, harmonics_of, ideal, passive, ran, with_changed
 
 AT_TWO = cam(2.0)
 SAMPLES = 2501
@@ -72,7 +72,7 @@ def test_the_passive_run_ends_in_the_periodic_motion(
     friction: QuarterCar, numbers: Values, held: ClosedLoopRun, rigid: bool, within: float
 ) -> None:
     """With the motion by which the drive gives way imposed on its link, closely; with a rigid link, within 1 %."""
-    signals = judged(held.signals, AT_TWO)
+    signals = evaluated(held.signals, AT_TWO)
     link = harmonics_of(signals.link_angle, signals.time, 2.0, ORDERS)
     assert 5e-4 < abs(link[1]) < 4e-3
     if rigid:
@@ -126,7 +126,7 @@ def test_the_active_run_is_that_of_an_error_controlled_integration(
 def test_the_plate_carries_the_weight_at_rest_and_on_average(sliding: ClosedLoopRun, smooth: Values) -> None:
     """Over whole periods, where no friction holds the rig: nothing else holds it up."""
     weight = float((smooth["m_s"] + smooth["m_u"]) * smooth["g"])
-    load = judged(sliding.signals, AT_TWO).tyre_load
+    load = evaluated(sliding.signals, AT_TWO).tyre_load
     assert sliding.signals.tyre_load[0] == pytest.approx(weight, rel=1e-6)
     assert np.mean(load) == pytest.approx(weight, abs=2e-3 * np.std(load))
     assert np.std(load) > 0.05 * weight
@@ -142,7 +142,7 @@ def test_what_the_motor_takes_is_copper_loss_and_work_on_its_shaft(
     quiet: ClosedLoopRun, numbers: Values
 ) -> None:
     """Over whole periods, from torque and speed alone; against all that flows to and fro."""
-    signals, p = judged(quiet.signals, AT_TWO), numbers
+    signals, p = evaluated(quiet.signals, AT_TWO), numbers
     current = signals.motor_torque / (1.5 * p["motor_pole_pairs"] * p["motor_flux_linkage"])
     copper = float(np.mean(1.5 * p["motor_resistance"] * current**2))
     shaft = float(np.mean(signals.motor_torque * p["motor_gear_ratio"] * signals.link_velocity))

@@ -1,4 +1,4 @@
-"""What a test lasts and where it is judged; what a run is worth, on signals whose worth is known."""
+"""What a test lasts and where it is evaluated; what a run is worth, on signals whose worth is known."""
 
 from collections.abc import Callable
 
@@ -79,14 +79,14 @@ def test_every_test_lasts_whole_frames_and_ends_with_a_road_that_stands_still(te
 
 
 @over("test", TESTS, ids=lambda test: test.title)
-def test_something_fails_while_the_test_is_judged_and_the_road_moves(test: LoopTest) -> None:
+def test_something_fails_while_the_test_is_evaluated_and_the_road_moves(test: LoopTest) -> None:
     assert test.start < test.fails_at < test.end
     later, _ = along(test.road, np.linspace(test.fails_at, test.end, 300))
     assert np.ptp(later) > 0.01
 
 
 @given(frequency=FREQUENCIES)
-def test_a_harmonic_test_is_judged_over_whole_periods_up_to_half_a_frame(frequency: float) -> None:
+def test_a_harmonic_test_is_evaluated_over_whole_periods_up_to_half_a_frame(frequency: float) -> None:
     test = harmonic_test(CAM, frequency)
     periods = (test.end - test.start) * frequency
     assert round(periods) >= 1
@@ -114,7 +114,7 @@ def test_the_rms_of_a_sine_is_its_amplitude_over_root_two_wherever_it_begins_and
     assert ride.tyre_load == pytest.approx(1000.0 * rms, rel=left)
 
 
-def test_what_happens_outside_the_judged_time_does_not_count() -> None:
+def test_what_happens_outside_the_evaluated_time_does_not_count() -> None:
     time = times_of(AT_TWO)
     outside = (time < AT_TWO.start) | (time >= AT_TWO.end)
     quiet, wild = np.sin(4.0 * np.pi * time), np.where(outside, 100.0, np.sin(4.0 * np.pi * time))
@@ -186,7 +186,7 @@ def test_the_test_of_a_bump_ends_behind_it(speed: float) -> None:
     assert np.all(velocity == 0.0)
 
 
-def test_speed_angle_and_power_are_the_extremes_of_the_judged_time() -> None:
+def test_speed_angle_and_power_are_the_extremes_of_the_evaluated_time() -> None:
     time = times_of(AT_TWO)
     inside = (time >= AT_TWO.start) & (time < AT_TWO.end)
     wave = np.sin(4.0 * np.pi * time)

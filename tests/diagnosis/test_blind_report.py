@@ -48,7 +48,7 @@ def test_the_picture_counts_every_trial_once(scores: list[Score]) -> None:
     assert counts[(columns.index("failed"), rows.index("cam_scale"))] == 1
 
 
-def test_right_and_wrong_are_told_by_colour(scores: list[Score]) -> None:
+def test_right_and_wrong_are_reported_by_colour(scores: list[Score]) -> None:
     (axes,) = confusion_figure(scores).axes
     rows = [label.get_text() for label in axes.get_yticklabels()]
     columns = [label.get_text() for label in axes.get_xticklabels()]
@@ -78,7 +78,7 @@ class _Cells(HTMLParser):
             self.rows[-1][-1] += data.strip()
 
 
-def test_the_page_tells_every_trial_and_executes_nothing(scores: list[Score]) -> None:
+def test_the_page_says_every_trial_and_executes_nothing(scores: list[Score]) -> None:
     page = blind_html(scores, SETTINGS, ("savgs-ident", "blind"))
     assert page == blind_html(scores, SETTINGS, ("savgs-ident", "blind"))
     cells = _Cells()

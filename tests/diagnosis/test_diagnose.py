@@ -47,11 +47,11 @@ def _check(diagnosis: Diagnosis, name: str) -> None:
 
 @pytest.mark.slow
 def test_a_stribeck_rail_is_found_in_a_few_dwells(measure_few: Measure, rig: Rig) -> None:
-    told: list[str] = []
-    diagnosis = diagnose_response(measure_few("stribeck_rail"), rig, progress=told.append)
+    reported: list[str] = []
+    diagnosis = diagnose_response(measure_few("stribeck_rail"), rig, progress=reported.append)
     _check(diagnosis, "stribeck_rail")
     assert diagnosis.ports[0].port == "rail"
-    assert len(told) > 5
+    assert len(reported) > 5
     law = diagnosis.loops[1]
     assert law.port == "rail"
     assert law.law.size == law.inferred.size == law.velocity.size

@@ -1,4 +1,4 @@
-"""A parameter that changes while a campaign goes on is told, and nothing else is missing."""
+"""A parameter that changes while a campaign goes on is reported, and nothing else is missing."""
 
 import re
 

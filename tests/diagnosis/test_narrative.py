@@ -86,7 +86,7 @@ def _evidence(kind: Any, reason: Reason, weights: dict[str, float], **more: Any)
     )
 
 
-def test_something_unknown_is_told_with_how_near_the_catalogue_comes() -> None:
+def test_something_unknown_is_reported_with_how_near_the_catalogue_comes() -> None:
     evidence = _evidence("unknown", "law", {"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0})
     verdict = write_verdict(PROBLEM, evidence, (), GAP)
     assert "law learned at the rail accounts for 90 %" in verdict.sentence
@@ -176,7 +176,7 @@ def test_a_tolerance_that_does_not_hold_is_named(weights: dict[str, float], star
     assert verdict.ports == ("tyre_radial",)
 
 
-def test_a_law_that_the_catalogue_does_not_have_is_told_with_the_nearest_formula() -> None:
+def test_a_law_that_the_catalogue_does_not_have_is_reported_with_the_nearest_formula() -> None:
     weights = {"none": 0.0, "unknown": 100.0, "rail_stribeck": 900.0}
     hypothesis = Hypothesis(flexible="rail/friction")
     mode = _mode(990.0, "learned_rail")
@@ -203,22 +203,22 @@ def test_a_law_that_the_catalogue_does_not_have_is_told_with_the_nearest_formula
 
 
 @pytest.mark.parametrize(
-    ("odds", "told"),
+    ("odds", "reported"),
     [
         (-3.0, ""),
         (3.0, "The evidence that something is missing is 3.0 nat"),
         (DEFAULTS.alarm_log_odds + 90.0, "too little to matter"),
     ],
 )
-def test_nothing_missing_is_told_with_what_speaks_against_it(odds: float, told: str) -> None:
+def test_nothing_missing_is_reported_with_what_speaks_against_it(odds: float, reported: str) -> None:
     evidence = _evidence("none", "law", {"none": 0.0, "unknown": -20.0, "rail_viscous": odds})
     sentence = write_verdict(PROBLEM, evidence, (), GAP).sentence
     assert sentence.startswith("These data show nothing missing in the model")
-    assert told in sentence
-    assert sentence.count(".") >= 2 + bool(told)
+    assert reported in sentence
+    assert sentence.count(".") >= 2 + bool(reported)
 
 
-def test_what_could_not_be_judged_or_settled_is_a_warning() -> None:
+def test_what_could_not_be_decided_or_settled_is_a_warning() -> None:
     evidence = _evidence(
         "unknown",
         "law",
@@ -227,21 +227,21 @@ def test_what_could_not_be_judged_or_settled_is_a_warning() -> None:
         refit_failed=True,
     )
     problem: Any = SimpleNamespace(base=_mode(0.0), constants=DEFAULTS, drifts={})
-    told = " ".join(write_warnings(problem, evidence, _mode(0.0), 1.0))
-    assert "The fit of gear_backlash found no periodic motion of the plant" in told
-    assert "not evaluated: stopped at the iteration limit" in told
-    assert "on twice as many mesh nodes failed" in told
+    reported = " ".join(write_warnings(problem, evidence, _mode(0.0), 1.0))
+    assert "The fit of gear_backlash found no periodic motion of the plant" in reported
+    assert "not evaluated: stopped at the iteration limit" in reported
+    assert "on twice as many mesh nodes failed" in reported
 
 
 @pytest.mark.parametrize(
-    ("reason", "told"),
+    ("reason", "reported"),
     [("tolerance", "would need `k_t` 4.2 tolerances below"), ("law", "Something more may be missing")],
 )
-def test_what_an_effect_does_not_explain_is_a_warning(reason: Reason, told: str) -> None:
+def test_what_an_effect_does_not_explain_is_a_warning(reason: Reason, reported: str) -> None:
     evidence = _evidence("rail_viscous", reason, {"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0})
     evidence = replace(evidence, kind="effect", left=0.0)
     problem: Any = SimpleNamespace(base=_mode(0.0), constants=DEFAULTS, drifts={})
-    assert any(told in each for each in write_warnings(problem, evidence, _mode(0.0), 1.0))
+    assert any(reported in each for each in write_warnings(problem, evidence, _mode(0.0), 1.0))
 
 
 GAPS = st.floats(0.0, 0.3)

@@ -41,7 +41,7 @@ def fitted(plant_and_data: tuple[DwellProblem, Data], start: PeriodicSolution) -
     return search, plant, modes[0], modes[1]
 
 
-def test_the_most_telling_tests_are_proposed_with_their_dwells(fitted: Fitted) -> None:
+def test_the_most_significant_tests_are_proposed_with_their_dwells(fitted: Fitted) -> None:
     search, plant, one, other = fitted
     found = next_tests(search, plant, one, other)
     assert len(found) == PROPOSED
@@ -53,7 +53,7 @@ def test_the_most_telling_tests_are_proposed_with_their_dwells(fitted: Fitted) -
         assert each.expected_sigma > 0.0
 
 
-def test_no_test_tells_a_hypothesis_from_itself(fitted: Fitted) -> None:
+def test_no_test_distinguishes_a_hypothesis_from_itself(fitted: Fitted) -> None:
     search, plant, one, _ = fitted
     assert all(each.expected_sigma < 1e-6 for each in next_tests(search, plant, one, one))
 

@@ -52,10 +52,10 @@ def _swept(frequency: np.ndarray) -> np.ndarray:
 def test_peaks_come_late_in_a_sweep() -> None:
     frequency = np.linspace(0.6, 2.9, 60)
     swept = _swept(frequency)
-    told = along(STEADY, _oscillator(STEADY)[:, None], frequency, np.full(60, RATE))[:, 0]
+    reported = along(STEADY, _oscillator(STEADY)[:, None], frequency, np.full(60, RATE))[:, 0]
     steady = _oscillator(frequency)
     assert np.abs(swept - steady).max() > 0.02
-    assert np.abs(swept - told).max() < 0.1 * np.abs(swept - steady).max()
+    assert np.abs(swept - reported).max() < 0.1 * np.abs(swept - steady).max()
 
 
 def _sweep(
@@ -100,7 +100,7 @@ def test_the_gap_is_relative_to_the_response_and_leaves_out_what_no_dwell_reache
     plant = cast(Any, SimpleNamespace(excitation=SimpleNamespace(frequency=DWELLS), channels=CHANNELS))
     sweep = _sweep()
 
-    def told(plant: Any, sweep: SweepResponse, frequencies: Any, terms: Any, values: Any) -> Any:
+    def reported(plant: Any, sweep: SweepResponse, frequencies: Any, terms: Any, values: Any) -> Any:
         low = sweep.frequency < 0.5
         return (
             None
@@ -108,7 +108,7 @@ def test_the_gap_is_relative_to_the_response_and_leaves_out_what_no_dwell_reache
             else np.where(low[:, None], 99.0, values["gain"] * np.repeat(sweep.response, 2, axis=1))
         )
 
-    monkeypatch.setattr(module, "first_harmonic", told)
+    monkeypatch.setattr(module, "first_harmonic", reported)
     found = sweep_shrink(plant, sweep, [((), {"gain": 1.2}), ((), {"gain": 0.9}), (("lag",), {})])
     assert found is not None
     assert (found.before, found.recalibrated) == (pytest.approx(0.2), pytest.approx(0.1))
@@ -137,9 +137,9 @@ def test_the_rig_swept_in_time_answers_as_predicted(rig: Rig, nominal_campaign) 
     sweep = estimate_sweep_response(Recording("sweep", "sweep", None, channels), "road_height")
     frequencies = frequencies_of(np.asarray(plant.excitation.frequency), sweep)
     assert frequencies is not None
-    told = first_harmonic(plant, sweep, frequencies, (), {})
-    assert told is not None
+    reported = first_harmonic(plant, sweep, frequencies, (), {})
+    assert reported is not None
     rows = (sweep.frequency > frequencies[0]) & (sweep.frequency < frequencies[-1])
     for place, name in enumerate(("sprung_accel", "susp_deflection")):
         seen = sweep.response[rows, sweep.channel(name)]
-        assert np.linalg.norm(seen - told[rows, place]) < 0.01 * np.linalg.norm(seen)
+        assert np.linalg.norm(seen - reported[rows, place]) < 0.01 * np.linalg.norm(seen)

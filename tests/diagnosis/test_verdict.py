@@ -156,7 +156,7 @@ def test_probabilities_are_those_of_the_weights() -> None:
     )
 
 
-def test_rivals_are_single_effects_that_the_data_hardly_tell_apart() -> None:
+def test_rivals_are_single_effects_that_the_data_hardly_distinguish() -> None:
     weights = {
         "none": 0.0,
         "unknown": 99.0,
@@ -272,7 +272,7 @@ def test_a_broken_tolerance_is_held_against_a_pair(pair: float, beside: tuple[st
     )
 
 
-def test_an_effect_whose_fit_was_lost_is_not_judged_by_its_score() -> None:
+def test_an_effect_whose_fit_was_lost_is_not_weighed_by_its_score() -> None:
     findings = Findings(
         _mode(0.0),
         SCORES,

@@ -67,7 +67,7 @@ def test_private_names_and_those_of_others_are_left_out(built: Path) -> None:
 
 
 @pytest.mark.slow
-def test_names_lead_to_where_they_are_told(built: Path) -> None:
+def test_names_lead_to_where_they_are_reported(built: Path) -> None:
     """One of an annotation, and one of a text."""
     assert _link("plants.model", "Model") in _page(built, "fit.result")
     assert _link("plants.quarter_car.rig_recordings", "load_campaign") in _page(built, "campaigns.run")

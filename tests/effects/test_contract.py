@@ -68,7 +68,7 @@ def test_its_parameters_have_units_bounds_and_a_scale(effect: Effect) -> None:
         assert parameter.about, parameter.name
         assert parameter.lower < parameter.upper
         assert parameter.lower > -inf or parameter.upper < inf or parameter.tolerance > 0.0, parameter.name
-        identified_bijection(parameter)  # Refuses a parameter whose scale nothing tells.
+        identified_bijection(parameter)  # Refuses a parameter whose scale nothing gives.
 
 
 @over("effect", effects_of())

@@ -144,7 +144,7 @@ def test_derivatives_in_its_parameters_are_those_of_differences(
 
 
 @over("effect", effects_of())
-def test_at_its_null_something_tells_it(effect: Effect, numbers: dict[str, float]) -> None:
+def test_at_its_null_something_shows_it(effect: Effect, numbers: dict[str, float]) -> None:
     """Its outcome has a slope there in what makes it vanish: it can be tested for."""
     p: Values = as_values(numbers | dict(effect.null))
     seen = seen_by(effect, as_values(numbers), seed=6)

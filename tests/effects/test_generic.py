@@ -96,7 +96,7 @@ def test_a_contact_that_sticks_has_limits_and_a_port_that_does_not_a_bristle_of_
 
 @pytest.mark.slow
 @each_effect
-def test_it_is_nothing_at_its_null_and_tells_itself_there(effect: Effect) -> None:
+def test_it_is_nothing_at_its_null_and_shows_itself_there(effect: Effect) -> None:
     null = _values(effect, null=True)
     assert effect.null
     assert not np.any(np.asarray(_outcome(effect, null)))

@@ -139,7 +139,7 @@ def test_it_sees_the_vertical_through_its_tilt(rig: Rig, numbers: dict[str, floa
     assert np.all(np.asarray(deflection) == 1.0)
 
 
-def test_nothing_tells_it_from_a_gain_below_one(rig: Rig, numbers: dict[str, float]) -> None:
+def test_nothing_distinguishes_it_from_a_gain_below_one(rig: Rig, numbers: dict[str, float]) -> None:
     p = as_values(numbers | {"accel_tilt_versine": 0.03, "accel_gain_error": -0.03})
     tilt, gain = (
         build_model(rig, (name,)).transfers(p, jnp.asarray(TILT_FREQUENCY))

@@ -93,9 +93,9 @@ def _given(effect: Effect, coefficient: float) -> dict[str, float]:
 
 
 def _words(effect: Effect) -> dict[str, str]:
-    """What is told of each coefficient, after the words that all have in common."""
-    told = {each.name: each.about for each in effect.parameters if each.name in effect.null}
-    return {name: about.removeprefix("learned in proportion to ") for name, about in told.items()}
+    """What is said of each coefficient, after the words that all have in common."""
+    reported = {each.name: each.about for each in effect.parameters if each.name in effect.null}
+    return {name: about.removeprefix("learned in proportion to ") for name, about in reported.items()}
 
 
 def _force(effect: Effect, p: Values, displacement: float, velocity: float, load: float) -> float:
@@ -249,7 +249,7 @@ def test_casadi_computes_the_same(effect: Effect) -> None:
         seen = PortSignals(*jnp.unstack(signals), jnp.zeros(()))
         return effect.force(dict(zip(names, jnp.unstack(p), strict=True)), seen, jnp.zeros(2))[None]
 
-    told = to_casadi("force", force, {"signals": np.zeros(3), "p": values}, ["force"])
+    reported = to_casadi("force", force, {"signals": np.zeros(3), "p": values}, ["force"])
     for signals in np.random.default_rng(3).uniform([0.36, -0.6, 0.0], [0.44, 0.6, 9e3], (40, 3)):
         expected = float(force(jnp.asarray(signals), jnp.asarray(values))[0])
-        assert float(told(signals, values)) == pytest.approx(expected, rel=1e-10, abs=1e-9)
+        assert float(reported(signals, values)) == pytest.approx(expected, rel=1e-10, abs=1e-9)

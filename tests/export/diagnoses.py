@@ -53,6 +53,7 @@ SPANS = {
     "learned_strut_stroke": 0.02,
     "learned_strut_speed": 0.3,
     "learned_strut_carried": 4e3,
+    "learned_strut_turn": 0.03,
 }
 COEFFICIENTS = {name: 10.0 * number for number, name in enumerate(coefficients_at(STRUT), 1)}
 LEARNED = diagnosis(

@@ -63,5 +63,5 @@ def test_the_compiled_functions_are_the_functions(library: ctypes.CDLL, model: E
             x = rest + 1e-2 * random.standard_normal(rest.size)
             u = still + 1e-2 * random.standard_normal(still.size)
             expected = functions[name](x, u, p).full().ravel()
-            told = _call(library, name, [x, u, p], expected.size)
-            assert told == pytest.approx(expected, rel=1e-9, abs=1e-6)
+            reported = _call(library, name, [x, u, p], expected.size)
+            assert reported == pytest.approx(expected, rel=1e-9, abs=1e-6)

@@ -54,7 +54,7 @@ def _instants(model: ExportedModel) -> list[tuple[np.ndarray, np.ndarray]]:
 
 def test_rates_outputs_and_residual_are_those_of_the_model(written: tuple[ExportedModel, Path]) -> None:
     model, folder = written
-    told = {
+    reported = {
         name: ca.Function.load(str(folder / f"{name}.casadi")) for name in ("rates", "outputs", "residual")
     }
     values = as_values(model.table.as_dict())
@@ -71,13 +71,13 @@ def test_rates_outputs_and_residual_are_those_of_the_model(written: tuple[Export
 
     for x, u in _instants(model):
         qdd, sd, loads = (np.asarray(part) for part in true(jnp.asarray(x), jnp.asarray(u)))
-        rates = told["rates"](x, u, p).full().ravel()
+        rates = reported["rates"](x, u, p).full().ravel()
         expected = np.concatenate([x[2:4], qdd, sd])
         assert rates == pytest.approx(expected, rel=1e-7, abs=1e-7)
-        outputs = told["outputs"](x, u, p).full().ravel()
+        outputs = reported["outputs"](x, u, p).full().ravel()
         assert outputs[0] == pytest.approx(qdd[0], rel=1e-7, abs=1e-7)
         assert outputs[2:5] == pytest.approx(loads, rel=1e-7, abs=1e-4)
-        left = told["residual"](x, np.concatenate([qdd, sd]), u, p).full().ravel()
+        left = reported["residual"](x, np.concatenate([qdd, sd]), u, p).full().ravel()
         # Forces of up to 1e5 N balance to their rounding.
         assert np.max(np.abs(left)) < 1e-5
 

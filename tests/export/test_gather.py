@@ -44,7 +44,7 @@ def test_a_model_with_its_own_posterior_is_not_doubted(identified: Rig, posterio
     }
 
 
-def test_a_posterior_without_the_diagnosed_effect_is_told(identified: Rig, posterior: Path) -> None:
+def test_a_posterior_without_the_diagnosed_effect_is_reported(identified: Rig, posterior: Path) -> None:
     found = gather(identified, SIMTR, MOUNT, posterior)
     doubt = found.doubts[0]
     assert "of a model without mount_compliance" in doubt
@@ -53,7 +53,9 @@ def test_a_posterior_without_the_diagnosed_effect_is_told(identified: Rig, poste
 
 
 @pytest.mark.parametrize("count", [None, 1, 2])
-def test_a_posterior_that_lies_elsewhere_is_told(identified: Rig, posterior: Path, count: int | None) -> None:
+def test_a_posterior_that_lies_elsewhere_is_reported(
+    identified: Rig, posterior: Path, count: int | None
+) -> None:
     """However few of its draws travel along."""
     moved = replace(identified, parameters=identified.parameters.with_values({"k_t": 2.0e5}))
     found = gather(moved, SIMTR, posterior=posterior, count=count)
@@ -62,7 +64,7 @@ def test_a_posterior_that_lies_elsewhere_is_told(identified: Rig, posterior: Pat
     assert "lies elsewhere than the model: k_t is more than 6 standard deviations off" in doubt
 
 
-def test_a_fit_that_was_not_trusted_is_told_and_travels_along(identified: Rig) -> None:
+def test_a_fit_that_was_not_trusted_is_reported_and_travels_along(identified: Rig) -> None:
     bad = replace(
         identified, provenance={**identified.provenance, "trusted": False, "status": "max_iterations"}
     )
@@ -74,8 +76,8 @@ def test_a_fit_that_was_not_trusted_is_told_and_travels_along(identified: Rig) -
 def _doubted(identified: Rig, diagnosis: dict[str, Any], *without: str) -> tuple[str, ...]:
     """Doubts of a model whose fit was not trusted, with a diagnosis; ``without`` some entries of its provenance."""
     provenance = {**identified.provenance, "trusted": False, "status": "max_iterations"}
-    told = {name: value for name, value in provenance.items() if name not in without}
-    return gather(replace(identified, provenance=told), SIMTR, diagnosis).doubts
+    reported = {name: value for name, value in provenance.items() if name not in without}
+    return gather(replace(identified, provenance=reported), SIMTR, diagnosis).doubts
 
 
 def test_a_fit_that_was_not_trusted_is_no_matter_once_all_its_numbers_are_replaced(identified: Rig) -> None:
@@ -101,7 +103,7 @@ def test_a_diagnosis_that_adds_nothing_replaces_nothing(identified: Rig, documen
     )
 
 
-def test_a_model_other_than_the_one_that_was_identified_is_told(rig: Rig, identified: Rig) -> None:
+def test_a_model_other_than_the_one_that_was_identified_is_reported(rig: Rig, identified: Rig) -> None:
     found = gather(identified, ())
     (sentence,) = found.said
     assert sentence.startswith(
@@ -112,12 +114,12 @@ def test_a_model_other_than_the_one_that_was_identified_is_told(rig: Rig, identi
     assert gather(identified, SIMTR[::-1]).said == gather(rig, ()).said == ()
 
 
-def test_a_diagnosis_that_did_not_converge_is_told(identified: Rig) -> None:
+def test_a_diagnosis_that_did_not_converge_is_reported(identified: Rig) -> None:
     found = gather(identified, SIMTR, MOUNT | {"converged": False})
     assert found.doubts == ("The diagnosis did not converge.",)
 
 
-def test_what_a_sensor_does_is_told_to_be_left_out(rig: Rig) -> None:
+def test_what_a_sensor_does_is_reported_to_be_left_out(rig: Rig) -> None:
     (sentence,) = gather(rig, (*SIMTR, "accel_lag")).said
     assert sentence.startswith("accel_lag is an error of a sensor")
 

@@ -58,8 +58,8 @@ def test_rig_covariance_and_draws_are_those_of_the_model(found: dict[str, Any], 
 
 def test_texts_are_json(found: dict[str, Any], model: ExportedModel) -> None:
     assert json.loads(found["diagnosis"]) == model.diagnosis
-    told = {name: value for name, value in model.rig.provenance.items() if name != "covariance"}
-    assert json.loads(found["provenance"]) == told
+    reported = {name: value for name, value in model.rig.provenance.items() if name != "covariance"}
+    assert json.loads(found["provenance"]) == reported
 
 
 def test_the_state_spaces_make_the_same_systems(found: dict[str, Any], model: ExportedModel) -> None:

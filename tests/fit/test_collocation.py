@@ -32,7 +32,7 @@ DWELLS = (2.0, 4.5, 6.0)
 """Slow enough to stick and fast enough to saturate the tyre's friction [Hz]."""
 
 PRESLIDING = {"k_pre": 1e7, "c_pre": 3e4}
-"""The bristle, as it truly is [SI]. The samples tell it two to three times as well as nine orders do, which see
+"""The bristle, as it truly is [SI]. The samples identify it two to three times as well as nine orders do, which see
 little of the milliseconds of a reversal: there the two are not comparable in standard errors of the latter."""
 
 EXACT = CollocationSettings(fixed_tolerances=True)
@@ -85,19 +85,19 @@ def test_the_covariance_belongs_to_the_estimates(found: CollocationFit) -> None:
 
 def test_it_says_that_it_did_not_get_there(campaign: Campaign, response: HarmonicResponse, rig: Rig) -> None:
     """After two iterations: no error is stated for what was not found."""
-    told: list[str] = []
+    reported: list[str] = []
     found = fit_by_collocation(
         campaign,
         response,
         RigModel(rig, MODELS["simtr"]),
         free=FREE,
         settings=replace(EXACT, iterations=2),
-        progress=told.append,
+        progress=reported.append,
     )
     assert found.status is Status.MAX_ITERATIONS
     assert found.iterations == 2
     assert all(np.isnan(estimate.stderr) for estimate in found.estimates)
-    assert Status.MAX_ITERATIONS.advice in told[-1]
+    assert Status.MAX_ITERATIONS.advice in reported[-1]
 
 
 def test_a_response_of_other_recordings_is_refused(
@@ -139,7 +139,7 @@ def fitted(few: HarmonicResponse, rig: Rig) -> Fit:
 
 
 def test_on_the_shipped_campaign_it_agrees_with_the_fit(fitted: Fit, crosschecked: CollocationFit) -> None:
-    """To half a standard error: the samples tell a little more than nine orders do."""
+    """To half a standard error: the samples say a little more than nine orders do."""
     assert crosschecked.status.ok
     assert crosschecked.tests == fitted.measured.tests
     for name in FREE:

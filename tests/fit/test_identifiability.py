@@ -27,7 +27,7 @@ def _words(covariance: NDArray[np.float64], bounds: dict[str, float] | None = No
     return " ".join(verdict_of(NAMES, VALUES, UNITS, covariance, bounds or {}, ()).sentences)
 
 
-def test_well_told_parameters_form_no_group_and_are_listed_with_their_errors() -> None:
+def test_well_identified_parameters_form_no_group_and_are_listed_with_their_errors() -> None:
     covariance = np.diag([0.01, 0.02, 0.03, 0.005]) ** 2
     assert confounded_groups(NAMES, covariance) == ()
     verdict = verdict_of(NAMES, VALUES, UNITS, covariance, {}, ())
@@ -85,10 +85,10 @@ def test_two_pairs_are_two_groups() -> None:
     assert sorted(confounded_groups(NAMES, covariance)) == [("mu_r", "c_sd"), ("mu_t", "ydot_Hth")]
 
 
-@pytest.mark.parametrize(("share", "told"), [(0.99, True), (1.01, False)])
-def test_the_limit_is_a_share_of_the_value(share: float, told: bool) -> None:
+@pytest.mark.parametrize(("share", "reported"), [(0.99, True), (1.01, False)])
+def test_the_limit_is_a_share_of_the_value(share: float, reported: bool) -> None:
     covariance = _covariance(0.01, ((0.0, 0.0, 0.0, 1.0), share * LARGEST_SD))
-    assert verdict_of(NAMES, VALUES, UNITS, covariance, {}, ()).identifiable is told
+    assert verdict_of(NAMES, VALUES, UNITS, covariance, {}, ()).identifiable is reported
 
 
 @given(seed=st.integers(0, 2**32 - 1), scale=st.floats(0.01, 3.0))

@@ -36,7 +36,7 @@ def test_campaigns_of_a_rig_scatter_by_their_own_error_and_share_the_other() -> 
     assert found.mean(axis=1).var() == pytest.approx(_share() * variance + own_of_mean, rel=0.06)
 
 
-def test_mean_scatter_and_trend_are_right_with_the_two_parts_told_apart() -> None:
+def test_mean_scatter_and_trend_are_right_with_the_two_parts_distinguished() -> None:
     found = _estimates(np.random.default_rng(1), 1500, 8)
     whole = _covariance()[0, 0]
     own, common = np.sqrt([(1.0 - _share()) * whole, _share() * whole])

@@ -1,4 +1,4 @@
-"""Profile likelihood near a well told minimum, where it is a parabola of the standard error's width."""
+"""Profile likelihood near a well identified minimum, where it is a parabola of the standard error's width."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from .bench import TRUTH, Bench, silent
 
 @pytest.fixture(scope="module")
 def best(bench: Bench) -> Minimum:
-    """The fit of one draw, which the compiled step of the bench cannot tell from the recorded one."""
+    """The fit of one draw, which the compiled step of the bench cannot distinguish from the recorded one."""
     return bench.fit(bench.predicted(TRUTH) + bench.noise(7))
 
 

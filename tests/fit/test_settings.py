@@ -19,7 +19,7 @@ from .bench import TRUTH, true_rig
 
 
 @pytest.mark.slow
-def test_peak_to_peak_alone_tells_them_too_as_in_the_paper(measured: HarmonicResponse, rig: Rig) -> None:
+def test_peak_to_peak_alone_identifies_them_too_as_in_the_paper(measured: HarmonicResponse, rig: Rig) -> None:
     """28 dwells and two channels, phases and waveforms unseen: wider errors about the same truth."""
     settings = FitSettings(quantity="peak_to_peak", fixed_tolerances=True)
     fit = fit_least_squares(measured, RigModel(true_rig(rig), MODELS["simtr"]), free=FREE, settings=settings)

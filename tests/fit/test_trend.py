@@ -16,7 +16,7 @@ VALUE, SLOPE = 30.0, -0.4
 
 
 def _drawn(seed: int, scale: float, slope: float = SLOPE) -> NDArray[np.float64]:
-    """Estimates (DRAWS, n) whose true errors are ``scale`` times those that are told."""
+    """Estimates (DRAWS, n) whose true errors are ``scale`` times those that are stated."""
     random = np.random.default_rng(seed)
     return VALUE + slope * X + scale * ERRORS * random.standard_normal((DRAWS, X.size))
 

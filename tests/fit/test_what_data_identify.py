@@ -42,7 +42,7 @@ def test_it_converges_and_is_not_to_be_trusted(slow_dwells: Fit) -> None:
     assert not slow_dwells.trusted
 
 
-def test_it_names_what_cannot_be_told_apart(slow_dwells: Fit) -> None:
+def test_it_names_what_cannot_be_distinguished(slow_dwells: Fit) -> None:
     assert slow_dwells.verdict.confounded == (("mu_t", "ydot_Hth"),)
     words = " ".join(slow_dwells.verdict.sentences)
     assert "mu_t and ydot_Hth cannot be distinguished" in words
@@ -50,14 +50,14 @@ def test_it_names_what_cannot_be_told_apart(slow_dwells: Fit) -> None:
     assert slow_dwells.by_name["ydot_Hth"].stderr > LARGEST_SD * TRUTH["ydot_Hth"]
 
 
-def test_it_tells_the_ratio_with_its_error(slow_dwells: Fit) -> None:
+def test_it_states_the_ratio_with_its_error(slow_dwells: Fit) -> None:
     ratio, percent = _number(slow_dwells, r"mu_t/ydot_Hth = (\S+) 1/\(m/s\), to (\S+) %")
     truth = TRUTH["mu_t"] / TRUTH["ydot_Hth"]
     assert percent < 3.0
     assert abs(ratio - truth) < 3.0 * percent / 100.0 * truth
 
 
-def test_it_tells_a_lower_bound(slow_dwells: Fit) -> None:
+def test_it_states_a_lower_bound(slow_dwells: Fit) -> None:
     """The scrub velocity reached at 4 Hz is the bound in principle; the truth must lie above what is said."""
     (bound,) = _number(slow_dwells, r"ydot_Hth is at least (\S+) m/s")
     assert 0.04 < bound < TRUTH["ydot_Hth"]
@@ -69,7 +69,7 @@ def test_it_proposes_a_faster_dwell(slow_dwells: Fit) -> None:
     assert percent < 100.0 * LARGEST_SD
 
 
-def test_the_others_are_told_as_well_as_from_all_dwells(slow_dwells: Fit, nominal: Fit) -> None:
+def test_the_others_are_identified_as_well_as_from_all_dwells(slow_dwells: Fit, nominal: Fit) -> None:
     for name in ("mu_r", "c_sd"):
         found = slow_dwells.by_name[name]
         assert found.value == pytest.approx(TRUTH[name], rel=0.01)

@@ -15,7 +15,7 @@ from fuzz.outcome import Kind, Outcome
 from fuzz.pool import Batch, run_side_by_side
 from fuzz.registry import LOADERS
 from fuzz.report import count, page
-from fuzz.trial import input_of, judge, original_of, place, run_trial
+from fuzz.trial import classify, input_of, original_of, place, run_trial
 from savgs_ident.core.errors import InputError
 
 from ..in_one_test import over
@@ -101,7 +101,7 @@ def test_a_planted_fault_is_found(
 ) -> None:
     monkeypatch.setattr(trial, "MEMORY", 1 << 27)
     if read is _takes_memory and not Path("/proc/self/clear_refs").exists():
-        pytest.skip("the system does not tell the memory of a process")
+        pytest.skip("the system does not say the memory of a process")
     outcome = run_trial(_planted(read), SEED, 0, tmp_path)
     assert outcome.kind is Kind.failed
     assert said in outcome.reason
@@ -147,7 +147,7 @@ def test_a_good_file_is_read_by_the_functions_that_it_is_to_cover(name: str, tmp
     for number, content in enumerate(original_of(loader).contents):
         folder = tmp_path / str(number)
         path = place(loader, content, folder)
-        assert judge(loader, path) == (Kind.read, "", "")
+        assert classify(loader, path) == (Kind.read, "", "")
         called |= _called(lambda path=path: loader.read(path))
     assert set(loader.covers) <= called
 
@@ -173,14 +173,14 @@ def test_a_process_that_ends_costs_one_input(tmp_path: Path) -> None:
     assert sorted(each.number for each in outcomes if each.loader == "weights") == [0, 1, 2]
 
 
-def test_the_command_tells_failures_by_its_exit_code(
+def test_the_command_says_failures_by_its_exit_code(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def told(*arguments: object) -> Iterator[Outcome]:
+    def reported(*arguments: object) -> Iterator[Outcome]:
         yield Outcome("csv", 3, Kind.failed, "truncate", "KeyError: 'a'")
         yield Outcome("csv", 4, Kind.read)
 
-    monkeypatch.setattr(command, "run_side_by_side", told)
+    monkeypatch.setattr(command, "run_side_by_side", reported)
     page_file = tmp_path / "fuzzing.md"
     assert command.main(["--count", "2", "--only", "csv", "--out", str(page_file)]) == 1
     assert "csv 3: KeyError: 'a'" in capsys.readouterr().out

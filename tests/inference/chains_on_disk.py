@@ -43,11 +43,11 @@ def main(name: str, last: str, inputs: str, *paths: str) -> None:
     toy, surrogate = pickle.loads(Path(inputs).read_bytes())
     for path in paths:
         keep = open_checkpoint(Path(path), CASE)
-        told = Told(keep.path, keep.case, keep.content, keep.counts)
-        told.last = int(last)
+        reported = Told(keep.path, keep.case, keep.content, keep.counts)
+        reported.last = int(last)
         print(keep.counts[0], flush=True)
         with suppress(_EnoughError):
-            for _ in SAMPLERS[name](toy, surrogate, SEED, told):  # type: ignore[index]
+            for _ in SAMPLERS[name](toy, surrogate, SEED, reported):  # type: ignore[index]
                 pass
 
 

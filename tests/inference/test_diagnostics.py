@@ -20,11 +20,11 @@ def _autoregressive(keep: float, steps: int = STEPS, seed: int = 1) -> np.ndarra
 
 def _chains(draws: np.ndarray, **changes: object) -> Chains:
     shape = draws.shape
-    told = Chains(draws[:, :, None], np.zeros(shape), np.ones(shape, bool), np.zeros(0), 0, draws.size, 0)
-    return told._replace(**changes)
+    reported = Chains(draws[:, :, None], np.zeros(shape), np.ones(shape, bool), np.zeros(0), 0, draws.size, 0)
+    return reported._replace(**changes)
 
 
-def _judged(draws: np.ndarray, target: float = 1000.0, **changes: object) -> Convergence:
+def _assessed(draws: np.ndarray, target: float = 1000.0, **changes: object) -> Convergence:
     return judge_chains(_chains(draws, **changes), [mixing_of(draws)], [], target, ())
 
 
@@ -53,7 +53,7 @@ def test_autoregressive_draws_are_worth_what_theory_says(keep: float) -> None:
 
 def test_good_chains_may_be_used() -> None:
     draws = _autoregressive(0.3)
-    found = _judged(draws, unsolved=3, evaluations=31_000)
+    found = _assessed(draws, unsolved=3, evaluations=31_000)
     assert found.converged
     assert found.reasons == ()
     assert found.ess_min == least_ess([mixing_of(draws)]) >= 1000.0
@@ -64,7 +64,7 @@ def test_good_chains_may_be_used() -> None:
 def test_chains_that_stay_apart_are_found_out() -> None:
     draws = _autoregressive(0.0)
     draws[:, 0] += 3.0
-    found = _judged(draws)
+    found = _assessed(draws)
     assert not found.converged
     assert any("R-hat" in reason for reason in found.reasons)
     assert found.r_hat_max > 1.3
@@ -79,7 +79,7 @@ def test_a_tolerated_parameter_that_disagrees_is_a_reason() -> None:
 
 
 def test_too_few_draws_are_a_reason() -> None:
-    found = _judged(_autoregressive(0.0, steps=100))
+    found = _assessed(_autoregressive(0.0, steps=100))
     assert ["effective sample size" in reason for reason in found.reasons] == [True]
     assert found.ess_min < 1000.0
 
@@ -123,7 +123,7 @@ def test_no_parameter_has_no_worth() -> None:
 def test_the_tail_of_the_weights_is_measured(index: float) -> None:
     # A Pareto variate of index 1 / k is the exponential of an exponential one of mean k.
     log_ratio = np.random.default_rng(4).exponential(index, size=20_000)
-    found = _judged(_autoregressive(0.0), log_ratio=log_ratio - 300.0)
+    found = _assessed(_autoregressive(0.0), log_ratio=log_ratio - 300.0)
     assert found.pareto_k == pytest.approx(index, abs=0.12)
     assert found.converged == (index < 0.7)
     assert any("Pareto" in reason for reason in found.reasons) == (index > 0.7)
@@ -131,8 +131,8 @@ def test_the_tail_of_the_weights_is_measured(index: float) -> None:
 
 def test_divergences_are_a_reason_beyond_one_in_a_hundred() -> None:
     draws = _autoregressive(0.0)
-    assert _judged(draws, divergences=draws.size // 200).converged
-    found = _judged(draws, divergences=draws.size // 50)
+    assert _assessed(draws, divergences=draws.size // 200).converged
+    found = _assessed(draws, divergences=draws.size // 50)
     assert ["diverged" in reason for reason in found.reasons] == [True]
     assert found.divergences == draws.size // 50
 

@@ -16,7 +16,7 @@ def test_its_axes_make_up_the_covariance() -> None:
     toy = straight_toy(scales=FIXED_SCALES, strength=300.0)
     axes = parameter_scale(toy.likelihood, Prior(FREE), jnp.zeros(5), toy.slope)
     np.testing.assert_allclose(axes @ axes.T, normal_covariance(toy), rtol=1e-4, atol=1e-10)
-    # The best told comes first: the shear counts on it.
+    # The best reported comes first: the shear counts on it.
     assert np.all(np.diff(np.linalg.norm(axes, axis=0)) >= 0.0)
 
 

@@ -62,7 +62,7 @@ def test_order_and_roles(marginals: Mapping[str, Marginal]) -> None:
     assert [each.profile is not None for each in marginals.values()] == [True, True, False, False, False]
 
 
-def test_draws_and_curvature_tell_the_analytic_posterior(
+def test_draws_and_curvature_give_the_analytic_posterior(
     strong: Toy, marginals: Mapping[str, Marginal]
 ) -> None:
     for name, mean, sd in zip(FREE.names, *_true(strong), strict=True):

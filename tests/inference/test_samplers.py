@@ -95,18 +95,18 @@ def test_the_surrogate_alone_would_be_found_out(
 
 @pytest.mark.parametrize("name", SAMPLERS)
 def test_a_chain_says_where_it_was(name: str, chains: Mapping[str, Chains], bent: Toy, rough: Stand) -> None:
-    told = chains[name]
-    points = told.points.reshape(-1, 5)
+    reported = chains[name]
+    points = reported.points.reshape(-1, 5)
     rows = bent.rows(points[:50, :-2])[0]
     densities = [rough.case.density(row, point) for row, point in zip(rows, points[:50], strict=True)]
-    np.testing.assert_allclose(told.log_density.ravel()[:50], densities, rtol=1e-10)
-    moved = np.any(np.diff(told.points, axis=0) != 0.0, axis=2)
-    assert np.all(told.accepted[1:] >= moved)
+    np.testing.assert_allclose(reported.log_density.ravel()[:50], densities, rtol=1e-10)
+    moved = np.any(np.diff(reported.points, axis=0) != 0.0, axis=2)
+    assert np.all(reported.accepted[1:] >= moved)
     # A trajectory may end where it began.
-    assert np.mean(told.accepted[1:] != moved) < 0.01
-    assert 0.3 < told.accepted.mean() < 1.0
-    assert told.unsolved == 0
-    assert told.evaluations >= told.accepted.size
+    assert np.mean(reported.accepted[1:] != moved) < 0.01
+    assert 0.3 < reported.accepted.mean() < 1.0
+    assert reported.unsolved == 0
+    assert reported.evaluations >= reported.accepted.size
 
 
 @pytest.mark.parametrize("name", SAMPLERS)
@@ -118,11 +118,11 @@ def test_no_point_without_a_solution_is_drawn(
 ) -> None:
     """Only this share of the posterior has a solution."""
     half = replace(bent, edge=reference.quantile(0, share))
-    told = _sampled(name, half, rough, 200 if share == 0.5 else 50)
-    assert told.points[:, :, 0].max() <= half.edge
-    assert np.isfinite(told.log_density).all()
-    assert 0.5 * (1.0 - share) < told.unsolved / told.evaluations < 1.0
+    reported = _sampled(name, half, rough, 200 if share == 0.5 else 50)
+    assert reported.points[:, :, 0].max() <= half.edge
+    assert np.isfinite(reported.log_density).all()
+    assert 0.5 * (1.0 - share) < reported.unsolved / reported.evaluations < 1.0
     if share == 0.5:
         true = reference_of(half, rough.point - np.eye(5)[0] * reference.sd(0))
-        for key, (value, error) in _estimates(told.points).items():
+        for key, (value, error) in _estimates(reported.points).items():
             assert abs(value - _true(true, key)) < SURE * error, key

@@ -48,7 +48,7 @@ def test_a_banana_becomes_linear() -> None:
     random = np.random.default_rng(3)
     axes, _ = np.linalg.qr(random.standard_normal((ROWS, 3)))
     weight = np.exp(random.standard_normal(ROWS))
-    # Weighted slopes are orthonormal together with the prior's share: the last axis is told by that alone.
+    # Weighted slopes are orthonormal together with the prior's share: the last axis is reported by that alone.
     slope = axes / weight[:, None]
     slope[:, 2] = 0.0
     second = np.zeros((3, 3, ROWS))

@@ -26,7 +26,7 @@ def _off(toy: Toy, stand: Stand, t: np.ndarray) -> float:
     return float(np.linalg.norm((np.asarray(stand.surrogate.predicted(jnp.asarray(t))) - true) / spread))
 
 
-def test_a_quadratic_model_is_told_exactly(quadratic: Toy) -> None:
+def test_a_quadratic_model_is_reported_exactly(quadratic: Toy) -> None:
     stand = stand_for(quadratic)
     for t in np.random.default_rng(0).uniform(-3.0, 3.0, (10, 5)):
         assert _off(quadratic, stand, t) < 1e-9

@@ -10,11 +10,11 @@ from savgs_ident.inference.result import Marginal, Role
 def _marginal(name: str, draws: np.ndarray, role: Role, **changes: float) -> Marginal:
     q025, median, q975 = np.quantile(draws, [0.025, 0.5, 0.975])
     sd = float(draws.std())
-    told = {"laplace_sd": sd, "contraction": 0.99} | changes
+    reported = {"laplace_sd": sd, "contraction": 0.99} | changes
     return Marginal(
         name=name, unit="m", about="", role=role, median=float(median), sd=sd, q025=float(q025),
         q975=float(q975), prior=(0.0, 1.0), laplace_value=float(median), ess_bulk=1e3, ess_tail=1e3,
-        r_hat=1.0, autocorrelation=1.0, **told,
+        r_hat=1.0, autocorrelation=1.0, **reported,
     )  # fmt: skip
 
 
@@ -65,14 +65,14 @@ def test_two_that_hardly_correlate_are_not() -> None:
     assert not any("trade off" in each for each in _said(_log_normal(0.7)))
 
 
-def test_one_that_is_not_told_is_said_to_be_so() -> None:
+def test_one_that_is_not_identified_is_said_to_be_so() -> None:
     said = _said(_log_normal(0.0, second=0.6), advice=("A dwell at 5 Hz would help.",))
     assert "These data do not identify ydot." in said
     assert "These data identify mu_t to 5 %." in said
     assert "A dwell at 5 Hz would help." in said
 
 
-def test_two_that_cannot_be_told_apart_are_said_to_be_so_once() -> None:
+def test_two_that_cannot_be_distinguished_are_said_to_be_so_once() -> None:
     said = _said(_log_normal(0.999, first=0.6, second=0.6))
     assert [each for each in said if "trade off" in each] == [
         "mu_t and ydot cannot be distinguished: they trade off along a line."
@@ -96,7 +96,7 @@ def test_data_that_add_little_are_said_to() -> None:
 
 
 @pytest.mark.parametrize("laplace_sd", [0.02, np.nan])
-def test_a_curvature_that_misjudges_is_said_to(laplace_sd: float) -> None:
+def test_a_curvature_that_misleads_is_said_to(laplace_sd: float) -> None:
     assert any(
         "not normal" in each and "mu_t" in each for each in _said(_log_normal(0.0), laplace_sd=laplace_sd)
     )

@@ -109,7 +109,7 @@ def test_channels_are_read_only(tmp_path: Path, signals: Callable[..., Signals],
         channel.values[0] = 1.0
 
 
-def test_a_header_without_unit_is_taken_as_si_and_told(
+def test_a_header_without_unit_is_taken_as_si_and_reported(
     tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Csv
 ) -> None:
     path = tmp_path / "dwell_1.00Hz.csv"
@@ -154,14 +154,14 @@ def test_a_map_wins_over_the_usual_name(
 def test_a_folder_with_one_test_a_file(
     tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Csv
 ) -> None:
-    told: list[float] = []
+    reported: list[float] = []
     for frequency in (1.0, 2.0, 3.0):
         (tmp_path / f"dwell_{frequency}Hz.csv").write_bytes(csv_bytes(signals(frequency)))
     (tmp_path / "notes.md").write_text("not a recording")
-    campaign = load_campaign(tmp_path, progress=told.append)
+    campaign = load_campaign(tmp_path, progress=reported.append)
     assert [r.frequency_hz for r in campaign.recordings] == [1.0, 2.0, 3.0]
-    assert told == sorted(told)
-    assert told[-1] == 1.0
+    assert reported == sorted(reported)
+    assert reported[-1] == 1.0
     (tmp_path / "dwell_3.0Hz.csv").write_bytes(csv_bytes(signals(3.0, 12.0)))
     assert load_campaign(tmp_path).sha256 != campaign.sha256
 
@@ -184,7 +184,7 @@ def test_a_file_much_larger_than_a_block(
         ("dwell_0Hz", "dwell", None), ("dwell_" + 400 * "9" + "Hz", "dwell", None),
     ],
 )  # fmt: skip
-def test_names_tell_kind_and_frequency(name: str, kind: str, frequency: float | None) -> None:
+def test_names_say_kind_and_frequency(name: str, kind: str, frequency: float | None) -> None:
     assert classify_test(name) == (kind, frequency)
 
 

@@ -129,7 +129,7 @@ def test_samples_outside_every_test_are_dropped(
     assert max(np.abs(r.channels["road_height"].values).max() for r in campaign.recordings) < 0.02
 
 
-def test_tests_without_their_events_are_told(
+def test_tests_without_their_events_are_reported(
     tmp_path: Path,
     signals: Callable[..., Any],
     json_messages: Callable[..., Any],
@@ -139,8 +139,8 @@ def test_tests_without_their_events_are_told(
     first, second = json_messages(signals(1.0), "a", 1.0), json_messages(signals(1.0), "b", 1.0, 10.5)
     path = write_mcap(tmp_path / "a.mcap", json_topics, [*first[:-1], *second[1:]])
     campaign = load_campaign(path)
-    told = [(w.code, w.test) for w in campaign.warnings]
-    assert told == [("unpaired_event", "b"), ("unpaired_event", "a"), ("time_jump", "a")]
+    reported = [(w.code, w.test) for w in campaign.warnings]
+    assert reported == [("unpaired_event", "b"), ("unpaired_event", "a"), ("time_jump", "a")]
     assert campaign.recordings[0].duration_s == pytest.approx(20.49)
 
 

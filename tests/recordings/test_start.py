@@ -11,7 +11,7 @@ LOGGED = 1_763_715_600.0
 """When the campaigns of ``json_messages`` begin [s since 1970]."""
 
 
-def test_log_times_of_an_mcap_file_tell_when_each_test_began(
+def test_log_times_of_an_mcap_file_say_when_each_test_began(
     tmp_path: Path, signals: Any, write_mcap: Any, json_messages: Any, json_topics: Any
 ) -> None:
     messages = [
@@ -28,7 +28,7 @@ def test_log_times_of_an_mcap_file_tell_when_each_test_began(
     assert campaign.only(("sprung_accel",)).start == LOGGED
 
 
-def test_log_times_that_count_from_the_recorders_start_tell_nothing(
+def test_log_times_that_count_from_the_recorders_start_say_nothing(
     tmp_path: Path, signals: Any, write_mcap: Any, json_messages: Any, json_topics: Any
 ) -> None:
     messages = json_messages(signals(1.0), "dwell_1.0Hz", 1.0, 5.0 - LOGGED)
@@ -45,7 +45,7 @@ def test_log_times_that_count_from_the_recorders_start_tell_nothing(
         (1e3 * LOGGED, "time [ms]", LOGGED),
     ],
 )
-def test_a_table_tells_it_if_its_time_does(
+def test_a_table_says_it_if_its_time_does(
     tmp_path: Path, signals: Any, csv_bytes: Any, origin: float, header: str, start: float | None
 ) -> None:
     given = signals(1.0)

@@ -55,8 +55,8 @@ def test_the_bode_figure_has_units_every_model_and_every_point(diagnosis: Diagno
             per_road, "deg]", "% of the response]"
         ]  # fmt: skip
         assert figure.axes[2].get_xlabel() == "frequency [Hz]"
-        told = [text.get_text() for text in figure.legends[0].get_texts()]
-        assert told == [
+        reported = [text.get_text() for text in figure.legends[0].get_texts()]
+        assert reported == [
             "before, as given", "recalibrated", "with rail_stribeck", "measured, ± 2 sd", "noise of the measurement"
         ]  # fmt: skip
         magnitude = {line.get_label(): line.get_ydata() for line in figure.axes[0].get_lines()}
@@ -157,9 +157,9 @@ def test_the_map_names_channel_units_and_dwells(diagnosis: Diagnosis) -> None:
     assert below.get_title(loc="left") == "gap [% of the response]"
     assert below.get_xlabel() == "frequency of the dwell [Hz]"
     assert above.get_ylabel() == "harmonic order"
-    told = [text.get_text() for text in below.get_xticklabels()]
-    assert told[0] == "0.5"
-    assert told[-1] == "6"
+    reported = [text.get_text() for text in below.get_xticklabels()]
+    assert reported[0] == "0.5"
+    assert reported[-1] == "6"
     assert [text.get_text() for text in above.get_yticklabels()] == [str(k) for k in range(1, 10)]
 
 

@@ -47,7 +47,7 @@ def page(source: str) -> Reader:
     return Reader(source)
 
 
-def test_the_terminal_tells_the_verdict_first_in_80_columns(by_kind: dict[str, Diagnosis]) -> None:
+def test_the_terminal_says_the_verdict_first_in_80_columns(by_kind: dict[str, Diagnosis]) -> None:
     for kind in KINDS:
         text = rendered(by_kind[kind], width=80)
         joined = " ".join(text.split())
@@ -62,7 +62,7 @@ def test_the_terminal_tells_the_verdict_first_in_80_columns(by_kind: dict[str, D
         )
 
 
-def test_the_terminal_tells_the_numbers(diagnosis: Diagnosis) -> None:
+def test_the_terminal_says_the_numbers(diagnosis: Diagnosis) -> None:
     text = rendered(diagnosis)
     # 1 - (8.71^2 - 0.21^2) / (17.32^2 - 0.21^2) and 1 - (0.47^2 - 0.21^2) / (8.71^2 - 0.21^2).
     assert re.search(r"together +17\.3 % +8\.71 % +0\.47 % +0\.21 % +74\.7 % +99\.8 %", text)
@@ -83,7 +83,7 @@ def test_the_terminal_tells_the_numbers(diagnosis: Diagnosis) -> None:
     assert f"Hypotheses (5 of {len(diagnosis.candidates)})" in text
 
 
-def test_none_and_unknown_are_told_however_unlikely_and_so_is_all_that_has_a_chance(
+def test_none_and_unknown_are_reported_however_unlikely_and_so_is_all_that_has_a_chance(
     diagnosis: Diagnosis,
 ) -> None:
     ordered = sorted(diagnosis.candidates, key=lambda each: bool(each.effects))
@@ -118,7 +118,7 @@ def test_pictures_are_drawings_that_execute_nothing(page: Reader) -> None:
         assert not re.search(r'href="(?!#|data:image/png)', drawing)
 
 
-def test_the_page_tells_numbers_and_origin(page: Reader) -> None:
+def test_the_page_says_numbers_and_origin(page: Reader) -> None:
     text = " ".join(page.texts)
     for part in (
         "98.2 %",
@@ -170,10 +170,10 @@ def test_a_diagnosis_that_did_not_converge_says_so_first_and_hostile_names_stay_
     # Data, sentence, baseline, warning, port, candidate, parameter, cycle, channel, next test, pair, limit, origin.
     assert sum(SHOWN in text for text in page.texts) >= 20
     assert any(SHOWN in (attributes["alt"] or "") for attributes in page.pictures)
-    told = rendered(attacked, width=300)
-    assert told.splitlines()[0] == warning
-    assert "[bold red]\\x1b[2J" in told
-    assert "\x1b" not in told
+    reported = rendered(attacked, width=300)
+    assert reported.splitlines()[0] == warning
+    assert "[bold red]\\x1b[2J" in reported
+    assert "\x1b" not in reported
 
 
 def test_a_diagnosis_with_nothing_beside_its_verdict_has_a_page(diagnosis: Diagnosis) -> None:
@@ -196,7 +196,7 @@ def test_a_diagnosis_with_nothing_beside_its_verdict_has_a_page(diagnosis: Diagn
     assert record_of(bare)["where"]["map"] == []
 
 
-def test_parameters_that_moved_are_told_in_tolerances(diagnosis: Diagnosis) -> None:
+def test_parameters_that_moved_are_reported_in_tolerances(diagnosis: Diagnosis) -> None:
     rows = {row.name: row for row in parameter_table(diagnosis)}
     assert set(rows) == {"c_sd", "k_t", "mu_r", "stribeck_rise", "stribeck_velocity"}
     # (264100 - 275000) / 13750 = -0.79.
@@ -207,7 +207,7 @@ def test_parameters_that_moved_are_told_in_tolerances(diagnosis: Diagnosis) -> N
     assert rows["stribeck_velocity"].unit == "m/s"
 
 
-def test_numbers_are_told_to_the_digits_that_they_justify() -> None:
+def test_numbers_are_reported_to_the_digits_that_they_justify() -> None:
     assert probability_words(1e-9) == "< 0.1 %"
     assert probability_words(0.0) == "0.0 %"
     assert probability_words(1.0) == "100.0 %"

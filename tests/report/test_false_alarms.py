@@ -26,7 +26,7 @@ def test_one_alarm_in_fifty_is_allowed() -> None:
         assert json.loads(json.dumps(record)) == record
 
 
-def test_what_could_not_be_solved_is_told_and_not_counted() -> None:
+def test_what_could_not_be_solved_is_reported_and_not_counted() -> None:
     record = alarms_record(AlarmStudy((*_draws(40, 0), NullDraw(40, None, False, ())), 812.0))
     assert (record["drawn"], record["not_solved"]) == (40, 1)
     text = alarms_text(record)

@@ -82,7 +82,7 @@ def test_pictures_are_drawings_that_execute_nothing(page: Reader) -> None:
         assert not re.search(r'href="(?!#|data:image/png)', drawing)
 
 
-def test_the_page_tells_numbers_sentences_and_origin(posterior: Posterior, page: Reader) -> None:
+def test_the_page_says_numbers_sentences_and_origin(posterior: Posterior, page: Reader) -> None:
     text = " ".join(page.texts)
     damping = posterior.by_name["c_sd"]
     numbers = (f"{damping.median:.0f}", f"{damping.q025:.0f} to {damping.q975:.0f}", "99.5 %")
@@ -106,9 +106,9 @@ def test_a_posterior_that_did_not_converge_says_so_first_and_hostile_names_stay_
         sum(HOSTILE.replace("\x1b", "\\x1b").replace("\u202e", "\\u202e") in text for text in page.texts) >= 5
     )
     assert not any(tag == "script" for tag, _ in page.tags)
-    told = rendered(failed, width=200)
-    assert told.splitlines()[:3] == [page.texts[0], f"- {page.texts[1]}", f"- {page.texts[2]}"]
-    assert "[bold red]\\x1b[2J" in told
+    reported = rendered(failed, width=200)
+    assert reported.splitlines()[:3] == [page.texts[0], f"- {page.texts[1]}", f"- {page.texts[2]}"]
+    assert "[bold red]\\x1b[2J" in reported
 
 
 def test_a_posterior_of_one_parameter_and_one_channel_has_a_page(posterior: Posterior) -> None:
@@ -176,7 +176,7 @@ def test_numbers_that_are_not_known_are_null_in_the_record(posterior: Posterior)
     assert "nan" not in rendered(unknown)
 
 
-def test_the_terminal_tells_the_numbers_in_80_columns(posterior: Posterior) -> None:
+def test_the_terminal_says_the_numbers_in_80_columns(posterior: Posterior) -> None:
     text = rendered(posterior, width=80)
     assert re.search(r"c_sd +5\d{3} ± \d+ +5\d{3} to 5\d{3} N s/m +99\.[45] % +427", text)
     assert "Strongest correlation: mu_t with ydot_Hth, +0.8" in text

@@ -126,7 +126,7 @@ def test_a_dwell_that_was_not_solved_is_not_converged(fit: Fit) -> None:
     assert record["trusted"] is False
 
 
-def test_data_that_cannot_tell_are_converged_but_not_trusted(fit: Fit) -> None:
+def test_data_that_identify_too_little_are_converged_but_not_trusted(fit: Fit) -> None:
     blind = Verdict(False, ("mu_t and ydot_Hth cannot be distinguished.",), (("mu_t", "ydot_Hth"),))
     origin = Origin(warnings=(DataWarning("odd", "something is odd"),))
     record = as_json(fit_record(replace(fit, verdict=blind, origin=origin)))

@@ -245,7 +245,7 @@ def test_a_gap_at_one_end_is_no_change(synthetic: Any, bus: Any) -> None:
         assert "not_steady" not in {warning.code for warning in response.warnings}
 
 
-def test_noise_far_above_standstill_is_told(synthetic: Any, bus: Any) -> None:
+def test_noise_far_above_standstill_is_reported(synthetic: Any, bus: Any) -> None:
     rng = np.random.default_rng(21)
     dwell = synthetic.dwell(rng, bus, 2.2, 6.4, name="dwell_a")
     time = np.arange(2000) / 200.0
@@ -259,7 +259,7 @@ def test_noise_far_above_standstill_is_told(synthetic: Any, bus: Any) -> None:
     assert codes(estimate_response(synthetic.campaign(dwell, calm))) == set()
 
 
-def test_a_wrong_label_is_told_and_the_measured_frequency_used(synthetic: Any, bus: Any) -> None:
+def test_a_wrong_label_is_reported_and_the_measured_frequency_used(synthetic: Any, bus: Any) -> None:
     dwell = replace(synthetic.dwell(np.random.default_rng(22), bus, 2.2, 6.4), frequency_hz=2.5)
     response = estimate_response(synthetic.campaign(dwell))
     assert codes(response) == {"frequency_differs"}

@@ -22,13 +22,13 @@ def test_a_folder_that_is_named_needs_no_home(monkeypatch: pytest.MonkeyPatch, t
     assert cache_folder() == tmp_path / "mine"
 
 
-@pytest.mark.parametrize("told", [None, ""])
-def test_a_user_without_a_home_keeps_nothing(monkeypatch: pytest.MonkeyPatch, told: str | None) -> None:
+@pytest.mark.parametrize("reported", [None, ""])
+def test_a_user_without_a_home_keeps_nothing(monkeypatch: pytest.MonkeyPatch, reported: str | None) -> None:
     monkeypatch.setattr(Path, "home", _homeless)
     for name in ("SAVGS_IDENT_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
         monkeypatch.delenv(name, raising=False)
-        if told is not None:
-            monkeypatch.setenv(name, told)
+        if reported is not None:
+            monkeypatch.setenv(name, reported)
     assert not use_persistent_cache()
 
 

@@ -1,4 +1,4 @@
-"""A fingerprint tells apart whatever shapes a program, and nothing that does not."""
+"""A fingerprint distinguishes whatever shapes a program, and nothing that does not."""
 
 import re
 import shutil

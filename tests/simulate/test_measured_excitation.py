@@ -95,7 +95,7 @@ def test_a_link_that_was_not_recorded_is_rigid(frictionless: QuarterCar) -> None
     assert np.all(np.asarray(inputs.link.velocity) == 0.0)
 
 
-def test_a_link_whose_mean_is_not_told_rests_where_it_is_said_to() -> None:
+def test_a_link_whose_mean_is_not_given_rests_where_it_is_said_to() -> None:
     response = _response()
     valid = response.valid.copy()
     valid[0, 3] = False

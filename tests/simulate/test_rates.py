@@ -77,7 +77,7 @@ def test_they_leave_no_residual(yielding: QuarterCar, values: Values, solve: Sol
     assert np.max(np.abs(np.asarray(left)[:, 2:])) < 1e-9
 
 
-def test_every_state_is_told_how_fast_it_moves(yielding: QuarterCar, values: Values, solve: Solve) -> None:
+def test_every_state_says_how_fast_it_moves(yielding: QuarterCar, values: Values, solve: Solve) -> None:
     instants = draw_instants(31, COUNT)
     rates, _ = solve(values, instants, _states(yielding, instants, 0.1))
     for place, state in enumerate(yielding.states):

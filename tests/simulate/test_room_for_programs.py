@@ -28,7 +28,7 @@ print(before, full, compilation.mapped_regions())
 """
 
 if mapped_regions() == 0:
-    pytest.skip("this system does not tell what is mapped", allow_module_level=True)
+    pytest.skip("this system does not say what is mapped", allow_module_level=True)
 
 
 def _regions(room: int) -> tuple[int, int, int]:
