@@ -55,7 +55,7 @@ SPANS = {
     "learned_strut_carried": 4e3,
     "learned_strut_turn": 0.03,
 }
-COEFFICIENTS = {name: 10.0 * number for number, name in enumerate(coefficients_at(STRUT), 1)}
+COEFFICIENTS = {name: 3.0 * number for number, name in enumerate(coefficients_at(STRUT), 1)}
 LEARNED = diagnosis(
     "unknown", [], ["strut"],
     learned={
