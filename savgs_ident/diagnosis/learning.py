@@ -29,23 +29,10 @@ from savgs_ident.diagnosis.problem import AbstractProblem, term_of
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Family, Port, PortKind
 from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.learned import (
-    coefficients_at,
-    coefficients_of,
-    functions_at,
-    learned_effect,
-    what_gives,
-)
-from savgs_ident.inference.find_map import (
-    LaplaceFit,
-    Search,
-    Start,
-    find_map,
-    find_map_from_both,
-    linearised_optimum,
-    log_evidence,
-    search_of,
-)
+from savgs_ident.effects.learned import learned_effect
+from savgs_ident.effects.learned_functions import coefficients_at, coefficients_of, functions_at, what_gives
+from savgs_ident.inference.find_map import LaplaceFit, Search, Start, find_map, find_map_from_both, search_of
+from savgs_ident.inference.laplace import linearised_optimum, log_evidence
 from savgs_ident.inference.observations import Data, Term
 from savgs_ident.inference.prior import Linear, bounds_of
 

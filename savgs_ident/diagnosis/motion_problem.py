@@ -33,7 +33,7 @@ from savgs_ident.diagnosis.regimes import Cycles, find_regimes
 from savgs_ident.diagnosis.result import DriveForces, ForceLoop, NextTest, Regime
 from savgs_ident.effects.base import Family, Port, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.learned import STRETCHES
+from savgs_ident.effects.learned_functions import STRETCHES
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.plants.base import AbstractPlant, AtPorts

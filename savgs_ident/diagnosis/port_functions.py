@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from savgs_ident.diagnosis.localisation import Law
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.effects.base import Family, Load, Port, PortSignals
-from savgs_ident.effects.learned import (
+from savgs_ident.effects.learned_functions import (
     OF_SLIDERS,
     OF_THE_LOAD,
     OF_THE_MOTION,

@@ -31,7 +31,7 @@ from savgs_ident.diagnosis.result import DriveForces, ForceLoop, NextTest, Regim
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import AbstractFrictionLimitLaw, Port, PortSignals
 from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.learned import SMALLEST
+from savgs_ident.effects.learned_functions import SMALLEST
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.inference.prior import Coordinates, Linear, Logarithmic, sheet_coordinate

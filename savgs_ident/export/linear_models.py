@@ -22,7 +22,8 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import AbstractInputLaw, Family
 from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.learned import LearnedForce, frictions_at
+from savgs_ident.effects.learned import LearnedForce
+from savgs_ident.effects.learned_functions import frictions_at
 from savgs_ident.export.document import JsonValue
 from savgs_ident.export.exported_model import ExportedModel, check_rest
 from savgs_ident.plants.quarter_car.plant import QuarterCar

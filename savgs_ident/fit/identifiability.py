@@ -21,7 +21,7 @@ from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import Verdict, comparable, gaps
-from savgs_ident.inference.find_map import spread_of
+from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import Pins, Problem, Task
 from savgs_ident.plants.base import Excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic

@@ -22,7 +22,7 @@ from savgs_ident.core.values import as_values
 from savgs_ident.fit.identifiability import EXPLAINED, assess, weighed_by_misfit
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import Estimate, Fit, Verdict
-from savgs_ident.inference.find_map import spread_of
+from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import ProblemSettings, Quantity, Task, plan_task
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse

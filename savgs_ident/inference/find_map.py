@@ -1,33 +1,14 @@
-"""The maximum a posteriori of a hypothesis on the true, nonlinear plant, and Laplace's method about it.
+"""The maximum a posteriori of a hypothesis on the true, nonlinear plant.
 
-Laplace's method puts a normal density in place of a posterior. With rows of slope J (m, n) and variance s (m,) in
-coordinates x whose prior is the unit normal, the posterior about its mode has the precision
-
-    P = I + J' diag(1/s) J
-
-and the log evidence of the hypothesis, up to what all hypotheses share, is
-
-    log Z = value - log det(P) / 2 + h log 2
-
-with the log density ``value`` at the mode and h the number of coordinates whose prior is cut in half there. Where no
-unit normal stands beside the rows, priors are rows themselves (:func:`spread_of`), and a direction along which
-nothing changes has no covariance: its standard deviation is :data:`LARGEST_SPREAD`, so that correlations stay
-meaningful.
-
-The best point of a linearised hypothesis (:func:`linearised_optimum`), rows r + J d with a unit-normal prior on x + d
-and bounds on it, depends on the rows' variance, noise scale and discrepancy included, and these on how far the rows
-miss there (:func:`savgs_ident.inference.likelihood.noise_scales`): the two are found in turn.
-
-One search on the nonlinear plant (:func:`find_map`) serves the hypotheses of a diagnosis and the mode and the
-profiles of a posterior. A step goes to the best point of the linearisation, so that a hypothesis that misses weighs
-its rows by what it can explain from the first step on; it is halved until the density rises. At the end stands the
-evidence by Laplace's method.
+One search (:func:`find_map`) serves the hypotheses of a diagnosis and the mode and the profiles of a posterior. A
+step goes to the best point of the linearisation (:func:`savgs_ident.inference.laplace.linearised_optimum`), so that a
+hypothesis that misses weighs its rows by what it can explain from the first step on; it is halved until the density
+rises. At the end stands the evidence by Laplace's method.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import log
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,146 +16,12 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
+from savgs_ident.inference.laplace import linearised_optimum, log_evidence, precision_of
 from savgs_ident.inference.likelihood import NoiseScales, noise_scales
 from savgs_ident.inference.observations import Data, Plant, Prediction, Term
 from savgs_ident.inference.prior import Coordinates, bounds_of, slopes_at, values_at
 
 Array = NDArray[np.float64]
-
-LARGEST_SPREAD = 1e3
-"""Standard deviation of a direction that is not identified [1]: a thousand e-folds of an identified parameter."""
-
-
-def precision_of(slopes: Array, variance: Array) -> Array:
-    """Precision P [1], (n, n), of coordinates with unit-normal priors.
-
-    ``slopes`` (m, n) are those of the rows [unit of the row], ``variance`` (m,) theirs [its square].
-    """
-    return np.asarray(np.eye(slopes.shape[1]) + (slopes.T / variance) @ slopes)
-
-
-def log_determinant(precision: Array) -> float:
-    """log det [1] of a precision matrix (n, n). Raises :class:`numpy.linalg.LinAlgError` if it is none."""
-    return float(2.0 * np.sum(np.log(np.diag(np.linalg.cholesky(precision)))))
-
-
-def log_evidence(value: float, precision: Array, coordinates: Coordinates) -> float:
-    """log Z for the log density ``value`` [1] at the mode, with its ``precision`` [1], (n, n).
-
-    ``coordinates`` are those that may have half a prior; others in the precision, as a law's coefficients, have a
-    whole one.
-    """
-    return value - 0.5 * log_determinant(precision) + log(2.0) * sum(each.halved for each in coordinates)
-
-
-class Spread(NamedTuple):
-    """Covariance (n, n) of unconstrained coordinates [1]."""
-
-    covariance: Array
-
-    @property
-    def sd(self) -> Array:
-        """Standard deviations, (n,)."""
-        return np.sqrt(np.diag(self.covariance))
-
-
-def principal_axes(jacobian: Array, longest: float) -> Array:
-    """Columns along the principal axes of the covariance for rows of unit variance, one sd long each, or shorter.
-
-    ``jacobian`` (m, n) has the priors among its rows; no column is longer than ``longest`` [1]. The shortest comes
-    first. The covariance is ``axes @ axes.T``. A Jacobian that is not finite, of a model that could not be evaluated,
-    says nothing: all columns are the longest.
-    """
-    if not np.all(np.isfinite(jacobian)):
-        return longest * np.eye(jacobian.shape[1])
-    # Fewer rows than coordinates leave directions without any; the thin decomposition would drop them.
-    missing = max(0, jacobian.shape[1] - jacobian.shape[0])
-    _, sizes, axes = np.linalg.svd(np.pad(jacobian, ((0, missing), (0, 0))), full_matrices=False)
-    return np.asarray(axes.T / np.maximum(sizes, 1.0 / longest))
-
-
-def spread_of(jacobian: Array) -> Spread:
-    """The spread for residuals of unit variance with ``jacobian`` (m, n), priors among the rows."""
-    axes = principal_axes(jacobian, LARGEST_SPREAD)
-    return Spread(axes @ axes.T)
-
-
-_LINEAR_ROUNDS = 50
-_PASSES = 60
-
-
-class LinearisedOptimum(NamedTuple):
-    """The best point of a linearised hypothesis.
-
-    Attributes:
-        x: its coordinates [1], (n,).
-        noise_scales: noise scale and discrepancy for the residuals that are predicted there.
-        value: log density of rows and prior, up to what all hypotheses share.
-        precision: precision of the coordinates there [1], (n, n).
-        converged: whether point and scales fit each other.
-    """
-
-    x: Array
-    noise_scales: NoiseScales
-    value: float
-    precision: Array
-    converged: bool
-
-
-def linearised_optimum(
-    data: Data,
-    residual: Array,
-    slopes: Array,
-    x: Array,
-    bounds: tuple[Array, Array],
-    level: float = 1e-3,
-) -> LinearisedOptimum:
-    """The best point for residuals (measured - predicted, m) with slopes (m, n) of the prediction at ``x`` (n,).
-
-    ``data`` are independent rows, in their units; coordinates are in standard deviations. The point for given
-    weights and the scales for a given point in turn, until the density rises by less than ``level``: it rises at
-    every turn.
-    """
-    misfit = noise_scales(data, residual)
-    value, point, converged = -np.inf, x, False
-    for _ in range(_LINEAR_ROUNDS):
-        point, inside = _within(residual, slopes, x, misfit.spread, bounds)
-        misfit = noise_scales(data, residual - slopes @ (point - x), misfit.discrepancy)
-        before, value = value, misfit.value - 0.5 * float(point @ point)
-        if abs(value - before) < level:
-            converged = misfit.converged and inside
-            break
-    return LinearisedOptimum(point, misfit, value, precision_of(slopes, misfit.spread), converged)
-
-
-def _within(
-    residual: Array, slopes: Array, x: Array, spread: Array, bounds: tuple[Array, Array]
-) -> tuple[Array, bool]:
-    """The best point within the bounds for given weights, and whether the search for it ended.
-
-    What would leave the bounds is held there, and let go where the density rises inwards.
-    """
-    weighted = slopes / spread[:, None]
-    precision = np.eye(x.size) + weighted.T @ slopes
-    right = weighted.T @ (residual + slopes @ x)
-    lower, upper = bounds
-    point, free = x.copy(), np.ones(x.size, bool)
-    for _ in range(_PASSES):
-        point[free] = np.linalg.solve(
-            precision[np.ix_(free, free)], right[free] - precision[np.ix_(free, ~free)] @ point[~free]
-        )
-        out = free & ((point < lower) | (point > upper))
-        if out.any():
-            point = np.clip(point, lower, upper)
-            free &= ~out
-            continue
-        rise = right - precision @ point
-        inwards = ~free & np.where(point <= lower, rise > 0.0, rise < 0.0) & (lower < upper)
-        if not inwards.any():
-            return point, True
-        free[np.argmax(np.where(inwards, np.abs(rise), -np.inf))] = True
-    return np.clip(point, lower, upper), False
-
 
 STEPS = 15
 """Most steps to a mode."""

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status, joint_status
-from savgs_ident.inference.find_map import LaplaceFit, find_map, principal_axes, search_of
+from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.inference.laplace import principal_axes
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.inference.near_mode import (
     Anchor,

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from savgs_ident.inference.find_map import linearised_optimum, log_determinant
+from savgs_ident.inference.laplace import linearised_optimum, log_determinant
 from savgs_ident.inference.likelihood import noise_scales
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import Linear, Logarithmic, Scales

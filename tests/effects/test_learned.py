@@ -13,14 +13,8 @@ from jaxtyping import Array
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import Family, Fundamental, InputSignal, Load, PortSignals
 from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.learned import (
-    SLIDER_LAG,
-    LearnedForce,
-    coefficients_at,
-    coefficients_of,
-    frictions_at,
-    functions_at,
-)
+from savgs_ident.effects.learned import SLIDER_LAG, LearnedForce
+from savgs_ident.effects.learned_functions import coefficients_at, coefficients_of, frictions_at, functions_at
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, EFFECTS, LEARNED
 from savgs_ident.plants.quarter_car.ports import FORCE_PORTS
 from savgs_ident.plants.quarter_car.rig_toml import KNOWN_UNITS

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from savgs_ident.effects.learned import coefficients_at
+from savgs_ident.effects.learned_functions import coefficients_at
 from savgs_ident.plants.quarter_car.ports import STRUT
 
 MOUNT_FITTED = {

@@ -14,7 +14,8 @@ from savgs_ident.control.linearisation import linearise, resting
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import PortSignals
 from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.learned import LearnedForce, frictions_at
+from savgs_ident.effects.learned import LearnedForce
+from savgs_ident.effects.learned_functions import frictions_at
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.linear_models import (
     equation_8,

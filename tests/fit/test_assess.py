@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.fit.identifiability import CHANCE, EXPLAINED, assess, weighed_by_misfit
 from savgs_ident.fit.minimise import Minimum
-from savgs_ident.inference.find_map import spread_of
+from savgs_ident.inference.laplace import spread_of
 from savgs_ident.plants.quarter_car.model import FREE
 
 from .bench import TRUTH, Bench, silent

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from savgs_ident.fit.identifiability import LARGEST_SD, confounded_groups, known_combination, verdict_of
-from savgs_ident.inference.find_map import LARGEST_SPREAD, spread_of
+from savgs_ident.inference.laplace import LARGEST_SPREAD, spread_of
 
 NAMES = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
 VALUES = {"mu_r": 0.03, "mu_t": 0.3, "ydot_Hth": 0.06, "c_sd": 5400.0}

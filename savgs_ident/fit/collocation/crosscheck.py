@@ -45,7 +45,7 @@ from savgs_ident.fit.collocation.transcription import (
 )
 from savgs_ident.fit.least_squares import INFORMED
 from savgs_ident.fit.result import Estimate
-from savgs_ident.inference.find_map import Spread, spread_of
+from savgs_ident.inference.laplace import Spread, spread_of
 from savgs_ident.inference.problem import ProblemSettings, Task, plan_task
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model

@@ -36,7 +36,8 @@ from savgs_ident.effects.laws.stop import LowerStop
 from savgs_ident.effects.laws.stribeck import Stribeck
 from savgs_ident.effects.laws.tilt import Tilt
 from savgs_ident.effects.laws.viscous import Viscous
-from savgs_ident.effects.learned import functions_at, learned_effect
+from savgs_ident.effects.learned import learned_effect
+from savgs_ident.effects.learned_functions import functions_at
 from savgs_ident.plants.quarter_car.forces import damper_curve
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.ports import (
