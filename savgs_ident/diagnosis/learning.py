@@ -30,7 +30,13 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Family, Port, PortKind
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned import learned_effect
-from savgs_ident.effects.learned_functions import coefficients_at, coefficients_of, functions_at, what_gives
+from savgs_ident.effects.learned_functions import (
+    coefficients_at,
+    coefficients_of,
+    functions_at,
+    interactions_at,
+    what_gives,
+)
 from savgs_ident.inference.find_map import LaplaceFit, Search, Start, find_map, find_map_from_both, search_of
 from savgs_ident.inference.laplace import linearised_optimum, log_evidence
 from savgs_ident.inference.observations import Data, Term
@@ -244,7 +250,7 @@ def _families(
     for family in dict.fromkeys(each.family for each in functions_at(port)):
         mine = tuple(name for name in coefficients_of(port, family) if name in seen)
         if mine:
-            found[family] = _needed(search, mode, port, mine, constants.function_prior)
+            found[family] = _needed(search, mode, port, mine, constants)
     return found
 
 
@@ -255,17 +261,17 @@ def _spared(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, float]
 
 
 def _needed(
-    search: Search, mode: LaplaceFit, port: Port, family: tuple[str, ...], prior: float
+    search: Search, mode: LaplaceFit, port: Port, family: tuple[str, ...], constants: DecisionConstants
 ) -> _FamilyAlone:
-    """Those of a family's functions without which the law is less probable; one at least.
-
-    ``prior`` is the probability that one of them is needed.
-    """
-    of_all = set(coefficients_at(port))
+    """Those of a family's functions without which the law is less probable; one at least."""
+    of_all, interactions = set(coefficients_at(port)), interactions_at(port)
+    priors = {
+        name: constants.interaction_prior if name in interactions else constants.function_prior
+        for name in family
+    }
 
     def alone(functions: tuple[str, ...], width: float) -> _FamilyAlone:
-        gone = len(family) - len(functions)
-        log_prior = len(functions) * log(prior) + gone * log(1.0 - prior)
+        log_prior = sum(log(each if name in functions else 1.0 - each) for name, each in priors.items())
         return _alone(search, mode, of_all.difference(functions), functions, width, log_prior)
 
     def at_its_width(functions: tuple[str, ...]) -> _FamilyAlone:

@@ -324,6 +324,15 @@ class DecisionConstants:
     Origin: by choice: laws are simple. Halved or doubled: not measured.
     """
 
+    interaction_prior: float = 0.04
+    """The same of a product of displacement and velocity.
+
+    Origin: by choice, the square of ``function_prior``: effects of one signal are more probable than interactions of
+    two (Chipman 1996, Bayesian variable selection with related predictors). No law of the catalogue is such a
+    product, but a force beside another one acts through a lever that changes over the stroke, and looks like one.
+    Halved or doubled: log odds between ports that do nearly the same move by up to 0.7 nat.
+    """
+
     likely_families: int = 2
     """Families of a learned law that are fitted by themselves on the nonlinear plant. Origin: computing time."""
 

@@ -13,10 +13,17 @@ from savgs_ident.effects.base import Family, Port, PortKind
 
 
 class Function(NamedTuple):
-    """A function of a learned law: in words, and the family to which it belongs."""
+    """A function of a learned law.
+
+    Attributes:
+        words: the function in words.
+        family: the family to which it belongs.
+        interaction: whether it is a product of the displacement and the velocity.
+    """
 
     words: str
     family: Family
+    interaction: bool = False
 
 
 SHARP = (0.01, 0.1)
@@ -46,9 +53,9 @@ OF_THE_MOTION = (
     Function("x", Family.STIFFNESS),
     Function("x^2", Family.STIFFNESS),
     Function("x^3", Family.STIFFNESS),
-    Function("x tanh(v/0.01)", Family.FRICTION),
-    Function("x v", Family.DAMPING),
-    Function("x^2 v", Family.DAMPING),
+    Function("x tanh(v/0.01)", Family.FRICTION, interaction=True),
+    Function("x v", Family.DAMPING, interaction=True),
+    Function("x^2 v", Family.DAMPING, interaction=True),
     Function("tanh(v/0.01) exp(-(v/0.05)^2)", Family.FRICTION),
     Function("tanh(v/0.01) exp(-(v/0.2)^2)", Family.FRICTION),
     Function("|v|", Family.DAMPING),
@@ -192,6 +199,12 @@ def coefficients_of(port: Port, family: Family) -> tuple[str, ...]:
     mine = {family, Family.GAIN} if family is Family.DYNAMICS else {family}
     both = zip(coefficients_at(port), functions_at(port), strict=True)
     return tuple(name for name, function in both if function.family in mine)
+
+
+def interactions_at(port: Port) -> tuple[str, ...]:
+    """Names of the coefficients of products of displacement and velocity at a port."""
+    both = zip(coefficients_at(port), functions_at(port), strict=True)
+    return tuple(name for name, function in both if function.interaction)
 
 
 def frictions_at(port: Port) -> tuple[str, ...]:
