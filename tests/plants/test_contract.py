@@ -2,9 +2,11 @@
 
 Periodic motion against transient motion, slopes against finite differences, energy, the translation to CasADi;
 and, for the linear plant, everything against its closed form. A plant that is added is added to ``BENCHES``.
+What is slow, the rig's motions above all, is left to the slow tests.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -28,7 +30,10 @@ from savgs_ident.plants.base import (
     state_sizes,
 )
 from savgs_ident.plants.profiles import ProfileSource, Sine
+from savgs_ident.plants.quarter_car.model import RigModel, load_rig
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass, closed_form
+from savgs_ident.simulate.collocation import node_motion
+from savgs_ident.simulate.excitation import inputs_at
 from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, resolve, simulate_periodic
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 from savgs_ident.simulate.transient import simulate_transient
@@ -89,6 +94,11 @@ def _axis(*effects: str) -> Bench:
     return Bench(plant, parameters + own, (200.0,), (0.7, 2.5))
 
 
+def _quarter_car(*effects: str) -> Bench:
+    model = RigModel(load_rig(), effects)
+    return Bench(model.build(), model.table, (0.01375, 0.0), (2.35, 4.0))
+
+
 BENCHES = {
     "axis": _axis(),
     "axis with dry friction and a stiffening screw": _axis("guide_coulomb", "screw_stiffening"),
@@ -96,17 +106,30 @@ BENCHES = {
     "two_mass with friction, stiffening and a soft mount": _two_mass(
         "suspension_friction", "tyre_stiffening", "mount_compliance"
     ),
+    "quarter_car": _quarter_car(),
+    "quarter_car that sticks on its rail": _quarter_car("rail_coulomb", "tyre_friction"),
 }
 
 
-MOVED = [
-    pytest.param(bench, id=name, marks=() if bench.plant.effects else pytest.mark.slow)
-    for name, bench in BENCHES.items()
-]
-"""Where motions are solved, plants without effects are left to the slow tests: the others have all their terms."""
+def _benches(*slow: str) -> list[Any]:
+    """All of them, those with names among ``slow`` left to the slow tests."""
+    return [
+        pytest.param(bench, id=name, marks=pytest.mark.slow if name in slow else ())
+        for name, bench in BENCHES.items()
+    ]
 
 
-@pytest.fixture(scope="module", params=BENCHES.values(), ids=BENCHES)
+BARE = tuple(name for name, bench in BENCHES.items() if not bench.plant.effects)
+RIG = tuple(name for name in BENCHES if name.startswith("quarter_car"))
+AT_INSTANTS = _benches("quarter_car")
+"""Where equations are compared, the rig without friction is slow: the other one has all its terms."""
+AT_REST = _benches(*RIG)
+"""Where a state of rest is solved for, the rig is slow."""
+MOVED = _benches(*BARE, *RIG)
+"""Where motions are solved, plants without effects and the rig are slow."""
+
+
+@pytest.fixture(scope="module", params=AT_INSTANTS)
 def bench(request: pytest.FixtureRequest) -> Bench:
     found: Bench = request.param
     return found
@@ -149,6 +172,7 @@ def test_it_declares_what_it_takes_and_gives(bench: Bench) -> None:
     assert len(state_sizes(plant)) == 2 * n + len(plant.states)
 
 
+@pytest.mark.parametrize("bench", AT_REST, indirect=True)
 def test_at_rest_nothing_is_out_of_balance(bench: Bench) -> None:
     plant, p = bench.plant, bench.p
     u = nominal_inputs(plant, p)
@@ -217,6 +241,28 @@ def test_periodic_and_transient_motions_agree(bench: Bench) -> None:
     for channel, reading in enumerate(found.readings):
         seen = np.fft.rfft(np.asarray(reading)[1:])[1:4] * 2.0 / 256.0
         assert np.max(np.abs(seen - wanted[channel, 1:])) < 5e-3 * abs(wanted[channel, 1])
+
+
+@pytest.mark.parametrize("bench", MOVED, indirect=True)
+def test_no_force_at_a_port_brings_energy_over_a_period(bench: Bench) -> None:
+    """Neither those of effects nor the plant's own: what they take is what the inputs bring."""
+    plant, p, solution = bench.plant, bench.p, bench.solution()
+    ports = [each for each in plant.ports if each.kind is PortKind.FORCE]
+    inputs = inputs_at(plant, solution.excitation, solution.mesh)
+
+    @jax.jit
+    @jax.vmap
+    def powers(u: Any, *parts: Array) -> Array:
+        motion, s, sd = node_motion(plant, parts)
+        at = plant.at_ports(p, motion, s, sd, u)
+        each = [port.sense * at.forces[port.name] * at.signals[port.name].velocity for port in ports]
+        return jnp.stack(each)
+
+    along = np.asarray(powers(inputs, *solution.trajectory.x, *solution.trajectory.y))
+    weighted = along * np.asarray(solution.mesh.weight)[:, None]
+    brought = np.add.reduceat(weighted, solution.mesh.layout.starts, axis=0)
+    assert np.max(brought) < 1e-4 * np.max(np.abs(along))
+    assert np.all(np.min(brought, axis=1) < -1e-3 * np.max(np.abs(along))) or not plant.effects
 
 
 def test_its_equations_are_the_same_in_casadi(bench: Bench) -> None:
