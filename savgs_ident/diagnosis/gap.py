@@ -335,7 +335,7 @@ def first_harmonic(
     motion is not found. Slow motions take the places of slow dwells, which have the nodes for it: no program is
     compiled anew.
     """
-    dwells, amplitude = problem.excitation, float(np.median(sweep.road_amplitude))
+    dwells, amplitude = problem.excitation, float(np.median(sweep.input_amplitude))
     place = np.argsort(np.argsort(np.asarray(dwells.frequency)))
     first, *others = (each.name for each in problem.plant.inputs)
     swept = {name: np.zeros(each.shape, complex) for name, each in dwells.harmonics.items()}

@@ -1,8 +1,8 @@
 """One dwell: frequency, harmonics and noise of every channel.
 
-The fit starts at the road's own frequency; every channel then estimates the drift of its phase against it, and the
-estimates are pooled by their variances. A channel is fitted with all orders that its sampling carries, not only
-those asked for: truncated orders would otherwise bias the orders kept, or be counted as noise.
+The fit starts at the frequency of the driven input; every channel then estimates the drift of its phase against it,
+and the estimates are pooled by their variances. A channel is fitted with all orders that its sampling carries, not
+only those asked for: truncated orders would otherwise bias the orders kept, or be counted as noise.
 
 The noise is what does not repeat from period to period. A periodic signal has power at the multiples of its
 fundamental f and nowhere else; a record of P periods also resolves the P - 1 frequencies between two neighbouring
@@ -208,13 +208,13 @@ class DwellFit:
     channels: Mapping[str, ChannelFit]
 
 
-def fit_dwell(groups: tuple[ClockGroup, ...], road: str, start: float, orders: int) -> DwellFit:
+def fit_dwell(groups: tuple[ClockGroup, ...], driven: str, start: float, orders: int) -> DwellFit:
     """Fit all channels of a dwell whose frequency is near ``start`` [Hz], up to ``orders``.
 
     Raises :class:`numpy.linalg.LinAlgError` when the stamps do not determine the harmonics.
     """
-    lead = next(group for group in groups if road in group.names)
-    frequency = refine_frequency(lead, lead.names.index(road), start)
+    lead = next(group for group in groups if driven in group.names)
+    frequency = refine_frequency(lead, lead.names.index(driven), start)
     for _ in range(_MOST_REFITS):
         channels = {
             name: fit for group in groups for name, fit in _fit_group(group, frequency, orders).items()

@@ -5,8 +5,8 @@
 
 Every dwell is fitted on its actual stamps, channel by channel as far as the sampling carries, spikes and dropouts
 left out; the noise is what does not repeat from period to period; then the time origin is moved to the instant,
-within half a period of mid-record, at which the road's fundamental is real and positive. The checks of a dwell and of
-its fit follow at the end; their findings are warnings of the response.
+within half a period of mid-record, at which the fundamental of the driven input is real and positive. The checks of a
+dwell and of its fit follow at the end; their findings are warnings of the response.
 """
 
 from collections.abc import Mapping
@@ -33,23 +33,25 @@ _STEADY_SIGMAS = 5.0
 _STEADY_ORDERS = 3
 _NOISE_FACTOR = 1.5
 _CLOCK_SIGMAS = 5.0
+_NO_MOTION = {"road_height": "no_road_motion"}
+"""Codes of warnings are contract: that of the road is older than tests of other inputs."""
 
 
 def estimate_response(campaign: Campaign, orders: int = 15, driven: str = "") -> HarmonicResponse:
     """Complex harmonics, covariance and peak-to-peak of all dwells of ``campaign``, sorted by frequency.
 
-    ``driven`` is the input that moves in them, that of the campaign's layout if empty; it is called the road below.
+    ``driven`` is the input that moves in them, that of the campaign's layout if empty.
 
     ``orders`` is the highest order kept; a channel sampled at r Hz is valid up to 0.4 r / f. The covariance
-    holds the noise of the channel and the phase noise of the road, which sets the time origin (a part common
-    to all entries of a dwell; it is left out for the road's fundamental itself). The mean (order 0) has
+    holds the noise of the channel and the phase noise of the driven input, which sets the time origin (a part common
+    to all entries of a dwell; it is left out for the fundamental of that input itself). The mean (order 0) has
     no imaginary part, and variance 0 for it. A constant offset between the clocks of two channels cannot be
     seen in periodic data: stamps are taken as true up to their rate, which is checked.
 
-    Dwells that cannot be used are left out with a warning: ``no_road_motion``, ``too_few_periods`` (3 are
-    needed to separate noise from signal), ``not_determined``. Further warnings: ``outlying_samples``,
-    ``unreliable_sensor``, ``frequency_differs``, ``not_steady``, ``clock_rate_differs``, ``noise_above_standstill``,
-    ``folded_orders``.
+    Dwells that cannot be used are left out with a warning: ``no_road_motion`` (``no_input_motion`` where another
+    input is driven), ``too_few_periods`` (3 are needed to separate noise from signal), ``not_determined``. Further
+    warnings: ``outlying_samples``, ``unreliable_sensor``, ``frequency_differs``, ``not_steady``,
+    ``clock_rate_differs``, ``noise_above_standstill``, ``folded_orders``.
 
     Raises :class:`InputError` when ``orders`` is below 1 or no dwell can be used.
     """
@@ -97,9 +99,9 @@ def _fit_all(
 
 
 def _middle(recording: Recording, driven: str) -> float:
-    """Middle of the road's record [s], 0 where there is none."""
-    road = recording.channels.get(driven)
-    return 0.0 if road is None or road.time.size == 0 else 0.5 * float(road.time[0] + road.time[-1])
+    """Middle of the record of the driven input [s], 0 where there is none."""
+    lead = recording.channels.get(driven)
+    return 0.0 if lead is None or lead.time.size == 0 else 0.5 * float(lead.time[0] + lead.time[-1])
 
 
 def _start_frequency(
@@ -111,14 +113,13 @@ def _start_frequency(
         return 0.0, DataWarning(code, what, source, recording.name, driven, None, remedy)
 
     lead = next((group for group in groups if driven in group.names), None)
+    still = _NO_MOTION.get(driven, "no_input_motion")
     if lead is None:
-        return refuse(
-            "no_road_motion", "no road height recorded", "map the road channel, or leave this test out"
-        )
-    road = lead.values[lead.names.index(driven)]
-    if np.ptp(road) == 0.0:
-        return refuse("no_road_motion", "the road does not move", "name this test a standstill")
-    frequency = coarse_frequency(lead.time, road)
+        return refuse(still, f"{driven} was not recorded", "map its channel, or leave this test out")
+    moved = lead.values[lead.names.index(driven)]
+    if np.ptp(moved) == 0.0:
+        return refuse(still, f"{driven} does not move", "name this test a standstill")
+    frequency = coarse_frequency(lead.time, moved)
     periods = min(group.span_s for group in groups) * frequency
     if periods < FEWEST_PERIODS - 0.3:
         return refuse(
@@ -129,7 +130,7 @@ def _start_frequency(
     if highest_valid_order(lead, frequency, 1) < 1:
         return refuse(
             "too_few_samples",
-            f"the road is sampled at {lead.rate_hz:.3g} Hz, too slow for {frequency:.3g} Hz",
+            f"{driven} is sampled at {lead.rate_hz:.3g} Hz, too slow for {frequency:.3g} Hz",
             f"sample it at {3 * frequency:.3g} Hz or faster",
         )
     return frequency, None
@@ -169,10 +170,10 @@ def _assemble(
     dof = np.zeros(shape)
     noise_sd, peak, peak_sd = (np.zeros(shape[:2]) for _ in range(3))
     for d, test in enumerate(tests):
-        road = fits[test].channels[driven]
+        lead = fits[test].channels[driven]
         for name, fit in fits[test].channels.items():
             c, upto = channels.index(name), slice(0, fit.amplitude.size)
-            harmonics[d, c, upto], covariance[d, c, upto] = _at_road_origin(fit, road)
+            harmonics[d, c, upto], covariance[d, c, upto] = _at_origin_of(lead, fit)
             valid[d, c, upto] = True
             dof[d, c, upto] = fit.dof
             noise_sd[d, c] = fit.noise_sd
@@ -204,17 +205,17 @@ def _recorded(campaign: Campaign, tests: tuple[str, ...]) -> NDArray[np.float64]
     return np.array([when[test] for test in tests])
 
 
-def _at_road_origin(fit: ChannelFit, road: ChannelFit) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
-    """Harmonics and covariance of (Re, Im) with the origin where the road's fundamental is real and positive.
+def _at_origin_of(lead: ChannelFit, fit: ChannelFit) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+    """Harmonics and covariance of (Re, Im) of ``fit``, the origin where the fundamental of ``lead`` is positive.
 
-    An error dphi of the road's phase turns X_k by -k dphi, which adds k^2 |X_k|^2 var(dphi) across it.
+    An error dphi of its phase turns X_k by -k dphi, which adds k^2 |X_k|^2 var(dphi) across it.
     """
     order = np.arange(fit.amplitude.size)
-    turn = np.exp(-1j * order * np.angle(road.amplitude[1]))
+    turn = np.exp(-1j * order * np.angle(lead.amplitude[1]))
     harmonics = fit.amplitude * turn
-    across = order**2 * _phase_variance(road)
-    if fit is road:
-        harmonics[1] = abs(road.amplitude[1])
+    across = order**2 * _phase_variance(lead)
+    if fit is lead:
+        harmonics[1] = abs(lead.amplitude[1])
         across[1] = 0.0
     spread = fit.variance + across * np.abs(harmonics) ** 2
     skew = fit.pseudo_variance * turn**2 - across * harmonics**2
@@ -225,22 +226,22 @@ def _at_road_origin(fit: ChannelFit, road: ChannelFit) -> tuple[NDArray[np.compl
     return harmonics, covariance
 
 
-def _phase_variance(road: ChannelFit) -> float:
-    """Variance of the phase of the road's fundamental [rad^2]."""
-    turn = np.exp(-1j * np.angle(road.amplitude[1]))
-    spread = 0.5 * (road.variance[1] - (road.pseudo_variance[1] * turn**2).real)
-    return float(spread / abs(road.amplitude[1]) ** 2)
+def _phase_variance(fit: ChannelFit) -> float:
+    """Variance of the phase of the fundamental [rad^2]."""
+    turn = np.exp(-1j * np.angle(fit.amplitude[1]))
+    spread = 0.5 * (fit.variance[1] - (fit.pseudo_variance[1] * turn**2).real)
+    return float(spread / abs(fit.amplitude[1]) ** 2)
 
 
 def check_frequency(
     source: str, recording: Recording, measured: float, driven: str
 ) -> tuple[DataWarning, ...]:
-    """A warning where the road moves at another frequency [Hz] than the test's name or label gives."""
+    """A warning where the driven input moves at another frequency [Hz] than the test's name or label gives."""
     nominal = recording.frequency_hz
     if nominal is None or abs(measured - nominal) <= _FREQUENCY_MISS * nominal:
         return ()
-    what = f"the road moves at {measured:.4g} Hz, {nominal:.4g} Hz was asked for; the measured one is used"
-    remedy = "check the test's label or the cam drive"
+    what = f"{driven} moves at {measured:.4g} Hz, {nominal:.4g} Hz was asked for; the measured one is used"
+    remedy = f"check the test's label and what drives {driven}"
     return (DataWarning("frequency_differs", what, source, recording.name, driven, None, remedy),)
 
 
@@ -265,7 +266,7 @@ def check_steady(
             deviation = np.sqrt(8.0 * channel.density[1] / samples)
             if change > max(_STEADY_SHARE * size, _STEADY_SIGMAS * deviation):
                 what = f"not steady: the fundamental changes by {100 * change / size:.2g} % within the dwell"
-                remedy = "let the rig settle longer before recording, or leave this dwell out"
+                remedy = "begin to record later, when the transient has died away, or leave this dwell out"
                 found.append(DataWarning("not_steady", what, source, test, name, None, remedy))
     return tuple(found)
 
@@ -344,21 +345,21 @@ def estimate_clock_rates(fits: Mapping[str, DwellFit]) -> dict[str, tuple[float,
 
 
 def check_clocks(
-    source: str, fits: Mapping[str, DwellFit], road: str
+    source: str, fits: Mapping[str, DwellFit], driven: str
 ) -> tuple[dict[str, float], tuple[DataWarning, ...]]:
-    """Factors [1] by which to stretch the time of channels whose clock differs from the road's, with warnings."""
+    """Factors [1] to stretch the time of channels by whose clock differs from that of ``driven``, with warnings."""
     rates = estimate_clock_rates(fits)
     stretch: dict[str, float] = {}
     found = []
-    lead, lead_sd = rates[road]
+    lead, lead_sd = rates[driven]
     for name, (rate, deviation) in rates.items():
         apart = rate - lead
-        if name == road or abs(apart) <= _CLOCK_SIGMAS * np.hypot(deviation, lead_sd):
+        if name == driven or abs(apart) <= _CLOCK_SIGMAS * np.hypot(deviation, lead_sd):
             continue
         stretch[name] = 1.0 + apart
         what = (
             f"the clock runs {1e6 * abs(apart):.3g} ppm (+- {1e6 * deviation:.2g})"
-            f" {'slower' if apart > 0 else 'faster'} than the road's; its time was scaled, about mid-dwell"
+            f" {'slower' if apart > 0 else 'faster'} than that of {driven}; its time was scaled, about mid-dwell"
         )
         found.append(
             DataWarning("clock_rate_differs", what, source, "", name, None, "synchronise the loggers' clocks")

@@ -140,7 +140,7 @@ def highest_valid_order(group: ClockGroup, frequency: float, orders: int) -> int
     return min(resolved, orders) if resolved >= 1 else -1
 
 
-_ROAD_ORDERS = 5
+_INPUT_ORDERS = 5
 _MOST_STEPS = 12
 _PADDING = 8
 _CONVERGED = 1e-8
@@ -164,7 +164,7 @@ def refine_frequency(group: ClockGroup, channel: int, start: float) -> float:
     frequency = start
     values = group.values[channel : channel + 1]
     for _ in range(_MOST_STEPS):
-        highest = min(_ROAD_ORDERS, highest_fitted_order(group, frequency))
+        highest = min(_INPUT_ORDERS, highest_fitted_order(group, frequency))
         if highest < 1:
             return frequency
         basis = plan_basis(group.time, frequency, highest)

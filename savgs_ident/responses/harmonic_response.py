@@ -4,7 +4,7 @@ Convention: a channel x(t) of a dwell with fundamental f is
 
     x(t) = X_0 + Re sum_{k=1..n} X_k exp(2 pi i k f t),
 
-with the time origin of every dwell moved so that the fundamental of the road height is real and positive.
+with the time origin of every dwell moved so that the fundamental of the driven input is real and positive.
 
 :func:`peak_to_peak` evaluates a waveform from its harmonics. Measured and predicted responses use the same
 function with the same orders, so that a steep flank, which needs many orders, is truncated alike on both sides.
@@ -80,14 +80,14 @@ class SweepResponse:
 
     Attributes:
         test: name of the test.
-        channels: names of the channels, length C, without the road itself.
+        channels: names of the channels, length C, without the driven input itself.
         time: middle of each window on the recording's own clock [s], (W,).
-        frequency: instantaneous frequency of the road there [Hz], (W,).
+        frequency: instantaneous frequency of the driven input there [Hz], (W,).
         frequency_sd: its standard deviation [Hz], (W,).
         sweep_rate: its rate of change [Hz/s], (W,).
         window_s: duration of each window [s], (W,).
-        road_amplitude: of the road's first harmonic [m], (W,).
-        response: complex first harmonic of the channel over that of the road [unit/m], (W, C).
+        input_amplitude: of the first harmonic of the driven input [its unit], (W,).
+        response: complex first harmonic of the channel over that of the driven input [unit per its unit], (W, C).
         response_sd: standard deviation of its real part, equal to that of its imaginary part, (W, C).
         valid: which entries the sampling of the channel supports, (W, C); the others are 0.
         warnings: findings of the checks.
@@ -100,7 +100,7 @@ class SweepResponse:
     frequency_sd: NDArray[np.float64]
     sweep_rate: NDArray[np.float64]
     window_s: NDArray[np.float64]
-    road_amplitude: NDArray[np.float64]
+    input_amplitude: NDArray[np.float64]
     response: NDArray[np.complex128]
     response_sd: NDArray[np.float64]
     valid: NDArray[np.bool_]

@@ -252,17 +252,17 @@ class RobustDwell:
     outliers: Outliers
 
 
-def fit_robust_dwell(groups: tuple[ClockGroup, ...], road: str, start: float, orders: int) -> RobustDwell:
+def fit_robust_dwell(groups: tuple[ClockGroup, ...], driven: str, start: float, orders: int) -> RobustDwell:
     """Fit all channels of a dwell near ``start`` [Hz] up to ``orders``, outliers left out.
 
     Raises :class:`numpy.linalg.LinAlgError` when the stamps do not determine the harmonics.
     """
-    fit = fit_dwell(groups, road, start, orders)
+    fit = fit_dwell(groups, driven, start, orders)
     outliers = _first_outliers(groups, fit)
     for _ in range(_MOST_REFITS):
         if not outliers:
             break
-        fit = fit_dwell(_without(groups, outliers), road, start, orders)
+        fit = fit_dwell(_without(groups, outliers), driven, start, orders)
         before, outliers = outliers, _further_outliers(groups, fit, outliers)
         if _same(before, outliers):
             break

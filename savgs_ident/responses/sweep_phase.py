@@ -1,6 +1,6 @@
-"""The phase of the road along a sweep.
+"""The phase of the driven input along a sweep.
 
-The road's zero crossings, taken with hysteresis, give its phase to a few degrees; within a window of a few cycles
+Its zero crossings, taken with hysteresis, give the phase to a few degrees; within a window of a few cycles
 the phase is refined by least squares on
 
     z(t) = Re[A exp(i (w s + b s^2 / 2))] + offset + slope s,      s = t - t_window.
@@ -21,9 +21,9 @@ _MOST_PHASE_STEPS = 8
 
 @dataclass(frozen=True)
 class LocalPhase:
-    """Phase of the road about ``middle`` [s]: w [rad/s], b [rad/s^2], complex amplitude A [m], sd of w.
+    """Phase of the input about ``middle`` [s]: w [rad/s], b [rad/s^2], complex amplitude A [its unit], sd of w.
 
-    ``miss`` is the rms of what the fit leaves of the road [m].
+    ``miss`` is the rms of what the fit leaves of it [its unit].
     """
 
     middle: float
@@ -40,10 +40,10 @@ class LocalPhase:
 
 
 @dataclass(frozen=True)
-class RoadPhase:
-    """Local phases of the road, the first and last instants of their ``windows`` [s], (W, 2), and its ``crossings``.
+class InputPhase:
+    """Local phases of the driven input, the first and last instants of their ``windows`` [s], (W, 2).
 
-    These are the times [s], (k,), at which it passes mid stroke.
+    ``crossings`` are the times [s], (k,), at which it passes mid stroke.
     """
 
     local: tuple[LocalPhase, ...]
@@ -55,41 +55,42 @@ class RoadPhase:
         phase: NDArray[np.float64] = phase_at_crossings(self.crossings)(time) / (2.0 * np.pi)
         return phase
 
-    def only(self, kept: NDArray[np.bool_]) -> "RoadPhase":
+    def only(self, kept: NDArray[np.bool_]) -> "InputPhase":
         """The windows that are ``kept``, (W,)."""
         local = tuple(phase for phase, keep in zip(self.local, kept, strict=True) if keep)
-        return RoadPhase(local, self.windows[kept], self.crossings)
+        return InputPhase(local, self.windows[kept], self.crossings)
 
 
-def follow_road(test: str, road: RecordedChannel, cycles: float, overlap: float, source: str) -> RoadPhase:
+def follow_input(test: str, lead: RecordedChannel, cycles: float, overlap: float, source: str) -> InputPhase:
     """Local phases in windows of ``cycles`` cycles, of which neighbours share ``overlap``.
 
-    Raises :class:`InputError` when the road moves too few cycles, or when its samples do not determine its phase.
+    ``lead`` is the driven channel. Raises :class:`InputError` when it moves too few cycles, or when its samples do
+    not determine its phase.
     """
-    times = crossing_times(road.time, road.values)
+    times = crossing_times(lead.time, lead.values)
     if times.size < 2.0 * (cycles + 1.0):
         raise InputError(
-            f"the road moves {max(times.size - 1, 0) / 2:g} cycles, {cycles + 1:g} are needed",
+            f"{lead.name} moves {max(times.size - 1, 0) / 2:g} cycles, {cycles + 1:g} are needed",
             source=source,
             test=test,
-            channel=road.name,
+            channel=lead.name,
             remedy="use shorter windows or a longer sweep",
         )
     try:
-        return _local_phases(road, times, cycles, overlap)
+        return _local_phases(lead, times, cycles, overlap)
     except (np.linalg.LinAlgError, ValueError) as error:
         raise InputError(
-            "its samples do not determine the phase of the road",
+            f"its samples do not determine the phase of {lead.name}",
             source=source,
             test=test,
-            channel=road.name,
+            channel=lead.name,
             remedy="sample faster, and check the sensor's cable and the logger",
         ) from error
 
 
 def _local_phases(
-    road: RecordedChannel, times: NDArray[np.float64], cycles: float, overlap: float
-) -> RoadPhase:
+    lead: RecordedChannel, times: NDArray[np.float64], cycles: float, overlap: float
+) -> InputPhase:
     """Raises :class:`ValueError` for crossings that do not follow one another."""
     phase_over_time = phase_at_crossings(times)
     total = np.pi * (times.size - 1)
@@ -99,21 +100,21 @@ def _local_phases(
     edges = np.stack([np.interp(middles + side * half, marks, times) for side in (-1.0, 0.0, 1.0)], axis=1)
     phases = []
     for start, middle, end in edges:
-        inside = (road.time >= start) & (road.time <= end)
+        inside = (lead.time >= start) & (lead.time <= end)
         nodes = np.linspace(start, end, 4 * int(cycles) + 1)
         bend, speed, _ = np.polyfit(nodes - middle, phase_over_time(nodes), 2)
-        phases.append(refine_phase(road.time[inside], road.values[inside], middle, speed, 2.0 * bend))
-    return RoadPhase(tuple(phases), edges[:, [0, 2]], times)
+        phases.append(refine_phase(lead.time[inside], lead.values[inside], middle, speed, 2.0 * bend))
+    return InputPhase(tuple(phases), edges[:, [0, 2]], times)
 
 
-def crossing_times(time: NDArray[np.float64], road: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Times [s], (k,), at which the road (n,) passes mid stroke, up and down in turn.
+def crossing_times(time: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Times [s], (k,), at which ``values`` (n,) of any unit pass mid stroke, up and down in turn.
 
     A passage runs from one threshold, 30 % of the amplitude off the middle, to the opposite one; its time is
     that of a straight line through the samples in between, so that noise near zero does not multiply it.
     """
-    middle = 0.5 * (np.max(road) + np.min(road))
-    height = road - middle
+    middle = 0.5 * (np.max(values) + np.min(values))
+    height = values - middle
     level = _CROSSING_THRESHOLD * float(np.max(np.abs(height)))
     side = np.where(height > level, 1, np.where(height < -level, -1, 0))
     outside = np.flatnonzero(side)
@@ -132,30 +133,30 @@ def phase_at_crossings(times: NDArray[np.float64]) -> PchipInterpolator:
 
 
 def refine_phase(
-    time: NDArray[np.float64], road: NDArray[np.float64], middle: float, speed: float, acceleration: float
+    time: NDArray[np.float64], values: NDArray[np.float64], middle: float, speed: float, acceleration: float
 ) -> LocalPhase:
-    """Least-squares phase of ``road`` (N,) [m] about ``middle``, from a guess of w and b (Gauss-Newton)."""
+    """Least-squares phase of ``values`` (N,) of any unit about ``middle``, from a guess of w and b (Gauss-Newton)."""
     since = time - middle
-    reach = float(np.max(np.abs(since)))
-    unit = since / reach
+    half = float(np.max(np.abs(since)))
+    unit = since / half
     for _ in range(_MOST_PHASE_STEPS):
         phase = speed * since + 0.5 * acceleration * since**2
         cosine, sine = np.cos(phase), np.sin(phase)
         waves = np.column_stack([cosine, sine, np.ones_like(unit), unit])
-        weights = np.linalg.solve(normal_products(waves), np.sum(waves * road[:, None], axis=0))
+        weights = np.linalg.solve(normal_products(waves), np.sum(waves * values[:, None], axis=0))
         along = weights[1] * cosine - weights[0] * sine
         columns = np.column_stack([waves, along * unit, along * unit**2])
-        left = road - np.sum(waves * weights, axis=1)
+        left = values - np.sum(waves * weights, axis=1)
         inverse = np.linalg.inv(normal_products(columns))
         step = inverse @ np.sum(columns * left[:, None], axis=0)
-        speed += step[4] / reach
-        acceleration += 2.0 * step[5] / reach**2
+        speed += step[4] / half
+        acceleration += 2.0 * step[5] / half**2
         if abs(step[4]) + abs(step[5]) < 1e-9:
             break
     remainder = left - np.sum(columns * step, axis=1)
     variance = float(np.sum(remainder**2)) / max(time.size - 6, 1)
     amplitude = complex(weights[0], -weights[1])
-    speed_sd = float(np.sqrt(inverse[4, 4] * variance)) / reach
+    speed_sd = float(np.sqrt(inverse[4, 4] * variance)) / half
     miss = float(np.sqrt(np.mean(remainder**2)))
     return LocalPhase(middle, float(speed), float(acceleration), amplitude, speed_sd, miss)
 

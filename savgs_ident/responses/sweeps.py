@@ -1,17 +1,17 @@
-"""Sweeps to a response: the local first harmonic relative to the road, at the road's instantaneous phase.
+"""Sweeps to a response: the local first harmonic relative to the driven input, at its instantaneous phase.
 
-The phase comes from the road's crossings of mid stroke, refined within windows of a few cycles (:mod:`sweep_phase`).
+The phase comes from the crossings of mid stroke, refined within windows of a few cycles (:mod:`sweep_phase`).
 Within the same windows every channel is fitted by
 
     y(t) = sum_{h=1..m} Re[(Y_h + Y'_h s) exp(i h theta(s))] + offset + drift s,
 
-theta being the road's phase and s the time since the middle of the window; the response is Y_1 over the amplitude of
-the road there.
+theta being the phase of the driven input and s the time since the middle of the window; the response is Y_1 over its
+amplitude there.
 
 Spikes and dropouts (:mod:`outliers`) are found in the residual of a channel's local fits and left out of others. The
 steps of a friction, which have more orders than the fits, are found again at the same phase of the periods nearby.
 Outliers of the driven channel come first, because they move the phase that all fits follow. Median filters make first
-guesses of the phase, the one that fits the filtered road best is taken, then outliers and phase are found in turn
+guesses of the phase, the one that fits the filtered input best is taken, then outliers and phase are found in turn
 until the same samples stand out. The phase that is used is that of the recorded samples without the outliers; a sweep
 in which no sample stands out keeps its plain response, number for number.
 """
@@ -28,23 +28,24 @@ from savgs_ident.recordings.recording import RecordedChannel, Recording
 from savgs_ident.responses.dwell_fit import smallest_density
 from savgs_ident.responses.harmonic_response import SweepResponse
 from savgs_ident.responses.outliers import WaveformSamples, can_leave_out, check_outliers, find_outliers
-from savgs_ident.responses.sweep_phase import LocalPhase, RoadPhase, follow_road, normal_products
+from savgs_ident.responses.sweep_phase import InputPhase, LocalPhase, follow_input, normal_products
 
 _MISS, _TYPICAL_MISSES, _LARGEST_MISS = 0.05, 5.0, 0.35
-"""What the fit may leave of the road in a window, rms over amplitude: so much more than so many times the median over
-the windows, and at most half of what it leaves where it explains nothing."""
+"""What the fit may leave of the driven input in a window, rms over amplitude: so much more than so many times the
+median over the windows, and at most half of what it leaves where it explains nothing."""
 _MOST_LOST = 0.5
-"""Share of the windows in which the road may not be followed."""
+"""Share of the windows in which the driven input may not be followed."""
+_NOT_FOLLOWED = {"road_height": "road_not_followed"}
+"""Codes of warnings are contract: that of the road is older than sweeps of other inputs."""
 
 
 def estimate_sweep_response(
     recording: Recording, driven: str, cycles: float = 4.0, overlap: float = 0.5, source: str = ""
 ) -> SweepResponse:
-    """First harmonic of each channel per unit of the input ``driven``, called the road below, along one sweep.
+    """First harmonic of each channel per unit of the input ``driven`` along one sweep.
 
-    ``cycles`` is the length of a window in cycles of the road, ``overlap`` the share that neighbours have in
-    common (their errors are correlated accordingly). The road's amplitude is taken as constant within a
-    window, as a cam makes it.
+    ``cycles`` is the length of a window in cycles of that input, ``overlap`` the share that neighbours have in
+    common (their errors are correlated accordingly). Its amplitude is taken as constant within a window.
 
     The standard deviation comes from the residual between the harmonics (orders 1/2, 3/2, 5/2), averaged over
     three windows to either side: about 20 degrees of freedom. It does not contain two biases. First, the
@@ -55,20 +56,21 @@ def estimate_sweep_response(
     through this same function: both biases then cancel.
 
     Spikes and dropouts are left out with the warning ``outlying_samples`` or ``unreliable_sensor``, windows in
-    which the road does not oscillate with ``road_not_followed``.
+    which the driven input does not oscillate with ``road_not_followed`` (``input_not_followed`` where it is no road).
 
-    Raises :class:`InputError` when the road is missing, moves fewer than ``cycles`` + 1 cycles or cannot be followed.
+    Raises :class:`InputError` when that input is missing, moves fewer than ``cycles`` + 1 cycles or cannot be
+    followed.
     """
-    road = _usable(recording.channels.get(driven))
-    if road is None or np.ptp(road.values) == 0.0:
+    lead = _usable(recording.channels.get(driven))
+    if lead is None or np.ptp(lead.values) == 0.0:
         raise InputError(
-            "the sweep has no road motion to refer to",
+            f"the sweep has no motion of {driven} to refer to",
             source=source,
             test=recording.name,
             channel=driven,
-            remedy="map the road channel, or leave this test out",
+            remedy="map its channel, or leave this test out",
         )
-    phase, out = follow_road_robustly(recording.name, road, cycles, overlap, source)
+    phase, out = follow_input_robustly(recording.name, lead, cycles, overlap, source)
     phase, lost = _followed(recording.name, driven, phase, source)
     names = [name for name in recording.channels if name != driven]
     usable = {name: each for name in names if (each := _usable(recording.channels[name])) is not None}
@@ -84,7 +86,7 @@ def estimate_sweep_response(
         frequency_sd=np.array([local.speed_sd for local in phase.local]) / (2 * np.pi),
         sweep_rate=np.array([local.acceleration for local in phase.local]) / (2 * np.pi),
         window_s=phase.windows[:, 1] - phase.windows[:, 0],
-        road_amplitude=np.array([abs(local.amplitude) for local in phase.local]),
+        input_amplitude=np.array([abs(local.amplitude) for local in phase.local]),
         response=np.stack([column[0] for column in columns], axis=1),
         response_sd=np.stack([column[1] for column in columns], axis=1),
         valid=np.stack([column[2] for column in columns], axis=1),
@@ -93,9 +95,9 @@ def estimate_sweep_response(
 
 
 def _followed(
-    test: str, driven: str, phase: RoadPhase, source: str
-) -> tuple[RoadPhase, tuple[DataWarning, ...]]:
-    """The windows in which the phase follows the road, with a warning about the others.
+    test: str, driven: str, phase: InputPhase, source: str
+) -> tuple[InputPhase, tuple[DataWarning, ...]]:
+    """The windows in which the phase follows the driven input, with a warning about the others.
 
     Raises :class:`InputError` where these are the most.
     """
@@ -104,12 +106,12 @@ def _followed(
     lost = int(np.count_nonzero(~kept))
     if lost == 0:
         return phase, ()
-    what = f"the road does not oscillate steadily in {lost} of {kept.size} windows"
+    what = f"{driven} does not oscillate steadily in {lost} of {kept.size} windows"
     first = phase.local[int(np.argmin(kept))].middle
-    remedy = "check the sensor of the road and the logger"
+    remedy = f"check the sensor of {driven} and the logger"
     if lost > _MOST_LOST * kept.size:
         raise InputError(what, source=source, test=test, channel=driven, time=first, remedy=remedy)
-    code = "road_not_followed"
+    code = _NOT_FOLLOWED.get(driven, "input_not_followed")
     return phase.only(kept), (DataWarning(code, f"{what}, left out", source, test, driven, first, remedy),)
 
 
@@ -132,15 +134,15 @@ _NEIGHBOURS = 3
 
 
 def channel_response(
-    channel: RecordedChannel | None, road: RoadPhase
+    channel: RecordedChannel | None, along: InputPhase
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.bool_]]:
     """Response, standard deviation and validity of one channel at every window, each (W,)."""
-    count = len(road.local)
+    count = len(along.local)
     response = np.zeros(count, dtype=np.complex128)
     gain, density = np.zeros(count), np.full(count, np.nan)
     if channel is None:
         return response, gain, np.zeros(count, dtype=np.bool_)
-    for w, (phase, (start, end)) in enumerate(zip(road.local, road.windows, strict=True)):
+    for w, (phase, (start, end)) in enumerate(zip(along.local, along.windows, strict=True)):
         inside = slice(*np.searchsorted(channel.time, [start, end]))
         time = channel.time[inside]
         orders = _sampled_orders(time, phase.speed / (2 * np.pi))
@@ -218,14 +220,14 @@ class WindowBasis:
     columns: NDArray[np.float64]
 
 
-def window_bases(time: NDArray[np.float64], road: RoadPhase) -> tuple[WindowBasis, ...]:
+def window_bases(time: NDArray[np.float64], along: InputPhase) -> tuple[WindowBasis, ...]:
     """The windows of a channel sampled at ``time`` [s], (N,), those without a resolved order left out."""
-    middles = np.array([phase.middle for phase in road.local])
-    bounds = np.concatenate([road.windows[:1, 0], 0.5 * (middles[1:] + middles[:-1]), road.windows[-1:, 1]])
-    first, last = np.searchsorted(time, road.windows.T)
+    middles = np.array([phase.middle for phase in along.local])
+    bounds = np.concatenate([along.windows[:1, 0], 0.5 * (middles[1:] + middles[:-1]), along.windows[-1:, 1]])
+    first, last = np.searchsorted(time, along.windows.T)
     halfway = np.searchsorted(time, bounds)
     bases = []
-    for w, phase in enumerate(road.local):
+    for w, phase in enumerate(along.local):
         inside = slice(int(first[w]), int(last[w]))
         nearest = slice(max(int(halfway[w]), inside.start), min(int(halfway[w + 1]), inside.stop))
         orders = _sampled_orders(time[inside], phase.speed / (2 * np.pi))
@@ -259,35 +261,35 @@ _MOST_REFITS = 4
 _ALIKE, _DRIFT = 3.0, 0.01
 """Periods to either side that have nearly the same waveform, and how far [periods] its features move meanwhile."""
 _OFF_FILTERED = 0.1
-"""How far a sample before or after the windows may be off the filtered road, in peak-to-peak values."""
+"""How far a sample before or after the windows may be off the filtered input, in peak-to-peak values."""
 
 
-def follow_road_robustly(
-    test: str, road: RecordedChannel, cycles: float, overlap: float, source: str
-) -> tuple[RoadPhase, NDArray[np.bool_]]:
-    """Phase of the road as :func:`follow_road` has it, and which of its samples are outliers, (N,).
+def follow_input_robustly(
+    test: str, lead: RecordedChannel, cycles: float, overlap: float, source: str
+) -> tuple[InputPhase, NDArray[np.bool_]]:
+    """Phase of the driven channel as :func:`follow_input` has it, and which of its samples are outliers, (N,).
 
-    Raises :class:`InputError` as :func:`follow_road` does.
+    Raises :class:`InputError` as :func:`follow_input` does.
     """
-    smooth, phase = _first_phase(test, road, cycles, overlap, source)
-    out = np.zeros(road.values.size, dtype=np.bool_)
+    smooth, phase = _first_phase(test, lead, cycles, overlap, source)
+    out = np.zeros(lead.values.size, dtype=np.bool_)
     for _ in range(_MOST_REFITS):
-        before, out = out, _outliers_of_road(road, smooth, phase)
-        phase = follow_road(test, without(road, out), cycles, overlap, source)
+        before, out = out, _outliers_of_input(lead, smooth, phase)
+        phase = follow_input(test, without(lead, out), cycles, overlap, source)
         if np.array_equal(before, out):
             break
     return phase, out
 
 
 def _first_phase(
-    test: str, road: RecordedChannel, cycles: float, overlap: float, source: str
-) -> tuple[RecordedChannel, RoadPhase]:
-    """The median-filtered road that a phase follows best, and this phase."""
+    test: str, lead: RecordedChannel, cycles: float, overlap: float, source: str
+) -> tuple[RecordedChannel, InputPhase]:
+    """The median-filtered input that a phase follows best, and this phase."""
     guesses = []
     for width in _FILTERS:
-        smooth = replace(road, values=median_filter(road.values, width))
+        smooth = replace(lead, values=median_filter(lead.values, width))
         try:
-            guesses.append((smooth, follow_road(test, smooth, cycles, overlap, source)))
+            guesses.append((smooth, follow_input(test, smooth, cycles, overlap, source)))
         except InputError as error:
             refusal = error
     if not guesses:
@@ -295,29 +297,31 @@ def _first_phase(
     return min(guesses, key=lambda guess: float(np.mean(relative_miss(guess[1]))))
 
 
-def relative_miss(phase: RoadPhase) -> NDArray[np.float64]:
-    """What the fit leaves of the road in each window, rms over amplitude [1], (W,)."""
+def relative_miss(phase: InputPhase) -> NDArray[np.float64]:
+    """What the fit leaves of the driven input in each window, rms over amplitude [1], (W,)."""
     miss = np.array([local.miss for local in phase.local])
     size = np.array([abs(local.amplitude) for local in phase.local])
     relative: NDArray[np.float64] = np.divide(miss, size, out=np.full_like(miss, np.inf), where=size > 0.0)
     return relative
 
 
-def _outliers_of_road(road: RecordedChannel, smooth: RecordedChannel, phase: RoadPhase) -> NDArray[np.bool_]:
-    """The outliers within the windows, and before and after them what is far off the ``smooth`` road, (N,)."""
-    outside = (road.time < phase.windows[0, 0]) | (road.time > phase.windows[-1, 1])
-    far = np.abs(road.values - smooth.values) > _OFF_FILTERED * np.ptp(smooth.values)
-    out: NDArray[np.bool_] = find_channel_outliers(road, phase) | (outside & far)
+def _outliers_of_input(
+    lead: RecordedChannel, smooth: RecordedChannel, phase: InputPhase
+) -> NDArray[np.bool_]:
+    """The outliers within the windows, and before and after them what is far off the ``smooth`` input, (N,)."""
+    outside = (lead.time < phase.windows[0, 0]) | (lead.time > phase.windows[-1, 1])
+    far = np.abs(lead.values - smooth.values) > _OFF_FILTERED * np.ptp(smooth.values)
+    out: NDArray[np.bool_] = find_channel_outliers(lead, phase) | (outside & far)
     return out
 
 
-def find_channel_outliers(channel: RecordedChannel, road: RoadPhase) -> NDArray[np.bool_]:
+def find_channel_outliers(channel: RecordedChannel, along: InputPhase) -> NDArray[np.bool_]:
     """Which samples of a channel within the windows are outliers, (N,).
 
     There are none where the samples left would not determine the fits.
     """
     out = np.zeros(channel.values.size, dtype=np.bool_)
-    bases = window_bases(channel.time, road)
+    bases = window_bases(channel.time, along)
     fitted = _fitted(out.size, bases)
     if not np.any(fitted):
         return out
@@ -329,7 +333,7 @@ def find_channel_outliers(channel: RecordedChannel, road: RoadPhase) -> NDArray[
         return local_residual(channel.values, bases, everywhere)[fitted]
 
     floor = float(np.sqrt(smallest_density(values[None])[0]))
-    samples = WaveformSamples(time, values, road.periods_at(time), floor, _ALIKE, _DRIFT)
+    samples = WaveformSamples(time, values, along.periods_at(time), floor, _ALIKE, _DRIFT)
     none = np.zeros(time.size, dtype=np.bool_)
     try:
         out[fitted] = find_outliers(samples, refit(none), none, refit)

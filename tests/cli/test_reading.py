@@ -18,7 +18,7 @@ def test_the_first_sweep_that_can_be_used_is_taken(nominal_campaign: Path) -> No
     assert sweep.test == campaign.of_kind("sweep")[0].name
     assert set(sweep.channels) >= {"sprung_accel", "susp_deflection"}
     assert sweep.frequency.max() > 2.5
-    np.testing.assert_allclose(sweep.road_amplitude[sweep.frequency > 0.5], 0.01375, rtol=0.01)
+    np.testing.assert_allclose(sweep.input_amplitude[sweep.frequency > 0.5], 0.01375, rtol=0.01)
     dwells = replace(campaign, recordings=campaign.of_kind("dwell"))
     assert first_sweep(dwells, QuarterCar) == (None, ())
     whole = campaign.of_kind("sweep")[0]

@@ -71,7 +71,7 @@ def _sweep(
         frequency_sd=np.zeros(50),
         sweep_rate=np.full(50, RATE),
         window_s=np.ones(50),
-        road_amplitude=np.full(50, 0.01375),
+        input_amplitude=np.full(50, 0.01375),
         response=np.repeat(_oscillator(frequency)[:, None], count, axis=1),
         response_sd=np.full((50, count), 0.01),
         valid=np.ones((50, count), bool),

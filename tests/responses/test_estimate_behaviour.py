@@ -14,6 +14,7 @@ from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse, signal_to_noise
+from savgs_ident.responses.sweeps import estimate_sweep_response
 
 
 def codes(response: HarmonicResponse) -> set[str]:
@@ -281,6 +282,26 @@ def test_unusable_dwells_are_named_and_the_others_kept(synthetic: Any, bus: Any)
     found = {(w.test, w.code) for w in response.warnings}
     assert found == {("short", "too_few_periods"), ("dead", "no_road_motion"), ("blind", "no_road_motion")}
     assert all(w.remedy for w in response.warnings)
+
+
+def test_findings_name_the_input_that_is_driven(synthetic: Any, bus: Any) -> None:
+    """The code of the road is its own; other inputs share one."""
+    good = synthetic.dwell(np.random.default_rng(27), bus, 2.2, 6.4, name="good")
+    still = change(good, road_height=lambda c: replace(c, values=np.zeros_like(c.values)))
+    for driven, code in (("road_height", "no_road_motion"), ("drive_force", "no_input_motion")):
+        each, other = (_renamed(dwell, driven) for dwell in (good, replace(still, name="dead")))
+        (warning,) = estimate_response(synthetic.campaign(each, other), driven=driven).warnings
+        assert (warning.test, warning.code, warning.channel) == ("dead", code, driven)
+        assert warning.what == f"{driven} does not move"
+        with pytest.raises(InputError, match=f"no motion of {driven} to refer to"):
+            estimate_sweep_response(other, driven)
+
+
+def _renamed(dwell: Recording, driven: str) -> Recording:
+    """The dwell with the road's channel under another name."""
+    names = {"road_height": driven}
+    channels = {names.get(name, name): each for name, each in dwell.channels.items()}
+    return replace(dwell, channels={name: replace(each, name=name) for name, each in channels.items()})
 
 
 @pytest.mark.parametrize("which", ["none", "short"])

@@ -58,7 +58,7 @@ def test_frequency_and_rate_follow_the_road() -> None:
     pull = (response.frequency - RATE * response.time) / response.frequency_sd
     assert np.abs(pull).max() < 5.0
     assert response.sweep_rate == pytest.approx(RATE, rel=0.01)
-    assert response.road_amplitude == pytest.approx(0.01375, rel=1e-3)
+    assert response.input_amplitude == pytest.approx(0.01375, rel=1e-3)
 
 
 def test_response_is_the_linear_one_with_its_known_bias() -> None:
@@ -97,5 +97,5 @@ def test_a_sweep_without_road_or_too_short_is_refused() -> None:
     with pytest.raises(InputError, match=r"cycles, 5 are needed.*Remedy"):
         estimate_sweep_response(whole, "road_height")
     blind = Recording("sweep", "sweep", None, {"susp_deflection": whole.channels["susp_deflection"]})
-    with pytest.raises(InputError, match=r"no road motion.*Remedy"):
+    with pytest.raises(InputError, match=r"no motion of road_height.*Remedy"):
         estimate_sweep_response(blind, "road_height", source="run.csv")

@@ -14,7 +14,7 @@ from savgs_ident.plants.quarter_car.rig import default_campaign_path
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import RecordedChannel, Recording
 from savgs_ident.responses.harmonic_response import SweepResponse
-from savgs_ident.responses.sweep_phase import follow_road
+from savgs_ident.responses.sweep_phase import follow_input
 from savgs_ident.responses.sweeps import estimate_sweep_response
 
 from .corruption import drop, spike
@@ -44,10 +44,10 @@ def plain_response(recording: Recording) -> SweepResponse:
     """The response with no sample left out."""
 
     def follow(test: str, road: RecordedChannel, *rest: object) -> object:
-        return follow_road(test, road, *rest), np.zeros(road.values.size, dtype=np.bool_)  # type: ignore[arg-type]
+        return follow_input(test, road, *rest), np.zeros(road.values.size, dtype=np.bool_)  # type: ignore[arg-type]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sweeps, "follow_road_robustly", follow)
+        patch.setattr(sweeps, "follow_input_robustly", follow)
         patch.setattr(
             sweeps, "find_channel_outliers", lambda channel, _: np.zeros(channel.values.size, dtype=np.bool_)
         )
@@ -127,7 +127,7 @@ def test_the_plain_response_is_spoilt_by_them(shipped: Recording, clean: SweepRe
     plain = plain_response(bad)
     assert np.median(plain.response_sd[:, c] / clean.response_sd[:, c]) > 3.0
     bad = changed(shipped, ("road_height",), partial(spike, share=0.002, rng=np.random.default_rng(17)))
-    with pytest.raises(InputError, match="do not determine the phase of the road"):
+    with pytest.raises(InputError, match="do not determine the phase of road_height"):
         plain_response(bad)
 
 
