@@ -15,7 +15,7 @@ from .relaxed import as_users_have_it
 
 TRUTH = {"k": 5.5e4, "c": 2.5e3}
 DWELLS = (0.8, 1.2, 1.6, 2.0, 2.5, 3.5, 5.0, 8.0, 11.0)
-NOISE = {"sprung_accel": 0.05, "susp_deflection": 1e-4}
+NOISE = {"body_accel": 0.05, "susp_deflection": 1e-4}
 
 PENDULUM = Path(__file__).resolve().parents[1] / "examples" / "pendulum.py"
 
@@ -68,7 +68,7 @@ def test_names_that_the_plant_does_not_have_are_refused(model: si.PlantModel) ->
     with pytest.raises(si.InputError, match="the plant has no input 'force'"):
         si.simulate_dwells(model, DWELLS, {"force": 1.0}, NOISE)
     with pytest.raises(si.InputError, match="channel 'susp_deflection' has no noise"):
-        si.simulate_dwells(model, DWELLS, {"road_height": 0.01}, {"sprung_accel": 0.05})
+        si.simulate_dwells(model, DWELLS, {"road_height": 0.01}, {"body_accel": 0.05})
 
 
 def test_a_fit_finds_the_truth(fit: si.Fit) -> None:
@@ -94,7 +94,7 @@ def test_a_fit_shows_itself(fit: si.Fit) -> None:
     assert "stiffness of the suspension at the wheel" in str(fit)
     record = json.loads(fit.to_json())
     assert record["parameters"]["k"]["unit"] == "N/m"
-    assert set(record["gap"]) == {"sprung_accel", "susp_deflection", "together"}
+    assert set(record["gap"]) == {"body_accel", "susp_deflection", "together"}
     assert fit.figure_names == ("bode",)
     figure = si.plot_bode(fit)
     assert figure.axes[0].get_ylabel() == "magnitude [m/s² per m of road]"
@@ -146,7 +146,7 @@ def test_friction_of_the_guide_is_diagnosed_and_reported_without_a_word_of_the_q
     assert "Diagnosis of TwoMass" in page
     assert "per metre of road" in page
     _names_no_quarter_car(page + str(found))
-    assert {"gap sprung_accel", "bode susp_deflection", "shrink", "force 0"} <= {*found.figure_names}
+    assert {"gap body_accel", "bode susp_deflection", "shrink", "force 0"} <= {*found.figure_names}
     assert "ports" not in found.figure_names
     assert si.plot_bode(found).axes[0].get_ylabel() == "magnitude [m/s² per m of road]"
 

@@ -4,8 +4,8 @@ An :class:`InputError` ends a command with exit code 2; a :class:`DataWarning` i
 so that every report can show it.
 
     >>> remedy = "name it in channels.toml"
-    >>> print(InputError("column 'sprung_accel' is missing", source="run7.csv", remedy=remedy))
-    run7.csv: column 'sprung_accel' is missing. Remedy: name it in channels.toml.
+    >>> print(InputError("column 'position' is missing", source="run7.csv", remedy=remedy))
+    run7.csv: column 'position' is missing. Remedy: name it in channels.toml.
 """
 
 import unicodedata

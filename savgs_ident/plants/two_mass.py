@@ -34,7 +34,7 @@ class Heights(NamedTuple):
 class Readings(NamedTuple):
     """Acceleration of the sprung mass [m/s^2] and suspension deflection [m]."""
 
-    sprung_accel: Scalar
+    body_accel: Scalar
     susp_deflection: Scalar
 
 
@@ -104,7 +104,7 @@ NUMBERS = (
     ),
 )
 SENSORS = (
-    Port("accelerometer", PortKind.SENSOR, "sensor.sprung_accel"),
+    Port("accelerometer", PortKind.SENSOR, "sensor.body_accel"),
     Port("potentiometer", PortKind.SENSOR, "sensor.susp_deflection"),
 )
 
@@ -134,7 +134,7 @@ class TwoMass(AbstractPlant):
     coordinate_type: ClassVar[type[Heights]] = Heights
     inputs: ClassVar[tuple[Input, ...]] = (Input("road_height", "m", "road", moves=(1.0, 1.0)),)
     channels: ClassVar[tuple[Channel, ...]] = (
-        Channel("sprung_accel", "m/s^2", "sprung-mass acceleration", decay=1),
+        Channel("body_accel", "m/s^2", "sprung-mass acceleration", decay=1),
         Channel("susp_deflection", "m", "suspension deflection", decay=2),
     )
     ports: ClassVar[tuple[Port, ...]] = (SUSPENSION, GUIDE, TYRE, MOUNT, ROAD, *NUMBERS, *SENSORS)
@@ -175,7 +175,10 @@ class TwoMass(AbstractPlant):
 
 
 def closed_form(p: Mapping[str, float], frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """First harmonics of both channels per metre of road [1/s^2], [1] at frequencies [Hz], (D, 2)."""
+    """First harmonics of both channels per metre of road [1/s^2], [1] at frequencies [Hz], (D, 2).
+
+    Valid without effects. The reference that tests of solvers and of diagnoses compare with; no product code uses it.
+    """
     w = 2j * np.pi * frequency
     strut, tyre = p["k"] + p["c"] * w, p["k_t"] + p["c_t"] * w
     sprung, unsprung = p["m_s"] * w**2 + strut, p["m_u"] * w**2 + strut + tyre

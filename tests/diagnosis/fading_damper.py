@@ -22,7 +22,7 @@ def fading_campaign(damping: np.ndarray, recorded: np.ndarray) -> HarmonicRespon
     seen[:, 1:] += (sd[:, :, None] * noise)[:, 1:]
     return HarmonicResponse(
         tests=tuple(f"dwell_{f}Hz" for f in FREQUENCY),
-        channels=("road_height", "sprung_accel", "susp_deflection"),
+        channels=("road_height", "body_accel", "susp_deflection"),
         frequency=FREQUENCY,
         frequency_sd=np.zeros(FREQUENCY.size),
         harmonics=seen,

@@ -141,7 +141,7 @@ def test_a_plant_with_more_coordinates_and_a_campaign_of_dwells_are_refused() ->
         si.PlantModel(si.TwoMass(), si.TwoMass.parameters),
         (1.0, 2.0),
         {"road_height": 0.01},
-        {"sprung_accel": 0.05, "susp_deflection": 1e-4},
+        {"body_accel": 0.05, "susp_deflection": 1e-4},
     )
     with pytest.raises(si.InputError, match="goes with a measured motion alone"):
         si.diagnose(si.PlantModel(si.TwoMass(), si.TwoMass.parameters), response, held_out=motion)

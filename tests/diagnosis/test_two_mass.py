@@ -48,7 +48,7 @@ LOCATIONS = {
     "tyre",
     "road",
     "inertia",
-    "sensor.sprung_accel",
+    "sensor.body_accel",
     "sensor.susp_deflection",
 }
 
