@@ -44,6 +44,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from savgs_ident.control.linearisation import nominal_rest, slopes
+from savgs_ident.core.small_root import Root
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.kinematics import installation_ratio, strut_length, suspension_travel
 from savgs_ident.plants.quarter_car.plant import QuarterCar, static_equilibrium
@@ -86,10 +87,18 @@ def equivalents(
 
 
 @eqx.filter_jit
-def resting_angles(model: QuarterCar, p: Values, theta_SL: Float[Array, " n"]) -> Float[Array, " n"]:
-    """Angle of the lower wishbone [rad] at which the rig rests, for link angles [rad], (n,)."""
+def resting_angles(
+    model: QuarterCar, p: Values, theta_SL: Float[Array, " n"]
+) -> tuple[Float[Array, " n"], Root]:
+    """Angle of the lower wishbone [rad] at which the rig rests, for link angles [rad], (n,), and how it was found."""
     still = jnp.zeros(())
-    return jax.lax.map(lambda angle: static_equilibrium(model, p, angle, still).q.theta_LW, theta_SL)
+
+    def at(angle: Float[Array, ""]) -> tuple[Float[Array, ""], Root]:
+        rest = static_equilibrium(model, p, angle, still)
+        return rest.q.theta_LW, rest.root
+
+    found: tuple[Array, Root] = jax.lax.map(at, theta_SL)
+    return found
 
 
 Matrix = NDArray[np.float64]

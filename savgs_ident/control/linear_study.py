@@ -188,8 +188,8 @@ def study_equivalents(model: QuarterCar, p: Values) -> EquivalentStudy:
     """The linear equivalent over the angles."""
     bare, rig = QuarterCar(model.damper), model.effective(p)
     link, wishbone = np.radians(LINK_DEG), np.radians(WISHBONE_DEG)
-    rest = resting_angles(bare, rig, jnp.asarray(link))
-    if not np.isfinite(rest).all():
+    rest, root = resting_angles(bare, rig, jnp.asarray(link))
+    if not root.status().ok:
         raise InputError(
             "the rig finds no rest at some link angle", remedy="mend the spring or the hardpoints of the rig"
         )

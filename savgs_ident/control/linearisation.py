@@ -40,6 +40,7 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.small_root import Root
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
@@ -69,13 +70,17 @@ _RIGID = ("sprung_position", "wishbone_angle", "sprung_velocity", "wishbone_velo
 
 
 class OperatingPoint(NamedTuple):
-    """A state: coordinates [m, rad], their rates, internal states (s,), road [m, m/s], link [rad, rad/s]."""
+    """A state: coordinates [m, rad], their rates, internal states (s,), road [m, m/s], link [rad, rad/s].
+
+    ``root`` is how the state of rest was found.
+    """
 
     q: Coordinates
     qd: Coordinates
     s: Float[Array, " s"]
     road: Road
     link: Link
+    root: Root
 
 
 def resting(model: QuarterCar, p: Values, link_angle: Float[Array, ""] | float) -> OperatingPoint:
@@ -93,13 +98,15 @@ def nominal_rest(model: QuarterCar, p: Values) -> OperatingPoint:
 def _resting(model: QuarterCar, p: Values, angle: Float[Array, ""]) -> OperatingPoint:
     zero = jnp.zeros_like(angle)
     rest = static_equilibrium(model, p, angle, zero)
-    return OperatingPoint(rest.q, Coordinates(zero, zero), rest.s, Road(zero, zero), Link(angle, zero))
+    still, road, link = Coordinates(zero, zero), Road(zero, zero), Link(angle, zero)
+    return OperatingPoint(rest.q, still, rest.s, road, link, rest.root)
 
 
 class Slopes(NamedTuple):
     """Derivatives of the residual (2 + s,) and of the outputs (6,) along all of x = (q, qd, s), y = (qdd, sd), u.
 
-    ``u`` are the heights, angles and velocities imposed: road height and velocity, link angle and velocity.
+    ``u`` are the heights, angles and velocities imposed: road height and velocity, link angle and velocity. ``root``
+    are the accelerations and rates of internal states there.
     """
 
     residual_x: Array
@@ -108,6 +115,7 @@ class Slopes(NamedTuple):
     output_x: Array
     output_y: Array
     output_u: Array
+    root: Root
 
 
 def _outputs(model: QuarterCar, p: Values, motion: Motion, s: Array, sd: Array, inputs: Inputs) -> Array:
@@ -128,7 +136,7 @@ def _outputs(model: QuarterCar, p: Values, motion: Motion, s: Array, sd: Array, 
 
 @eqx.filter_jit
 def slopes(model: QuarterCar, p: Values, at: OperatingPoint) -> Slopes:
-    """All derivatives at a state; NaN where the model is not defined."""
+    """All derivatives at a state; look at the status of the root that its accelerations are."""
     count = len(model.states)
     rates = solve_rates(model, p, at.q, at.qd, at.s, Inputs(at.road, at.link))
     x = jnp.concatenate([jnp.stack([*at.q, *at.qd]), at.s])
@@ -143,7 +151,7 @@ def slopes(model: QuarterCar, p: Values, at: OperatingPoint) -> Slopes:
 
     by_x, by_y, by_u = jax.jacfwd(everything, argnums=(0, 1, 2))(x, y, u)
     rows = 2 + count
-    return Slopes(by_x[:rows], by_y[:rows], by_u[:rows], by_x[rows:], by_y[rows:], by_u[rows:])
+    return Slopes(by_x[:rows], by_y[:rows], by_u[:rows], by_x[rows:], by_y[rows:], by_u[rows:], rates.root)
 
 
 def linearise(model: QuarterCar, p: Values, at: OperatingPoint) -> control.StateSpace:
@@ -154,7 +162,7 @@ def linearise(model: QuarterCar, p: Values, at: OperatingPoint) -> control.State
     linearisation.
     """
     found: Slopes = jax.tree.map(np.asarray, slopes(model, p, at))
-    if not all(np.isfinite(part).all() for part in found):
+    if not found.root.status().ok:
         raise InputError(
             "the rig cannot be linearised there: it finds no accelerations",
             remedy="choose a state within the travel of the suspension",

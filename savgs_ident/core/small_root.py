@@ -1,21 +1,26 @@
 """Newton's method for the roots of small systems of equations, a few unknowns each, inside larger computations.
 
     >>> root = find_root(lambda x: x**2 - 2.0, jnp.ones(1), jnp.ones(1))
-    >>> round(float(root[0]), 9)
-    1.414213562
+    >>> round(float(root.x[0]), 9), root.status().name
+    (1.414213562, 'CONVERGED')
 
 The Jacobian is exact. The forces of the rig are piecewise smooth in the unknowns (a friction changes sign), so a
-step may land on another piece: steps are repeated until the next one is negligible. A root that was not found is
-NaN, never a plausible number. Derivatives, of any order and in either direction, come from the implicit function
-theorem at the root, not from the iterations.
+step may land on another piece: steps are repeated until the next one is negligible. How it ended is a status of the
+:class:`Root`. A root that was not found is NaN besides: a compiled program cannot ask for the status, and must not go
+on with a plausible number. Derivatives, of any order and in either direction, come from the implicit function theorem
+at the root, not from the iterations.
 """
 
 from collections.abc import Callable
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
+
+from savgs_ident.core.status import Status
 
 PRECISION = 1e-11
 """Largest remaining Newton step at a root, relative to the typical size of its unknown."""
@@ -24,6 +29,27 @@ LIMIT = 30
 """Most iterations."""
 
 Vector = Float[Array, " n"]
+
+
+class Root(eqx.Module):
+    """What Newton's method found, or several roots with a leading axis each.
+
+    Attributes:
+        x: the root, (n,), each in the unit of its unknown; NaN where it was not found.
+        step_left: the Newton step that remains there, relative to the typical sizes of the unknowns [1], ().
+        precision: the largest one at a root [1].
+    """
+
+    x: Vector
+    step_left: Float[Array, ""]
+    precision: float = eqx.field(static=True)
+
+    def status(self) -> Status:
+        """How it ended; of several roots, how the worst did. To be asked outside of compiled programs."""
+        left = float(np.max(np.asarray(self.step_left)))
+        if not np.isfinite(left):
+            return Status.NOT_FINITE
+        return Status.CONVERGED if left <= self.precision else Status.MAX_ITERATIONS
 
 
 class _NewtonState(NamedTuple):
@@ -64,15 +90,15 @@ def find_root(
     scale: Vector,
     precision: float = PRECISION,
     solve: LinearSolver = solve_dense,
-) -> Vector:
-    """The root (n,) of ``function`` to which Newton's method converges from ``start``; NaN if it does not converge.
+) -> Root:
+    """The root (n,) of ``function`` to which Newton's method converges from ``start``, and whether it converges.
 
     ``scale`` (n,) is the typical size of each unknown [its unit], ``precision`` [1] that of the root in it;
     ``solve`` must suit the function's Jacobian. The function may be closed over traced values; derivatives with
     respect to these are exact.
     """
 
-    def newton(function: Callable[[Vector], Vector], start: Vector) -> Vector:
+    def newton(function: Callable[[Vector], Vector], start: Vector) -> tuple[Vector, Float[Array, ""]]:
         def advance(now: _NewtonState) -> _NewtonState:
             residual, slope = jax.linearize(function, now.root)
             jacobian = _columns(slope, now.root)
@@ -86,10 +112,10 @@ def find_root(
 
         begin = _NewtonState(start, jnp.asarray(jnp.inf, start.dtype), jnp.asarray(0))
         end = jax.lax.while_loop(unfinished, advance, begin)
-        return jnp.where(end.step_left <= precision, end.root, jnp.nan)
+        return jnp.where(end.step_left <= precision, end.root, jnp.nan), end.step_left
 
     def linear(function: Callable[[Vector], Vector], right: Vector) -> Vector:
         return solve(_columns(function, right), right)
 
-    root: Vector = jax.lax.custom_root(function, start, newton, linear)
-    return root
+    x, step_left = jax.lax.custom_root(function, start, newton, linear, has_aux=True)
+    return Root(x, step_left, precision)

@@ -21,7 +21,6 @@ three steps suffice.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import isfinite
 from typing import Any
 
 import jax
@@ -33,7 +32,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.core.small_root import solve_dense
+from savgs_ident.core.small_root import Root, solve_dense
 from savgs_ident.core.values import as_values
 from savgs_ident.effects.base import AbstractInputLaw, Fundamental, InputSignal
 from savgs_ident.plants.base import AbstractPlant, Motion, find_rest, nominal_inputs
@@ -212,14 +211,13 @@ def resting_state(model: ExportedModel) -> list[float]:
     p = as_values(model.table.as_dict())
     plant = model.plant
     rest = find_rest(plant, p, nominal_inputs(plant, p))
-    x = [*map(float, rest.q), *(0.0 for _ in rest.q), *map(float, rest.s)]
-    check_rest(x, model)
-    return x
+    check_rest(rest.root, model)
+    return [*map(float, rest.q), *(0.0 for _ in rest.q), *map(float, rest.s)]
 
 
-def check_rest(found: Iterable[float], model: ExportedModel) -> None:
-    """Raise :class:`InputError` unless the ``found`` rest [SI] in the nominal state is finite."""
-    if not all(isfinite(value) for value in found):
+def check_rest(found: Root, model: ExportedModel) -> None:
+    """Raise :class:`InputError` unless the rest in the nominal state was ``found``."""
+    if not found.status().ok:
         nominal = [
             f"{each.about} {model.table[each.rest].value:.4g} {each.unit}"
             for each in model.plant.inputs

@@ -117,7 +117,7 @@ def exact(model: ExportedModel) -> LinearModel:
     """
     p, bare = values_without_friction(model), without_friction(model.plant)
     at = linearisation.nominal_rest(bare, p)
-    check_rest(map(float, at.q), model)
+    check_rest(at.root, model)
     space = linearisation.linearise(bare, p, at)
     internal = {f"{place}_{state.name}": state.unit for place, state in enumerate(bare.states)}
     about = "exact linearisation of the rig at rest, the link at its nominal angle, without friction"

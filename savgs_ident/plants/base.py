@@ -24,7 +24,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
-from savgs_ident.core.small_root import find_root
+from savgs_ident.core.small_root import Root, find_root
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import (
     AbstractSensorLaw,
@@ -164,10 +164,11 @@ class Motion(NamedTuple):
 
 
 class Rest(NamedTuple):
-    """Coordinates and internal states (s,) of a plant that stands still [SI]."""
+    """Coordinates and internal states (s,) of a plant that stands still [SI], and how they were found."""
 
     q: Any
     s: Float[Array, " s"]
+    root: Root
 
 
 class Inputs(NamedTuple):
@@ -369,7 +370,7 @@ def standing(plant: AbstractPlant, q: Any) -> Motion:
 
 
 def find_rest(plant: AbstractPlant, p: Values, u: Any, prepared: Any = None) -> Rest:
-    """Where the plant stands still under constant inputs ``u``; NaN if it finds no rest.
+    """Where the plant stands still under constant inputs ``u``; look at the status of its root.
 
     It is the root of the residual without velocities and accelerations. Frictions carry nothing then: their internal
     states are among the unknowns. Differentiable in everything, exactly, by the implicit function theorem.
@@ -382,8 +383,8 @@ def find_rest(plant: AbstractPlant, p: Values, u: Any, prepared: Any = None) -> 
 
     scale = jnp.asarray([*(each.size for each in plant.coordinates), *(each.scale for each in plant.states)])
     # At rest a velocity among the states has nothing on the diagonal: rows have to be exchanged.
-    x = find_root(residual, jnp.zeros_like(scale), scale, REST_PRECISION, jnp.linalg.solve)
-    return Rest(plant.coordinate_type(*jnp.unstack(x[:n])), x[n:])
+    root = find_root(residual, jnp.zeros_like(scale), scale, REST_PRECISION, jnp.linalg.solve)
+    return Rest(plant.coordinate_type(*jnp.unstack(root.x[:n])), root.x[n:], root)
 
 
 def nominal_readings(plant: AbstractPlant, p: Values, prepared: Any = None) -> tuple[Scalar, ...]:

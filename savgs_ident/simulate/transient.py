@@ -25,7 +25,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 from numpy.typing import ArrayLike
 
-from savgs_ident.core.small_root import find_root
+from savgs_ident.core.small_root import Root, find_root
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import (
@@ -58,10 +58,11 @@ SHORTEST = 1e-12
 
 
 class Rates(NamedTuple):
-    """Accelerations (n scalars) and rates of the internal states (s,), in SI."""
+    """Accelerations (n scalars) and rates of the internal states (s,), in SI, and how they were found."""
 
     qdd: Any
     sd: Float[Array, " s"]
+    root: Root
 
 
 def solve_rates(
@@ -72,13 +73,13 @@ def solve_rates(
     s: Float[Array, " s"],
     u: Any,
     prepared: Any = None,
-    near: Float[Array, " k"] | None = None,
+    warm_start: Float[Array, " k"] | None = None,
 ) -> Rates:
-    """Accelerations and rates that make the residual vanish; NaN where there are none; all in SI.
+    """Accelerations and rates that make the residual vanish, in SI; look at the status of their root.
 
-    ``prepared`` serves as in :meth:`AbstractPlant.residual`; ``near`` (n + s,) are accelerations and rates of a
-    moment ago, from where they are found sooner. Differentiable in everything, exactly, by the implicit function
-    theorem.
+    ``prepared`` serves as in :meth:`AbstractPlant.residual`; ``warm_start`` (n + s,) are accelerations and
+    rates of a moment ago, from where they are found sooner. Differentiable in everything, exactly, by the implicit
+    function theorem.
     """
     n = len(model.coordinates)
 
@@ -88,9 +89,9 @@ def solve_rates(
 
     rates = [state.scale / STATE_TIME for state in model.states]
     scale = jnp.asarray([*(each.acceleration_size for each in model.coordinates), *rates])
-    start = jnp.zeros_like(scale) if near is None else near
-    y = find_root(residual, start, scale)
-    return Rates(model.coordinate_type(*jnp.unstack(y[:n])), y[n:])
+    start = jnp.zeros_like(scale) if warm_start is None else warm_start
+    root = find_root(residual, start, scale)
+    return Rates(model.coordinate_type(*jnp.unstack(root.x[:n])), root.x[n:], root)
 
 
 class PlantState(eqx.Module):
@@ -151,7 +152,7 @@ def rest_state(
 ) -> PlantState:
     """The plant at static equilibrium with its inputs as they stand at time ``t`` [s]."""
     u = source.at_rest(model, t)
-    q, s = find_rest(model, p, u, prepared)
+    q, s, _ = find_rest(model, p, u, prepared)
     motion = standing(model, q)
     loads = model.loads(p, motion, s, jnp.zeros_like(s), u, prepared)
     return PlantState(q, motion.qd, s, source.start(p, t, loads))
@@ -164,10 +165,10 @@ def _inputs_and_rates(
     t: Array,
     now: PlantState,
     prepared: Any = None,
-    near: Array | None = None,
+    warm_start: Array | None = None,
 ) -> tuple[Any, Rates]:
     u = source.inputs(model, t, now.source)
-    return u, solve_rates(model, p, now.q, now.qd, now.s, u, prepared, near)
+    return u, solve_rates(model, p, now.q, now.qd, now.s, u, prepared, warm_start)
 
 
 def state_rates(
@@ -177,13 +178,13 @@ def state_rates(
     t: Float[Array, ""],
     now: PlantState,
     prepared: Any = None,
-    near: Float[Array, " k"] | None = None,
+    warm_start: Float[Array, " k"] | None = None,
 ) -> PlantState:
     """Time derivative of the state at time ``t`` [s], in SI: the right side of the differential equations.
 
-    ``prepared`` serves as in :meth:`AbstractPlant.residual`, ``near`` as in :func:`solve_rates`.
+    ``prepared`` serves as in :meth:`AbstractPlant.residual`, ``warm_start`` as in :func:`solve_rates`.
     """
-    u, rates = _inputs_and_rates(model, p, source, t, now, prepared, near)
+    u, rates = _inputs_and_rates(model, p, source, t, now, prepared, warm_start)
     loads = model.loads(p, Motion(now.q, now.qd, rates.qdd), now.s, rates.sd, u, prepared)
     return PlantState(now.qd, rates.qdd, rates.sd, source.rate(p, t, now.source, loads))
 

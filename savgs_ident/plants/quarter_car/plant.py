@@ -20,6 +20,7 @@ from typing import ClassVar, NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from savgs_ident.core.small_root import Root
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import Fundamental, InputSignal, Load, Port, PortSignals
 from savgs_ident.effects.composition import (
@@ -78,9 +79,6 @@ from savgs_ident.plants.quarter_car.ports import (
     TYRE_LATERAL,
     TYRE_RADIAL,
 )
-
-RESPONSE_CHANNELS = ("sprung_accel", "susp_deflection")
-"""The channels that a model predicts, in the order of :class:`Readings`."""
 
 
 class Readings(NamedTuple):
@@ -339,11 +337,12 @@ def _wheel(
 
 
 class Equilibrium(NamedTuple):
-    """Coordinates and internal states (s,) at rest, and the force [N] with which the strut pushes apart."""
+    """Coordinates and internal states (s,) at rest, the push of the strut apart [N], and how they were found."""
 
     q: Coordinates
     s: Float[Array, " s"]
     strut: Float[Array, ""]
+    root: Root
 
 
 def static_equilibrium(
@@ -353,15 +352,15 @@ def static_equilibrium(
     road_height: Float[Array, ""],
     prepared: SectionCurves | None = None,
 ) -> Equilibrium:
-    """Where the rig rests at a link angle [rad] and a height of the plate [m]; NaN if it finds no rest.
+    """Where the rig rests at a link angle [rad] and a height of the plate [m]; look at the status of its root.
 
     ``prepared`` serves as in :meth:`QuarterCar.residual`. Differentiable in everything, exactly.
     """
     zero = jnp.zeros_like(link_angle)
     u = Inputs(Road(road_height, zero), Link(link_angle, zero))
-    q, s = find_rest(model, p, u, prepared)
+    q, s, root = find_rest(model, p, u, prepared)
     loads = model.loads(p, standing(model, q), s, jnp.zeros_like(s), u, prepared)
-    return Equilibrium(q, s, loads.strut)
+    return Equilibrium(q, s, loads.strut, root)
 
 
 def deflection_zero(model: QuarterCar, p: Values, prepared: SectionCurves | None = None) -> Float[Array, ""]:
