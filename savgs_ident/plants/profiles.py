@@ -2,7 +2,7 @@
 
 Every profile has a value and, from it by differentiation, a rate; nobody writes a derivative twice.
 
-    >>> profile = Sine(amplitude=0.01375, frequency=2.0, mean=0.0, phase=0.0, settle=0.0)
+    >>> profile = Sine(amplitude=0.01375, frequency=2.0, mean=0.0, phase=0.0, rise_time=0.0)
     >>> round(float(profile.value(jnp.asarray(0.5))), 6), round(float(profile.rate(jnp.asarray(0.5))), 6)
     (0.01375, 0.0)
 """
@@ -52,21 +52,22 @@ class Constant(AbstractProfile):
 
 
 class Sine(AbstractProfile):
-    """mean + amplitude w(t) cos(2 pi f t + phase), where w rises smoothly from 0 to 1 in ``settle`` [s].
+    """mean + amplitude w(t) cos(2 pi f t + phase), where w rises smoothly from 0 to 1 in ``rise_time`` [s].
 
-    ``amplitude`` and ``mean`` in the quantity's unit, ``frequency`` [Hz], ``phase`` [rad]. With ``settle`` = 0
-    the motion is steady from the start.
+    ``amplitude`` and ``mean`` in the quantity's unit, ``frequency`` [Hz], ``phase`` [rad]. With
+    ``rise_time`` = 0 the motion is steady from the start.
     """
 
     amplitude: Number = eqx.field(converter=jnp.asarray)
     frequency: Number = eqx.field(converter=jnp.asarray)
     mean: Number = eqx.field(converter=jnp.asarray)
     phase: Number = eqx.field(converter=jnp.asarray)
-    settle: Number = eqx.field(converter=jnp.asarray)
+    rise_time: Number = eqx.field(converter=jnp.asarray)
 
     def value(self, t: Scalar) -> Scalar:
         """The quantity at time ``t`` [s]."""
-        share = jnp.where(self.settle > 0.0, t / jnp.where(self.settle > 0.0, self.settle, 1.0), 1.0)
+        rises = self.rise_time > 0.0
+        share = jnp.where(rises, t / jnp.where(rises, self.rise_time, 1.0), 1.0)
         wave = jnp.cos(2.0 * jnp.pi * self.frequency * t + self.phase)
         return self.mean + self.amplitude * _smooth_rise(share) * wave
 

@@ -133,7 +133,7 @@ Nodes = Float[Array, "k P"]
 
 
 class Trajectory(NamedTuple):
-    """States x = (q, qd, s), (m, P), and their algebraic partners y = (qdd, sd), (k, P)."""
+    """States x = (q, qd, s), (m, P), and the algebraic unknowns y = (qdd, sd), (k, P)."""
 
     x: Nodes
     y: Nodes

@@ -12,8 +12,8 @@ Newton's iteration is damped, and on all dwells at once. Each dwell has its own 
 the one before it (a friction that sticks now here, now there), the next ones are shortened; where steps shrink they
 are taken whole again.
 
-What the truncation to a finite number of nodes costs is stated by :func:`truncation_error`, which solves once more on
-twice as many nodes. How the response changes with the parameters is in :mod:`savgs_ident.simulate.sensitivity`.
+What the truncation to a finite number of nodes costs shows in the solution on twice as many (:func:`adapt`): the
+rule is of second order. How the response changes with the parameters is in :mod:`savgs_ident.simulate.sensitivity`.
 """
 
 from dataclasses import dataclass
@@ -371,16 +371,3 @@ def _sensors(
     """What the sensors make of each order."""
     order = jnp.arange(orders + 1, dtype=frequency.dtype)
     return jnp.moveaxis(model.transfers(p, frequency[:, None] * order), 0, 1)
-
-
-def truncation_error(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int
-) -> Float[Array, "D C"]:
-    """Largest change of any order 1..orders when the nodes are doubled, relative to the first harmonic [1].
-
-    The error of ``solution`` itself is about four thirds of it (the rule is of second order).
-    """
-    doubled = Layout(tuple(2 * count for count in solution.mesh.layout.counts))
-    finer = adapt(model, p, solution, doubled, PeriodicSettings.iterations)
-    coarse, fine = (harmonics(model, p, each, orders) for each in (solution, finer))
-    return jnp.max(jnp.abs(coarse - fine)[..., 1:], axis=-1) / jnp.abs(fine[..., 1])

@@ -310,11 +310,3 @@ def simulate_transient(
     start = rest_state(model, p, source, instants[0], prepared) if initial is None else initial
     found = _integrate(model, p, source, instants, start, jnp.asarray(tolerance), prepared)
     return _observe(model, p, source, found, _nominal_readings(model, p, prepared), prepared)
-
-
-@eqx.filter_jit
-def transient_loads(model: AbstractPlant, p: Values, solution: TransientSolution) -> Any:
-    """Forces along a motion, as the plant's ``loads`` arranges them, each (n, ...)."""
-    return jax.vmap(lambda *at: model.loads(p, *at))(
-        solution.motion, solution.s, solution.sd, solution.inputs
-    )

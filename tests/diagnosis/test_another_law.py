@@ -29,7 +29,7 @@ from savgs_ident.effects.base import (
 )
 from savgs_ident.effects.effect import Effect, effect_at
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
-from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS, QuarterCar
+from savgs_ident.plants.quarter_car.plant import CHANNELS, QuarterCar
 from savgs_ident.plants.quarter_car.ports import RAIL, ROAD
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
@@ -82,7 +82,7 @@ def _recorded(response: HarmonicResponse, rig: Rig, effect: Effect) -> HarmonicR
     clean = np.asarray(harmonics(model, p, solution, response.orders))
     shown = response.harmonics.copy()
     random = np.random.default_rng(7)
-    for place, name in enumerate(RESPONSE_CHANNELS):
+    for place, name in enumerate(each.name for each in CHANNELS):
         c = response.channel(name)
         root = np.linalg.cholesky(response.covariance[:, c, 1:])
         noise = np.einsum("dkij,dkj->dki", root, random.standard_normal(root.shape[:-1]))

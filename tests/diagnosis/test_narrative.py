@@ -28,10 +28,10 @@ from savgs_ident.diagnosis.verdict import (
     WeighedHypothesis,
     decide,
 )
-from savgs_ident.effects.base import Family
+from savgs_ident.effects.base import Family, Port
 from savgs_ident.inference.prior import Linear
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.plants.quarter_car.ports import FORCE_PORTS, LOCATION_WORDS
+from savgs_ident.plants.quarter_car.ports import LOCATION_WORDS, STRUT, SUSPENSION
 
 GAP = Shrink(0.3, 0.04, 0.002, 0.0015, 0.99, (0.98, 1.0))
 RAIL: Any = SimpleNamespace(name="rail", share=0.9, evidence=50.0)
@@ -116,11 +116,11 @@ def test_what_predicts_no_tests_is_unknown_at_its_port() -> None:
 def test_ports_that_do_the_same_are_listed_where_a_prior_decides_between_them() -> None:
     """The law in the joints fits a little better, but stops are no part of joints."""
 
-    def law(place: str, evidence: float, relative: float) -> FlexibleMember:
-        found: Any = SimpleNamespace(mode=SimpleNamespace(evidence=evidence), port=FORCE_PORTS[place])
+    def law(port: Port, evidence: float, relative: float) -> FlexibleMember:
+        found: Any = SimpleNamespace(mode=SimpleNamespace(evidence=evidence), port=port)
         return FlexibleMember(found, evidence + relative, 0.0, relative_prior=relative)
 
-    laws = (law("strut", 990.0, 0.0), law("suspension", 992.0, np.log(0.1)))
+    laws = (law(STRUT, 990.0, 0.0), law(SUSPENSION, 992.0, np.log(0.1)))
     evidence = _evidence("unknown", "law", {"none": 0.0, "unknown": 100.0}, flexible=laws)
     named = replace(evidence, kind="effect", named_law=laws[0])
     assert named.indistinguishable_ports() == ("suspension",)

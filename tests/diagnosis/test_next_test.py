@@ -11,12 +11,12 @@ from savgs_ident.diagnosis.next_test import PROPOSED, next_tests, predicted
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.base import OperatingCondition
-from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS
+from savgs_ident.plants.quarter_car.plant import CHANNELS
 from savgs_ident.simulate.periodic import PeriodicSolution
 
 Fitted = tuple[Search, DwellProblem, LaplaceFit, LaplaceFit]
 
-ACCELERATION, DEFLECTION = map(RESPONSE_CHANNELS.index, ("sprung_accel", "susp_deflection"))
+ACCELERATION, DEFLECTION = map([each.name for each in CHANNELS].index, ("sprung_accel", "susp_deflection"))
 
 
 def _harmonics(

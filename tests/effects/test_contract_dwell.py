@@ -85,7 +85,7 @@ def _transient(
     From rest, on a cam whose lift grows, or from a state ``start`` where the cam is highest.
     """
     times = np.arange(periods * SAMPLES + 1) / (HERTZ * SAMPLES)
-    road = cam_road(LIFT, HERTZ, settle=1.0 if start is None else 0.0)
+    road = cam_road(LIFT, HERTZ, rise_time=1.0 if start is None else 0.0)
     solution = simulate_transient(model, p, RigSource(road, held_link(LINK)), times, start)
     assert solution.status().ok
     shown = np.stack(solution.readings)[:, (periods - 2) * SAMPLES : (periods - 1) * SAMPLES]

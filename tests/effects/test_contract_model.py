@@ -14,7 +14,7 @@ from savgs_ident.core.values import Values
 from savgs_ident.effects.base import AbstractSensorLaw, AbstractSeriesLaw, Fundamental
 from savgs_ident.effects.effect import Effect
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
-from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS, QuarterCar
+from savgs_ident.plants.quarter_car.plant import CHANNELS, QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 
 from ..in_one_test import over
@@ -122,7 +122,7 @@ def test_at_its_value_it_moves_the_rig_or_what_is_seen_of_it(
     shown = [not np.array_equal(*each) for each in zip(here.transfers, there.transfers, strict=True)]
     if isinstance(effect.law, AbstractSensorLaw):
         assert not moves
-        assert shown == [effect.port.location == f"sensor.{channel}" for channel in RESPONSE_CHANNELS]
+        assert shown == [effect.port.location == f"sensor.{each.name}" for each in CHANNELS]
     elif isinstance(effect.law, AbstractSeriesLaw):
         assert not moves
         assert np.any([there.states[state.name] for state in effect.states])

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from jaxtyping import Array
 
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.effects.base import Family, Fundamental, InputSignal, Load, PortSignals
+from savgs_ident.effects.base import Family, Fundamental, InputSignal, Load, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned import SLIDER_LAG, LearnedForce
 from savgs_ident.effects.learned_functions import coefficients_at, coefficients_of, frictions_at, functions_at
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, EFFECTS, LEARNED
-from savgs_ident.plants.quarter_car.ports import FORCE_PORTS
+from savgs_ident.plants.quarter_car.ports import PORTS
 from savgs_ident.plants.quarter_car.rig_toml import KNOWN_UNITS
 from savgs_ident.symbolic.translate import to_casadi
 
@@ -105,7 +105,9 @@ def _carried(effect: Effect, words: str, displacement: float, velocity: float) -
 
 
 def test_there_is_one_for_every_port_that_can_have_one_and_none_is_looked_for() -> None:
-    assert set(FORCE_PORTS.values()) < {effect.port for effect in LEARNED.values()}
+    assert {port for port in PORTS if port.kind is PortKind.FORCE} < {
+        effect.port for effect in LEARNED.values()
+    }
     assert all(functions_at(effect.port) for effect in LEARNED.values())
     assert not set(LEARNED) & set(CATALOGUE)
     assert set(EFFECTS) == {*LEARNED, *CATALOGUE}

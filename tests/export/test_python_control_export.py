@@ -100,7 +100,7 @@ def test_it_moves_as_the_simulator_says(systems: dict[str, Any], model: Exported
     # Between these instants python-control takes the inputs as straight lines: of a cam, that is off by 3e-8 m.
     times = np.linspace(0.0, DURATION, round(DURATION / 2e-4) + 1)
     car, p = model.equations.model, as_values(model.table.as_dict())
-    road, nominal = cam_road(LIFT, FREQUENCY, settle=0.2), float(p["psi_nominal"])
+    road, nominal = cam_road(LIFT, FREQUENCY, rise_time=0.2), float(p["psi_nominal"])
     ours = simulate_transient(car, p, RigSource(road, held_link(nominal)), times, tolerance=1e-9)
     assert ours.status().ok
     x, _ = resting_point(path)

@@ -9,7 +9,7 @@ import pytest
 from savgs_ident.fit.result import Fit
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE
-from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS
+from savgs_ident.plants.quarter_car.plant import CHANNELS
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
 
@@ -65,7 +65,8 @@ def test_tolerance_parameters_stay_where_they_truly_are(nominal: Fit) -> None:
 def test_the_residuals_are_noise(nominal: Fit, measured: HarmonicResponse) -> None:
     assert nominal.chi2 / nominal.dof <= 1.6
     assert nominal.chi2 / nominal.dof >= 0.8
-    for place, (channel, limit) in enumerate(zip(RESPONSE_CHANNELS, (0.0025, 0.0010), strict=True)):
+    names = (each.name for each in CHANNELS)
+    for place, (channel, limit) in enumerate(zip(names, (0.0025, 0.0010), strict=True)):
         wanted = measured.harmonics[:, measured.channel(channel), 1:10]
         miss = nominal.predicted[:, place, 1:10] - wanted
         assert np.sqrt(np.sum(np.abs(miss) ** 2) / np.sum(np.abs(wanted) ** 2)) <= limit

@@ -8,13 +8,13 @@ import pytest
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.inference.problem import Target, harmonic_target, peak_to_peak_target
-from savgs_ident.plants.quarter_car.plant import CHANNELS, RESPONSE_CHANNELS
+from savgs_ident.plants.quarter_car.plant import CHANNELS
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 
 def _at(response: HarmonicResponse) -> np.ndarray:
     """Its own harmonics of the response channels, (D, 2, n + 1)."""
-    return response.harmonics[:, [response.channel(name) for name in RESPONSE_CHANNELS]]
+    return response.harmonics[:, [response.channel(each.name) for each in CHANNELS]]
 
 
 def test_what_was_measured_has_no_residual(few: HarmonicResponse) -> None:
@@ -32,7 +32,7 @@ def test_the_sum_of_squares_is_the_distance_in_the_covariance(few: HarmonicRespo
     residual = np.asarray(harmonic_target(few, CHANNELS, 9)(_at(few) + miss))
     wanted = 0.0
     for dwell in range(shape[0]):
-        for place, name in enumerate(RESPONSE_CHANNELS):
+        for place, name in enumerate(each.name for each in CHANNELS):
             for order in range(1, shape[2]):
                 covariance = few.covariance[dwell, few.channel(name), order]
                 parts = np.array([miss[dwell, place, order].real, miss[dwell, place, order].imag])
@@ -85,7 +85,7 @@ def test_without_both_there_is_nothing_to_fit(
     few: HarmonicResponse, make: Callable[[HarmonicResponse], Target]
 ) -> None:
     with pytest.raises(InputError, match="neither sprung_accel nor susp_deflection"):
-        make(_without(few, *RESPONSE_CHANNELS))
+        make(_without(few, *(each.name for each in CHANNELS)))
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_peak_to_peak_counts_in_its_own_standard_deviations(few: HarmonicRespons
     target = peak_to_peak_target(few, CHANNELS)
     base = np.asarray(target(_at(few))).reshape(-1, 2)
     double = np.asarray(target(2.0 * _at(few))).reshape(-1, 2)
-    places = [few.channel(name) for name in RESPONSE_CHANNELS]
+    places = [few.channel(each.name) for each in CHANNELS]
     reach, sd = few.peak_to_peak[:, places], few.peak_to_peak_sd[:, places]
     assert double - 2.0 * base == pytest.approx(reach / sd, rel=1e-9)
     assert np.max(np.abs(base) * sd / reach) < 0.01

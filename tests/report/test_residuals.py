@@ -17,13 +17,13 @@ from savgs_ident.fit.result import (
     predicted_peak_to_peak,
     whitened,
 )
-from savgs_ident.plants.quarter_car.plant import RESPONSE_CHANNELS
+from savgs_ident.plants.quarter_car.plant import CHANNELS
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 
 def test_reports_know_the_channels_of_the_model() -> None:
-    assert RIG_LAYOUT.responses == RESPONSE_CHANNELS
+    assert RIG_LAYOUT.responses == tuple(each.name for each in CHANNELS)
 
 
 def test_whitened_residuals_of_the_truth_are_unit_normals(fit: Fit) -> None:

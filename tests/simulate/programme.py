@@ -1,16 +1,19 @@
 """The dwells of the rig's programme, and shorthand for what tests do with solutions."""
 
 from collections.abc import Mapping
+from typing import Any
 
+import jax
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.plants.base import Excitation
+from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.plants.quarter_car.inputs import cam_excitation
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.simulate.mesh import Layout
 from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, adapt, harmonics
+from savgs_ident.simulate.transient import TransientSolution
 
 STROKE = 0.0275
 LINK = np.pi / 2.0
@@ -46,6 +49,12 @@ def orders(
 def distance(found: NDArray[np.complex128], wanted: NDArray[np.complex128]) -> NDArray[np.float64]:
     """Largest difference of any order but the mean, relative to the first harmonic wanted, (D, 2)."""
     return np.max(np.abs(found - wanted)[..., 1:], axis=-1) / np.abs(wanted[..., 1])
+
+
+def loads_along(model: AbstractPlant, p: Values, solution: TransientSolution) -> Any:
+    """Forces along a motion, as the plant's ``loads`` arranges them, each (n, ...)."""
+    loads = jax.jit(jax.vmap(lambda *at: model.loads(p, *at)))
+    return loads(solution.motion, solution.s, solution.sd, solution.inputs)
 
 
 def finer(model: QuarterCar, p: Values, solution: PeriodicSolution, times: int) -> PeriodicSolution:

@@ -10,16 +10,17 @@ from jaxtyping import Array
 
 from savgs_ident.core.status import Status
 from savgs_ident.plants.base import state_sizes
+from savgs_ident.plants.profiles import Constant, Sine
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
-from savgs_ident.plants.quarter_car.drive import holding_drive
+from savgs_ident.plants.quarter_car.drive import Drive
 from savgs_ident.plants.quarter_car.dynamics import section_curves, upright_mass
 from savgs_ident.plants.quarter_car.forces import Inputs
 from savgs_ident.plants.quarter_car.inputs import (
+    ImposedLink,
     RigSource,
     cam_excitation,
     cam_road,
     flat_road,
-    harmonic_link,
     held_link,
 )
 from savgs_ident.plants.quarter_car.kinematics import Values, linkage, strut_length, suspension_travel
@@ -31,8 +32,9 @@ from savgs_ident.simulate.transient import (
     TransientSolution,
     rest_state,
     simulate_transient,
-    transient_loads,
 )
+
+from .programme import loads_along
 
 LIFT = 0.0275
 NOMINAL = np.pi / 2.0
@@ -57,7 +59,7 @@ def simtr(rig: Rig) -> Bench:
 def steady_period(bench: Bench, frequency: float, tolerance: float = 1e-8) -> TransientSolution:
     """One period of a dwell, after as many as it takes until two ends agree to 1e-5 of a typical motion."""
     road, link, period, count = (
-        cam_road(LIFT, frequency, settle=1.0),
+        cam_road(LIFT, frequency, rise_time=1.0),
         held_link(NOMINAL),
         1.0 / frequency,
         2048,
@@ -120,7 +122,7 @@ def lever(p: Values, theta_LW: Array, angle: Array) -> Array:
 def _power(bench: Bench, solution: TransientSolution) -> dict[str, np.ndarray]:
     """What every source brings in [W], (n,); the losses are negative."""
     p, (q, qd, _), (road, link, *_) = bench.p, solution.motion, solution.inputs
-    loads = transient_loads(bench.model, p, solution)
+    loads = loads_along(bench.model, p, solution)
     spring = p["k_sd"] * (p["l_free"] - jax.vmap(lambda a, b: strut_length(p, a, b))(q.theta_LW, link.angle))
     torque = jax.vmap(lambda *at: at[0] * lever(p, *at[1:]))(loads.strut, q.theta_LW, link.angle)
     pressed = p["k_t"] * jnp.maximum(loads.touch.compression, 0.0)
@@ -138,7 +140,7 @@ def _power(bench: Bench, solution: TransientSolution) -> dict[str, np.ndarray]:
 @pytest.mark.slow
 def test_the_energy_of_the_rig_is_accounted_for(simtr: Bench) -> None:
     """Road and link work, the losses and what is stored balance over a second with stick and slip."""
-    road, link = cam_road(LIFT, 2.35, settle=0.5), harmonic_link(NOMINAL, 0.2, 1.5, settle=0.5)
+    road, link = cam_road(LIFT, 2.35, rise_time=0.5), ImposedLink(Sine(0.2, 1.5, NOMINAL, 0.0, 0.5))
     times = np.linspace(0.0, 1.0, 40_001)
     solution = simulate_transient(simtr.model, simtr.p, RigSource(road, link), times, tolerance=1e-10)
     assert solution.status().ok
@@ -165,7 +167,7 @@ def test_the_rig_stays_at_rest_on_a_flat_road(simtr: Bench) -> None:
 
 @pytest.mark.slow
 def test_a_motion_can_be_cut_and_continued(simtr: Bench) -> None:
-    road, link = cam_road(LIFT, 2.0, settle=0.5), held_link(NOMINAL)
+    road, link = cam_road(LIFT, 2.0, rise_time=0.5), held_link(NOMINAL)
     times = np.linspace(0.0, 1.0, 2049)
     whole = simulate_transient(simtr.model, simtr.p, RigSource(road, link), times, tolerance=1e-9)
     half = simulate_transient(simtr.model, simtr.p, RigSource(road, link), times / 2.0, tolerance=1e-9)
@@ -179,7 +181,7 @@ def test_a_motion_can_be_cut_and_continued(simtr: Bench) -> None:
 
 @pytest.mark.slow
 def test_the_error_follows_the_tolerance(simtr: Bench) -> None:
-    road, link, times = cam_road(LIFT, 2.35, settle=0.5), held_link(NOMINAL), np.linspace(0.0, 1.0, 2049)
+    road, link, times = cam_road(LIFT, 2.35, rise_time=0.5), held_link(NOMINAL), np.linspace(0.0, 1.0, 2049)
 
     def motion(tolerance: float) -> np.ndarray:
         solution = simulate_transient(simtr.model, simtr.p, RigSource(road, link), times, tolerance=tolerance)
@@ -198,7 +200,7 @@ def test_the_error_follows_the_tolerance(simtr: Bench) -> None:
 
 @pytest.mark.slow
 def test_derivatives_are_those_of_finite_differences(simtr: Bench) -> None:
-    road, link, times = cam_road(LIFT, 2.35, settle=0.3), held_link(NOMINAL), np.linspace(0.0, 0.6, 2049)
+    road, link, times = cam_road(LIFT, 2.35, rise_time=0.3), held_link(NOMINAL), np.linspace(0.0, 0.6, 2049)
 
     def acceleration(shift: Array) -> Array:
         p = dict(simtr.p) | {name: simtr.p[name] * (1.0 + shift) for name in ("c_sd", "mu_r", "D_z")}
@@ -221,7 +223,7 @@ def test_a_rig_out_of_range_is_named(simtr: Bench) -> None:
     state = rest_state(simtr.model, simtr.p, RigSource(flat_road(), link), jnp.asarray(0.0))
     solution = simulate_transient(simtr.model, ill, RigSource(flat_road(), link), times, state)
     assert solution.status() is Status.NOT_FINITE
-    wild = simulate_transient(simtr.model, simtr.p, RigSource(cam_road(1.0, 4.0, settle=0.2), link), times)
+    wild = simulate_transient(simtr.model, simtr.p, RigSource(cam_road(1.0, 4.0, rise_time=0.2), link), times)
     assert wild.status() is Status.NOT_FINITE
 
 
@@ -237,7 +239,7 @@ def test_a_limit_of_steps_is_named(simtr: Bench, monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.slow
 def test_the_solved_rates_leave_no_residual(simtr: Bench) -> None:
-    road, link = cam_road(LIFT, 3.0, settle=0.1), held_link(NOMINAL)
+    road, link = cam_road(LIFT, 3.0, rise_time=0.1), held_link(NOMINAL)
     times = np.linspace(0.0, 0.5, 2049)
     solution = simulate_transient(simtr.model, simtr.p, RigSource(road, link), times)
 
@@ -286,7 +288,7 @@ def test_equilibrium_is_differentiable(simtr: Bench) -> None:
 @pytest.mark.slow
 def test_deflection_counts_from_standstill_at_the_nominal_angle(simtr: Bench) -> None:
     stiff = dict(simtr.p) | {"k_sd": simtr.p["k_sd"] * 1.05}
-    times, still = np.linspace(0.0, 0.5, 2049), cam_road(0.0, 1.0, settle=1.0)
+    times, still = np.linspace(0.0, 0.5, 2049), cam_road(0.0, 1.0, rise_time=1.0)
     solution = simulate_transient(simtr.model, stiff, RigSource(still, held_link(NOMINAL)), times)
     assert abs(float(solution.motion.q.theta_LW[0])) > 1e-3
     assert np.max(np.abs(solution.readings.susp_deflection)) < 1e-8
@@ -295,7 +297,7 @@ def test_deflection_counts_from_standstill_at_the_nominal_angle(simtr: Bench) ->
 @pytest.mark.slow
 def test_a_drive_holds_the_link_through_a_dwell(simtr: Bench) -> None:
     """The link gives way a little; the energy that it takes from the rig is what the drive's shaft gets."""
-    drive, road = holding_drive(NOMINAL), cam_road(LIFT, 2.35, settle=0.5)
+    drive, road = Drive(Constant(0.0), NOMINAL), cam_road(LIFT, 2.35, rise_time=0.5)
     times = np.linspace(0.0, 1.5, 32_769)
     solution = simulate_transient(simtr.model, simtr.p, RigSource(road, drive), times, tolerance=1e-9)
     assert solution.status().ok
@@ -307,7 +309,9 @@ def test_a_drive_holds_the_link_through_a_dwell(simtr: Bench) -> None:
     )
     accel, stiff = solution.readings.sprung_accel[::16], rigid.readings.sprung_accel
     assert 1e-4 < np.std(accel - stiff) / np.std(stiff) < 0.05
-    still = simulate_transient(simtr.model, simtr.p, RigSource(cam_road(0.0, 2.35, settle=0.5), drive), times)
+    still = simulate_transient(
+        simtr.model, simtr.p, RigSource(cam_road(0.0, 2.35, rise_time=0.5), drive), times
+    )
     assert np.max(np.abs(np.asarray(still.inputs.link.angle) - NOMINAL)) < 1e-7
     power = _power(simtr, solution)
     energy = jax.jit(jax.vmap(lambda *at: _energy(simtr.p, *at)))

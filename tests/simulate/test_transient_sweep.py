@@ -6,13 +6,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from savgs_ident.plants.profiles import tabulated
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
 from savgs_ident.plants.quarter_car.inputs import (
+    ImposedLink,
     RigSource,
+    RoadMotion,
     cam_excitation,
     held_link,
-    recorded_link,
-    recorded_road,
     sweep_road,
 )
 from savgs_ident.plants.quarter_car.kinematics import Values
@@ -50,9 +51,12 @@ def test_the_recorded_sweep_is_met_within_its_noise(
 ) -> None:
     (sweep,), (still,) = campaign.of_kind("sweep"), campaign.of_kind("standstill")
     times = sweep.channels["sprung_accel"].time
-    solution = simulate_transient(
-        simtr, truth, RigSource(recorded_road(sweep), recorded_link(sweep)), times, tolerance=1e-6
+    road, link = (
+        tabulated(sweep.channels[name].time, sweep.channels[name].values)
+        for name in ("road_height", "link_angle")
     )
+    source = RigSource(RoadMotion(road), ImposedLink(link))
+    solution = simulate_transient(simtr, truth, source, times, tolerance=1e-6)
     assert solution.status().ok
     for name, allowed in zip(CHANNELS, (0.005, 0.002), strict=True):
         measured = sweep.channels[name].values

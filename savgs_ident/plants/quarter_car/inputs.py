@@ -1,8 +1,8 @@
 """What drives the rig over time: a road, and what moves the single link.
 
-The road is the plate under the tyre: still, on a steady cam, in a sweep, or at a recorded or tabulated height.
+The road is the plate under the tyre: still, on a steady cam, in a sweep, or at a tabulated height.
 
-    road = cam_road(peak_to_peak=0.0275, frequency=2.35, settle=1.0)
+    road = cam_road(peak_to_peak=0.0275, frequency=2.35, rise_time=1.0)
     road.height(t), road.velocity(t)
 
 The link follows a motion imposed from outside, or a drive with states of its own. Either gives the link's angle and
@@ -28,7 +28,6 @@ from savgs_ident.plants.base import AbstractSource, Excitation
 from savgs_ident.plants.profiles import AbstractProfile, Constant, LinearSweep, Sine, SweptAngle, tabulated
 from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
 from savgs_ident.plants.quarter_car.plant import Loads, QuarterCar
-from savgs_ident.recordings.recording import Recording
 
 
 class RoadMotion(eqx.Module):
@@ -77,40 +76,19 @@ def flat_road() -> RoadMotion:
     return RoadMotion(Constant(0.0))
 
 
-def cam_road(peak_to_peak: float, frequency: float, settle: float = 0.0) -> RoadMotion:
+def cam_road(peak_to_peak: float, frequency: float, rise_time: float = 0.0) -> RoadMotion:
     """A cam of height ``peak_to_peak`` [m] at ``frequency`` [Hz], highest at t = 0.
 
-    Its lift grows smoothly from nothing during the first ``settle`` [s].
+    Its lift grows smoothly from nothing during the first ``rise_time`` [s].
     """
     angle = SweptAngle(frequency, frequency, 1.0, 0.0)
-    return RoadMotion(Sine(peak_to_peak / 2.0, frequency, 0.0, 0.0, settle), angle)
+    return RoadMotion(Sine(peak_to_peak / 2.0, frequency, 0.0, 0.0, rise_time), angle)
 
 
 def sweep_road(peak_to_peak: float, start: float, end: float, duration: float) -> RoadMotion:
     """A cam [m] whose frequency runs from ``start`` to ``end`` [Hz] in ``duration`` [s], upwards first."""
     angle = SweptAngle(start, end, duration, -np.pi / 2.0)
     return RoadMotion(LinearSweep(peak_to_peak / 2.0, start, end, duration), angle)
-
-
-def tabulated_road(time: ArrayLike, height: ArrayLike, source: str = "") -> RoadMotion:
-    """A height [m], (n,), given at times [s], (n,), with a C1 curve between.
-
-    Raises :class:`InputError` as :func:`savgs_ident.plants.profiles.tabulated` does.
-    """
-    return RoadMotion(tabulated(time, height, source))
-
-
-def recorded_road(recording: Recording) -> RoadMotion:
-    """The road of a recorded test. Raises :class:`InputError` if none was recorded."""
-    if "road_height" not in recording.channels:
-        raise InputError(
-            "the road was not recorded",
-            test=recording.name,
-            channel="road_height",
-            remedy="choose a test with the road's height",
-        )
-    channel = recording.channels["road_height"]
-    return tabulated_road(channel.time, channel.values, channel.source)
 
 
 def read_road(path: Path | str) -> RoadMotion:
@@ -130,7 +108,7 @@ def read_road(path: Path | str) -> RoadMotion:
         raise InputError(
             f"has {table.shape[1]} columns", source=path, remedy="give two: time [s] and height [m]"
         )
-    return tabulated_road(table[:, 0], table[:, 1], str(path))
+    return RoadMotion(tabulated(table[:, 0], table[:, 1], str(path)))
 
 
 Scalar = Float[Array, ""]
@@ -184,35 +162,6 @@ class ImposedLink(AbstractActuation):
 def held_link(angle: float) -> ImposedLink:
     """A rigid link at ``angle`` [rad]."""
     return ImposedLink(Constant(angle))
-
-
-def harmonic_link(mean: float, amplitude: float, frequency: float, settle: float = 0.0) -> ImposedLink:
-    """A link that swings about ``mean`` [rad] by ``amplitude`` [rad] at ``frequency`` [Hz], growing smoothly.
-
-    The swing is at its greatest angle at t = 0, and grows from nothing during the first ``settle`` [s].
-    """
-    return ImposedLink(Sine(amplitude, frequency, mean, 0.0, settle))
-
-
-def tabulated_link(time: ArrayLike, angle: ArrayLike, source: str = "") -> ImposedLink:
-    """A link angle [rad], (n,), given at times [s], (n,), with a C1 curve between.
-
-    Raises :class:`InputError` as :func:`savgs_ident.plants.profiles.tabulated` does.
-    """
-    return ImposedLink(tabulated(time, angle, source))
-
-
-def recorded_link(recording: Recording) -> ImposedLink:
-    """The link's motion in a recorded test. Raises :class:`InputError` if it was not recorded."""
-    if "link_angle" not in recording.channels:
-        raise InputError(
-            "the link angle was not recorded",
-            test=recording.name,
-            channel="link_angle",
-            remedy="hold the link at its nominal angle instead",
-        )
-    channel = recording.channels["link_angle"]
-    return tabulated_link(channel.time, channel.values, channel.source)
 
 
 class RigSource(AbstractSource):

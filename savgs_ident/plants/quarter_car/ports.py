@@ -220,9 +220,6 @@ PORTS = (
 )  # fmt: skip
 """All ports of the rig."""
 
-FORCE_PORTS = {port.location: port for port in PORTS if port.kind is PortKind.FORCE}
-"""The force ports by location: there is one at each."""
-
 LOCATION_WORDS: Mapping[str, str] = MappingProxyType(
     {
         "rail": "rail",

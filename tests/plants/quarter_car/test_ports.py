@@ -13,18 +13,27 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values
-from savgs_ident.effects.base import AbstractForceLaw, Family, InternalState, Port, PortSignals, Role
+from savgs_ident.effects.base import (
+    AbstractForceLaw,
+    Family,
+    InternalState,
+    Port,
+    PortKind,
+    PortSignals,
+    Role,
+)
 from savgs_ident.effects.effect import Effect, effect_at
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.dynamics import SectionCurves, section_curves
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.ports import FORCE_PORTS, STRUT, TYRE_LATERAL
+from savgs_ident.plants.quarter_car.ports import PORTS, STRUT, TYRE_LATERAL
 
 from ...in_one_test import over
 from .instants import NOMINAL, as_values, draw_instants, inputs_of, motion_of
 from .series import SERIES_PORTS, yielding
 
 FORCE = 7.0
+FORCE_PORTS = [port for port in PORTS if port.kind is PortKind.FORCE]
 
 
 class _Free(AbstractForceLaw):
@@ -90,11 +99,11 @@ def test_a_force_at_each_port_has_the_power_of_its_velocity(
 ) -> None:
     """Force times velocity of a port is what the force adds to the power of the generalised forces."""
     p, instant, model = as_values(numbers), _lively(), simqc
-    for port in FORCE_PORTS.values():
+    for port in FORCE_PORTS:
         model = model + _probe(port, port.name)
     still = jnp.zeros(2 * len(FORCE_PORTS))
     bare = np.asarray(_out_of_balance(model, p, instant, still, still))
-    for place, port in enumerate(FORCE_PORTS.values()):
+    for place, port in enumerate(FORCE_PORTS):
         pushed = still.at[2 * place + 1].set(FORCE)
         probed = np.asarray(_out_of_balance(model, p, instant, pushed, still))
         velocity = -probed[2 + 2 * place]
@@ -105,10 +114,10 @@ def test_a_force_at_each_port_has_the_power_of_its_velocity(
 
 def test_a_force_from_outside_is_one_of_an_effect(simqc: QuarterCar, numbers: dict[str, float]) -> None:
     p, instant, model = as_values(numbers), _lively(), simqc
-    for port in FORCE_PORTS.values():
+    for port in FORCE_PORTS:
         model = model + _probe(port, port.name)
     still = jnp.zeros(2 * len(FORCE_PORTS))
-    for place, port in enumerate(FORCE_PORTS.values()):
+    for place, port in enumerate(FORCE_PORTS):
         pushed = still.at[2 * place + 1].set(FORCE)
         expected = np.asarray(_out_of_balance(model, p, instant, pushed, still))[:2]
         imposed = {port.name: jnp.asarray(port.sense * FORCE)}

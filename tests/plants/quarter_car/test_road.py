@@ -12,19 +12,14 @@ from hypothesis import strategies as st
 from savgs_ident.core.errors import InputError
 from savgs_ident.plants.profiles import AbstractProfile, Constant, LinearSweep, Sine, tabulated
 from savgs_ident.plants.quarter_car.inputs import (
+    ImposedLink,
     RoadMotion,
     cam_road,
     flat_road,
-    harmonic_link,
     held_link,
     read_road,
-    recorded_link,
-    recorded_road,
     sweep_road,
-    tabulated_link,
-    tabulated_road,
 )
-from savgs_ident.recordings.recording import RecordedChannel, Recording
 
 TIMES = np.linspace(0.0, 4.0, 401)
 
@@ -52,7 +47,7 @@ def test_the_rate_is_the_derivative(name: str) -> None:
 
 
 def test_a_cam_grows_from_rest_and_is_steady_then() -> None:
-    road = cam_road(0.0275, 2.35, settle=1.0)
+    road = cam_road(0.0275, 2.35, rise_time=1.0)
     height, velocity = over(road.height, TIMES), over(road.velocity, TIMES)
     assert height[0] == 0.0
     assert velocity[0] == 0.0
@@ -83,7 +78,7 @@ def test_the_cam_is_at_nought_where_it_lifts_highest(road: RoadMotion) -> None:
 
 
 def test_nothing_turns_behind_a_road_that_no_cam_drives() -> None:
-    for road in (flat_road(), tabulated_road([0.0, 1.0], [0.0, 0.01])):
+    for road in (flat_road(), RoadMotion(tabulated([0.0, 1.0], [0.0, 0.01]))):
         assert road.cam_at(jnp.zeros(())) is None
 
 
@@ -111,7 +106,7 @@ def test_a_fine_table_of_a_wave_is_the_wave() -> None:
     """As fine as a recording: 500 samples a second, of 3 Hz, at uneven times."""
     times = np.arange(0.0, 3.0, 0.002) + np.random.default_rng(3).normal(0.0, 4e-5, 1500)
     wave = 6.0 * np.pi
-    road = tabulated_road(times, 0.01375 * np.sin(wave * times))
+    road = RoadMotion(tabulated(times, 0.01375 * np.sin(wave * times)))
     between = np.linspace(0.01, 2.98, 5001)
     height, velocity = over(road.height, between), over(road.velocity, between)
     assert np.max(np.abs(height - 0.01375 * np.sin(wave * between))) < 1e-4 * 0.01375
@@ -151,7 +146,7 @@ def test_a_table_has_no_kinks() -> None:
 )
 def test_a_bad_table_is_refused(time: list[float], height: list[float], says: str) -> None:
     with pytest.raises(InputError, match=says):
-        tabulated_road(time, height, "bump.csv")
+        tabulated(time, height, "bump.csv")
 
 
 def test_a_road_is_read_from_a_file(tmp_path: Path) -> None:
@@ -169,32 +164,14 @@ def test_a_road_is_read_from_a_file(tmp_path: Path) -> None:
         read_road(tmp_path / "absent.csv")
 
 
-def test_recorded_motions_are_imposed_as_they_are() -> None:
-    times = np.linspace(0.0, 1.0, 51)
-    channels = {
-        "road_height": RecordedChannel("road_height", "m", times, 0.01 * np.sin(times)),
-        "link_angle": RecordedChannel("link_angle", "rad", times, 1.57 + 0.001 * np.cos(times)),
-    }
-    test = Recording("dwell", "dwell", 1.0, channels)
-    road, link = recorded_road(test), recorded_link(test)
-    np.testing.assert_allclose(over(road.height, times), channels["road_height"].values, atol=1e-12)
-    angle = over(lambda t: link.link(t, jnp.zeros(0)).angle, times)
-    np.testing.assert_allclose(angle, channels["link_angle"].values, atol=1e-12)
-    bare = Recording("dwell", "dwell", 1.0, {})
-    with pytest.raises(InputError, match="road was not recorded"):
-        recorded_road(bare)
-    with pytest.raises(InputError, match="link angle was not recorded"):
-        recorded_link(bare)
-
-
 def test_links_are_held_swung_and_tabulated() -> None:
     none, t = jnp.zeros(0), jnp.asarray(0.25)
     held = held_link(1.2).link(t, none)
     assert (float(held.angle), float(held.velocity)) == (1.2, 0.0)
-    swung = harmonic_link(1.5, 0.1, 1.0).link(t, none)
+    swung = ImposedLink(Sine(0.1, 1.0, 1.5, 0.0, 0.0)).link(t, none)
     assert float(swung.angle) == pytest.approx(1.5, abs=1e-12)
     assert float(swung.velocity) == pytest.approx(-0.2 * np.pi)
-    table = tabulated_link([0.0, 1.0], [1.0, 2.0]).link(t, none)
+    table = ImposedLink(tabulated([0.0, 1.0], [1.0, 2.0])).link(t, none)
     assert float(table.angle) == pytest.approx(1.25)
     assert float(table.velocity) == pytest.approx(1.0)
 
