@@ -50,11 +50,9 @@ def simulate(
     import savgs_ident as si
     from savgs_ident.core.files import prepare_folder
 
-    if sum((bool(frequency), sweep, campaign is not None)) > 1:
+    # A sweep is a call of its own, which cannot see the others.
+    if sweep and (frequency or campaign is not None):
         raise typer.BadParameter("choose one of --frequency, --sweep and --campaign")
-    for value in frequency or ():
-        if not 0.0 < value < float("inf"):
-            raise typer.BadParameter(f"--frequency {value:g}: give a frequency above 0 Hz")
     reporter = Reporter(json, quiet)
     prepare_folder(out)
     shown = read_model(model_file, model)

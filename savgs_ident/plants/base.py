@@ -88,6 +88,8 @@ class Input:
         required: whether a recording without it is refused; otherwise it stays at rest.
         keeps_mean: whether its mean counts. A plate, say, has no absolute height.
         orders: highest order of its motion that is imposed; what lies above is below the sensor's resolution.
+        stroke: name of the parameter that holds its motion in a test, peak to peak; empty where the sizes of the
+            coordinates say how far it moves.
     """
 
     name: str
@@ -100,6 +102,7 @@ class Input:
     required: bool = True
     keeps_mean: bool = False
     orders: int | None = None
+    stroke: str = ""
 
 
 @dataclass(frozen=True)

@@ -78,6 +78,17 @@ def _smooth_rise(share: Scalar) -> Scalar:
     return share**3 * (10.0 + share * (6.0 * share - 15.0))
 
 
+class Offset(AbstractProfile):
+    """A profile about a ``level``, in its unit, instead of about zero."""
+
+    inner: AbstractProfile
+    level: Number = eqx.field(converter=jnp.asarray)
+
+    def value(self, t: Scalar) -> Scalar:
+        """The quantity at time ``t`` [s]."""
+        return self.level + self.inner.value(t)
+
+
 class Faded(AbstractProfile):
     """A profile that grows from nothing during the first ``fade`` [s] and is gone ``fade`` after ``end`` [s]."""
 

@@ -4,6 +4,7 @@ A plant is driven by the harmonics of its inputs, as they are given or as they w
 A model is held against the response of the campaign's dwells, or of those of them that a command is asked to look at.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -50,6 +51,69 @@ def _synthesise(harmonics: Array, omega: Array, phase: Array) -> tuple[Array, Ar
     order = jnp.arange(harmonics.shape[1])
     terms = harmonics * turns(phase, harmonics.shape[1] - 1)
     return jnp.sum(terms.real, axis=1), jnp.sum((1j * order * terms).real, axis=1) * omega
+
+
+def typical_amplitude(plant: AbstractPlant | type[AbstractPlant], table: ParameterTable) -> float:
+    """Amplitude of the first input in a test [its unit]: half of its stroke, where it declares one.
+
+    Otherwise the largest with which no coordinate moves by more than its typical size.
+    """
+    driven = plant.inputs[0]
+    if driven.stroke:
+        return table[driven.stroke].value / 2.0
+    moved = zip(plant.coordinates, driven.moves, strict=True)
+    return min(each.size / abs(moves) for each, moves in moved if moves)
+
+
+def resting_values(plant: AbstractPlant | type[AbstractPlant], table: ParameterTable) -> dict[str, float]:
+    """What each input is at rest [its unit], by its name."""
+    return {each.name: table[each.rest].value if each.rest else 0.0 for each in plant.inputs}
+
+
+def sine_excitation(
+    plant: AbstractPlant | type[AbstractPlant],
+    table: ParameterTable,
+    frequency: NDArray[np.float64],
+    amplitudes: Mapping[str, float],
+) -> Excitation:
+    """Sines of ``amplitudes`` [unit of each input], by name, at D frequencies [Hz], about rest; other inputs rest."""
+    harmonics = {}
+    for name, rest in resting_values(plant, table).items():
+        row = [rest, amplitudes[name]] if name in amplitudes else [rest]
+        harmonics[name] = jnp.asarray(np.tile(np.array(row, np.complex128), (frequency.size, 1)))
+    return Excitation(jnp.asarray(frequency), harmonics)
+
+
+def interpolate_excitation(excitation: Excitation) -> Excitation:
+    """As many frequencies again, in the widest gaps on a logarithmic axis."""
+    known = np.asarray(excitation.frequency)
+    added = bisect_widest_gaps(known, known.size)
+
+    def interpolated(values: object) -> NDArray[np.complex128]:
+        columns = np.asarray(values).T
+        parts = [
+            np.interp(added, known, column.real) + 1j * np.interp(added, known, column.imag)
+            for column in columns
+        ]
+        return np.stack(parts, axis=1)
+
+    harmonics = {name: jnp.asarray(interpolated(values)) for name, values in excitation.harmonics.items()}
+    return Excitation(jnp.asarray(added), harmonics)
+
+
+def bisect_widest_gaps(known: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """``count`` frequencies, each in the middle of what is then the widest gap; growing.
+
+    ``known`` (D,) grows; a single one has no gap and is followed at one per cent.
+    """
+    points = list(np.log(known)) if known.size > 1 else [*np.log(known), *(np.log(known) + 0.01)]
+    added = []
+    for _ in range(count):
+        gap = int(np.argmax(np.diff(points)))
+        middle = 0.5 * (points[gap] + points[gap + 1])
+        points.insert(gap + 1, middle)
+        added.append(middle)
+    return np.asarray(np.exp(np.sort(added)))
 
 
 def recorded_names(plant: AbstractPlant | type[AbstractPlant]) -> tuple[str, ...]:

@@ -21,19 +21,18 @@ from savgs_ident.core.status import Status
 from savgs_ident.core.values import as_values
 from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.plants.model import Model
-from savgs_ident.plants.quarter_car.inputs import (
-    RigSource,
-    cam_excitation,
-    held_link,
-    nominal_test,
-    sweep_road,
-)
-from savgs_ident.plants.quarter_car.model import RigModel
-from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.profiles import Constant, LinearSweep, Offset, ProfileSource, SweptAngle
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak, unbiased_peak_to_peak
-from savgs_ident.simulate.excitation import measured_excitation, recorded_names
+from savgs_ident.simulate.excitation import (
+    interpolate_excitation,
+    measured_excitation,
+    recorded_names,
+    resting_values,
+    sine_excitation,
+    typical_amplitude,
+)
 from savgs_ident.simulate.mesh import Layout, layout_for
 from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
@@ -70,8 +69,8 @@ def model_curve(
     """
     every = np.ones(harmonics.shape, dtype=np.bool_)
     transfer = np.where(solved[:, None], harmonics[:, :, 1] / driven[:, None], np.nan)
-    reach = np.where(solved[:, None], peak_to_peak(harmonics, every), np.nan)
-    return ModelCurve(label, frequency, transfer, reach)
+    extent = np.where(solved[:, None], peak_to_peak(harmonics, every), np.nan)
+    return ModelCurve(label, frequency, transfer, extent)
 
 
 @dataclass(frozen=True)
@@ -162,38 +161,6 @@ def merge_responses(one: SimulatedResponse, other: SimulatedResponse) -> Simulat
     )
 
 
-def interpolate_excitation(excitation: Excitation) -> Excitation:
-    """As many frequencies again, in the widest gaps on a logarithmic axis."""
-    known = np.asarray(excitation.frequency)
-    added = bisect_widest_gaps(known, known.size)
-
-    def interpolated(values: object) -> NDArray[np.complex128]:
-        columns = np.asarray(values).T
-        parts = [
-            np.interp(added, known, column.real) + 1j * np.interp(added, known, column.imag)
-            for column in columns
-        ]
-        return np.stack(parts, axis=1)
-
-    harmonics = {name: jnp.asarray(interpolated(values)) for name, values in excitation.harmonics.items()}
-    return Excitation(jnp.asarray(added), harmonics)
-
-
-def bisect_widest_gaps(known: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """``count`` frequencies, each in the middle of what is then the widest gap; growing.
-
-    ``known`` (D,) grows; a single one has no gap and is followed at one per cent.
-    """
-    points = list(np.log(known)) if known.size > 1 else [*np.log(known), *(np.log(known) + 0.01)]
-    added = []
-    for _ in range(count):
-        gap = int(np.argmax(np.diff(points)))
-        middle = 0.5 * (points[gap] + points[gap + 1])
-        points.insert(gap + 1, middle)
-        added.append(middle)
-    return np.asarray(np.exp(np.sort(added)))
-
-
 LOWEST_HZ, HIGHEST_HZ, DURATION_S, RATE_HZ = 0.0, 3.0, 60.0, 500.0
 """The paper's sweep, and how densely it is written down."""
 
@@ -237,42 +204,58 @@ DWELLS = (
 
 
 def simulate(
-    model: RigModel,
+    model: Model,
     frequency: Sequence[float] = (),
     campaign: Campaign | None = None,
     orders: int = 15,
     progress: Progress = no_progress,
+    *,
+    amplitude: float | None = None,
 ) -> SimulatedResponse:
-    """The periodic motions of a model on the cam.
+    """The periodic motions of a model under a sine in its plant's first input, the others at rest.
 
     Args:
-        model: the rig with its effects.
-        frequency: of the cam [Hz]; 28 from 0.5 to 6 if empty.
-        campaign: road and link as in its dwells instead.
+        model: the plant with its effects.
+        frequency: of the tests [Hz]; 28 from 0.5 to 6 if empty.
+        campaign: all inputs as in its dwells instead.
         orders: highest harmonic order.
         progress: called with a sentence on what is being done.
+        amplitude: of the first input [its unit]; if left out, what the plant declares: half the cam's stroke for the
+            rig, what moves a coordinate by its typical size for others.
 
-    A motion that was not found has its status in the result. Raises :class:`InputError` for a frequency that is not
-    above zero.
+    A motion that was not found has its status in the result. Raises :class:`InputError` for a frequency or an
+    amplitude that is not above zero, for ``orders`` below 1, where a campaign is given besides a frequency or an
+    amplitude, and where it cannot be used.
     """
     use_persistent_cache()
-    excitation = _excitation(model, frequency, campaign, orders)
+    if orders < 1:
+        raise InputError(f"orders is {orders}", source="orders", remedy="ask for at least order 1")
+    excitation = _excitation(model, frequency, campaign, orders, amplitude)
     progress(f"solving {excitation.frequency.shape[0]} periodic motions")
     return replace(simulate_response(model, excitation, orders), origin=model.origin(campaign))
 
 
-def simulate_sweep(model: RigModel, progress: Progress = no_progress) -> SimulatedSweep:
-    """A sweep of the cam from 0 to 3 Hz in 60 s, from standstill, the link held at its nominal angle."""
+def simulate_sweep(
+    model: Model, progress: Progress = no_progress, *, amplitude: float | None = None
+) -> SimulatedSweep:
+    """A sweep of the plant's first input from 0 to 3 Hz in 60 s, from standstill, the others at rest.
+
+    ``amplitude`` as in :func:`simulate`. Raises :class:`InputError` for one that is not above zero.
+    """
     use_persistent_cache()
     progress("integrating a sweep of 60 s")
-    table = model.table
-    cam, angle = nominal_test(table.as_dict())
+    table, size = model.table, _amplitude(model, amplitude)
+    level, *others = resting_values(model.plant, table).values()
     time = np.linspace(0.0, DURATION_S, round(DURATION_S * RATE_HZ) + 1)
-    source = RigSource(sweep_road(cam, LOWEST_HZ, HIGHEST_HZ, DURATION_S), held_link(angle))
+    sweep = LinearSweep(size, LOWEST_HZ, HIGHEST_HZ, DURATION_S)
+    driven = Offset(sweep, level) if model.plant.inputs[0].rest else sweep
+    # A sine that begins upwards is a cosine a quarter of a turn later: laws of a cam count from where it is highest.
+    turning = SweptAngle(LOWEST_HZ, HIGHEST_HZ, DURATION_S, -np.pi / 2.0)
+    source = ProfileSource((driven, *(Constant(rest) for rest in others)), turning)
     solution = simulate_transient(model.build(), as_values(table.as_dict()), source, time)
-    readings = np.stack([np.asarray(getattr(solution.readings, each.name)) for each in model.channels])
-    road = np.asarray(solution.inputs.road.height)
-    return SimulatedSweep(model, time, road, readings, solution.status(), origin=model.origin())
+    readings = np.stack([np.asarray(each) for each in solution.readings])
+    moved = np.asarray(jax.lax.map(driven.value, solution.times))
+    return SimulatedSweep(model, time, moved, readings, solution.status(), origin=model.origin())
 
 
 def simulate_dwells(
@@ -309,20 +292,16 @@ def simulate_dwells(
         if not noise.get(each.name, 0.0) > 0.0:
             raise InputError(f"channel '{each.name}' has no noise", remedy="give its standard deviation")
     hertz = np.unique(_checked(frequency))
-    rows = {
-        each.name: [table[each.rest].value if each.rest else 0.0, amplitudes.get(each.name, 0.0)]
-        for each in plant.inputs
-    }
-    driven = {name: jnp.tile(jnp.asarray(row, complex), (hertz.size, 1)) for name, row in rows.items()}
-    excitation, p = Excitation(jnp.asarray(hertz), driven), as_values(table.as_dict())
+    every = {each.name: amplitudes.get(each.name, 0.0) for each in plant.inputs}
+    excitation, p = sine_excitation(plant, table, hertz, every), as_values(table.as_dict())
     progress(f"solving {hertz.size} periodic motions")
     solution = simulate_periodic(plant, p, excitation)
     lost = [f"{f:g} Hz" for f, status in zip(hertz, solution.status(), strict=True) if not status.ok]
     if lost:
         raise InputError("there is no periodic motion at " + ", ".join(lost), remedy="change the amplitudes")
     true = np.zeros((hertz.size, len(recorded_names(plant)), orders + 1), complex)
-    for c, row in enumerate(rows.values()):
-        true[:, c, :2] = row
+    for c, each in enumerate(plant.inputs):
+        true[:, c, :2] = np.asarray(excitation.harmonics[each.name])
     true[:, len(plant.inputs) :] = np.asarray(harmonics(plant, p, solution, orders))
     return _measured(plant, hertz, true, noise, samples, np.random.default_rng(seed))
 
@@ -369,14 +348,30 @@ def _check_names(what: str, given: Mapping[str, float], known: Sequence[str]) ->
 def _checked(frequency: Sequence[float]) -> Sequence[float]:
     for value in frequency:
         if not 0.0 < value < np.inf:
-            raise InputError(f"{value:g} Hz is no frequency", remedy="give frequencies above 0 Hz")
+            raise InputError(f"{value:g} Hz is no frequency", remedy="give a frequency above 0 Hz")
     return frequency
 
 
+def _amplitude(model: Model, given: float | None) -> float:
+    """The amplitude of the first input [its unit]."""
+    if given is None:
+        return typical_amplitude(model.plant, model.table)
+    if not 0.0 < given < np.inf:
+        raise InputError(f"an amplitude of {given:g} moves nothing", remedy="give one above zero")
+    return given
+
+
 def _excitation(
-    model: RigModel, frequency: Sequence[float], campaign: Campaign | None, orders: int
+    model: Model, frequency: Sequence[float], campaign: Campaign | None, orders: int, amplitude: float | None
 ) -> Excitation:
-    parameters = model.rig.parameters
-    if campaign is not None:
-        return measured_excitation(QuarterCar, estimate_response(campaign, orders), parameters)
-    return cam_excitation(np.unique(_checked(frequency) or DWELLS), *nominal_test(parameters.as_dict()))
+    driven = model.plant.inputs[0].name
+    if campaign is None:
+        hertz = np.unique(_checked(frequency) if len(frequency) else DWELLS)
+        return sine_excitation(model.plant, model.table, hertz, {driven: _amplitude(model, amplitude)})
+    if len(frequency) or amplitude is not None:
+        raise InputError(
+            "a campaign has frequencies and amplitudes of its own",
+            source=campaign.source,
+            remedy="give a campaign, or a frequency and an amplitude",
+        )
+    return measured_excitation(model.plant, estimate_response(campaign, orders, driven), model.table)

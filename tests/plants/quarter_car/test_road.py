@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.plants.profiles import AbstractProfile, Constant, LinearSweep, Sine, tabulated
+from savgs_ident.plants.profiles import AbstractProfile, Constant, LinearSweep, Offset, Sine, tabulated
 from savgs_ident.plants.quarter_car.inputs import (
     ImposedLink,
     RoadMotion,
@@ -33,6 +33,7 @@ PROFILES: dict[str, AbstractProfile] = {
     "constant": Constant(0.3),
     "sine": Sine(0.01, 2.0, 0.2, 0.4, 1.5),
     "sweep": LinearSweep(0.01, 0.2, 2.0, 3.0),
+    "offset": Offset(LinearSweep(0.01, 0.2, 2.0, 3.0), 0.3),
     "table": tabulated(TIMES[::7] ** 1.1, np.sin(3.0 * TIMES[::7])),
 }
 
