@@ -51,7 +51,7 @@ from savgs_ident.simulate.periodic import (
     resolve,
     simulate_periodic,
 )
-from savgs_ident.simulate.program_cache import placed, stored
+from savgs_ident.simulate.program_cache import placed, run_cached
 from savgs_ident.simulate.sensitivity import directional
 
 
@@ -66,7 +66,7 @@ def rows_of(
 @eqx.filter_jit
 def slopes_of(*args: Any) -> tuple[Array, ...]:
     """Their slopes along directions (k, n) of named parameters, (k, m) [unit of the reading]."""
-    return stored(_directional_rows, *args)
+    return run_cached(_directional_rows, *args)
 
 
 def _directional_rows(

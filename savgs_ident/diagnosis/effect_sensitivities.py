@@ -32,7 +32,7 @@ from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.plants.base import AbstractPlant, AtPorts
 from savgs_ident.simulate.along_motion import FORWARD, NEWTON_STEPS
 from savgs_ident.simulate.periodic import PeriodicSolution
-from savgs_ident.simulate.program_cache import placed, stored
+from savgs_ident.simulate.program_cache import placed, run_cached
 from savgs_ident.simulate.sensitivity import answers, ports_at_nodes
 
 SAMPLES = 384
@@ -130,7 +130,7 @@ def impose(
 
 @eqx.filter_jit
 def _answered(*args: Any) -> tuple[Array, ...]:
-    return stored(_answer_rows, *args)
+    return run_cached(_answer_rows, *args)
 
 
 def _answer_rows(

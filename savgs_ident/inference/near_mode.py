@@ -37,7 +37,7 @@ from savgs_ident.inference.prior import NUISANCE, Prior
 from savgs_ident.inference.problem import Problem
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, harmonics_of, resolve, solve_near
-from savgs_ident.simulate.program_cache import placed, stored
+from savgs_ident.simulate.program_cache import placed, run_cached
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities, trajectory_sensitivities
 
 ENOUGH = 1e-4
@@ -119,7 +119,7 @@ def rows_and_slopes(
 
 @eqx.filter_jit
 def _linear_rows(*args: Any) -> tuple[Array, ...]:
-    return stored(_rows_and_derivatives, *args)
+    return run_cached(_rows_and_derivatives, *args)
 
 
 def _rows_and_derivatives(
@@ -132,7 +132,7 @@ def _rows_and_derivatives(
 
 @eqx.filter_jit
 def _slopes_of(*args: Any) -> tuple[Array, ...]:
-    return stored(_trajectory_slopes, *args)
+    return run_cached(_trajectory_slopes, *args)
 
 
 def _trajectory_slopes(problem: Problem, u: Array, p: Any, solution: PeriodicSolution) -> tuple[Array, ...]:
@@ -143,7 +143,7 @@ def _trajectory_slopes(problem: Problem, u: Array, p: Any, solution: PeriodicSol
 
 @eqx.filter_jit
 def _response(*args: Any) -> tuple[Array, ...]:
-    return stored(_harmonics_near, *args)
+    return run_cached(_harmonics_near, *args)
 
 
 def _harmonics_near(problem: Problem, anchor: Anchor, u: Array) -> tuple[Array, Array]:

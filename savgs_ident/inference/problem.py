@@ -29,7 +29,7 @@ from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
 from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, harmonics, resolve
-from savgs_ident.simulate.program_cache import placed, stored
+from savgs_ident.simulate.program_cache import placed, run_cached
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 
 
@@ -270,7 +270,7 @@ def _evaluation(problem: Problem, pins: Pins, u: Array, p: Values, solution: Per
 
 @eqx.filter_jit
 def _compared(*args: Any) -> tuple[Array, ...]:
-    return stored(_residual_and_jacobian, *args)
+    return run_cached(_residual_and_jacobian, *args)
 
 
 def _residual_and_jacobian(

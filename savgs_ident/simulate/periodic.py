@@ -43,7 +43,7 @@ from savgs_ident.simulate.collocation import (
 )
 from savgs_ident.simulate.excitation import inputs_at, signals_at
 from savgs_ident.simulate.mesh import Layout, Mesh, adapted_mesh, layout_for, turns, uniform_mesh
-from savgs_ident.simulate.program_cache import placed, stored
+from savgs_ident.simulate.program_cache import placed, run_cached
 
 TOLERANCE = 1e-7
 """Largest last Newton step, relative to the size of the motion: the error left is far smaller."""
@@ -220,7 +220,7 @@ def solve_on_mesh(
 
 @eqx.filter_jit
 def _solved(*args: Any) -> tuple[Array, ...]:
-    return stored(_solve, *args)
+    return run_cached(_solve, *args)
 
 
 def _solve(

@@ -42,7 +42,7 @@ _SETTINGS = (
 )
 
 
-class _UntoldError(Exception):
+class _UndescribedError(Exception):
     """Something of which no description is certain."""
 
 
@@ -50,7 +50,7 @@ def fingerprint(function: Callable[..., Any], args: tuple[Any, ...]) -> str | No
     """A digest of ``function`` of this package and the structure of its arguments; None if it has none."""
     try:
         parts = [_origin(function), *_description(args)]
-    except _UntoldError:
+    except _UndescribedError:
         return None
     parts += [_SOURCE, jax.default_backend(), *map(version, _TRACERS)]
     parts += [f"{setting} {getattr(jax.config, setting)}" for setting in _SETTINGS]
@@ -98,7 +98,7 @@ def _origin(thing: Any) -> str:
     """Where a class or function is defined; a function within another sees more than its arguments."""
     name = f"{thing.__module__}.{thing.__qualname__}"
     if thing.__module__.partition(".")[0] != _PACKAGE or "<locals>" in name or "<lambda>" in name:
-        raise _UntoldError(name)
+        raise _UndescribedError(name)
     return name
 
 
@@ -128,17 +128,17 @@ def _description(value: Any) -> Iterator[str]:
                 yield field.name
                 yield from _description(getattr(value, field.name))
         case _:
-            raise _UntoldError(type(value).__name__)
+            raise _UndescribedError(type(value).__name__)
 
 
 _DIGEST = hashlib.sha256().digest_size
 
 
-def stored(function: Callable[..., tuple[Array, ...]], *args: Any) -> tuple[Array, ...]:
-    """``function(*args)`` from its stored program, if one was kept; else trace it, and keep it.
+def run_cached(function: Callable[..., tuple[Array, ...]], *args: Any) -> tuple[Array, ...]:
+    """``function(*args)`` by its program in the cache folder; where there is none, it is traced and written there.
 
     ``function`` is pure, defined at the top of a module of this package, and gives a flat tuple of arrays
-    of any shape and any units. A stored program can be compiled within a larger one, but neither
+    of any shape and any units. A cached program can be compiled within a larger one, but neither
     differentiated nor batched.
     """
     folder = jax.config.values["jax_compilation_cache_dir"]
@@ -167,7 +167,7 @@ def stored(function: Callable[..., tuple[Array, ...]], *args: Any) -> tuple[Arra
 def placed(tree: Any) -> Any:
     """``tree`` with its arrays bound to the device.
 
-    What a stored program gives is bound to a device. A program that takes such arrays together with others is
+    What a cached program gives is bound to a device. A program that takes such arrays together with others is
     compiled once for every combination in which they come; if all are bound there is only one.
     """
     arrays, rest = eqx.partition(tree, eqx.is_array)

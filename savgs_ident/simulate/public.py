@@ -300,8 +300,8 @@ def simulate_dwells(
     if lost:
         raise InputError("there is no periodic motion at " + ", ".join(lost), remedy="change the amplitudes")
     true = np.zeros((hertz.size, len(recorded_names(plant)), orders + 1), complex)
-    for c, each in enumerate(plant.inputs):
-        true[:, c, :2] = np.asarray(excitation.harmonics[each.name])
+    for c, given in enumerate(plant.inputs):
+        true[:, c, :2] = np.asarray(excitation.harmonics[given.name])
     true[:, len(plant.inputs) :] = np.asarray(harmonics(plant, p, solution, orders))
     return _measured(plant, hertz, true, noise, samples, np.random.default_rng(seed))
 

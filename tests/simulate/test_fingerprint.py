@@ -101,7 +101,7 @@ def test_a_change_counts_where_programs_are_traced_and_nowhere_else(tmp_path: Pa
 
 
 def test_no_program_is_defined_elsewhere() -> None:
-    defining = re.compile(r"@eqx\.|@(jax|partial\(jax)\.|filter_jit|jax\.jit|stored\(")
+    defining = re.compile(r"@eqx\.|@(jax|partial\(jax)\.|filter_jit|jax\.jit|run_cached\(")
     elsewhere = [path for path in PACKAGE.rglob("*.py") if path.relative_to(PACKAGE).parts[0] not in TRACED]
     assert elsewhere
     assert [path for path in elsewhere if defining.search(path.read_text(encoding="utf-8"))] == []

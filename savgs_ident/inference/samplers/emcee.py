@@ -27,7 +27,7 @@ from jaxtyping import Array, Float
 
 from savgs_ident.inference.near_mode import ExactModel, Surrogate
 from savgs_ident.inference.samplers.chains import Chains, Checkpoint, decide, unsettled
-from savgs_ident.simulate.program_cache import placed, stored
+from savgs_ident.simulate.program_cache import placed, run_cached
 
 STEPS = 60
 """Steps of one walk: enough to forget where it began."""
@@ -51,7 +51,7 @@ def pcn_steps(
 
 @eqx.filter_jit
 def _walked(*args: Any) -> tuple[Array, ...]:
-    return stored(_walk, *args)
+    return run_cached(_walk, *args)
 
 
 def _walk(surrogate: Surrogate, key: Array, start: Array, steps: Array) -> tuple[Array, ...]:

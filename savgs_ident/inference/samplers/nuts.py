@@ -36,7 +36,7 @@ from jaxtyping import Array, Bool, Float
 
 from savgs_ident.inference.near_mode import ExactModel, Surrogate
 from savgs_ident.inference.samplers.chains import Chains, Checkpoint, decide, unsettled
-from savgs_ident.simulate.program_cache import placed, stored
+from savgs_ident.simulate.program_cache import placed, run_cached
 
 CHAINS = 8
 """Chains: as many responses of the exact model are solved side by side."""
@@ -190,12 +190,12 @@ def _chains(state: State, evaluations: int, unsolved: int) -> Chains:
 
 @eqx.filter_jit
 def _adapted(*args: Any) -> tuple[Array, ...]:
-    return stored(_adapt, *args)
+    return run_cached(_adapt, *args)
 
 
 @eqx.filter_jit
 def _transitions(*args: Any) -> tuple[Array, ...]:
-    return stored(_transit, *args)
+    return run_cached(_transit, *args)
 
 
 def _adapt(surrogate: Surrogate, key: Array) -> tuple[Array, ...]:

@@ -1,4 +1,4 @@
-"""A stored program is the program: same numbers in a later run, made anew where the file is not whole."""
+"""A cached program is the program: same numbers in a later run, made anew where the file is not whole."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.small_root import solve_dense
 from savgs_ident.simulate import program_cache
-from savgs_ident.simulate.program_cache import stored
+from savgs_ident.simulate.program_cache import run_cached
 
 _SOLVE = """
 import jax.monitoring
@@ -106,7 +106,7 @@ def test_a_program_is_traced_once_and_again_where_its_file_is_not_whole(
     )
 
     def solved() -> NDArray[np.float64]:
-        return np.asarray(stored(solve_dense, matrix, right))
+        return np.asarray(run_cached(solve_dense, matrix, right))
 
     np.testing.assert_allclose(solved(), wanted)
     (file,) = folder.glob("traced-*")
