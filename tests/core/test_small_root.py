@@ -19,18 +19,16 @@ def _square_root(of: Array) -> Root:
 def test_a_root_and_its_slopes_are_exact() -> None:
     root = jax.jit(_square_root)(2.0 * ONE)
     assert root.status() is Status.CONVERGED
-    assert float(root.x[0]) == pytest.approx(np.sqrt(2.0), rel=1e-14)
-    first, second = (
-        jax.jacfwd(lambda of: _square_root(of).x),
-        jax.jacrev(jax.jacfwd(lambda of: _square_root(of).x)),
-    )
-    assert float(first(2.0 * ONE)[0, 0]) == pytest.approx(0.5 / np.sqrt(2.0), rel=1e-13)
-    assert float(second(2.0 * ONE)[0, 0, 0]) == pytest.approx(-0.25 / 2.0**1.5, rel=1e-12)
+    assert float(root.x[0]) == pytest.approx(np.sqrt(2.0), rel=1e-11)
+    first = jax.jacfwd(lambda of: _square_root(of).x)
+    second = jax.jacrev(first)
+    assert float(first(2.0 * ONE)[0, 0]) == pytest.approx(0.5 / np.sqrt(2.0), rel=1e-10)
+    assert float(second(2.0 * ONE)[0, 0, 0]) == pytest.approx(-0.25 / 2.0**1.5, rel=1e-10)
 
 
 @pytest.mark.parametrize(
     ("of", "status"),
-    [(2.0, Status.CONVERGED), (-1.0, Status.MAX_ITERATIONS), (np.nan, Status.NOT_FINITE)],
+    [(2.0, Status.CONVERGED), (-2.0, Status.MAX_ITERATIONS), (np.nan, Status.NOT_FINITE)],
     ids=["a root", "none", "no number"],
 )
 def test_how_it_ended_is_a_status_and_a_root_that_was_not_found_is_no_number(
@@ -44,5 +42,5 @@ def test_how_it_ended_is_a_status_and_a_root_that_was_not_found_is_no_number(
 def test_of_several_roots_the_worst_counts() -> None:
     roots = jax.jit(lambda of: jax.lax.map(_square_root, of))
     assert roots(np.array([[2.0], [3.0]])).status() is Status.CONVERGED
-    assert roots(np.array([[2.0], [-1.0]])).status() is Status.MAX_ITERATIONS
-    assert roots(np.array([[np.nan], [-1.0]])).status() is Status.NOT_FINITE
+    assert roots(np.array([[2.0], [-2.0]])).status() is Status.MAX_ITERATIONS
+    assert roots(np.array([[np.nan], [-2.0]])).status() is Status.NOT_FINITE
