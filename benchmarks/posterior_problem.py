@@ -16,7 +16,7 @@ from benchmarks.outcome import Progress
 from savgs_ident.inference.near_mode import Surrogate, identity_map
 from savgs_ident.inference.posterior_mode import expand
 from savgs_ident.inference.problem import Problem
-from savgs_ident.inference.sample import Question, case_of, locate, plan
+from savgs_ident.inference.sample import Question, density_of, locate, plan
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.inference.samplers.emcee import pcn_steps
 from savgs_ident.plants.base import Excitation
@@ -53,7 +53,7 @@ def pose_posterior(dwells_hz: Sequence[float], progress: Progress) -> PosteriorP
     measured = response_of(read_dwells(dwells_hz))
     question = Question(measured, RigModel(read_rig(default_rig_path()), MODELS["simtr"]), {}, FREE)
     task = plan(question, SamplingSettings())
-    case = case_of(task)
+    case = density_of(task)
     mode = locate(case, task, question, progress)
     return PosteriorProblem(
         task.problem, task.excitation, expand(case, mode.linearisation_point, progress).surrogate

@@ -13,7 +13,7 @@ from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from threadpoolctl import threadpool_limits
 
@@ -260,7 +260,8 @@ def _identified(task: Task) -> Kept:
         )
     found = fit_with(job.model_of(task.rig), campaign, job.free, job.settings, job.max_frequency)
     named = replace(found, origin=replace(found.origin, data=task.source, command=job.command))
-    return Kept(named.to_json(), rig_text(named.model.rig), campaign.start)
+    # A fit gives a model of the kind that it was given.
+    return Kept(named.to_json(), rig_text(cast(RigModel, named.model).rig), campaign.start)
 
 
 @dataclass(frozen=True)

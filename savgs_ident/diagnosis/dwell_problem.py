@@ -198,7 +198,7 @@ class DwellProblem(AbstractProblem):
         """The problem with rows as they are on finitely many nodes."""
         return replace(self, corrections={})
 
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""

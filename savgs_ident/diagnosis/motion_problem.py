@@ -117,7 +117,7 @@ class MotionProblem(AbstractProblem):
         rows = self.motion.rows(np.asarray(needed.force))
         return Prediction(rows, self._slopes(model, p, names), status, warm_start)
 
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""

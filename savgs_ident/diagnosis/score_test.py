@@ -56,7 +56,7 @@ def score_terms(
     search: Search, mode: LaplaceFit, terms: list[Term], constants: DecisionConstants = DEFAULTS
 ) -> list[Score]:
     """Scores of candidates about a fit, best first."""
-    columns = search.plant.columns(mode.terms, mode.values, mode.prediction.warm_start, terms)
+    columns = search.plant.sensitivities(mode.terms, mode.values, mode.prediction.warm_start, terms)
     return scores_of(search, mode, terms, columns, constants)
 
 

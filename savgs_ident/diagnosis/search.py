@@ -120,7 +120,7 @@ def single_effects(
         progress(f"{hypothesis_of(together[0])}: nothing is left")
         return _findings(base, score_terms(search, base, list(terms), constants), together)
     progress(f"scores of {len(terms)} effects")
-    sensitivities = search.plant.columns((), base.values, base.prediction.warm_start, list(terms))
+    sensitivities = search.plant.sensitivities((), base.values, base.prediction.warm_start, list(terms))
     scores = scores_of(search, base, terms, sensitivities, constants)
     by_name = dict(zip((term.name for term in terms), sensitivities, strict=True))
     return _findings(base, scores, [*together, *_single_effects(fits, scores)], by_name)

@@ -14,11 +14,10 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Progress
-from savgs_ident.core.status import Status
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import Verdict, comparable, gaps
 from savgs_ident.inference.laplace import spread_of
@@ -119,22 +118,6 @@ CHI2_95 = 3.841458820694124
 """95 % point of chi2 with one degree of freedom."""
 
 
-class ProfilePoint(NamedTuple):
-    """chi2 (priors included) with the parameter held at ``value`` [its unit], all others refitted."""
-
-    value: float
-    chi2: float
-    status: Status
-
-
-class Profile(NamedTuple):
-    """The profile likelihood of a parameter: its points by growing value, and the least chi2 known."""
-
-    name: str
-    points: tuple[ProfilePoint, ...]
-    best: float
-
-
 def held_at(
     minimiser: Minimiser, start: Minimum, name: str, coordinate: float, progress: Progress
 ) -> Minimum:
@@ -144,30 +127,6 @@ def held_at(
     pins = Pins(blank.at[place].set(PIN), blank.at[place].set(coordinate))
     moved = start.u.at[place].set(coordinate)
     return minimiser.minimise(moved, start.solution, STEPS, progress, pins)
-
-
-def profile_likelihood(
-    minimiser: Minimiser,
-    best: Minimum,
-    name: str,
-    coordinates: Float[Array, " k"] | NDArray[np.float64],
-    progress: Progress,
-) -> Profile:
-    """The profile of ``name`` at unconstrained ``coordinates`` [1], (k,), each refitted from its neighbour.
-
-    Starts from the best fit outwards in both directions, so that warm starts stay close.
-    """
-    problem, place = minimiser.problem, minimiser.problem.free.names.index(name)
-    middle = float(best.u[place])
-    points = []
-    for side in (-1.0, 1.0):
-        at = best
-        outward = [c for c in map(float, coordinates) if side * (c - middle) >= 0.0]
-        for coordinate in sorted(outward, key=lambda c: abs(c - middle)):
-            at = held_at(minimiser, at, name, coordinate, progress)
-            value = float(problem.parameters(at.u)[name])
-            points.append(ProfilePoint(value, at.cost, at.status))
-    return Profile(name, tuple(sorted(set(points))), best.cost)
 
 
 def lower_bound(minimiser: Minimiser, best: Minimum, name: str, progress: Progress) -> float | None:

@@ -157,7 +157,7 @@ def compare(
 
 def comparison_of(fit: Fit) -> Comparison:
     """The identified model of a fit held against what it was fitted to; nothing is solved anew."""
-    model: Model = fit.model
+    model = fit.model
     excitation = measured_excitation(model.plant, fit.measured, model.table)
     return Comparison(
         fit.measured,

@@ -125,7 +125,7 @@ class Fit(Result):
         return self.by_name[name]
 
     @property
-    def model(self) -> Any:
+    def model(self) -> Model:
         """The identified model, of the kind that was fitted, which remembers where its numbers come from."""
         return self.estimated.with_provenance(self._provenance())
 
@@ -350,7 +350,7 @@ def measured_points(response: HarmonicResponse, channels: Sequence[str], driven_
     """The measured response of the named channels to the input ``driven_by``, as points with error bars."""
     shape = (len(response.tests), len(channels))
     transfer = np.full(shape, np.nan, dtype=np.complex128)
-    magnitude_sd, phase_sd, reach, reach_sd = (np.full(shape, np.nan) for _ in range(4))
+    magnitude_sd, phase_sd, span, span_sd = (np.full(shape, np.nan) for _ in range(4))
     drive = response.harmonics[:, response.channel(driven_by), 1]
     for column, name in enumerate(channels):
         if name not in response.channels:
@@ -362,8 +362,8 @@ def measured_points(response: HarmonicResponse, channels: Sequence[str], driven_
         transfer[d, column] = first / drive[d]
         magnitude_sd[d, column] = _deviation(covariance, along) / np.abs(drive[d])
         phase_sd[d, column] = _deviation(covariance, 1j * along) / np.abs(first)
-        reach[d, column], reach_sd[d, column] = response.peak_to_peak[d, c], response.peak_to_peak_sd[d, c]
-    return MeasuredPoints(response.frequency, transfer, magnitude_sd, phase_sd, reach, reach_sd)
+        span[d, column], span_sd[d, column] = response.peak_to_peak[d, c], response.peak_to_peak_sd[d, c]
+    return MeasuredPoints(response.frequency, transfer, magnitude_sd, phase_sd, span, span_sd)
 
 
 def _deviation(covariance: NDArray[np.float64], direction: NDArray[np.complex128]) -> NDArray[np.float64]:

@@ -27,7 +27,7 @@ from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
 from savgs_ident.inference.likelihood import values_of
 from savgs_ident.inference.near_mode import Surrogate
 from savgs_ident.inference.observations import Prediction, Term
-from savgs_ident.inference.posterior_mode import Case
+from savgs_ident.inference.posterior_mode import PosteriorDensity
 from savgs_ident.inference.prior import NUISANCE, Coordinates, sheet_coordinate
 from savgs_ident.inference.result import Convergence, Marginal, ProfileLine, Role
 from savgs_ident.inference.samplers.chains import Chains
@@ -100,7 +100,7 @@ def precise(mixing: Sequence[Mixing]) -> bool:
     return least_ess(mixing) >= 0.5 * np.pi / PRECISE**2
 
 
-def judge_chains(
+def assess_convergence(
     chains: Chains,
     identified: Sequence[Mixing],
     others: Sequence[Mixing],
@@ -194,7 +194,7 @@ class SurrogatePlant:
         """Nothing is started from nearby. Values are in SI."""
         return
 
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """Nothing may be added."""
@@ -242,18 +242,18 @@ def names_by_role(free: FreeVector) -> dict[str, Role]:
 
 
 def marginals_of(
-    case: Case, surrogate: Surrogate, chains: Chains, mixing: Mapping[str, Mixing]
+    posterior: PosteriorDensity, surrogate: Surrogate, chains: Chains, mixing: Mapping[str, Mixing]
 ) -> tuple[Marginal, ...]:
     """The marginal of every parameter, identified ones with their profiles."""
-    free, scales = case.problem.free, case.likelihood.scales
+    free, scales = posterior.problem.free, posterior.likelihood.scales
     draws = values_of(free, scales, chains.points)
-    low, high = (_prior_values(case, share) for share in (0.025, 0.975))
+    low, high = (_prior_values(posterior, share) for share in (0.025, 0.975))
     top = surrogate_mode(surrogate)
     point = np.concatenate(
         [top.x * free.widths, scales.coordinates(top.noise_scales.noise, top.noise_scales.discrepancy)]
     )
     mode = values_of(free, scales, point[None])
-    laplace = _laplace_sd(case, surrogate, point)
+    laplace = _laplace_sd(posterior, surrogate, point)
     about = {each.name: (each.unit, each.about) for each in free.parameters}
     about |= {name: ("1", text) for name, text in _ABOUT.items()}
     found = []
@@ -281,19 +281,21 @@ def marginals_of(
     return tuple(found)
 
 
-def _prior_values(case: Case, share: float) -> dict[str, float]:
+def _prior_values(posterior: PosteriorDensity, share: float) -> dict[str, float]:
     """The value of every parameter below which ``share`` of its prior lies."""
     normal = float(ndtri(share))
     # The discrepancy is half-normal: its quantile is one of the upper half of the normal.
     half = float(ndtri(0.5 + 0.5 * share))
-    point = np.concatenate([case.prior.quantile(share), [normal, half]])
+    point = np.concatenate([posterior.prior.quantile(share), [normal, half]])
     return {
         name: float(value[0])
-        for name, value in values_of(case.problem.free, case.likelihood.scales, point[None]).items()
+        for name, value in values_of(posterior.problem.free, posterior.likelihood.scales, point[None]).items()
     }
 
 
-def _laplace_sd(case: Case, surrogate: Surrogate, point: Float[np.ndarray, " n+2"]) -> dict[str, float]:
+def _laplace_sd(
+    posterior: PosteriorDensity, surrogate: Surrogate, point: Float[np.ndarray, " n+2"]
+) -> dict[str, float]:
     """Standard deviations from the curvature at the surrogate's highest point, each in its unit."""
     # Where no discrepancy is best, beside the symmetry plane: the magnitude has no second derivative there.
     point = np.append(point[:-1], max(point[-1], _STEP))
@@ -303,11 +305,11 @@ def _laplace_sd(case: Case, surrogate: Surrogate, point: Float[np.ndarray, " n+2
     spread = slopes @ (axes / np.sqrt(np.where(sizes > 0.0, sizes, np.nan)))
     deviation = np.sqrt(np.sum(spread**2, axis=1))
     found = {}
-    for place, name in enumerate((*case.problem.free.names, *NUISANCE)):
+    for place, name in enumerate((*posterior.problem.free.names, *NUISANCE)):
         # Away from zero, where the discrepancy, a magnitude, has a kink.
         step = np.copysign(_STEP, point[place]) * np.eye(1, point.size, place)
         moved = values_of(
-            case.problem.free, case.likelihood.scales, np.concatenate([point[None], point + step])
+            posterior.problem.free, posterior.likelihood.scales, np.concatenate([point[None], point + step])
         )
         found[name] = float(abs(np.diff(moved[name])[0]) / _STEP * deviation[place])
     return found

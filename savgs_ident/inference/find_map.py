@@ -221,8 +221,8 @@ class _Ascent:
     def _fit(self, point: _Point) -> LaplaceFit:
         search, coordinates, here = self._search, self._coordinates, point.prediction
         slopes = here.slopes * slopes_at(coordinates, point.x)
-        misfit = noise_scales(search.rows, search.missed(here))
-        precision = precision_of(search.turned(slopes), misfit.spread)
+        scales = noise_scales(search.rows, search.missed(here))
+        precision = precision_of(search.turned(slopes), scales.spread)
         evidence = log_evidence(point.value, precision, coordinates) if here.solved else -np.inf
         return LaplaceFit(
             self._names,
@@ -230,7 +230,7 @@ class _Ascent:
             point.x,
             here,
             slopes,
-            misfit,
+            scales,
             point.value,
             precision,
             evidence,

@@ -125,16 +125,16 @@ def linearised_optimum(
     weights and the scales for a given point in turn, until the density rises by less than ``level``: it rises at
     every turn.
     """
-    misfit = noise_scales(data, residual)
+    scales = noise_scales(data, residual)
     value, point, converged = -np.inf, x, False
     for _ in range(_LINEAR_ROUNDS):
-        point, inside = _within(residual, slopes, x, misfit.spread, bounds)
-        misfit = noise_scales(data, residual - slopes @ (point - x), misfit.discrepancy)
-        before, value = value, misfit.value - 0.5 * float(point @ point)
+        point, inside = _within(residual, slopes, x, scales.spread, bounds)
+        scales = noise_scales(data, residual - slopes @ (point - x), scales.discrepancy)
+        before, value = value, scales.value - 0.5 * float(point @ point)
         if abs(value - before) < level:
-            converged = misfit.converged and inside
+            converged = scales.converged and inside
             break
-    return LinearisedOptimum(point, misfit, value, precision_of(slopes, misfit.spread), converged)
+    return LinearisedOptimum(point, scales, value, precision_of(slopes, scales.spread), converged)
 
 
 def _within(

@@ -1,7 +1,7 @@
 """What a search asks of a plant, and the data that it is held against: independent rows with their noise."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
@@ -64,10 +64,6 @@ class Term:
             return tuple(typical | dict(each) for each in self.tries or ({},))
         return tuple(self._at(multiple) for multiple in MULTIPLES)
 
-    def at_multiples(self, multiples: Sequence[float]) -> "Term":
-        """The same term, looked for at other multiples [1] of its typical shapes."""
-        return replace(self, tries=tuple(self._at(multiple) for multiple in multiples))
-
     def _at(self, multiple: float) -> dict[str, float]:
         return {each.name: min(max(multiple * each.centre, each.lower), each.upper) for each in self.shapes}
 
@@ -90,7 +86,7 @@ class Plant(Protocol):
     def refined(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any) -> Any:
         """What to start from nearby, made as precise as it can be. Values are in SI."""
 
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """First-order change of the rows per unit of each candidate's amplitudes, wherever it is tried.

@@ -116,8 +116,8 @@ class PosteriorMode(NamedTuple):
     solved: bool
 
 
-class Case(NamedTuple):
-    """A problem with its likelihood and its prior."""
+class PosteriorDensity(NamedTuple):
+    """The density of a posterior: a problem with its likelihood and its prior."""
 
     problem: Problem
     likelihood: Likelihood
@@ -130,15 +130,15 @@ class Case(NamedTuple):
 
 
 @dataclass(frozen=True)
-class CasePlant:
-    """The model of a case, as the search for a mode asks for it; its motions are what it starts from nearby."""
+class PosteriorPlant:
+    """The model of a posterior, as the search for a mode asks for it; its motions are what it starts from nearby."""
 
-    case: Case
+    posterior: PosteriorDensity
 
     @property
     def nuisances(self) -> Coordinates:
         """The free parameters."""
-        return tuple(sheet_coordinate(parameter) for parameter in self.case.problem.free.parameters)
+        return tuple(sheet_coordinate(parameter) for parameter in self.posterior.problem.free.parameters)
 
     def predict(
         self,
@@ -148,9 +148,9 @@ class CasePlant:
         warm_start: PeriodicSolution,
     ) -> Prediction:
         """Rows at ``values`` [SI] with their slopes, on the nodes of ``warm_start``. There are no ``terms``."""
-        problem = self.case.problem
+        problem = self.posterior.problem
         u = problem.free.to_unconstrained(values)
-        rows, slopes, solution = rows_and_slopes(problem, self.case.likelihood, u, warm_start)
+        rows, slopes, solution = rows_and_slopes(problem, self.posterior.likelihood, u, warm_start)
         status = joint_status(solution.status())
         return Prediction(rows, slopes / np.asarray(problem.slopes(u)), status, solution)
 
@@ -158,11 +158,11 @@ class CasePlant:
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
     ) -> PeriodicSolution:
         """The same motions on nodes that follow them. ``values`` are in SI."""
-        problem = self.case.problem
+        problem = self.posterior.problem
         p = problem.parameters(problem.free.to_unconstrained(values))
         return adapt(problem.model, p, warm_start, warm_start.mesh.layout, problem.iterations)
 
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """Nothing may be added."""
@@ -170,42 +170,42 @@ class CasePlant:
 
 
 def find_mode(
-    case: Case, u: Float[Array, " n"], warm_start: PeriodicSolution, report: Progress
+    posterior: PosteriorDensity, u: Float[Array, " n"], warm_start: PeriodicSolution, report: Progress
 ) -> PosteriorMode:
     """The mode from free coordinates ``u`` (n,), where the model has the motions ``warm_start``.
 
     Its nodes are adapted there.
     """
-    search = search_of(CasePlant(case), case.likelihood.data)
-    values = case.problem.parameters(u)
-    start = {name: float(values[name]) for name in case.problem.free.names}
+    search = search_of(PosteriorPlant(posterior), posterior.likelihood.data)
+    values = posterior.problem.parameters(u)
+    start = {name: float(values[name]) for name in posterior.problem.free.names}
     found = find_map(search, (), start, warm_start, level=LEVEL, progress=report)
     if found.status.ok:
         finer = search.plant.refined((), found.values, found.prediction.warm_start)
         found = find_map(search, (), found.values, finer, level=LEVEL, progress=report)
-    return PosteriorMode(_linearisation_point(case, found), found.status, found.solved)
+    return PosteriorMode(_linearisation_point(posterior, found), found.status, found.solved)
 
 
-def _linearisation_point(case: Case, found: LaplaceFit) -> LinearisationPoint:
-    widths = case.problem.free.widths
-    scales = case.likelihood.scales.coordinates(found.noise_scales.noise, found.noise_scales.discrepancy)
+def _linearisation_point(posterior: PosteriorDensity, found: LaplaceFit) -> LinearisationPoint:
+    widths = posterior.problem.free.widths
+    scales = posterior.likelihood.scales.coordinates(found.noise_scales.noise, found.noise_scales.discrepancy)
     point = np.concatenate([found.x * widths, scales])
     rows = found.prediction.rows
-    value = case.density(rows, point) if found.solved else -np.inf
+    value = posterior.density(rows, point) if found.solved else -np.inf
     return LinearisationPoint(point, rows, found.slopes / widths, found.prediction.warm_start, value)
 
 
-def linear_surrogate(case: Case, at: LinearisationPoint) -> Surrogate:
+def linear_surrogate(posterior: PosteriorDensity, at: LinearisationPoint) -> Surrogate:
     """The surrogate about a linearisation point, without second derivatives."""
     point = jnp.asarray(at.point)
-    means, spreads = nuisance_scale(case.likelihood, case.prior, point, at.rows)
+    means, spreads = nuisance_scale(posterior.likelihood, posterior.prior, point, at.rows)
     scale = np.zeros((point.size, point.size))
-    scale[:-2, :-2] = parameter_scale(case.likelihood, case.prior, point, at.slopes)
+    scale[:-2, :-2] = parameter_scale(posterior.likelihood, posterior.prior, point, at.slopes)
     scale[[-2, -1], [-2, -1]] = spreads
     slope = at.slopes @ scale[:-2, :-2]
     return Surrogate(
-        likelihood=case.likelihood,
-        prior=case.prior,
+        likelihood=posterior.likelihood,
+        prior=posterior.prior,
         centre=jnp.asarray(np.concatenate([at.point[:-2], means])),
         scale=jnp.asarray(scale),
         rows=jnp.asarray(at.rows),
@@ -226,21 +226,21 @@ class Expansion(NamedTuple):
     surrogate: Surrogate
 
 
-def expand(case: Case, at: LinearisationPoint, report: Progress) -> Expansion:
+def expand(posterior: PosteriorDensity, at: LinearisationPoint, report: Progress) -> Expansion:
     """The expansion about a linearisation point."""
-    linear = linear_surrogate(case, at)
+    linear = linear_surrogate(posterior, at)
     axes = np.asarray(linear.scale)[:-2, :-2]
-    weight = 1.0 / np.sqrt(np.asarray(case.likelihood.spread(linear.centre)))
+    weight = 1.0 / np.sqrt(np.asarray(posterior.likelihood.spread(linear.centre)))
     report(f"second derivatives of the response along {axes.shape[1]} axes")
-    anchor = anchor_at(case.problem, jnp.asarray(at.point[:-2]), at.solution)
-    second = _second_derivatives(case, at, anchor, axes, weight)
+    anchor = anchor_at(posterior.problem, jnp.asarray(at.point[:-2]), at.solution)
+    second = _second_derivatives(posterior, at, anchor, axes, weight)
     bent = (bend_of(second, weight), triangular_map_of(second, np.asarray(linear.slope), weight))
     surrogate = eqx.tree_at(lambda each: (each.bend, each.map), linear, bent)
-    return Expansion(ExactModel(case.problem, case.likelihood, anchor), surrogate)
+    return Expansion(ExactModel(posterior.problem, posterior.likelihood, anchor), surrogate)
 
 
 def _second_derivatives(
-    case: Case,
+    posterior: PosteriorDensity,
     at: LinearisationPoint,
     anchor: Anchor,
     axes: Float[np.ndarray, "n n"],
@@ -254,7 +254,7 @@ def _second_derivatives(
     def slopes_at(shift: np.ndarray) -> np.ndarray | None:
         u = jnp.asarray(at.point[:-2] + shift)
         _, slopes, solution = rows_and_slopes(
-            case.problem, case.likelihood, u, at.solution, anchor.predicted(u)
+            posterior.problem, posterior.likelihood, u, at.solution, anchor.predicted(u)
         )
         return np.asarray((slopes @ axes).T) if joint_status(solution.status()).ok else None
 

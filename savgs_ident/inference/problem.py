@@ -231,11 +231,12 @@ class Evaluation(NamedTuple):
 
     @property
     def status(self) -> Status:
-        """Whether residuals and Jacobian are numbers; if not, how the search for the motions ended."""
-        if bool(jnp.isfinite(self.at.residual).all() & jnp.isfinite(self.at.jacobian).all()):
-            return Status.CONVERGED
+        """How the search for the motions ended, and whether residuals and Jacobian of those found are numbers."""
         motions = joint_status(self.solution.status())
-        return Status.NOT_FINITE if motions.ok else motions
+        if not motions.ok:
+            return motions
+        finite = bool(jnp.isfinite(self.at.residual).all() & jnp.isfinite(self.at.jacobian).all())
+        return Status.CONVERGED if finite else Status.NOT_FINITE
 
 
 def evaluate(problem: Problem, u: Float[Array, " n"], pins: Pins, warm_start: PeriodicSolution) -> Evaluation:

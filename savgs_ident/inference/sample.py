@@ -24,8 +24,8 @@ from savgs_ident import __version__
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Progress
 from savgs_ident.inference.diagnostics import (
+    assess_convergence,
     enough,
-    judge_chains,
     least_ess,
     marginals_of,
     mixing_of,
@@ -35,7 +35,7 @@ from savgs_ident.inference.diagnostics import (
 )
 from savgs_ident.inference.likelihood import likelihood_of, values_of
 from savgs_ident.inference.near_mode import ExactModel, Surrogate
-from savgs_ident.inference.posterior_mode import Case, Expansion, PosteriorMode, expand, find_mode
+from savgs_ident.inference.posterior_mode import Expansion, PosteriorDensity, PosteriorMode, expand, find_mode
 from savgs_ident.inference.prior import Prior
 from savgs_ident.inference.problem import ProblemSettings, Task, harmonic_target, plan_task
 from savgs_ident.inference.result import Marginal, Posterior, Predictive, Sampler
@@ -127,7 +127,7 @@ class _Answer(NamedTuple):
     """Everything that a result is made of."""
 
     task: Task
-    case: Case
+    posterior: PosteriorDensity
     mode: PosteriorMode
     expansion: Expansion
     chains: Chains
@@ -150,15 +150,15 @@ def sample_posterior(
     """
     began, report = time.perf_counter(), progress or _silent
     task = plan(question, settings)
-    case = case_of(task)
+    posterior = density_of(task)
     checkpoint = _checkpoint(question, settings, chain, resume)
-    mode = locate(case, task, question, report)
-    expansion = expand(case, mode.linearisation_point, report)
+    mode = locate(posterior, task, question, report)
+    expansion = expand(posterior, mode.linearisation_point, report)
     chains = _run(expansion, settings, checkpoint, began, report)
     wall_s = time.perf_counter() - began
     report("summing up")
     return _summed_up(
-        _Answer(task, case, mode, expansion, chains), question, settings, wall_s, describe or _nothing
+        _Answer(task, posterior, mode, expansion, chains), question, settings, wall_s, describe or _nothing
     )
 
 
@@ -170,24 +170,24 @@ def plan(question: Question, settings: SamplingSettings) -> Task:
     return plan_task(question.measured, question.model, question.free, options)
 
 
-def case_of(task: Task) -> Case:
-    """The posterior's ingredients: always the complex harmonics, never peak-to-peak values."""
+def density_of(task: Task) -> PosteriorDensity:
+    """The density of the posterior: always the complex harmonics, never peak-to-peak values."""
     target = harmonic_target(task.measured, task.model.channels, task.settings.orders)
-    return Case(task.problem, likelihood_of(target), Prior(task.problem.free))
+    return PosteriorDensity(task.problem, likelihood_of(target), Prior(task.problem.free))
 
 
-def locate(case: Case, task: Task, question: Question, report: Progress) -> PosteriorMode:
+def locate(posterior: PosteriorDensity, task: Task, question: Question, report: Progress) -> PosteriorMode:
     """The mode, looked for from the question's values.
 
     Raises :class:`InputError` if the model has no periodic motion there.
     """
     report("solving the model")
     start = task.table.as_dict() | dict(question.values)
-    u = case.problem.free.to_unconstrained(start)
-    near = simulate_periodic(
-        case.problem.model, case.problem.parameters(u), task.excitation, task.settings.periodic
+    u = posterior.problem.free.to_unconstrained(start)
+    warm_start = simulate_periodic(
+        posterior.problem.model, posterior.problem.parameters(u), task.excitation, task.settings.periodic
     )
-    mode = find_mode(case, u, near, report)
+    mode = find_mode(posterior, u, warm_start, report)
     if not mode.solved:
         raise InputError(
             "the model has no periodic motion at these parameters",
@@ -258,16 +258,16 @@ def _run(
 def _summed_up(
     answer: _Answer, question: Question, settings: SamplingSettings, wall_s: float, describe: Describe
 ) -> Posterior:
-    case, chains = answer.case, answer.chains
-    roles = names_by_role(case.problem.free)
-    values = values_of(case.problem.free, case.likelihood.scales, chains.points)
+    posterior, chains = answer.posterior, answer.chains
+    roles = names_by_role(posterior.problem.free)
+    values = values_of(posterior.problem.free, posterior.likelihood.scales, chains.points)
     mixing = {name: mixing_of(values[name]) for name in roles}
     identified = [mixing[name] for name, role in roles.items() if role == "identified"]
     others = [mixing[name] for name, role in roles.items() if role != "identified"]
     status = answer.mode.status
     doubts = () if status.ok else (f"the mode was not found: {status.advice}",)
-    convergence = judge_chains(chains, identified, others, settings.target_ess, doubts)
-    marginals = marginals_of(case, answer.expansion.surrogate, chains, mixing)
+    convergence = assess_convergence(chains, identified, others, settings.target_ess, doubts)
+    marginals = marginals_of(posterior, answer.expansion.surrogate, chains, mixing)
     draws = {name: values[name].T for name in roles}
     medians = {each.name: each.median for each in marginals if each.role != "nuisance"}
     return Posterior(

@@ -95,11 +95,12 @@ class _Fit(_Identified["Fit"]):
         return comparison_of(result)
 
     def more(self, result: "Fit", folder: Path) -> Iterator[Path]:
-        if not is_quarter_car(result.estimated):
-            return
+        from savgs_ident.plants.quarter_car.model import RigModel
         from savgs_ident.plants.quarter_car.rig import write_rig
 
-        write_rig(result.model.rig, folder / "model.toml")
+        if not isinstance(model := result.model, RigModel):
+            return
+        write_rig(model.rig, folder / "model.toml")
         yield folder / "model.toml"
 
 

@@ -29,7 +29,7 @@ from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.sampling import question_about
 from savgs_ident.inference.diagnostics import least_ess, mixing_of, names_by_role
 from savgs_ident.inference.likelihood import likelihood_of, values_of
-from savgs_ident.inference.posterior_mode import Case, Expansion, expand, find_mode
+from savgs_ident.inference.posterior_mode import Expansion, PosteriorDensity, expand, find_mode
 from savgs_ident.inference.prior import Prior, Scales
 from savgs_ident.inference.problem import Task, harmonic_target
 from savgs_ident.inference.result import Sampler
@@ -83,7 +83,7 @@ class Calibrator(eqx.Module):
     """
 
     task: Task
-    case: Case
+    case: PosteriorDensity
     settings: SamplingSettings
     middle: PeriodicSolution
     asked: tuple[str, ...] = eqx.field(static=True)
@@ -120,7 +120,7 @@ class Calibrator(eqx.Module):
         return rows + np.sqrt(spread) * random.standard_normal(rows.size)
 
     def _ranked(
-        self, case: Case, expansion: Expansion, number: int, truth: Float[np.ndarray, " n+2"]
+        self, case: PosteriorDensity, expansion: Expansion, number: int, truth: Float[np.ndarray, " n+2"]
     ) -> Trial:
         free, scales = case.problem.free, case.likelihood.scales
         sampler = SAMPLERS[self.settings.sampler](*expansion, 1 + number, new_checkpoint(None, ""))
@@ -151,7 +151,7 @@ def calibrator(question: Question, settings: SamplingSettings) -> Calibrator:
     task = plan(narrow, settings)
     problem = task.problem
     likelihood = likelihood_of(harmonic_target(question.measured, known.channels, settings.orders), SCALES)
-    case = Case(problem, likelihood, Prior(problem.free))
+    case = PosteriorDensity(problem, likelihood, Prior(problem.free))
     values = problem.parameters(jnp.zeros(len(problem.free.names)))
     middle = simulate_periodic(problem.model, values, task.excitation, settings.periodic)
     return Calibrator(task, case, settings, middle, question.free)

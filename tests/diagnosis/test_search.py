@@ -285,10 +285,10 @@ class _Breaking(ToyPlant):
         found = super().predict(terms, values, names, warm_start)
         return found._replace(status=Status.STALLED) if "twist" in terms else found
 
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[np.ndarray]:
-        found = super().columns(terms, values, warm_start, candidates)
+        found = super().sensitivities(terms, values, warm_start, candidates)
         return [
             np.full_like(each, np.nan) if term.name == "ripple" else each
             for each, term in zip(found, candidates, strict=True)

@@ -23,8 +23,12 @@ STEP = 1e-6
 TERMS = (
     Term("bend", "spring", (Linear("c", "N", 0.0, 0.4),)),
     Term(
-        "ripple", "sensor", (Linear("s", "N", 0.0, 0.4, lower=0.0),), (Logarithmic("w", "1", 6.0, 0.5),)
-    ).at_multiples((0.5, 1.0, 2.0)),
+        "ripple",
+        "sensor",
+        (Linear("s", "N", 0.0, 0.4, lower=0.0),),
+        (Logarithmic("w", "1", 6.0, 0.5),),
+        tries=({"w": 3.0}, {"w": 6.0}, {"w": 12.0}),
+    ),
     Term("twist", "joint", (Linear("t", "1", 0.0, 0.4),)),
 )
 
@@ -66,7 +70,7 @@ class ToyPlant:
     def refined(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any) -> Any:
         return warm_start
 
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         found = []

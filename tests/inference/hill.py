@@ -1,4 +1,4 @@
-"""Densities over t that are known: what a surrogate is to those who only climb it or walk on it."""
+"""Densities over t that are known: what a surrogate is to a sampler."""
 
 import equinox as eqx
 import jax.numpy as jnp

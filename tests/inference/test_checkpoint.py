@@ -79,10 +79,14 @@ def _assert_same(chains: Chains, other: Chains) -> None:
 )
 @pytest.mark.parametrize("name", EACH)
 def test_a_chain_that_was_stopped_is_the_same(
-    name: str, calls: tuple[int, ...], partly: Toy, rough: Stand, tmp_path: Path
+    name: str,
+    calls: tuple[int, ...],
+    partly: Toy,
+    rough: Stand,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Stopped after so many calls of the model, and again after so many more."""
-    # Stretches are counted in whole ones: an interrupted run has other stretches, but the same steps.
     straight = _grown(name, partly, rough, new_checkpoint(None, ""), STRETCHES)
     path = tmp_path / "chain.h5"
     for count in calls:
@@ -90,13 +94,9 @@ def test_a_chain_that_was_stopped_is_the_same(
         with pytest.raises(_InterruptError):
             for _ in SAMPLERS[name](stopped, rough.surrogate, 5, open_checkpoint(path, "case")):
                 pass
-    resumed = _continued(name, partly, rough, path, len(straight.points))
-    steps = len(straight.points)
-    np.testing.assert_array_equal(resumed.points[:steps], straight.points)
-    np.testing.assert_array_equal(resumed.log_density[:steps], straight.log_density)
-    np.testing.assert_array_equal(resumed.accepted[:steps], straight.accepted)
-    if len(resumed.points) == steps:
-        _assert_same(resumed, straight)
+    # A stop may leave any number of steps: only a run that grows step by step ends at the same number as the other.
+    monkeypatch.setattr(f"savgs_ident.inference.samplers.{name}._STRIDE", 1)
+    _assert_same(_continued(name, partly, rough, path, len(straight.points)), straight)
 
 
 @pytest.mark.parametrize("name", EACH)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from savgs_ident.inference.diagnostics import LEAST_DRAWS, Mixing, judge_chains, least_ess, mixing_of
+from savgs_ident.inference.diagnostics import LEAST_DRAWS, Mixing, assess_convergence, least_ess, mixing_of
 from savgs_ident.inference.result import Convergence
 from savgs_ident.inference.samplers.chains import Chains
 
@@ -25,7 +25,7 @@ def _chains(draws: np.ndarray, **changes: object) -> Chains:
 
 
 def _assessed(draws: np.ndarray, target: float = 1000.0, **changes: object) -> Convergence:
-    return judge_chains(_chains(draws, **changes), [mixing_of(draws)], [], target, ())
+    return assess_convergence(_chains(draws, **changes), [mixing_of(draws)], [], target, ())
 
 
 def test_independent_draws_are_worth_their_number() -> None:
@@ -73,7 +73,9 @@ def test_chains_that_stay_apart_are_found_out() -> None:
 def test_a_tolerated_parameter_that_disagrees_is_a_reason() -> None:
     good, bad = _autoregressive(0.0), _autoregressive(0.0, seed=2)
     bad[:, 0] += 3.0
-    found = judge_chains(_chains(good), [mixing_of(good)], [mixing_of(good), mixing_of(bad)], 1000.0, ())
+    found = assess_convergence(
+        _chains(good), [mixing_of(good)], [mixing_of(good), mixing_of(bad)], 1000.0, ()
+    )
     assert ["tolerated" in reason for reason in found.reasons] == [True]
     assert found.r_hat_max == pytest.approx(mixing_of(bad).r_hat)
 
@@ -88,7 +90,7 @@ def test_hardly_any_draws_say_nothing() -> None:
     draws = _autoregressive(0.0, steps=LEAST_DRAWS - 1)
     few = mixing_of(draws)
     assert np.isnan(few).all()
-    found = judge_chains(_chains(draws), [few], [few], 1000.0, ())
+    found = assess_convergence(_chains(draws), [few], [few], 1000.0, ())
     assert not found.converged
     assert found.ess_min == 0.0
 
@@ -100,9 +102,9 @@ def test_one_parameter_that_does_not_move_is_enough(place: int) -> None:
     mixing = [mixing_of(good), mixing_of(good)]
     mixing[place] = mixing_of(np.full_like(good, 0.3))
     assert least_ess(mixing) == 0.0
-    found = judge_chains(_chains(good), mixing, [], 1000.0, ())
+    found = assess_convergence(_chains(good), mixing, [], 1000.0, ())
     assert any("R-hat" in reason for reason in found.reasons)
-    assert not judge_chains(_chains(good), mixing[:1], mixing[1:], 1000.0, ()).converged
+    assert not assess_convergence(_chains(good), mixing[:1], mixing[1:], 1000.0, ()).converged
 
 
 @pytest.mark.parametrize("steps", [LEAST_DRAWS, 1000])
@@ -111,7 +113,7 @@ def test_one_chain_that_does_not_move_is_found_out(steps: int) -> None:
     draws[:, 2] = 0.5
     mixing = mixing_of(draws)
     assert np.isnan(mixing.autocorrelation)
-    assert not judge_chains(_chains(draws), [mixing], [], 10.0, ()).converged
+    assert not assess_convergence(_chains(draws), [mixing], [], 10.0, ()).converged
 
 
 def test_no_parameter_has_no_worth() -> None:
@@ -139,6 +141,6 @@ def test_divergences_are_a_reason_beyond_one_in_a_hundred() -> None:
 
 def test_doubts_that_were_known_come_first() -> None:
     draws = _autoregressive(0.0)
-    found = judge_chains(_chains(draws), [mixing_of(draws)], [], 1e6, ("the mode was not found",))
+    found = assess_convergence(_chains(draws), [mixing_of(draws)], [], 1e6, ("the mode was not found",))
     assert found.reasons[0] == "the mode was not found"
     assert len(found.reasons) == 2

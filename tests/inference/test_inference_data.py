@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.inference.diagnostics import judge_chains, mixing_of
+from savgs_ident.inference.diagnostics import assess_convergence, mixing_of
 from savgs_ident.inference.likelihood import values_of
 from savgs_ident.inference.result import Marginal, Posterior, inference_data, write_inference_data
 from savgs_ident.inference.sample import predict
@@ -43,7 +43,7 @@ def posterior(rig: Rig) -> Posterior:
         marginals=marginals,
         draws={name: each.T for name, each in values.items()},
         statistics={"lp": logs.T, "accepted": accepted.T.astype(float)},
-        convergence=judge_chains(chains, [mixing_of(values["friction"])], [], 1000.0, ()),
+        convergence=assess_convergence(chains, [mixing_of(values["friction"])], [], 1000.0, ()),
         predictive=predict(toy, chains, 20, 1),
         measured=toy.measured,
         sentences=(),

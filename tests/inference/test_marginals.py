@@ -16,7 +16,7 @@ from savgs_ident.inference.result import Marginal
 from savgs_ident.inference.samplers.chains import Chains
 
 from .toy import FIXED_SCALES, FREE, PARAMETERS, Toy, straight_toy
-from .toy_surrogate import case_of, mode_of, normal_covariance, stand_for
+from .toy_surrogate import density_of, mode_of, normal_covariance, stand_for
 
 
 def _normal_chains(toy: Toy, mode: np.ndarray) -> Chains:
@@ -33,7 +33,7 @@ def _marginals(toy: Toy) -> Mapping[str, Marginal]:
     chains = _normal_chains(toy, stand.point)
     draws = values_of(FREE, toy.likelihood.scales, chains.points)
     mixing = {name: mixing_of(each) for name, each in draws.items()}
-    return {each.name: each for each in marginals_of(stand.case, stand.surrogate, chains, mixing)}
+    return {each.name: each for each in marginals_of(stand.posterior, stand.surrogate, chains, mixing)}
 
 
 @pytest.fixture(scope="module")
@@ -111,14 +111,14 @@ def test_contraction_is_the_share_by_which_the_interval_shrank(marginals: Mappin
 def test_the_curvature_is_that_of_the_exact_density_at_its_mode(miss: float) -> None:
     """Without a discrepancy its density is highest at zero, on the symmetry plane of its coordinate."""
     toy = straight_toy(miss=miss)
-    case, mode = case_of(toy), mode_of(toy)
+    posterior, mode = density_of(toy), mode_of(toy)
     base, slope = jnp.asarray(toy.base), jnp.asarray(toy.slope)
     assert (mode[-1] > 0.3) == (miss > 0.0)
     # The magnitude has no second derivative at zero, the square of it has.
     at = jnp.asarray(np.append(mode[:-1], max(mode[-1], 1e-6)))
 
     def density(point: jax.Array) -> jax.Array:
-        return case.likelihood(base + slope @ point[:-2], point) + case.prior(point)
+        return posterior.likelihood(base + slope @ point[:-2], point) + posterior.prior(point)
 
     deviation = np.sqrt(np.diag(np.linalg.inv(-np.asarray(jax.hessian(density)(at)))))
     scales = toy.likelihood.scales

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from savgs_ident.inference.posterior_mode import Case, Expansion, PosteriorMode, expand, find_mode
-from savgs_ident.inference.sample import Question, case_of, locate, plan
+from savgs_ident.inference.posterior_mode import Expansion, PosteriorDensity, PosteriorMode, expand, find_mode
+from savgs_ident.inference.sample import Question, density_of, locate, plan
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
@@ -32,18 +32,18 @@ def question(nominal_campaign: Path, rig: Rig) -> Question:
 
 
 @pytest.fixture(scope="module")
-def case(question: Question) -> Case:
-    return case_of(plan(question, SETTINGS))
+def posterior(question: Question) -> PosteriorDensity:
+    return density_of(plan(question, SETTINGS))
 
 
 @pytest.fixture(scope="module")
-def mode(case: Case, question: Question) -> PosteriorMode:
-    return locate(case, plan(question, SETTINGS), question, silent)
+def mode(posterior: PosteriorDensity, question: Question) -> PosteriorMode:
+    return locate(posterior, plan(question, SETTINGS), question, silent)
 
 
 @pytest.fixture(scope="module")
-def expansion(case: Case, mode: PosteriorMode) -> Expansion:
-    return expand(case, mode.linearisation_point, silent)
+def expansion(posterior: PosteriorDensity, mode: PosteriorMode) -> Expansion:
+    return expand(posterior, mode.linearisation_point, silent)
 
 
 SETTINGS = SamplingSettings(fixed_tolerances=True)
@@ -54,7 +54,7 @@ def test_the_mode_is_found_from_the_drawing(mode: PosteriorMode) -> None:
 
 
 def test_the_density_falls_away_from_the_mode_in_every_direction(
-    case: Case, mode: PosteriorMode, expansion: Expansion
+    posterior: PosteriorDensity, mode: PosteriorMode, expansion: Expansion
 ) -> None:
     middle = mode.linearisation_point.point[:-2]
     steps = np.asarray(expansion.surrogate.scale)[:-2, :-2].T
@@ -63,7 +63,7 @@ def test_the_density_falls_away_from_the_mode_in_every_direction(
     assert solved.all()
     points = np.concatenate([around, np.tile(mode.linearisation_point.point[-2:], (len(around), 1))], axis=1)
     assert all(
-        case.density(row, point) < mode.linearisation_point.value
+        posterior.density(row, point) < mode.linearisation_point.value
         for row, point in zip(rows, points, strict=True)
     )
 
@@ -105,10 +105,10 @@ def test_the_surrogate_is_of_second_order(expansion: Expansion) -> None:
 
 @pytest.mark.parametrize("miss", [0.01, 0.03])
 def test_a_model_that_misses_is_found_to_miss_by_as_much(
-    case: Case, mode: PosteriorMode, question: Question, miss: float
+    posterior: PosteriorDensity, mode: PosteriorMode, question: Question, miss: float
 ) -> None:
     """The mode of the discrepancy, from 144 rows of which it moves most: its own error is about a tenth."""
-    likelihood = case.likelihood
+    likelihood = posterior.likelihood
     errors = np.random.default_rng(4).standard_normal(mode.linearisation_point.rows.size) * np.asarray(
         likelihood.discrepancy_scale
     )
@@ -116,7 +116,7 @@ def test_a_model_that_misses_is_found_to_miss_by_as_much(
         lambda each: each.measured, likelihood, likelihood.measured + jnp.asarray(miss * errors)
     )
     u = jnp.asarray(mode.linearisation_point.point[:-2])
-    found = find_mode(case._replace(likelihood=off), u, mode.linearisation_point.solution, silent)
+    found = find_mode(posterior._replace(likelihood=off), u, mode.linearisation_point.solution, silent)
     assert found.status.ok
     assert float(likelihood.scales.miss(jnp.asarray(found.linearisation_point.point))) == pytest.approx(
         miss, rel=0.3

@@ -98,7 +98,7 @@ def test_a_chain_says_where_it_was(name: str, chains: Mapping[str, Chains], bent
     reported = chains[name]
     points = reported.points.reshape(-1, 5)
     rows = bent.rows(points[:50, :-2])[0]
-    densities = [rough.case.density(row, point) for row, point in zip(rows, points[:50], strict=True)]
+    densities = [rough.posterior.density(row, point) for row, point in zip(rows, points[:50], strict=True)]
     np.testing.assert_allclose(reported.log_density.ravel()[:50], densities, rtol=1e-10)
     moved = np.any(np.diff(reported.points, axis=0) != 0.0, axis=2)
     assert np.all(reported.accepted[1:] >= moved)

@@ -69,7 +69,7 @@ def test_points_and_coordinates_are_one_to_one(rough: Stand) -> None:
 
 
 def test_its_density_is_that_of_its_rows(rough: Stand, bent: Toy) -> None:
-    surrogate, case = rough.surrogate, rough.case
+    surrogate, posterior = rough.surrogate, rough.posterior
     t = jnp.asarray([0.3, -1.0, 0.2, 0.5, 1.2])
     point = surrogate.points(np.asarray(t)[None])[0]
-    assert float(surrogate(t)) == pytest.approx(case.density(np.asarray(surrogate.predicted(t)), point))
+    assert float(surrogate(t)) == pytest.approx(posterior.density(np.asarray(surrogate.predicted(t)), point))

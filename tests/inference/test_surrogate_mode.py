@@ -22,7 +22,7 @@ def test_a_toys_mode_is_the_one_of_another_search(miss: float) -> None:
     np.testing.assert_allclose(np.append(found.x * FREE.widths, scales), mode_of(toy), atol=2e-3)
     point = np.append(found.x * FREE.widths, scales)
     rows = toy.rows(point[None, :-2])[0][0]
-    assert found.value == pytest.approx(stand.case.density(rows, point), abs=1e-9)
+    assert found.value == pytest.approx(stand.posterior.density(rows, point), abs=1e-9)
 
 
 def test_with_a_parameter_held_the_others_make_the_best_of_it(bent: Toy, rough: Stand) -> None:

@@ -10,32 +10,32 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from savgs_ident.inference.near_mode import Surrogate, bend_of, triangular_map_of
-from savgs_ident.inference.posterior_mode import Case, LinearisationPoint, linear_surrogate
+from savgs_ident.inference.posterior_mode import LinearisationPoint, PosteriorDensity, linear_surrogate
 from savgs_ident.inference.prior import Prior
 
 from .toy import Toy
 
 
 class Stand(NamedTuple):
-    """A surrogate, the case that it stands in for, and the point (n + 2,) that it was made about."""
+    """A surrogate, the density that it stands in for, and the point (n + 2,) that it was made about."""
 
-    case: Case
+    posterior: PosteriorDensity
     surrogate: Surrogate
     point: NDArray[np.float64]
 
 
-def case_of(toy: Toy) -> Case:
-    """The toy as the posterior knows its cases."""
-    return Case(toy.problem, toy.likelihood, Prior(toy.problem.free))  # type: ignore[arg-type]
+def density_of(toy: Toy) -> PosteriorDensity:
+    """The density of the toy's posterior."""
+    return PosteriorDensity(toy.problem, toy.likelihood, Prior(toy.problem.free))  # type: ignore[arg-type]
 
 
 def mode_of(toy: Toy) -> NDArray[np.float64]:
     """The mode of the exact density, (n + 2,), the discrepancy's coordinate positive."""
-    case = case_of(toy)
+    posterior = density_of(toy)
 
     @jax.jit
     def density(rows: jax.Array, point: jax.Array) -> jax.Array:
-        return case.likelihood(rows, point) + case.prior(point)
+        return posterior.likelihood(rows, point) + posterior.prior(point)
 
     slopes_of = jax.jit(jax.grad(density, argnums=(0, 1)))
 
@@ -53,17 +53,17 @@ def mode_of(toy: Toy) -> NDArray[np.float64]:
 
 def stand_for(toy: Toy, slope_share: float = 1.0, bend_share: float = 1.0) -> Stand:
     """The surrogate about the mode, with this share of its slopes and second derivatives there."""
-    case, point = case_of(toy), mode_of(toy)
+    posterior, point = density_of(toy), mode_of(toy)
     rows = toy.rows(point[None, :-2])[0][0]
     slopes = slope_share * toy.slopes(point[:-2])
-    linear = linear_surrogate(case, LinearisationPoint(point, rows, slopes, None, 0.0))  # type: ignore[arg-type]
+    linear = linear_surrogate(posterior, LinearisationPoint(point, rows, slopes, None, 0.0))  # type: ignore[arg-type]
     axes = np.asarray(linear.scale)[:-2, :-2]
     weight = 1.0 / np.sqrt(np.asarray(toy.likelihood.spread(linear.centre)))
     at_point = toy.bend.copy()
     at_point[0, 0] += 6.0 * point[0] * toy.cubic
     second = bend_share * np.einsum("ia,jb,ijm->abm", axes, axes, at_point)
     bent = (bend_of(second, weight), triangular_map_of(second, np.asarray(linear.slope), weight))
-    return Stand(case, eqx.tree_at(lambda each: (each.bend, each.map), linear, bent), point)
+    return Stand(posterior, eqx.tree_at(lambda each: (each.bend, each.map), linear, bent), point)
 
 
 def normal_covariance(toy: Toy) -> NDArray[np.float64]:

@@ -199,7 +199,7 @@ def assemble_result(task: Task, program: Program, end: Solution, wall_s: float) 
     prior = float(np.sum(np.asarray(problem.free.prior_residuals(u)) ** 2))
     known = len(problem.free.identified) + program.unknowns.zeros.size
     return CollocationFit(
-        estimates=_estimates(task, u, slope * _told(spread, problem.free)),
+        estimates=_estimates(task, u, slope * _identified_sd(spread, problem.free)),
         covariance=np.asarray(spread.covariance * np.outer(slope, slope), np.float64),
         chi2=2.0 * end.objective - prior,
         dof=program.quadratic.samples - known,
@@ -212,7 +212,7 @@ def assemble_result(task: Task, program: Program, end: Solution, wall_s: float) 
     )
 
 
-def _told(spread: Spread, free: FreeVector) -> NDArray[np.float64]:
+def _identified_sd(spread: Spread, free: FreeVector) -> NDArray[np.float64]:
     """Standard deviations of the coordinates, infinite where the data do not identify what they are asked for."""
     asked = np.arange(len(free.names)) < len(free.identified)
     return np.where(asked & (spread.sd >= INFORMED * free.widths), np.inf, spread.sd)
@@ -274,14 +274,14 @@ def fit_by_collocation(
     planned = ProblemSettings(fixed_tolerances=settings.fixed_tolerances, periodic=settings.periodic)
     task = plan_task(measured, model, free, planned)
     report("solving the model as given")
-    near = simulate_periodic(task.problem.model, task.problem.fixed, task.excitation, settings.periodic)
-    points = radau_points(near.mesh)
+    warm_start = simulate_periodic(task.problem.model, task.problem.fixed, task.excitation, settings.periodic)
+    points = radau_points(warm_start.mesh)
     report("gathering the samples")
     misfits = _misfits(campaign, measured, model.plant, points)
     report("translating the equations")
     program = _program(task, points, misfits)
     report(f"IPOPT: {program.unknowns.size} unknowns, {program.quadratic.samples} samples")
-    start = start_vector(task, program, points, near)
+    start = start_vector(task, program, points, warm_start)
     end = solve_program(program, start, settings.iterations, settings.tolerance)
     report(f"IPOPT: {end.iterations} iterations, {end.status.advice}")
     return assemble_result(task, program, end, time.perf_counter() - began)

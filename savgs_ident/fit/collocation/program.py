@@ -50,7 +50,7 @@ def assemble_objective(
 
     ``widths`` (n,) are the standard deviations of their coordinates before the data [1].
     """
-    first = unknowns.states + unknowns.partners
+    first = unknowns.states + unknowns.algebraic
     places = np.arange(widths.size)
     rows, columns, values = [places], [places], [widths**-2.0]
     slope, rest, count = np.zeros(unknowns.size), 0.0, 0
@@ -92,12 +92,12 @@ def point_equations(problem: Problem, unknowns: Unknowns) -> ca.Function:
     ``z`` are the unknowns of a point, ``u`` the parameters' coordinates, ``drive`` value and rate of each input
     [SI].
     """
-    states, partners, plant = unknowns.states, unknowns.partners, problem.model
+    states, algebraic, plant = unknowns.states, unknowns.algebraic, problem.model
     n, signals = len(plant.coordinates), len(plant.inputs)
 
     def equations(z: Array, u: Array, drive: Array) -> Array:
         here = jnp.asarray(unknowns.scale) * z
-        x, y, readings = jnp.split(here, [states, states + partners])
+        x, y, readings = jnp.split(here, [states, states + algebraic])
         p = problem.parameters(u)
         parts = (x[:n], x[n : 2 * n], y[:n])
         motion = Motion(*(plant.coordinate_type(*(part[i] for i in range(n))) for part in parts))
@@ -162,8 +162,8 @@ def _scaled_rule(unknowns: Unknowns, points: Points, frequency: NDArray[np.float
     at = unknowns.at_points
     q = len(unknowns.coordinates)
     velocities = list(range(q, 2 * q))
-    partners = list(range(states, states + unknowns.partners))
-    rule = step_rule(points, seconds, at[:, :states], at[:, velocities + partners])
+    algebraic = list(range(states, states + unknowns.algebraic))
+    rule = step_rule(points, seconds, at[:, :states], at[:, velocities + algebraic])
     rule.resize((rule.shape[0], unknowns.size))
     sizes = np.ones(unknowns.size)
     sizes[at.ravel()] = np.tile(scale, unknowns.points)
@@ -207,29 +207,31 @@ def as_casadi(matrix: csc_array) -> ca.DM:
     return ca.DM(sparsity, matrix.data)
 
 
-def start_vector(task: Task, program: Program, points: Points, near: PeriodicSolution) -> NDArray[np.float64]:
+def start_vector(
+    task: Task, program: Program, points: Points, warm_start: PeriodicSolution
+) -> NDArray[np.float64]:
     """All unknowns, scaled [1], (n,).
 
-    The model's values, the motions ``near`` them, and what the sensors would read of these.
+    The model's values, the motions there, ``warm_start``, and what the sensors would read of these.
     """
     unknowns = program.unknowns
     w = np.zeros(unknowns.size)
     w[: unknowns.parameters] = task.problem.free.to_unconstrained(task.table.as_dict())
-    known = unknowns.states + unknowns.partners
+    known = unknowns.states + unknowns.algebraic
     at = unknowns.at_points
-    w[at[:, :known]] = _at_points(points, near) / unknowns.scale[:known]
+    w[at[:, :known]] = _at_points(points, warm_start) / unknowns.scale[:known]
     missed = np.array(program.constraints(w)).ravel()[: unknowns.points * unknowns.residual_scale.size]
-    w[at[:, known:]] = missed.reshape(unknowns.points, -1)[:, unknowns.partners :]
+    w[at[:, known:]] = missed.reshape(unknowns.points, -1)[:, unknowns.algebraic :]
     return w
 
 
-def _at_points(points: Points, near: PeriodicSolution) -> NDArray[np.float64]:
-    """The motions at the points by straight lines, (P, states and their partners)."""
-    values = np.concatenate([near.trajectory.x, near.trajectory.y]).T
+def _at_points(points: Points, warm_start: PeriodicSolution) -> NDArray[np.float64]:
+    """The motions at the points by straight lines, (P, states and algebraic variables)."""
+    values = np.concatenate([warm_start.trajectory.x, warm_start.trajectory.y]).T
     found = np.empty_like(values)
-    for dwell in range(len(near.mesh.layout.counts)):
-        mine = near.mesh.layout.dwell == dwell
-        nodes, wanted = np.asarray(near.mesh.phase)[mine], np.asarray(points.mesh.phase)[mine]
+    for dwell in range(len(warm_start.mesh.layout.counts)):
+        mine = warm_start.mesh.layout.dwell == dwell
+        nodes, wanted = np.asarray(warm_start.mesh.phase)[mine], np.asarray(points.mesh.phase)[mine]
         columns = [np.interp(wanted, nodes, column, period=2.0 * np.pi) for column in values[mine].T]
         found[mine] = np.stack(columns, axis=1)
     return found

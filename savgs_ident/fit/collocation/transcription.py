@@ -4,7 +4,7 @@ The unknowns stand in one long vector (:class:`Unknowns`),
 
     [ parameters (n) | point 0: x, y, m | point 1: x, y, m | ... | zeros of the sensors (D, C) ]
 
-with x the states, y their algebraic partners (accelerations and rates of internal states), m what the sensors
+with x the states, y the algebraic variables (accelerations and rates of internal states), m what the sensors
 read. Parameters stand as unconstrained coordinates, everything else in units of its typical size, so that all
 unknowns are of the order of one.
 
@@ -77,14 +77,14 @@ class Unknowns:
         return 2 * len(self.coordinates) + len(self.internal)
 
     @property
-    def partners(self) -> int:
+    def algebraic(self) -> int:
         """Entries of y."""
         return len(self.coordinates) + len(self.internal)
 
     @property
     def width(self) -> int:
         """Unknowns of a point."""
-        return self.states + self.partners + len(self.readings)
+        return self.states + self.algebraic + len(self.readings)
 
     @property
     def size(self) -> int:

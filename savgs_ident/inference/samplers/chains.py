@@ -54,13 +54,14 @@ class Chains(NamedTuple):
     unsolved: int
 
 
-def unsettled(log_density: Float[np.ndarray, "S C"]) -> int:
-    """Leading steps at which some chain has been nowhere yet where the model is solved.
+def steps_without_density(log_density: Float[np.ndarray, "S C"]) -> int:
+    """Leading steps at which some chain still stands where the posterior has no density.
 
-    ``log_density`` [1] is minus infinity there.
+    ``log_density`` [1] is minus infinity there. Such a state is no draw, whether the model was not solved there or
+    its density is zero; a chain leaves it once and does not return.
     """
-    solved = np.isfinite(log_density).all(axis=1)
-    return int(np.argmax(solved)) if solved.any() else len(solved)
+    positive = np.isfinite(log_density).all(axis=1)
+    return int(np.argmax(positive)) if positive.any() else len(positive)
 
 
 _ATTRIBUTE = "savgs_ident_case"

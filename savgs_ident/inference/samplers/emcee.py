@@ -1,4 +1,4 @@
-"""emcee on the exact posterior, with proposals that are random walks on the surrogate.
+"""emcee on the exact posterior, with proposals that are ends of chains on the surrogate.
 
 emcee's own moves stretch between walkers, which in forty dimensions hardly gets anywhere: hundreds of steps of
 eighty walkers for one independent draw. Here a proposal y is where preconditioned Crank-Nicolson steps on the
@@ -26,11 +26,11 @@ from emcee.backends import HDFBackend
 from jaxtyping import Array, Float
 
 from savgs_ident.inference.near_mode import ExactModel, Surrogate
-from savgs_ident.inference.samplers.chains import Chains, Checkpoint, decide, unsettled
+from savgs_ident.inference.samplers.chains import Chains, Checkpoint, decide, steps_without_density
 from savgs_ident.simulate.program_cache import placed, run_cached
 
 STEPS = 60
-"""Steps of one walk: enough to forget where it began."""
+"""Steps to one proposal: enough to forget where it began."""
 
 LENGTHS = (0.2, 0.5, 0.8)
 """The b of steps, drawn at random: long ones travel, short ones get through where the surrogate is not normal."""
@@ -39,22 +39,22 @@ LENGTHS = (0.2, 0.5, 0.8)
 def pcn_steps(
     surrogate: Surrogate, seed: int, start: Float[np.ndarray, "W n+2"], rounds: int = 1
 ) -> tuple[Float[np.ndarray, "W n+2"], Float[np.ndarray, " W"], Float[np.ndarray, " W"]]:
-    """Walks of ``rounds`` times :data:`STEPS` steps from ``start`` (W, n + 2) in t.
+    """Chains of ``rounds`` times :data:`STEPS` steps from ``start`` (W, n + 2) in t.
 
-    Gives where they end, and the surrogate's log density at the start and there, (W,).
+    Gives their last draws, and the surrogate's log density at the start and there, (W,).
     """
     key = jax.random.PRNGKey(seed)
     args = placed((surrogate, key, jnp.asarray(start), jnp.asarray(rounds * STEPS)))
-    end, before, after = _walked(*args)
+    end, before, after = _compiled_steps(*args)
     return np.asarray(end), np.asarray(before), np.asarray(after)
 
 
 @eqx.filter_jit
-def _walked(*args: Any) -> tuple[Array, ...]:
-    return run_cached(_walk, *args)
+def _compiled_steps(*args: Any) -> tuple[Array, ...]:
+    return run_cached(_pcn_steps, *args)
 
 
-def _walk(surrogate: Surrogate, key: Array, start: Array, steps: Array) -> tuple[Array, ...]:
+def _pcn_steps(surrogate: Surrogate, key: Array, start: Array, steps: Array) -> tuple[Array, ...]:
     density = jax.vmap(surrogate)
 
     def step(count: Array, at: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -77,7 +77,7 @@ WALKERS = 8
 BURN_IN = 4
 """Steps left out at least: the walkers begin on the surrogate, a step or two from the posterior."""
 
-_FIRST_WALK = 20
+_FIRST_ROUNDS = 20
 _STRIDE = 4
 
 
@@ -107,14 +107,14 @@ def sample_by_emcee(
 
 
 def _first_state(surrogate: Surrogate, seed: int) -> emcee.State:
-    start, _, _ = pcn_steps(surrogate, seed, np.zeros((WALKERS, surrogate.centre.size)), _FIRST_WALK)
+    start, _, _ = pcn_steps(surrogate, seed, np.zeros((WALKERS, surrogate.centre.size)), _FIRST_ROUNDS)
     points = surrogate.points(start)
     return emcee.State(points, random_state=np.random.RandomState(seed).get_state())
 
 
 def _chains(sampler: emcee.EnsembleSampler, tally: "_Tally") -> Chains:
     points, log_density = sampler.get_chain(), sampler.get_log_prob()
-    begin = max(BURN_IN, unsettled(log_density))
+    begin = max(BURN_IN, steps_without_density(log_density))
     moved = np.any(np.diff(points[begin - 1 :], axis=0) != 0.0, axis=2)
     evaluations, unsolved = tally.counts
     return Chains(points[begin:], log_density[begin:], moved, np.zeros(0), 0, evaluations, unsolved)
@@ -135,7 +135,7 @@ class _Tally:
     def propose(
         self, points: Float[np.ndarray, "W n+2"], random: np.random.RandomState
     ) -> tuple[Float[np.ndarray, "W n+2"], Float[np.ndarray, " W"]]:
-        """Where walks on the surrogate lead, and the surrogate's log density here less that there."""
+        """The last draws of chains on the surrogate, and the surrogate's log density here less that there."""
         begin = self.surrogate.coordinates(points)
         end, before, after = pcn_steps(self.surrogate, int(random.randint(2**31)), begin)
         return self.surrogate.points(end), before - after

@@ -35,7 +35,7 @@ from blackjax.adaptation.step_size import dual_averaging_adaptation
 from jaxtyping import Array, Bool, Float
 
 from savgs_ident.inference.near_mode import ExactModel, Surrogate
-from savgs_ident.inference.samplers.chains import Chains, Checkpoint, decide, unsettled
+from savgs_ident.inference.samplers.chains import Chains, Checkpoint, decide, steps_without_density
 from savgs_ident.simulate.program_cache import placed, run_cached
 
 CHAINS = 8
@@ -175,7 +175,7 @@ def load_state(file: Path) -> State:
 
 
 def _chains(state: State, evaluations: int, unsolved: int) -> Chains:
-    first = max(min(BURN_IN, len(state.points)), unsettled(state.log_density))
+    first = max(min(BURN_IN, len(state.points)), steps_without_density(state.log_density))
     ratios = state.proposal_log_ratio[np.isfinite(state.proposal_log_ratio)]
     return Chains(
         state.points[first:],

@@ -1,4 +1,4 @@
-"""Walks leave the density that they walk on as it is, in both directions of time."""
+"""Crank-Nicolson steps leave their density as it is, in both directions of time."""
 
 import jax
 import numpy as np
@@ -9,7 +9,7 @@ from savgs_ident.inference.samplers.emcee import pcn_steps
 
 from .hill import SkewHill, a_normal_hill
 
-WALKERS = 20_000
+CHAINS = 20_000
 
 
 @pytest.fixture(scope="module")
@@ -19,19 +19,19 @@ def skew() -> SkewHill:
 
 @pytest.fixture(scope="module")
 def pairs(skew: SkewHill) -> tuple[np.ndarray, np.ndarray]:
-    """Where short walks begin, as independent draws, and where they end, (WALKERS, 2) both."""
-    start = skew.draws(np.random.default_rng(3), WALKERS)
+    """Where short chains begin, as independent draws, and where they end, (CHAINS, 2) both."""
+    start = skew.draws(np.random.default_rng(3), CHAINS)
     return start, pcn_steps(skew, 5, start)[0]
 
 
-def test_long_walks_reach_mean_and_covariance_of_a_normal_density() -> None:
+def test_long_chains_have_mean_and_covariance_of_a_normal_density() -> None:
     hill = a_normal_hill(3)
-    end, _, _ = pcn_steps(hill, 4, np.zeros((WALKERS, 3)), rounds=4)
+    end, _, _ = pcn_steps(hill, 4, np.zeros((CHAINS, 3)), rounds=4)
     covariance = np.linalg.inv(np.asarray(hill.precision))
     sd = np.sqrt(np.diag(covariance))
-    assert np.abs((end.mean(axis=0) - np.asarray(hill.centre)) / sd).max() < 4.0 / np.sqrt(WALKERS)
+    assert np.abs((end.mean(axis=0) - np.asarray(hill.centre)) / sd).max() < 4.0 / np.sqrt(CHAINS)
     # The variance of an element of a normal sample covariance is (c_ij^2 + c_ii c_jj) / N.
-    error = np.sqrt((covariance**2 + np.outer(sd**2, sd**2)) / WALKERS)
+    error = np.sqrt((covariance**2 + np.outer(sd**2, sd**2)) / CHAINS)
     assert (np.abs(np.cov(end.T) - covariance) / error).max() < 4.0
     # A density that is not the unit normal, or the last comparison says nothing.
     assert np.abs(covariance - np.eye(3)).max() > 0.3
@@ -45,8 +45,8 @@ def test_a_density_that_is_not_normal_stays(skew: SkewHill, pairs: tuple[np.ndar
     assert np.mean(np.any(start != end, axis=1)) > 0.99
 
 
-def test_walks_are_reversible(pairs: tuple[np.ndarray, np.ndarray]) -> None:
-    """E f(x) g(y) = E g(x) f(y) for draws x of the density and ends y of their walks."""
+def test_the_steps_are_reversible(pairs: tuple[np.ndarray, np.ndarray]) -> None:
+    """E f(x) g(y) = E g(x) f(y) for draws x of the density and ends y of chains from there."""
     start, end = pairs
 
     def shapes(t: np.ndarray) -> list[np.ndarray]:
@@ -55,7 +55,7 @@ def test_walks_are_reversible(pairs: tuple[np.ndarray, np.ndarray]) -> None:
     for i, (f_start, f_end) in enumerate(zip(shapes(start), shapes(end), strict=True)):
         for g_start, g_end in list(zip(shapes(start), shapes(end), strict=True))[:i]:
             difference = f_start * g_end - g_start * f_end
-            assert abs(difference.mean()) < 4.0 * difference.std() / np.sqrt(WALKERS)
+            assert abs(difference.mean()) < 4.0 * difference.std() / np.sqrt(CHAINS)
 
 
 def test_the_densities_are_those_at_both_ends(skew: SkewHill) -> None:
@@ -65,7 +65,7 @@ def test_the_densities_are_those_at_both_ends(skew: SkewHill) -> None:
     np.testing.assert_allclose(after, jax.vmap(skew)(end), rtol=1e-12)
 
 
-def test_a_seed_gives_the_same_walk_and_another_one_another(skew: SkewHill) -> None:
+def test_a_seed_gives_the_same_chain_and_another_one_another(skew: SkewHill) -> None:
     start = skew.draws(np.random.default_rng(9), 10)
     one, again, other = (pcn_steps(skew, seed, start)[0] for seed in (1, 1, 2))
     np.testing.assert_array_equal(one, again)
