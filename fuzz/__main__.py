@@ -90,7 +90,7 @@ def _run(batches: Sequence[Batch], seed: int, jobs: int, keep: Path) -> list[Out
     began, total = time.perf_counter(), sum(len(batch.numbers) for batch in batches)
     outcomes: list[Outcome] = []
 
-    def tell(batch: Batch) -> None:
+    def print_progress(batch: Batch) -> None:
         failed = sum(each.kind is Kind.failed for each in outcomes)
         print(
             f"{time.perf_counter() - began:7.1f} s  {len(outcomes)} of {total} done, {failed} failed; "
@@ -99,8 +99,8 @@ def _run(batches: Sequence[Batch], seed: int, jobs: int, keep: Path) -> list[Out
             flush=True,
         )
 
-    # One by one: what is told while they come depends on them.
-    outcomes.extend(run_side_by_side(batches, seed, jobs, keep, tell))
+    # One by one: the progress that is printed counts them.
+    outcomes.extend(run_side_by_side(batches, seed, jobs, keep, print_progress))
     return outcomes
 
 

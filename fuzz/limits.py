@@ -1,4 +1,4 @@
-"""What one input may take: time of the processor, and memory of the process (where the system tells it)."""
+"""What one input may take: time of the processor, and memory of the process (where the system reports it)."""
 
 import resource
 import signal

@@ -17,7 +17,7 @@ from pathlib import Path
 from fuzz.outcome import Kind, Outcome
 
 AT_ONCE = 100
-"""Inputs that are handed to a process together."""
+"""Inputs that are sent to a process together."""
 
 PATIENCE = 600.0
 """So long an input may take by the clock [s] before its process is ended: its limit is in time of the processor, of
@@ -32,8 +32,8 @@ class Batch:
     numbers: tuple[int, ...]
 
 
-Tell = Callable[[Batch], None]
-"""Told which batch begins."""
+OnBatch = Callable[[Batch], None]
+"""Called with each batch when it begins."""
 
 
 @dataclass
@@ -57,10 +57,13 @@ def batches_of(names: Sequence[str], count: int) -> list[Batch]:
 
 
 def run_side_by_side(
-    batches: Sequence[Batch], seed: int, jobs: int, keep: Path, tell: Tell = lambda batch: None
+    batches: Sequence[Batch], seed: int, jobs: int, keep: Path, on_batch: OnBatch = lambda batch: None
 ) -> Iterator[Outcome]:
-    """The outcome of every input, as they come; a failing input is left in ``keep``. ``tell`` hears what begins."""
-    pool = _Pool(seed, keep, tell, deque(batches), [])
+    """The outcome of every input, as they come; a failing input is left in ``keep``.
+
+    ``on_batch`` is called with each batch that begins.
+    """
+    pool = _Pool(seed, keep, on_batch, deque(batches), [])
     try:
         yield from pool.outcomes(jobs)
     finally:
@@ -74,7 +77,7 @@ class _Pool:
 
     seed: int
     keep: Path
-    tell: Tell
+    on_batch: OnBatch
     waiting: deque[Batch]
     workers: list[_Worker]
 
@@ -99,16 +102,16 @@ class _Pool:
         theirs.close()
         worker = _Worker(process, ours, "", deque(), 0.0)
         self.workers.append(worker)
-        self._hand_over(worker)
+        self._send_batch(worker)
 
-    def _hand_over(self, worker: _Worker) -> None:
+    def _send_batch(self, worker: _Worker) -> None:
         """The next batch, or the end where there is none."""
         if not self.waiting:
             worker.connection.close()
             self.workers.remove(worker)
             return
         batch = self.waiting.popleft()
-        self.tell(batch)
+        self.on_batch(batch)
         worker.loader, worker.left, worker.since = batch.loader, deque(batch.numbers), time.monotonic()
         worker.connection.send(batch)
 
@@ -122,7 +125,7 @@ class _Pool:
         worker.left.popleft()
         worker.since = time.monotonic()
         if not worker.left:
-            self._hand_over(worker)
+            self._send_batch(worker)
         return outcome
 
     def _lost(self, worker: _Worker, reason: str) -> Outcome:
@@ -177,5 +180,5 @@ def keep_failure(keep: Path, outcome: Outcome, seed: int) -> None:
     folder.mkdir(parents=True)
     loader = LOADERS[outcome.loader]
     place(loader, input_of(loader, seed, outcome.number).content, folder)
-    told = f"{outcome.loader} {outcome.number}: {outcome.reason}\nby {outcome.how}\n\n{outcome.trace}"
-    (folder / "failure.txt").write_text(told, encoding="utf-8", errors="backslashreplace")
+    report = f"{outcome.loader} {outcome.number}: {outcome.reason}\nby {outcome.how}\n\n{outcome.trace}"
+    (folder / "failure.txt").write_text(report, encoding="utf-8", errors="backslashreplace")
