@@ -22,7 +22,7 @@ from fuzz.pool import Batch, batches_of, run_side_by_side
 from fuzz.registry import LOADERS
 from fuzz.report import count, failures_text, page, table_text
 
-KEEP = Path("out/fuzz")
+FAILURES = Path("out/fuzz")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,9 +71,9 @@ def _parser() -> argparse.ArgumentParser:
     add(
         "--keep",
         type=Path,
-        default=KEEP,
+        default=FAILURES,
         metavar="DIR",
-        help=f"where inputs that fail are left (default: {KEEP})",
+        help=f"where inputs that fail are left (default: {FAILURES})",
     )
     add("--out", type=Path, metavar="FILE", help="write the page of the documentation there")
     return parser
@@ -86,7 +86,7 @@ def _positive(text: str) -> int:
     return number
 
 
-def _run(batches: Sequence[Batch], seed: int, jobs: int, keep: Path) -> list[Outcome]:
+def _run(batches: Sequence[Batch], seed: int, jobs: int, folder: Path) -> list[Outcome]:
     began, total = time.perf_counter(), sum(len(batch.numbers) for batch in batches)
     outcomes: list[Outcome] = []
 
@@ -100,7 +100,7 @@ def _run(batches: Sequence[Batch], seed: int, jobs: int, keep: Path) -> list[Out
         )
 
     # One by one: the progress that is printed counts them.
-    outcomes.extend(run_side_by_side(batches, seed, jobs, keep, print_progress))
+    outcomes.extend(run_side_by_side(batches, seed, jobs, folder, print_progress))
     return outcomes
 
 

@@ -87,7 +87,7 @@ def json_mcap() -> Original:
     for time, *values in _signals().tolist():
         record = json.dumps(dict(zip(names, values, strict=True)))
         messages.append(("/rig/daq", START_NS + round(1e9 * time), record.encode()))
-    return _in_every_dress(topics, _between_events(messages, "/rig/test"))
+    return _in_every_container(topics, _between_events(messages, "/rig/test"))
 
 
 def cdr_mcap() -> Original:
@@ -106,7 +106,9 @@ def cdr_mcap() -> Original:
         messages.append(("/road_height", at, number_message(road)))
     first, last = messages[0][1], messages[-1][1]
     begin = ("/test", first, text_message("start dwell_2.00Hz"))
-    return _in_every_dress(topics, [begin, *messages, ("/test", last + 1, text_message("end dwell_2.00Hz"))])
+    return _in_every_container(
+        topics, [begin, *messages, ("/test", last + 1, text_message("end dwell_2.00Hz"))]
+    )
 
 
 def channel_map() -> Original:
@@ -170,7 +172,7 @@ def _between_events(messages: list[Message], topic: str) -> list[Message]:
     return [(topic, messages[0][1], begin), *messages, (topic, messages[-1][1] + 1, end)]
 
 
-def _in_every_dress(topics: dict[str, Topic], messages: list[Message]) -> Original:
+def _in_every_container(topics: dict[str, Topic], messages: list[Message]) -> Original:
     return Original(
         tuple(
             mcap_bytes(topics, messages, compression, chunked)
