@@ -22,7 +22,7 @@ from fuzz.pool import Batch, batches_of, run_side_by_side
 from fuzz.registry import LOADERS
 from fuzz.report import count, failures_text, page, table_text
 
-KEEP = Path("out/fuzz")
+FAILURES = Path("out/fuzz")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,9 +71,9 @@ def _parser() -> argparse.ArgumentParser:
     add(
         "--keep",
         type=Path,
-        default=KEEP,
+        default=FAILURES,
         metavar="DIR",
-        help=f"where inputs that fail are left (default: {KEEP})",
+        help=f"where inputs that fail are left (default: {FAILURES})",
     )
     add("--out", type=Path, metavar="FILE", help="write the page of the documentation there")
     return parser
@@ -86,11 +86,11 @@ def _positive(text: str) -> int:
     return number
 
 
-def _run(batches: Sequence[Batch], seed: int, jobs: int, keep: Path) -> list[Outcome]:
+def _run(batches: Sequence[Batch], seed: int, jobs: int, folder: Path) -> list[Outcome]:
     began, total = time.perf_counter(), sum(len(batch.numbers) for batch in batches)
     outcomes: list[Outcome] = []
 
-    def tell(batch: Batch) -> None:
+    def print_progress(batch: Batch) -> None:
         failed = sum(each.kind is Kind.failed for each in outcomes)
         print(
             f"{time.perf_counter() - began:7.1f} s  {len(outcomes)} of {total} done, {failed} failed; "
@@ -99,8 +99,8 @@ def _run(batches: Sequence[Batch], seed: int, jobs: int, keep: Path) -> list[Out
             flush=True,
         )
 
-    # One by one: what is told while they come depends on them.
-    outcomes.extend(run_side_by_side(batches, seed, jobs, keep, tell))
+    # One by one: the progress that is printed counts them.
+    outcomes.extend(run_side_by_side(batches, seed, jobs, folder, print_progress))
     return outcomes
 
 

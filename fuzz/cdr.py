@@ -1,4 +1,4 @@
-"""A ROS 2 accelerometer's messages, and tests told in words, as a laboratory records them."""
+"""A ROS 2 accelerometer's messages, and tests announced in text, as a laboratory records them."""
 
 import struct
 

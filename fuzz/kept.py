@@ -24,7 +24,7 @@ from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, rig_conten
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.report.blind import blind_record
 from savgs_ident.report.campaigns.record import campaigns_columns, campaigns_record
-from savgs_ident.report.validation import alarms_record, calibration_record
+from savgs_ident.report.present_validation import alarms_record, calibration_record
 from savgs_ident.validation.blind import Job as BlindJob
 from savgs_ident.validation.blind import plan_of
 from savgs_ident.validation.blind_answer import Answer, Envelope, Interval, Score, score_from, sealed
@@ -237,11 +237,11 @@ def _blind_files() -> dict[str, bytes]:
         path.write_bytes(gzip.compress(campaign, mtime=0))
         envelope = Envelope(answer, "ab" * 16)
         seal = sealed(envelope, load_campaign(folder).sha256)
-        told = {"trial": _NUMBER, "settings": _PLAN.marks()} | asdict(envelope)
+        opened = {"trial": _NUMBER, "settings": _PLAN.marks()} | asdict(envelope)
         return {
             f"trial_0001/campaign/{FILE}": path.read_bytes(),
             "trial_0001/campaign/seal.json": json.dumps({"without": [], "seal": asdict(seal)}).encode(),
-            "trial_0001/answer.json": json.dumps(told).encode(),
+            "trial_0001/answer.json": json.dumps(opened).encode(),
         }
 
 

@@ -1,4 +1,4 @@
-"""What one input may take: time of the processor, and memory of the process (where the system tells it)."""
+"""What one input may take: time of the processor, and memory of the process (where the system reports it)."""
 
 import resource
 import signal
@@ -56,7 +56,7 @@ def grown(begin: int) -> int:
     return max(_resident("VmHWM") - begin, 0) if begin else 0
 
 
-def keep_the_machine_safe() -> None:
+def limit_memory() -> None:
     """Whatever a file declares, this process gets no more than some gigabytes beyond what it has."""
     now = _resident("VmSize")
     if now:

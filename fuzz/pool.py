@@ -17,7 +17,7 @@ from pathlib import Path
 from fuzz.outcome import Kind, Outcome
 
 AT_ONCE = 100
-"""Inputs that are handed to a process together."""
+"""Inputs that are sent to a process together."""
 
 PATIENCE = 600.0
 """So long an input may take by the clock [s] before its process is ended: its limit is in time of the processor, of
@@ -32,8 +32,8 @@ class Batch:
     numbers: tuple[int, ...]
 
 
-Tell = Callable[[Batch], None]
-"""Told which batch begins."""
+OnBatch = Callable[[Batch], None]
+"""Called with each batch when it begins."""
 
 
 @dataclass
@@ -57,10 +57,13 @@ def batches_of(names: Sequence[str], count: int) -> list[Batch]:
 
 
 def run_side_by_side(
-    batches: Sequence[Batch], seed: int, jobs: int, keep: Path, tell: Tell = lambda batch: None
+    batches: Sequence[Batch], seed: int, jobs: int, folder: Path, on_batch: OnBatch = lambda batch: None
 ) -> Iterator[Outcome]:
-    """The outcome of every input, as they come; a failing input is left in ``keep``. ``tell`` hears what begins."""
-    pool = _Pool(seed, keep, tell, deque(batches), [])
+    """The outcome of every input, as they come; a failing input is left in ``folder``.
+
+    ``on_batch`` is called with each batch that begins.
+    """
+    pool = _Pool(seed, folder, on_batch, deque(batches), [])
     try:
         yield from pool.outcomes(jobs)
     finally:
@@ -73,8 +76,8 @@ class _Pool:
     """The processes at work, and the batches that none has begun."""
 
     seed: int
-    keep: Path
-    tell: Tell
+    folder: Path
+    on_batch: OnBatch
     waiting: deque[Batch]
     workers: list[_Worker]
 
@@ -86,7 +89,7 @@ class _Pool:
             ready = wait([worker.connection for worker in self.workers], timeout=1.0)
             for worker in tuple(self.workers):
                 if worker.connection in ready:
-                    yield self._heard(worker)
+                    yield self._received(worker)
                 elif time.monotonic() - worker.since > PATIENCE:
                     worker.process.kill()
                     yield self._lost(worker, f"is not done in {PATIENCE:g} s")
@@ -94,25 +97,25 @@ class _Pool:
     def _begin(self) -> None:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        process = context.Process(target=work, args=(theirs, self.seed, self.keep), daemon=True)
+        process = context.Process(target=work, args=(theirs, self.seed, self.folder), daemon=True)
         process.start()
         theirs.close()
         worker = _Worker(process, ours, "", deque(), 0.0)
         self.workers.append(worker)
-        self._hand_over(worker)
+        self._send_batch(worker)
 
-    def _hand_over(self, worker: _Worker) -> None:
+    def _send_batch(self, worker: _Worker) -> None:
         """The next batch, or the end where there is none."""
         if not self.waiting:
             worker.connection.close()
             self.workers.remove(worker)
             return
         batch = self.waiting.popleft()
-        self.tell(batch)
+        self.on_batch(batch)
         worker.loader, worker.left, worker.since = batch.loader, deque(batch.numbers), time.monotonic()
         worker.connection.send(batch)
 
-    def _heard(self, worker: _Worker) -> Outcome:
+    def _received(self, worker: _Worker) -> Outcome:
         """What a process says: an outcome, or nothing any more."""
         try:
             outcome: Outcome = worker.connection.recv()
@@ -122,7 +125,7 @@ class _Pool:
         worker.left.popleft()
         worker.since = time.monotonic()
         if not worker.left:
-            self._hand_over(worker)
+            self._send_batch(worker)
         return outcome
 
     def _lost(self, worker: _Worker, reason: str) -> Outcome:
@@ -131,51 +134,51 @@ class _Pool:
         outcome = Outcome(worker.loader, worker.left.popleft(), Kind.failed, reason=reason)
         if worker.left:
             self.waiting.appendleft(Batch(worker.loader, tuple(worker.left)))
-        # Where making the input is at fault there is none to keep.
+        # Where making the input is at fault there is none to write.
         with suppress(Exception):
-            keep_failure(self.keep, outcome, self.seed)
+            write_failure(self.folder, outcome, self.seed)
         return outcome
 
 
-def work(connection: Connection, seed: int, keep: Path) -> None:
+def work(connection: Connection, seed: int, folder: Path) -> None:
     """The body of a process: batch after batch until nobody sends one."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    from fuzz.limits import keep_the_machine_safe
+    from fuzz.limits import limit_memory
 
-    keep_the_machine_safe()
+    limit_memory()
     while True:
         try:
             batch: Batch = connection.recv()
         except EOFError:
             return
         for number in batch.numbers:
-            connection.send(_one(batch.loader, seed, number, keep))
+            connection.send(_one(batch.loader, seed, number, folder))
 
 
-def _one(name: str, seed: int, number: int, keep: Path) -> Outcome:
+def _one(name: str, seed: int, number: int, folder: Path) -> Outcome:
     from fuzz.registry import LOADERS
     from fuzz.trial import run_trial
 
     with tempfile.TemporaryDirectory(prefix="fuzz-") as place:
         outcome = run_trial(LOADERS[name], seed, number, Path(place))
     if outcome.kind is Kind.failed:
-        keep_failure(keep, outcome, seed)
+        write_failure(folder, outcome, seed)
     return outcome
 
 
-def keep_failure(keep: Path, outcome: Outcome, seed: int) -> None:
+def write_failure(failures: Path, outcome: Outcome, seed: int) -> None:
     """Leave the input of a failure, made again, and what was said of it, in a folder of its own."""
     from fuzz.registry import LOADERS
     from fuzz.trial import input_of, place
 
-    folder = keep / f"{outcome.loader}-{seed}-{outcome.number}"
+    folder = failures / f"{outcome.loader}-{seed}-{outcome.number}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     loader = LOADERS[outcome.loader]
     place(loader, input_of(loader, seed, outcome.number).content, folder)
-    told = f"{outcome.loader} {outcome.number}: {outcome.reason}\nby {outcome.how}\n\n{outcome.trace}"
-    (folder / "failure.txt").write_text(told, encoding="utf-8", errors="backslashreplace")
+    report = f"{outcome.loader} {outcome.number}: {outcome.reason}\nby {outcome.how}\n\n{outcome.trace}"
+    (folder / "failure.txt").write_text(report, encoding="utf-8", errors="backslashreplace")

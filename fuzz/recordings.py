@@ -87,7 +87,7 @@ def json_mcap() -> Original:
     for time, *values in _signals().tolist():
         record = json.dumps(dict(zip(names, values, strict=True)))
         messages.append(("/rig/daq", START_NS + round(1e9 * time), record.encode()))
-    return _in_every_dress(topics, _told(messages, "/rig/test"))
+    return _in_every_container(topics, _between_events(messages, "/rig/test"))
 
 
 def cdr_mcap() -> Original:
@@ -106,11 +106,13 @@ def cdr_mcap() -> Original:
         messages.append(("/road_height", at, number_message(road)))
     first, last = messages[0][1], messages[-1][1]
     begin = ("/test", first, text_message("start dwell_2.00Hz"))
-    return _in_every_dress(topics, [begin, *messages, ("/test", last + 1, text_message("end dwell_2.00Hz"))])
+    return _in_every_container(
+        topics, [begin, *messages, ("/test", last + 1, text_message("end dwell_2.00Hz"))]
+    )
 
 
 def channel_map() -> Original:
-    """A map that settles everything, beside a campaign that needs it."""
+    """A map that names every channel, beside a campaign that needs it."""
     header = "condition,clock,road_height [m],ACC_3,pot,link_angle [rad]\n"
     body = "".join(
         f"dwell_2.00Hz,{1000.0 * time},{road},{-accel / 9.80665},{1000.0 * deflection},{angle}\n"
@@ -163,14 +165,14 @@ def _schema() -> bytes:
     return json.dumps({"properties": {name: {"description": unit} for name, unit in _UNITS.items()}}).encode()
 
 
-def _told(messages: list[Message], topic: str) -> list[Message]:
+def _between_events(messages: list[Message], topic: str) -> list[Message]:
     event = {"test": "dwell_2.00Hz", "frequency_hz": FREQUENCY_HZ}
     begin = json.dumps(event | {"event": "start"}).encode()
     end = json.dumps(event | {"event": "end"}).encode()
     return [(topic, messages[0][1], begin), *messages, (topic, messages[-1][1] + 1, end)]
 
 
-def _in_every_dress(topics: dict[str, Topic], messages: list[Message]) -> Original:
+def _in_every_container(topics: dict[str, Topic], messages: list[Message]) -> Original:
     return Original(
         tuple(
             mcap_bytes(topics, messages, compression, chunked)

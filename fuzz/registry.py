@@ -14,7 +14,7 @@ _JSON_MCAP = (
     "recordings.mcap_timing._from_json", "recordings.mcap_records.McapRecords._decompress",
 )  # fmt: skip
 _CDR_MCAP = (
-    "recordings.mcap_timing._cdr_string", "recordings.cdr._LayoutWalk._length",
+    "recordings.mcap_timing._cdr_string", "recordings.cdr._LayoutReader._length",
     "recordings.mcap_records.McapRecords._unpack_chunk",
 )  # fmt: skip
 _MATLAB = tuple(

@@ -49,12 +49,12 @@ def page(counts: Mapping[str, Counter[Kind]], command: str) -> str:
         loader = LOADERS[name]
         rows.append(f"| {name} | {loader.about} | {loader.form} | {each.total()} | {kinds} |")
     whole: Counter[Kind] = sum(counts.values(), Counter())
-    told = (
+    total = (
         f"Together {whole.total()} inputs: {whole[Kind.read]} read, {whole[Kind.refused]} refused, "
         f"{whole[Kind.failed]} failures."
     )
     versions = [f"Python {platform.python_version()}", *(f"{name} {version(name)}" for name in PACKAGES)]
     return _PAGE.read_text("utf-8").format(
-        seconds=SECONDS, memory=MEMORY >> 20, command=command, table="\n".join(rows), sum=told,
+        seconds=SECONDS, memory=MEMORY >> 20, command=command, table="\n".join(rows), sum=total,
         versions=", ".join(versions),
     )  # fmt: skip

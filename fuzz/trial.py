@@ -1,4 +1,4 @@
-"""One input: a good file, damaged as its number says, read, and judged."""
+"""One input: a good file, damaged as its number says, read, and classified."""
 
 import traceback
 import warnings
@@ -61,15 +61,19 @@ def classify(loader: Loader, path: Path, seconds: float = SECONDS) -> tuple[Kind
     """Read a file within so much time of the processor: how that ended, why, and where it failed."""
     small, begin = path.stat().st_size < 100_000, begin_peak()
     try:
-        with warnings.catch_warnings(record=True) as told, time_limit(seconds):
+        with warnings.catch_warnings(record=True) as caught, time_limit(seconds):
             warnings.simplefilter("always")
             kind, reason = _read(loader, path)
     except TooLongError:
         return Kind.failed, f"takes more than {seconds:g} s", traceback.format_exc()
     except Exception as error:
         return Kind.failed, f"{type(error).__name__}: {error!s:.200}", traceback.format_exc()
-    if told:
-        return Kind.failed, f"warns: {told[0].category.__name__}: {told[0].message!s:.200}", str(told[0])
+    if caught:
+        return (
+            Kind.failed,
+            f"warns: {caught[0].category.__name__}: {caught[0].message!s:.200}",
+            str(caught[0]),
+        )
     used = grown(begin)
     if small and used > MEMORY:
         return Kind.failed, f"takes {used >> 20} MiB of memory", ""
@@ -80,14 +84,14 @@ def _read(loader: Loader, path: Path) -> tuple[Kind, str]:
     try:
         found = loader.read(path)
     except InputError as error:
-        return _judged(str(error), path)
+        return _refusal(str(error), path)
     if found is None:
         return Kind.refused, "left alone"
     fault = unsound(found)
     return (Kind.failed, f"accepted although {fault}") if fault else (Kind.read, "")
 
 
-def _judged(message: str, path: Path) -> tuple[Kind, str]:
+def _refusal(message: str, path: Path) -> tuple[Kind, str]:
     """A refusal is one line that people can read and that names the file, or the folder it is in."""
     if message != one_line(message, len(message)):
         return Kind.failed, f"the refusal is not one line of plain text: {message!r:.200}"

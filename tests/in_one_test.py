@@ -20,6 +20,8 @@ def over(
     several = isinstance(names, tuple)
     arguments = names if isinstance(names, tuple) else (names,)
     cases = list(values)
+    if not cases:
+        raise ValueError("a test of no values at all cannot fail")
     labels = [ids(case) for case in cases] if callable(ids) else list(ids)
 
     def decorate(check: Callable[..., None]) -> Callable[..., None]:

@@ -54,17 +54,12 @@ class Shrink:
     @property
     def closed_by_calibration(self) -> float:
         """1 - (recalibrated^2 - floor^2) / (before^2 - floor^2) [1]."""
-        return _share_closed(self.before, self.recalibrated, self.floor)
+        return float(_closed(*np.square([self.before, self.recalibrated, self.floor])))
 
     @property
     def closed_by_effect(self) -> float:
         """1 - (after^2 - floor^2) / (recalibrated^2 - floor^2) [1]."""
-        return _share_closed(self.recalibrated, self.after, self.floor)
-
-
-def _share_closed(before: float, after: float, floor: float) -> float:
-    whole = before**2 - floor**2
-    return 1.0 - max(after**2 - floor**2, 0.0) / whole if whole > 0.0 else nan
+        return float(_closed(*np.square([self.recalibrated, self.after, self.floor])))
 
 
 @dataclass(frozen=True)

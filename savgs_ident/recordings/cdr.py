@@ -11,7 +11,7 @@ values and comments do not change the bytes and are skipped::
     string frame_id
 
 CDR has no tags: the offset of a number depends only on the lengths of the strings and sequences before it. So one
-message is walked in Python and its offsets are kept as a :class:`MessageLayout`; every other message with the same
+message is parsed in Python and its offsets are kept as a :class:`MessageLayout`; every other message with the same
 lengths (in practice all of a topic) is read by numpy at those offsets, thousands at a time.
 """
 
@@ -145,17 +145,17 @@ class MessageLayout:
 
 
 def find_layout(message: bytes, fields: tuple[Field, ...]) -> MessageLayout:
-    """Walk one message; raises :class:`SchemaError` where the bytes do not fit the definition."""
+    """Parse one message; raises :class:`SchemaError` where the bytes do not fit the definition."""
     if len(message) < _ENCAPSULATION or message[1] not in _ALIGNMENTS:
         raise SchemaError("the message does not begin as CDR does")
-    walk = _LayoutWalk(message, "<" if message[1] & 1 else ">", _ALIGNMENTS[message[1]])
-    walk.guards.append((NumberAt(1, "u1"), message[1]))
-    walk.struct(fields, "")
-    return MessageLayout(walk.numbers, tuple(walk.guards), walk.texts, walk.at)
+    reader = _LayoutReader(message, "<" if message[1] & 1 else ">", _ALIGNMENTS[message[1]])
+    reader.guards.append((NumberAt(1, "u1"), message[1]))
+    reader.struct(fields, "")
+    return MessageLayout(reader.numbers, tuple(reader.guards), reader.texts, reader.at)
 
 
-class _LayoutWalk:
-    """Walks one message field by field and notes where its numbers stand."""
+class _LayoutReader:
+    """Parses one message field by field and records the offsets of its numbers."""
 
     def __init__(self, message: bytes, order: str, alignment: int) -> None:
         self.message = message
@@ -170,7 +170,7 @@ class _LayoutWalk:
         for field in fields:
             name = f"{path}.{field.name}" if path else field.name
             if field.count == SINGLE:
-                self._element(field, name, keep=True)
+                self._element(field, name, record=True)
                 continue
             count = self._length() if field.count == SEQUENCE else field.count
             self._array(field, name, count)
@@ -178,24 +178,24 @@ class _LayoutWalk:
     def _array(self, field: Field, name: str, count: int) -> None:
         kept = min(count, _MOST_ELEMENTS)
         for index in range(kept):
-            self._element(field, f"{name}[{index}]", keep=True)
+            self._element(field, f"{name}[{index}]", record=True)
         if field.type in PRIMITIVES:
             self._advance((count - kept) * int(PRIMITIVES[field.type][1]))
             return
         for _ in range(count - kept):
-            self._element(field, name, keep=False)
+            self._element(field, name, record=False)
 
-    def _element(self, field: Field, name: str, keep: bool) -> None:
+    def _element(self, field: Field, name: str, record: bool) -> None:
         if field.type in PRIMITIVES:
             code = PRIMITIVES[field.type]
             offset = self._take(int(code[1]))
-            if keep:
+            if record:
                 self.numbers[name] = NumberAt(offset, self.order + code)
         elif field.type == "string":
             length = self._length()
             text = self.message[self.at : self.at + length].rstrip(b"\x00")
             self._advance(length)
-            if keep:
+            if record:
                 self.texts[name] = text.decode("utf-8", errors="replace")
         elif field.type == "wstring":
             raise SchemaError(f"'{name}' is a wstring, which is not read")

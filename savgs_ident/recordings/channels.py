@@ -246,12 +246,12 @@ def bind(
         name = layout.canonical_name(label)
         if name is None or name == "time" or name in mapped:
             continue
-        rival = bindings.get(name)
+        earlier = bindings.get(name)
         exact = layout.is_exact(label)
-        if rival is not None and rival.exact and not exact:
+        if earlier is not None and earlier.exact and not exact:
             continue
-        if rival is not None and rival.exact == exact:
-            raise ambiguous(name, rival.label, candidate.label, source)
+        if earlier is not None and earlier.exact == exact:
+            raise ambiguous(name, earlier.label, candidate.label, source)
         bindings[name] = _by_name(name, layout, candidate, exact, source, warnings)
     return tuple(bindings.values()), tuple(warnings)
 

@@ -303,10 +303,10 @@ class _TopicCollector:
         best: dict[str, Binding] = {}
         for columns in used:
             for binding in columns.bindings or ():
-                rival = best.get(binding.channel)
-                if rival is not None and rival.exact == binding.exact:
-                    raise ambiguous(binding.channel, rival.label, binding.label, self._source)
-                if rival is None or binding.exact:
+                earlier = best.get(binding.channel)
+                if earlier is not None and earlier.exact == binding.exact:
+                    raise ambiguous(binding.channel, earlier.label, binding.label, self._source)
+                if earlier is None or binding.exact:
                     best[binding.channel] = binding
         kept = []
         for columns in used:

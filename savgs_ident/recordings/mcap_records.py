@@ -82,7 +82,7 @@ class McapRecords:
                     remedy="give an MCAP or CSV file",
                 )
             for data in self._payloads(stream, size):
-                yield self._walk(data)
+                yield self._segment_of(data)
         if self._ends_early:
             self.warnings.append(self._truncated())
 
@@ -180,7 +180,7 @@ class McapRecords:
             )
         )
 
-    def _walk(self, data: bytes) -> Segment:
+    def _segment_of(self, data: bytes) -> Segment:
         schemas: list[Schema] = []
         channels: list[McapChannel] = []
         messages: dict[int, list[int]] = {}

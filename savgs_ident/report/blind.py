@@ -11,7 +11,6 @@ from matplotlib.patches import Rectangle
 from rich.console import Group, RenderableType
 
 from savgs_ident.core.presentation import package_versions
-from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.report.html import embed, render_page
 from savgs_ident.report.text import DASH, decimal, percentage, plain, table
 from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, new_figure, printable, styled
@@ -24,7 +23,7 @@ from savgs_ident.validation.blind_rates import (
     rates_of,
     reliability_of,
 )
-from savgs_ident.validation.foreign_laws import FOREIGN
+from savgs_ident.validation.foreign_laws import TRIAL_EFFECTS
 from savgs_ident.validation.varied_constants import MovedMarks
 
 RATE_WORDS: Mapping[str, str] = {
@@ -148,7 +147,7 @@ def blind_record(
 
     ``trusted`` says that every rate keeps its bounds. Shares and changes are relative, parameters in SI.
     """
-    rates, confusion = rates_of(scores), confusion_of(scores, ORDER)
+    rates, confusion = rates_of(scores), confusion_of(scores, TRIAL_EFFECTS)
     return {
         "schema": 1,
         "trusted": all(rate.met is not False for rate in rates.values()),
@@ -214,13 +213,10 @@ _WRONG = LinearSegmentedColormap.from_list("wrong", ["#fbe3d3", ORANGE])
 _CELL = 0.27
 """Size of a cell [inch]."""
 
-ORDER = (*CATALOGUE, *FOREIGN)
-"""Effects in the order in which the confusion matrix has them."""
-
 
 def confusion_figure(scores: Sequence[Score]) -> Figure:
     """Truths down, verdicts across; blue is right, orange is not, the number says how many trials."""
-    confusion = confusion_of(scores, ORDER)
+    confusion = confusion_of(scores, TRIAL_EFFECTS)
     truths, verdicts, counts = confusion.truths, confusion.verdicts, confusion.counts
     most = max(int(counts.max(initial=1)), 1)
     with styled():

@@ -352,5 +352,5 @@ def _draw_misses(axes: Axes, band: Band) -> None:
     axes.scatter([], [], marker="s", s=40, color=ORANGE, label="together outside")
     axes.set_ylabel("distance [band half-widths]")
     finite = np.concatenate([np.abs(values[np.isfinite(values)]) for values in band.misses])
-    reach = 1.12 * max(float(np.max(finite, initial=0.0)), _LEAST_SHOWN)
-    axes.set_ylim(-reach, reach)
+    limit = 1.12 * max(float(np.max(finite, initial=0.0)), _LEAST_SHOWN)
+    axes.set_ylim(-limit, limit)

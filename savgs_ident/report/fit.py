@@ -103,7 +103,7 @@ def _named_matrix(fit: Fit, matrix: NDArray[np.float64]) -> dict[str, dict[str, 
 def _dwell_records(fit: Fit) -> list[dict[str, object]]:
     chi2, entries = chi2_by_dwell(fit), entries_by_dwell(fit)
     sigma = whitened(fit.measured, fit.channels, fit.predicted, fit.used)
-    reach = predicted_peak_to_peak(fit.measured, fit.channels, fit.predicted)
+    identified = predicted_peak_to_peak(fit.measured, fit.channels, fit.predicted)
     frictionless = predicted_peak_to_peak(fit.measured, fit.channels, fit.frictionless)
     return [
         {
@@ -114,7 +114,7 @@ def _dwell_records(fit: Fit) -> list[dict[str, object]]:
             "entries": entries[d],
             "channels": {
                 name: _dwell_channel(fit, d, c, sigma[d, c])
-                | {"peak_to_peak_identified": reach[d, c], "peak_to_peak_simqc": frictionless[d, c]}
+                | {"peak_to_peak_identified": identified[d, c], "peak_to_peak_simqc": frictionless[d, c]}
                 for c, name in enumerate(fit.channels)
                 if np.any(fit.used[d, c])
             },
@@ -174,11 +174,13 @@ def _measured(points: MeasuredPoints, c: int, key: str) -> dict[str, object]:
     }
 
 
-def _transfer(transfer: NDArray[np.complex128], reach: NDArray[np.float64], key: str) -> dict[str, object]:
+def _transfer(
+    transfer: NDArray[np.complex128], peak_to_peak: NDArray[np.float64], key: str
+) -> dict[str, object]:
     return {
         key: np.abs(transfer),
         "phase_deg": np.degrees(np.angle(transfer)),
-        "peak_to_peak": reach,
+        "peak_to_peak": peak_to_peak,
     }
 
 

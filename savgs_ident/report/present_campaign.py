@@ -14,7 +14,7 @@ from rich.console import RenderableType
 
 from savgs_ident.core.files import write_bytes, write_json
 from savgs_ident.core.presentation import Progress, no_progress
-from savgs_ident.report.presenters import AbstractPresenter, Figures, Shown, is_quarter_car
+from savgs_ident.report.presenters import AbstractPresenter, Figures, Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -95,13 +95,10 @@ class _Fit(_Identified["Fit"]):
         return comparison_of(result)
 
     def more(self, result: "Fit", folder: Path) -> Iterator[Path]:
-        from savgs_ident.plants.quarter_car.model import RigModel
-        from savgs_ident.plants.quarter_car.rig import write_rig
+        from savgs_ident.report.by_plant import report_of
 
-        if not isinstance(model := result.model, RigModel):
-            return
-        write_rig(model.rig, folder / "model.toml")
-        yield folder / "model.toml"
+        write = report_of(result.estimated).write_model
+        yield from write(result, folder) if write is not None else ()
 
 
 class _Comparison(_Identified["Comparison"]):
@@ -238,8 +235,8 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
         return diagnosis_html(result, result.origin.with_versions(self.packages))
 
     def figures(self, result: "Diagnosis") -> Figures:
+        from savgs_ident.report.by_plant import report_of
         from savgs_ident.report.diagnosis.compared import diagnosis_bode_figure, drive_figure
-        from savgs_ident.report.diagnosis.drawing import rig_figure
         from savgs_ident.report.diagnosis.figures import (
             force_figure,
             gap_map_figure,
@@ -256,7 +253,8 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
         if result.measured is None:
             return {"drive": lambda: drive_figure(result), **shrink, **loops}
         names = [each.name for each in result.given.channels]
-        drawing: Figures = {"ports": lambda: rig_figure(result)} if is_quarter_car(result.given) else {}
+        draw = report_of(result.given).ports_figure
+        drawing: Figures = {} if draw is None else {"ports": partial(draw, result)}
         return {
             **{f"gap {name}": partial(gap_map_figure, result, name) for name in names},
             **drawing,

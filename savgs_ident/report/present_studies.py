@@ -1,4 +1,4 @@
-"""The presenters of many campaigns, and of studies with known truth.
+"""The presenters of many campaigns, and of blind trials.
 
 What draws is loaded when something is drawn.
 """
@@ -14,8 +14,6 @@ from savgs_ident.report.presenters import AbstractPresenter, Figures
 if TYPE_CHECKING:
     from savgs_ident.campaigns.study import CampaignStudy
     from savgs_ident.validation.blind import BlindStudy
-    from savgs_ident.validation.calibration import CalibrationStudy
-    from savgs_ident.validation.false_alarms import AlarmStudy
 
 
 class _CampaignStudy(AbstractPresenter["CampaignStudy"]):
@@ -88,51 +86,4 @@ class _BlindStudy(AbstractPresenter["BlindStudy"]):
         }
 
 
-class _AlarmStudy(AbstractPresenter["AlarmStudy"]):
-    stem = "false_alarms"
-
-    def record(self, result: "AlarmStudy") -> Mapping[str, Any]:
-        from savgs_ident.report.validation import alarms_record
-
-        return alarms_record(result)
-
-    def text(self, result: "AlarmStudy") -> RenderableType:
-        from savgs_ident.report.text import plain
-        from savgs_ident.report.validation import alarms_text
-
-        return plain(alarms_text(self.record(result)))
-
-    def doubts(self, result: "AlarmStudy") -> tuple[str, ...]:
-        return () if result.trusted else ("there are more false alarms than there may be.",)
-
-    def figures(self, result: "AlarmStudy") -> Figures:
-        from savgs_ident.report.validation import alarms_figure
-
-        return {"false_alarms": lambda: alarms_figure(result)}
-
-
-class _CalibrationStudy(AbstractPresenter["CalibrationStudy"]):
-    stem = "calibration"
-
-    def record(self, result: "CalibrationStudy") -> Mapping[str, Any]:
-        from savgs_ident.report.validation import calibration_record
-
-        return calibration_record(result)
-
-    def text(self, result: "CalibrationStudy") -> RenderableType:
-        from savgs_ident.report.validation import calibration_text
-
-        return calibration_text(self.record(result))
-
-    def doubts(self, result: "CalibrationStudy") -> tuple[str, ...]:
-        return () if result.trusted else ("coverage or ranks are not what they should be.",)
-
-    def figures(self, result: "CalibrationStudy") -> Figures:
-        from savgs_ident.report.validation import calibration_figure
-
-        return {"calibration": lambda: calibration_figure(result)}
-
-
 BLIND_STUDY = _BlindStudy()
-ALARM_STUDY = _AlarmStudy()
-CALIBRATION_STUDY = _CalibrationStudy()

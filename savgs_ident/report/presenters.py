@@ -83,19 +83,12 @@ class AbstractPresenter(ABC, Generic[Shown]):
             yield from write_figure(folder, name, figure())
 
 
-def is_quarter_car(model: object) -> bool:
-    """Whether a model is one of the quarter car, of which there is a drawing and a rig file."""
-    from savgs_ident.plants.quarter_car.model import RigModel
-
-    return isinstance(model, RigModel)
-
-
 _FILES = {
     "CAMPAIGN_SUMMARY": "present_campaign",
     "CAMPAIGN_STUDY": "present_studies",
     "BLIND_STUDY": "present_studies",
-    "ALARM_STUDY": "present_studies",
-    "CALIBRATION_STUDY": "present_studies",
+    "ALARM_STUDY": "present_validation",
+    "CALIBRATION_STUDY": "present_validation",
     "FIT": "present_campaign",
     "COMPARISON": "present_campaign",
     "SIMULATED_RESPONSE": "present_models",

@@ -32,10 +32,9 @@ from savgs_ident.validation.blind_trial import (
     diagnose_folder,
     draw_and_record,
     kept_trials,
-    record_trial,
     run_trial,
 )
-from savgs_ident.validation.trials import begin_trials, keep_trial, known_trials, marks_in, side_by_side
+from savgs_ident.validation.trials import append_trial, begin_trials, known_trials, marks_in, side_by_side
 from savgs_ident.validation.varied_constants import MovedMarks, moved_marks
 
 FILE = "trials.jsonl"
@@ -169,26 +168,6 @@ def check_shares(job: Job) -> None:
         )
 
 
-def record_trials(job: Job, draw: Draw, out: Path, progress: Progress = no_progress) -> list[Path]:
-    """Draw and record the trials that are not in the folder ``out`` yet, without a diagnosis; their folders.
-
-    :func:`run_blind` with the same job diagnoses them.
-    """
-    check_shares(job)
-    use_persistent_cache()
-    prepare_folder(out)
-    plan = plan_of(job, rig_content(job.rig or default_rig_path()), out / FILE)
-    if not marks_in(out / FILE):
-        begin_trials(out / FILE, plan.marks())
-    found = {}
-    work = partial(record_trial, plan, draw, out)
-    with closing(side_by_side(work, range(1, job.trials + 1), job.jobs, job.scheduler)) as recorded:
-        for each in recorded:
-            found[each.number] = each.folder
-            progress(f"{len(found)} of {job.trials} trials recorded")
-    return [found[number] for number in sorted(found)]
-
-
 def plan_of(job: Job, sheet: bytes, kept: Path) -> Plan:
     """What the trials are, with the seed of an earlier run or a secret one if none was given.
 
@@ -220,7 +199,7 @@ def _run(
     with closing(side_by_side(work, missing, job.jobs, job.scheduler)) as made:
         for score in made:
             scores[score.number] = score
-            keep_trial(out / FILE, asdict(score))
+            append_trial(out / FILE, asdict(score))
             there = sum(number <= job.trials for number in scores)
             progress(f"{there} of {job.trials} trials done; {score}")
     return [scores[number] for number in sorted(scores) if number <= job.trials]

@@ -20,17 +20,16 @@ from savgs_ident.diagnosis.problem import term_of
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.validation.blind_answer import Answer, Drawn
+from savgs_ident.validation.effect_size import draw_form, find_size
 from savgs_ident.validation.lookalikes import (
     Hiding,
-    Ways,
-    draw_form,
-    find_size,
+    Sensitivities,
     hiding_at,
     moved,
     rows_of,
+    sensitivities_of,
     sigma_of,
     similar,
-    ways_of,
 )
 from savgs_ident.validation.virtual_rig import Bench, change_of, draw_rig
 
@@ -178,8 +177,8 @@ class Drawing:
             return columns
 
         start = np.concatenate([np.zeros(known), further])
-        reach = np.array([np.inf if name in self.bench.unknown else STANDS_OUT for name in self.hiding.names])
-        lower, upper = (-reach, reach) if beside is None else map(np.append, (-reach, reach), beside.bounds)
+        limit = np.array([np.inf if name in self.bench.unknown else STANDS_OUT for name in self.hiding.names])
+        lower, upper = (-limit, limit) if beside is None else map(np.append, (-limit, limit), beside.bounds)
         return sigma_of(miss_at, columns_at, start, known, (lower, upper))
 
     def _hiding_at(self, names: Sequence[str], given: Mapping[str, float]) -> Hiding:
@@ -205,7 +204,7 @@ class Drawing:
         """
         change = rows_of(present.response) - rows_of(self.response)
         found = []
-        for name, parameters in similar(self.hiding, change, self.ways, present.name).items():
+        for name, parameters in similar(self.hiding, change, self.sensitivities, present.name).items():
             effect = CATALOGUE[name]
             within = {
                 each.name: float(np.clip(parameters[each.name], each.lower, each.upper))
@@ -216,11 +215,11 @@ class Drawing:
         return tuple(found)
 
     @cached_property
-    def ways(self) -> Ways:
+    def sensitivities(self) -> Sensitivities:
         """What all effects would do to the rig."""
         solution = self.starts[()]
         assert solution is not None
-        return ways_of(self.bench, self.rig, solution)
+        return sensitivities_of(self.bench, self.rig, solution)
 
 
 def drawing_of(bench: Bench, rig: Mapping[str, float]) -> Drawing | None:

@@ -1,4 +1,4 @@
-"""What many trials say together: rates with their intervals, who is taken for whom, and stated probabilities.
+"""What many trials say together: rates with their intervals, confusions of effects, and stated probabilities.
 
 Stated probabilities are held against how often what was said is true, in bins, and the expected calibration error is
 

@@ -110,15 +110,7 @@ class Drawn:
 
 
 @dataclass(frozen=True)
-class Recorded:
-    """A trial that is recorded, and where."""
-
-    number: int
-    folder: Path
-
-
-@dataclass(frozen=True)
-class HandedOver:
+class Question:
     """What goes with the recordings: the seal, and what the catalogue of this trial lacks."""
 
     without: tuple[str, ...]
@@ -150,24 +142,24 @@ def check_trial_folder(plan: Plan, out: Path, number: int) -> None:
         )
 
 
-def record_trial(plan: Plan, draw: Draw, out: Path, number: int) -> Recorded:
-    """Draw a trial and record it, unless its folder holds that already."""
+def record_trial(plan: Plan, draw: Draw, out: Path, number: int) -> Path:
+    """Draw a trial and record it, unless its folder holds that already; the folder."""
     folder = prepare_folder(_folder(out, number))
     if not _is_recorded(folder, plan, number):
         drawn = draw(plan, plan.bench(), number)
         check_trial_folder(plan, out, number)
         _record(folder, plan, drawn, number)
-    return Recorded(number, folder)
+    return folder
 
 
 def run_trial(plan: Plan, draw: Draw, diagnose: Diagnose, out: Path, number: int) -> Score:
     """The marks of a trial: drawn and recorded unless its folder holds that already, diagnosed, opened."""
-    folder = record_trial(plan, draw, out, number).folder
+    folder = record_trial(plan, draw, out, number)
     campaign = folder / "campaign"
     rig = parse_rig(plan.sheet, plan.rig)
-    found = _diagnosed(diagnose, campaign, rig, _handed_over(folder).without)
+    found = _diagnosed(diagnose, campaign, rig, _question(folder).without)
     write_json(folder / "diagnosis.json", found)
-    seal = _handed_over(folder).seal
+    seal = _question(folder).seal
     envelope = _read(folder / "answer.json", envelope_of)
     with blamed_on(campaign / "seal.json"):
         answer = opened(seal, envelope, load_campaign(campaign).sha256)
@@ -272,8 +264,8 @@ def _strange(folder: Path, names: Sequence[str]) -> list[Path]:
     ]
 
 
-def _handed_over(folder: Path) -> HandedOver:
-    return _read(folder / "campaign" / "seal.json", partial(record_of, HandedOver))
+def _question(folder: Path) -> Question:
+    return _read(folder / "campaign" / "seal.json", partial(record_of, Question))
 
 
 def _read(path: Path, parse: Callable[[dict[str, Any]], Parsed]) -> Parsed:

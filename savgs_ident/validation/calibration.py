@@ -40,7 +40,7 @@ from savgs_ident.recordings.recording import Campaign
 from savgs_ident.simulate.excitation import every_so_many, measured_response
 from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
-from savgs_ident.validation.trials import Kept, marks_of, once_a_process, run_trials
+from savgs_ident.validation.trials import TrialFile, marks_of, once_a_process, run_trials
 
 SPREAD = 0.15
 """Relative standard deviation of the identified parameters."""
@@ -256,19 +256,19 @@ def calibrate(
     Raises :class:`InputError` as :func:`sample` does, and for trials of something else in the folder.
     """
     use_persistent_cache()
-    kept = None
+    file = None
     if folder is not None:
         marks = marks_of(model, campaign.source, channels)
         marks |= {"sampler": sampler, "every": every, "seed": seed}
-        kept = Kept(prepare_folder(Path(folder)) / FILE, marks, resume)
-    done = [] if kept is None else kept.earlier(trial_reader())
+        file = TrialFile(prepare_folder(Path(folder)) / FILE, marks, resume)
+    done = [] if file is None else file.earlier(trial_reader())
     response = measured_response(campaign, model.plant, SamplingSettings.orders, None, progress)
     question = question_about(model, every_so_many(response, every))
     asked = _Asked(question, SamplingSettings(sampler, target_ess=DRAWS, seed=seed))
     progress("preparing")
     asked.calibrator()
     found = run_trials(
-        partial(_trial, asked), trials, kept, done, jobs=jobs, scheduler=scheduler, progress=progress
+        partial(_trial, asked), trials, file, done, jobs=jobs, scheduler=scheduler, progress=progress
     )
     ranked = next((each.rank for each in found if each.rank), {})
     names = sorted(ranked, key=lambda name: name not in question.free)

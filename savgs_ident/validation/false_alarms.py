@@ -35,7 +35,7 @@ from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
-from savgs_ident.validation.trials import Kept, marks_of, once_a_process, run_trials
+from savgs_ident.validation.trials import TrialFile, marks_of, once_a_process, run_trials
 
 CONFIDENCE = 0.95
 """Of the bound that is given of a rate."""
@@ -240,17 +240,17 @@ def false_alarms(
     """
     use_persistent_cache()
     rig, settings, values = baseline_of(model, orders)
-    kept = None
+    file = None
     if folder is not None:
         marks = marks_of(model, campaign.source, channels)
         marks |= {"max_frequency": max_frequency, "orders": orders, "seed": seed}
-        kept = Kept(prepare_folder(Path(folder)) / FILE, marks, resume)
-    done = [] if kept is None else kept.earlier(read_draw)
+        file = TrialFile(prepare_folder(Path(folder)) / FILE, marks, resume)
+    done = [] if file is None else file.earlier(read_draw)
     measured = measured_response(campaign, model.plant, orders, max_frequency, progress)
     asked = _Asked(measured, rig, settings, values, seed)
     bench = asked.bench(progress)
     found = run_trials(
-        partial(_draw, asked), draws, kept, done, jobs=jobs, scheduler=scheduler, progress=progress
+        partial(_draw, asked), draws, file, done, jobs=jobs, scheduler=scheduler, progress=progress
     )
     return AlarmStudy(tuple(found), bench.odds, origin=model.origin(campaign, measured.warnings))
 

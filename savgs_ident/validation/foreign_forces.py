@@ -47,8 +47,8 @@ def _shape(role: str, value: float, unit: str, about: str, within: float = 4.0) 
     return Parameter(role, value, unit, lower=value / within, upper=value * within, about=about)
 
 
-def _strain(signals: PortSignals, from_rest: bool) -> Scalar:
-    """Displacement [m] that strains a spring; without ``from_rest`` it is compression, and only that."""
+def _deflection(signals: PortSignals, from_rest: bool) -> Scalar:
+    """Deflection [m] of a spring: from the nominal state, or, without ``from_rest``, its compression alone."""
     if from_rest:
         return signals.displacement - signals.rest
     return jnp.maximum(signals.displacement, 0.0)
@@ -60,11 +60,11 @@ def _beyond(displacement: Array, gap: Scalar) -> Array:
 
 
 class CubicStiffness(AbstractForceLaw):
-    """A spring that stiffens with the cube of its strain.
+    """A spring that stiffens with the cube of its deflection.
 
         F = -k_3 x^3
 
-    with the strain x [m] and k_3 [N/m^3]. The strain counts from the nominal state or, for a tyre, is its
+    with the deflection x [m] and k_3 [N/m^3]. The deflection counts from the nominal state or, for a tyre, is its
     compression.
 
     Source: Duffing 1918, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz.
@@ -83,7 +83,7 @@ class CubicStiffness(AbstractForceLaw):
 
     def force(self, v: Values, signals: PortSignals, state: State) -> Scalar:
         """The force on top of that of the linear spring [N]."""
-        return -v["stiffness"] * _strain(signals, self.from_rest) ** 3
+        return -v["stiffness"] * _deflection(signals, self.from_rest) ** 3
 
 
 class ExponentialStiffness(AbstractForceLaw):
@@ -91,7 +91,7 @@ class ExponentialStiffness(AbstractForceLaw):
 
         F = -F_0 sign(x) (exp(|x| / d) - 1)
 
-    with the strain x [m], the force F_0 [N] and the strain d [m] over which the stiffness grows e-fold. The strain
+    with the deflection x [m], the force F_0 [N] and the deflection d [m] over which the stiffness grows e-fold. x
     counts from the nominal state or, for a tyre, is its compression.
 
     Source: Fung 1967, American Journal of Physiology 213(6), on the elasticity of soft materials.
@@ -104,7 +104,7 @@ class ExponentialStiffness(AbstractForceLaw):
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
         """A tenth of the typical force; it grows e-fold over half the typical displacement."""
-        about = "strain over which the stiffness grows e-fold"
+        about = "deflection over which the stiffness grows e-fold"
         return {
             "force": _amplitude("force", port.force / 10.0, port.force_unit, "force of the spring"),
             "growth": _shape("growth", 0.5 * port.displacement, port.displacement_unit, about),
@@ -112,9 +112,9 @@ class ExponentialStiffness(AbstractForceLaw):
 
     def force(self, v: Values, signals: PortSignals, state: State) -> Scalar:
         """The force on top of that of the linear spring [N]."""
-        strain = _strain(signals, self.from_rest)
-        grown = jnp.expm1(jnp.minimum(jnp.abs(strain) / v["growth"], STEEPEST))
-        return -v["force"] * jnp.sign(strain) * grown
+        deflection = _deflection(signals, self.from_rest)
+        grown = jnp.expm1(jnp.minimum(jnp.abs(deflection) / v["growth"], STEEPEST))
+        return -v["force"] * jnp.sign(deflection) * grown
 
 
 class ExponentialStop(AbstractForceLaw):
@@ -297,13 +297,13 @@ def _attached_states(port: Port) -> tuple[InternalState, ...]:
 
 
 class HardeningOscillator(AbstractForceLaw):
-    """A mass on rubber mounts that harden as they are strained.
+    """A mass on rubber mounts that are stiffer the further they are deflected.
 
         F = -m ydd,        ydd = w^2 d (1 + (d / d_0)^2) + 2 zeta w (v - yd),        d = x - y,        w = 2 pi f
 
     with the port's displacement x [m] from the nominal state and velocity v [m/s], the mass's displacement y [m], its
-    mass m [kg], natural frequency f [Hz] in small motions, damping ratio zeta [1] and the strain d_0 [m] at which the
-    mounts are twice as stiff.
+    mass m [kg], natural frequency f [Hz] in small motions, damping ratio zeta [1] and the deflection d_0 [m] at
+    which the mounts are twice as stiff.
 
     Source: Nayfeh and Mook 1979, Nonlinear Oscillations, ch. 6.
     """
@@ -314,7 +314,7 @@ class HardeningOscillator(AbstractForceLaw):
         Role("mass", 0.0),
         Role("frequency"),
         Role("damping_ratio"),
-        Role("strain"),
+        Role("deflection"),
     )
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
@@ -324,7 +324,7 @@ class HardeningOscillator(AbstractForceLaw):
         """
         frequency = _shape("frequency", 9.0, "Hz", "natural frequency in small motions", 1.5)
         shapes: dict[str, Parameter | float]
-        shapes = {"frequency": frequency, "damping_ratio": 0.15, "strain": 1.5 * port.displacement}
+        shapes = {"frequency": frequency, "damping_ratio": 0.15, "deflection": 1.5 * port.displacement}
         return _attached_mass(port) | shapes
 
     def states(self, port: Port) -> tuple[InternalState, ...]:
@@ -338,7 +338,7 @@ class HardeningOscillator(AbstractForceLaw):
     def rate(self, v: Values, signals: PortSignals, state: State) -> State:
         """Velocity [m/s] and acceleration [m/s^2] of the mass."""
         omega = 2.0 * pi * v["frequency"]
-        stretch = signals.displacement - signals.rest - state[0]
-        hard = 1.0 + (stretch / v["strain"]) ** 2
+        deflection = signals.displacement - signals.rest - state[0]
+        hard = 1.0 + (deflection / v["deflection"]) ** 2
         drag = 2.0 * v["damping_ratio"] * omega * (signals.velocity - state[1])
-        return jnp.stack([state[1], omega**2 * stretch * hard + drag])
+        return jnp.stack([state[1], omega**2 * deflection * hard + drag])

@@ -33,6 +33,7 @@ from savgs_ident.effects.base import (
     Role,
 )
 from savgs_ident.effects.effect import Effect, effect_at
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.ports import (
     ACCEL,
     DAMPER,
@@ -241,6 +242,9 @@ _ENTRIES = (
 
 FOREIGN: Mapping[str, ForeignEffect] = MappingProxyType({each.effect.name: each for each in _ENTRIES})
 """All foreign effects by name."""
+
+TRIAL_EFFECTS = (*CATALOGUE, *FOREIGN)
+"""Names of the effects that a rig of a trial may have: those of the catalogue, then the foreign ones."""
 
 
 def foreign_laws() -> Mapping[str, tuple[str, ...]]:

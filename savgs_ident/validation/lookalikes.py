@@ -1,4 +1,4 @@
-"""How far a drawn effect stands out of a campaign, which others do the same to it, and how large it is made.
+"""How far a drawn effect stands out of a campaign, and which others do the same to it.
 
 A spring that is 3 % stiffer than its sheet says, at a tolerance of 1.5 %, is no missing effect, and a tyre with 10 %
 more friction is identified anyway. What an effect changes is therefore held against the best that the model without
@@ -14,14 +14,9 @@ identified parameter where a fit has three. Other widths could change what is dr
 
 Which effects may do the same is seen to first order about the rig without any: effects without states by their
 derivatives, those with states by what they do along its motion, for several of their shapes.
-
-Newtons of friction and seconds of lag have no common size; what they do to the response has. The amplitude is
-searched for at which the clean response changes by what was drawn
-(:func:`savgs_ident.validation.virtual_rig.change_of`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -36,7 +31,6 @@ from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.effect_sensitivities import columns_with_states
 from savgs_ident.diagnosis.problem import term_of
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import Scales
@@ -55,7 +49,7 @@ STEPS = 12
 SHARES = (1.0, 0.3, 0.1, 0.03)
 """Shares of a step that are tried."""
 
-SETTLED = 0.95
+CONVERGED = 0.95
 """The search ends where a whole step leaves more than this of the square."""
 
 ENOUGH = 2.0
@@ -182,7 +176,7 @@ def sigma_of(
             if square(there, found) < best:
                 x, miss, best = there, found, square(there, found)
                 break
-        if best == before or (share == 1.0 and best > SETTLED * before):
+        if best == before or (share == 1.0 and best > CONVERGED * before):
             break
     return float(np.sqrt(best))
 
@@ -191,36 +185,41 @@ SIMILAR = 0.6
 """Share of its distance from the baseline that an effect keeps, to first order, from one that may do the same."""
 
 
-class Way(NamedTuple):
-    """What an effect does at given shapes [SI]: change of the rows in noise per unit of its amplitudes, (m, a)."""
+class Sensitivity(NamedTuple):
+    """What an effect does at given shapes [SI], to first order.
+
+    ``columns`` are the change of the rows in noise per unit of its amplitudes, (m, a).
+    """
 
     shapes: Mapping[str, float]
     columns: Real
 
 
-Ways = Mapping[str, tuple[Way, ...]]
+Sensitivities = Mapping[str, tuple[Sensitivity, ...]]
 """By effect, for every shape that is tried."""
 
 
-def ways_of(bench: Bench, given: Mapping[str, float], solution: PeriodicSolution) -> Ways:
+def sensitivities_of(bench: Bench, given: Mapping[str, float], solution: PeriodicSolution) -> Sensitivities:
     """What every effect that the baseline lacks would do to a rig whose motions are ``solution``.
 
     ``given`` are its parameters in SI.
     """
     terms = [term_of(each) for name, each in CATALOGUE.items() if name not in bench.baseline]
     model, noise = bench.model(()), noise_rows(bench)
-    ways: dict[str, list[Way]] = {term.name: [] for term in terms}
+    found: dict[str, list[Sensitivity]] = {term.name: [] for term in terms}
     for one in range(max(len(term.tried) for term in terms)):
         some = [term for term in terms if len(term.tried) > one]
         shapes = {name: value for term in some for name, value in term.tried[one].items()}
         p = bench.values({**given, **shapes})
         rows = {**_sloped(model, p, solution, some), **_marched(bench, model, p, solution, some)}
         for term in some:
-            ways[term.name].append(Way(term.tried[one], rows[term.name] / noise[:, None]))
-    return {name: tuple(each) for name, each in ways.items()}
+            found[term.name].append(Sensitivity(term.tried[one], rows[term.name] / noise[:, None]))
+    return {name: tuple(each) for name, each in found.items()}
 
 
-def similar(hiding: Hiding, change: Real, ways: Ways, name: str) -> dict[str, dict[str, float]]:
+def similar(
+    hiding: Hiding, change: Real, sensitivities: Sensitivities, name: str
+) -> dict[str, dict[str, float]]:
     """Effects other than ``name`` that ``change`` the rows (m,) nearly as it does, to first order.
 
     With the parameters [SI] at which they do.
@@ -228,15 +227,15 @@ def similar(hiding: Hiding, change: Real, ways: Ways, name: str) -> dict[str, di
     blank = np.zeros((change.size, 0))
     limit = SIMILAR * closest(hiding, change, blank).sigma
     found = {}
-    for other in ways:
+    for other in sensitivities:
         if other == name:
             continue
-        nearest = [(way, closest(hiding, change, way.columns)) for way in ways[other]]
-        way, best = min(nearest, key=lambda each: each[1].sigma)
+        nearest = [(each, closest(hiding, change, each.columns)) for each in sensitivities[other]]
+        sensitivity, best = min(nearest, key=lambda each: each[1].sigma)
         if best.sigma < limit:
             null = CATALOGUE[other].null
             found[other] = {
-                **way.shapes,
+                **sensitivity.shapes,
                 **{each: null[each] + float(size) for each, size in zip(null, best.sizes, strict=True)},
             }
     return found
@@ -280,123 +279,3 @@ def _all_rows(bench: Bench) -> Likelihood:
         discrepancy_scale=nothing,
         scales=Scales(),
     )
-
-
-SHAPE_SPREAD = 0.35
-"""Width of the logarithm of what shapes an effect: nearly always within a factor of two of its typical value."""
-
-SHAPE_LIMIT = 2.0
-"""It is never further off."""
-
-CLOSE = 0.02
-"""The change is met to this share of it."""
-
-TRIES = 14
-"""Amplitudes that are tried."""
-
-FURTHER = 8.0
-"""Most by which an amplitude grows from one try to the next."""
-
-UNSEEN = 1e-9
-"""A change that is none."""
-
-Change = Callable[[float], float | None]
-"""Change of the response at an amplitude in typical sizes; None where there is no motion."""
-
-
-@dataclass(frozen=True)
-class Form:
-    """An effect whose size is still open.
-
-    ``shapes`` are the parameters that shape it and ``direction`` those of its size, at one typical size; SI.
-    ``null`` are the values at which it vanishes and ``most`` the typical sizes that its bounds allow.
-    """
-
-    shapes: Mapping[str, float]
-    direction: Mapping[str, float]
-    null: Mapping[str, float]
-    most: float
-
-    def at(self, size: float) -> dict[str, float]:
-        """All parameters [SI] at so many typical sizes."""
-        return {name: self.null[name] + size * step for name, step in self.direction.items()} | dict(
-            self.shapes
-        )
-
-
-def draw_form(effect: Effect, random: np.random.Generator) -> Form:
-    """Shapes and the direction of the amplitudes of an effect.
-
-    An effect with one amplitude grows to either side that its bounds allow, one with several in any direction.
-    """
-    amplitudes = [each for each in effect.parameters if each.name in effect.null]
-    shapes = {each.name: _shape(each, random) for each in effect.parameters if each.name not in effect.null}
-    typical = np.array([abs(each.value - effect.null[each.name]) for each in amplitudes])
-    toward = random.standard_normal(len(amplitudes))
-    toward *= typical / np.linalg.norm(toward)
-    signed = [
-        float(step if _room(each, effect.null[each.name], step) > 0.0 else -step)
-        for each, step in zip(amplitudes, toward, strict=True)
-    ]
-    most = min(
-        _room(each, effect.null[each.name], step) for each, step in zip(amplitudes, signed, strict=True)
-    )
-    direction = {each.name: step for each, step in zip(amplitudes, signed, strict=True)}
-    return Form(shapes, direction, effect.null, most)
-
-
-def _shape(each: Parameter, random: np.random.Generator) -> float:
-    factor = np.exp(SHAPE_SPREAD * random.standard_normal())
-    return float(
-        np.clip(each.value * np.clip(factor, 1.0 / SHAPE_LIMIT, SHAPE_LIMIT), each.lower, each.upper)
-    )
-
-
-def _room(each: Parameter, null: float, step: float) -> float:
-    """Steps that fit between the null and the bound."""
-    bound = each.upper if step > 0.0 else each.lower
-    return abs((bound - null) / step)
-
-
-def find_size(change: Change, target: float, most: float) -> float | None:
-    """The size [1] at which the response changes by ``target`` [1]; None if it does nowhere up to ``most``.
-
-    Steps along the logarithms of size and change, held between what was too small and what was too large.
-    """
-    size, below, above = min(1.0, most), 0.0, most
-    known: list[tuple[float, float]] = []
-    for _ in range(TRIES):
-        found = change(size)
-        if found is not None and abs(found / target - 1.0) < CLOSE:
-            return size
-        if found is not None and found < target:
-            if size >= most:
-                return None
-            below = size
-        else:
-            above = min(above, size)
-        if found is not None and found > UNSEEN:
-            known.append((float(np.log(size)), float(np.log(found))))
-        size = _next(known, target, size, below, above, found is None)
-    return None
-
-
-def _next(
-    known: list[tuple[float, float]], target: float, size: float, below: float, above: float, lost: bool
-) -> float:
-    """The next size to try."""
-    if lost:
-        return float(np.sqrt(below * size)) if below > 0.0 else size / FURTHER
-    if not known:
-        return min(size * FURTHER, above)
-    slope = 1.0
-    if len(known) > 1:
-        (x0, y0), (x1, y1) = known[-2:]
-        slope = float(np.clip((y1 - y0) / (x1 - x0), 0.3, 5.0)) if x1 != x0 else 1.0
-    x, y = known[-1]
-    wanted = float(np.exp(x + np.clip((np.log(target) - y) / slope, -np.log(FURTHER), np.log(FURTHER))))
-    if below < wanted < above:
-        return wanted
-    if wanted >= above and above > size:
-        return above
-    return float(np.sqrt(max(below, 1e-3 * above) * above))

@@ -103,59 +103,59 @@ def _git(folder: Path, *words: str) -> str:
     return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10.0).stdout.strip()
 
 
-def marks_in(kept: Path) -> dict[str, Any]:
+def marks_in(file: Path) -> dict[str, Any]:
     """What the trials of a file have in common; empty where there is no file, or not even that line is whole.
 
     Raises :class:`InputError` for a file that is no list of trials.
     """
-    if not kept.exists():
+    if not file.exists():
         return {}
     try:
-        first, ended, _ = kept.read_text().partition("\n")
+        first, ended, _ = file.read_text().partition("\n")
         marks = json.loads(first) if ended else {}
     except (ValueError, RecursionError) as error:
-        raise _no_list(kept) from error
+        raise _no_list(file) from error
     if not isinstance(marks, dict):
-        raise _no_list(kept)
+        raise _no_list(file)
     return marks
 
 
 def known_trials(
-    kept: Path, marks: Mapping[str, object], trial: Callable[[dict[str, Any]], Trial]
+    file: Path, marks: Mapping[str, object], trial: Callable[[dict[str, Any]], Trial]
 ) -> list[Trial]:
     """The whole trials of an earlier run; a last line that was cut off is left out and the file mended.
 
     ``marks`` are what trials must have in common to be counted together; ``trial`` makes one of what its line says.
     Raises :class:`InputError` for trials with other marks, and for a file that is no list of trials.
     """
-    of = marks_in(kept)
+    of = marks_in(file)
     if not of:
         return []
     if of != marks:
-        raise InputError(_unlike(of, marks), source=kept, remedy="name another --out DIR, or remove the file")
-    lines = kept.read_text().split("\n")[1:-1]
+        raise InputError(_unlike(of, marks), source=file, remedy="name another --out DIR, or remove the file")
+    lines = file.read_text().split("\n")[1:-1]
     try:
         found = [trial(json.loads(line)) for line in lines]
     except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise _no_list(kept) from error
-    _write(kept, [json.dumps(marks), *lines])
+        raise _no_list(file) from error
+    _write(file, [json.dumps(marks), *lines])
     return found
 
 
-def begin_trials(kept: Path, marks: Mapping[str, object]) -> None:
+def begin_trials(file: Path, marks: Mapping[str, object]) -> None:
     """Begin the file anew."""
-    _write(kept, [json.dumps(marks)])
+    _write(file, [json.dumps(marks)])
 
 
-def keep_trial(kept: Path, fields: Mapping[str, object]) -> None:
+def append_trial(file: Path, fields: Mapping[str, object]) -> None:
     """Put a trial at its end."""
-    with kept.open("a") as stream:
+    with file.open("a") as stream:
         stream.write(json.dumps(fields) + "\n")
 
 
 @dataclass(frozen=True)
-class Kept:
-    """A file in which trials are kept, and what they have in common.
+class TrialFile:
+    """A file of trials, and what they have in common.
 
     Attributes:
         path: of the file.
@@ -175,7 +175,7 @@ class Kept:
 def run_trials(
     work: Callable[[int], Made],
     count: int,
-    kept: Kept | None,
+    file: TrialFile | None,
     done: Sequence[Made] = (),
     *,
     jobs: int | None = None,
@@ -184,18 +184,18 @@ def run_trials(
 ) -> list[Made]:
     """The trials 0 to ``count`` - 1, in order: those ``done``, and the others as ``work`` makes them.
 
-    Each is ``kept`` as soon as it is there. The work is spread, and what goes wrong with it is raised, as
+    Each is written to ``file`` as soon as it is there. The work is spread, and what goes wrong with it is raised, as
     :func:`side_by_side` says.
     """
-    if kept is not None and not done:
-        begin_trials(kept.path, kept.marks)
+    if file is not None and not done:
+        begin_trials(file.path, file.marks)
     found = {_number(each): each for each in done}
     missing = [number for number in range(count) if number not in found]
     with closing(side_by_side(work, missing, jobs, scheduler)) as results:
         for made in results:
             found[_number(made)] = made
-            if kept is not None:
-                keep_trial(kept.path, asdict(made))
+            if file is not None:
+                append_trial(file.path, asdict(made))
             progress(f"{sum(number < count for number in found)} of {count} trials done")
     return [found[number] for number in range(count)]
 
@@ -259,9 +259,9 @@ def _unlike(of: Mapping[str, object], marks: Mapping[str, object]) -> str:
     return f"holds trials of another {', '.join(unlike)}"
 
 
-def _write(kept: Path, lines: list[str]) -> None:
-    write_bytes(kept, "".join(line + "\n" for line in lines).encode())
+def _write(file: Path, lines: list[str]) -> None:
+    write_bytes(file, "".join(line + "\n" for line in lines).encode())
 
 
-def _no_list(kept: Path) -> InputError:
-    return InputError("is no list of trials", source=kept, remedy="remove it, or name another --out DIR")
+def _no_list(file: Path) -> InputError:
+    return InputError("is no list of trials", source=file, remedy="remove it, or name another --out DIR")

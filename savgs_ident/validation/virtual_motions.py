@@ -68,7 +68,7 @@ CLOSED = 2e-4
 leaves open, and about what the steps of the integration scatter by."""
 
 PATIENCE = 60.0
-"""A dwell that has not settled after so long [s] does not."""
+"""A dwell whose motion is not periodic after so long [s] does not become so."""
 
 PRECISION = 1e-6
 """Relative tolerance of a step of the integration."""
@@ -82,12 +82,12 @@ class Steady:
         frequency: [Hz].
         readings: what the sensors show over a period that begins with the cam at its top, noise apart: [m/s^2]
             and [m], (2, SAMPLES).
-        settled: whether the motion had become periodic.
+        periodic: whether the motion had become so.
     """
 
     frequency: float
     readings: NDArray[np.float64]
-    settled: bool
+    periodic: bool
 
 
 def without_sensor_faults(model: QuarterCar) -> QuarterCar:

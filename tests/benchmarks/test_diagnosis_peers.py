@@ -98,7 +98,6 @@ def test_columns_that_are_the_same_stand_under_all_their_names() -> None:
 
 
 def test_peers_find_what_stands_out_and_keep_quiet_about_noise() -> None:
-    pytest.importorskip("pysindy")
     given = regression(np.random.default_rng(5), "accel_lag", 40.0)
     for peer in (by_stlsq, by_frols):
         said = dict(zip(THRESHOLDS, peer(given), strict=True))
@@ -116,7 +115,6 @@ def _lasso(library: np.ndarray, residual: np.ndarray, names: str, either_sign: b
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_l1_selection_finds_the_column_among_others_like_it(sign: float) -> None:
     """Ten columns that have cosines of 0.8 with each other, one of them at 15 standard deviations."""
-    pytest.importorskip("sklearn")
     random = np.random.default_rng(6)
     for truth in "adgj":
         library = random.standard_normal((ROWS, 10)) + 2.0 * random.standard_normal((ROWS, 1))
@@ -126,7 +124,6 @@ def test_l1_selection_finds_the_column_among_others_like_it(sign: float) -> None
 
 
 def test_l1_selection_keeps_signs_and_adds_up_what_shapes_of_an_effect_contribute() -> None:
-    pytest.importorskip("sklearn")
     random = np.random.default_rng(7)
     library = random.standard_normal((ROWS, 3))
     unit = library / np.linalg.norm(library, axis=0)
@@ -143,7 +140,6 @@ def test_l1_selection_keeps_signs_and_adds_up_what_shapes_of_an_effect_contribut
 
 def test_l1_selection_keeps_something_of_pure_noise_once_in_the_root_of_the_rows() -> None:
     """0.041 of 600 rows: 4 of 100 expected, of which 10 or more have a probability of 0.008."""
-    pytest.importorskip("sklearn")
     random = np.random.default_rng(8)
     library = random.standard_normal((ROWS, 10))
     said = [_lasso(library, random.standard_normal(ROWS), "abcdefghij", either_sign=True) for _ in range(100)]
@@ -151,7 +147,6 @@ def test_l1_selection_keeps_something_of_pure_noise_once_in_the_root_of_the_rows
 
 
 def test_a_peer_is_compared_at_its_best_on_either_kind_of_trials() -> None:
-    pytest.importorskip("pysindy")
     kinds = {
         "": trials([OWN, OWN, NOTHING], ["accel_tilt", "accel_gain", ""], ["accel_tilt", None, "accel_lag"]),
         "foreign_": trials(

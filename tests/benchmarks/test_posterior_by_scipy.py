@@ -30,7 +30,7 @@ def task(rig: Rig) -> Task:
 
 
 def test_only_the_dwells_asked_for_are_kept() -> None:
-    """What tells the noise, the standstill, stays."""
+    """What the noise is estimated from, the standstill, stays."""
     campaign = read_dwells(QUICK_HZ)
     assert [each.frequency_hz for each in campaign.of_kind("dwell")] == list(QUICK_HZ)
     assert len(campaign.of_kind("standstill")) == 1

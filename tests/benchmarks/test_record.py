@@ -100,7 +100,7 @@ def test_record_is_flat_and_holds_what_was_measured(
 ) -> None:
     asked: list[tuple[tuple[str, ...], Size]] = []
 
-    def run(names: tuple[str, ...], size: Size, tell: object) -> Outcome:
+    def run(names: tuple[str, ...], size: Size, progress: object) -> Outcome:
         asked.append((tuple(names), size))
         return Outcome({"mcap_peak_mb": 123.0}, ("short",))
 

@@ -43,7 +43,7 @@ def pages(nominal_campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> d
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_a_page_asks_for_nothing_and_has_nothing_to_complain_about(
+def test_a_page_requests_nothing_and_logs_no_error(
     browser: Browser, pages: dict[str, Path], name: str
 ) -> None:
     browser.open(pages[name])

@@ -41,7 +41,7 @@ OPEN_ALL = "document.querySelectorAll('details').forEach(each => { each.open = t
 
 
 @pytest.mark.parametrize("name", ["page", "hostile_page"])
-def test_a_page_asks_for_nothing_and_has_nothing_to_complain_about(
+def test_a_page_requests_nothing_and_logs_no_error(
     browser: Browser, name: str, request: pytest.FixtureRequest
 ) -> None:
     path: Path = request.getfixturevalue(name)
@@ -51,7 +51,7 @@ def test_a_page_asks_for_nothing_and_has_nothing_to_complain_about(
     assert asked == [path.as_uri()]
 
 
-def test_requests_and_complaints_of_a_page_are_noticed(browser: Browser, tmp_path: Path) -> None:
+def test_requests_and_logged_errors_of_a_page_are_noticed(browser: Browser, tmp_path: Path) -> None:
     bad = tmp_path / "bad.html"
     bad.write_text("<img src='http://nowhere.invalid/x.png'><script>console.error('oh')</script>")
     browser.open(bad)

@@ -128,9 +128,7 @@ def pages(rig: Rig, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pages]
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_page_asks_for_nothing_and_has_nothing_to_complain_about(
-    browser: Browser, pages: Pages, name: str
-) -> None:
+def test_a_page_requests_nothing_and_logs_no_error(browser: Browser, pages: Pages, name: str) -> None:
     browser.open(pages(name))
     console, asked = browser.heard()
     assert console == []

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from savgs_ident.core.errors import InputError
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
-from savgs_ident.report.validation import calibration_figure, calibration_record
+from savgs_ident.report.present_validation import calibration_figure, calibration_record
 from savgs_ident.validation.calibration import RANKED, CalibrationStudy, Trial
 from savgs_ident.validation.trials import known_trials, marks_of
 

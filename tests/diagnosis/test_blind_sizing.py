@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.validation.lookalikes import CLOSE, SHAPE_LIMIT, draw_form, find_size
+from savgs_ident.validation.effect_size import CLOSE, SHAPE_LIMIT, draw_form, find_size
 
 from ..in_one_test import over
 

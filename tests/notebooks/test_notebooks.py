@@ -26,7 +26,7 @@ def _pictures(notebook: nbformat.NotebookNode) -> int:
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_is_kept_with_its_results_and_without_complaints(path: Path) -> None:
+def test_a_notebook_is_stored_with_its_results_and_without_errors(path: Path) -> None:
     notebook = nbformat.read(path, as_version=4)
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
     assert [cell.execution_count for cell in code] == list(range(1, len(code) + 1))
@@ -38,7 +38,7 @@ def test_a_notebook_is_kept_with_its_results_and_without_complaints(path: Path) 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebook_runs_and_prints_what_is_kept_in_it(path: Path) -> None:
+def test_a_notebook_runs_and_prints_what_is_stored_in_it(path: Path) -> None:
     kept = nbformat.read(path, as_version=4)
     fresh = nbformat.read(path, as_version=4)
     # JAX as users have it, without the strictness of the tests, which a kernel would inherit.

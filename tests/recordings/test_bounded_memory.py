@@ -37,14 +37,14 @@ def test_peak_is_the_result_and_a_few_buffers(long_mcap: tuple[Path, int]) -> No
     assert _peak(lambda: load_campaign(path)) < samples * BYTES_A_SAMPLE + buffers
 
 
-def test_the_container_is_walked_in_the_memory_of_a_chunk(long_mcap: tuple[Path, int]) -> None:
+def test_the_container_is_read_in_the_memory_of_a_chunk(long_mcap: tuple[Path, int]) -> None:
     path, _ = long_mcap
 
-    def walk() -> None:
+    def read() -> None:
         for _ in McapRecords(path, lambda fraction: None):
             pass
 
-    assert _peak(walk) < 8 << 20
+    assert _peak(read) < 8 << 20
 
 
 def test_the_long_campaign_is_whole_and_sound(long_mcap: tuple[Path, int]) -> None:

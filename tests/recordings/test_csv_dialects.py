@@ -120,7 +120,7 @@ def test_a_header_without_unit_is_taken_as_si_and_reported(
     _same(campaign, signals())
 
 
-def test_a_channel_map_settles_names_units_signs_and_offsets(
+def test_a_channel_map_gives_names_units_signs_and_offsets(
     tmp_path: Path, signals: Callable[..., Signals], csv_bytes: Csv
 ) -> None:
     raw = signals()

@@ -5,7 +5,7 @@ import json
 import numpy as np
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.report.validation import alarms_figure, alarms_record, alarms_text
+from savgs_ident.report.present_validation import alarms_figure, alarms_record, alarms_text
 from savgs_ident.validation.false_alarms import AlarmStudy, NullDraw
 
 

@@ -154,7 +154,13 @@ def test_the_picture_of_a_campaign_has_units_and_all_dwells(summary: CampaignSum
 
 def test_a_campaign_without_dwells_is_drawn(summary: CampaignSummary, tmp_path: Path) -> None:
     bare = replace(summary, response=None, sweeps=(), standstill_noise={})
-    write_figure(tmp_path, "inspect", campaign_figure(bare))
+    figure = campaign_figure(bare)
+    assert not any(axes.get_lines() for axes in figure.axes)
+    for axes in figure.axes[:2]:
+        assert [text.get_text() for text in axes.texts] == ["not recorded"]
+    files = write_figure(tmp_path, "inspect", figure)
+    assert [each.name for each in files] == ["inspect.png", "inspect.pdf"]
+    assert all(each.stat().st_size > 1000 for each in files)
 
 
 def test_a_response_at_a_single_frequency_is_seen(

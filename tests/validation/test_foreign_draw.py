@@ -12,10 +12,10 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
 from savgs_ident.plants.quarter_car.model import FREE
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, rig_content
-from savgs_ident.validation.blind import FOREIGN_SHARES, Job, check_shares, record_trials
+from savgs_ident.validation.blind import FILE, FOREIGN_SHARES, Job, check_shares, plan_of
 from savgs_ident.validation.blind_answer import Answer
 from savgs_ident.validation.blind_draw import LARGEST, SMALLEST, Shares
-from savgs_ident.validation.blind_trial import Plan, draw_and_record
+from savgs_ident.validation.blind_trial import Plan, draw_and_record, record_trial
 from savgs_ident.validation.foreign_draw import (
     COLOUR,
     DAMPER_ERROR,
@@ -144,7 +144,7 @@ def test_the_fixed_step_comes_to_the_periodic_motion(bench: Bench) -> None:
         truth = _answer(effects=names, parameters=parameters, small_errors=replace(errors, drift=0.0))
         true = true_bench(bench, truth)
         steady = steady_dwells(true.model(names), true.values_during(parameters), DWELLS, true.step)
-        found = [np.fft.rfft(each.readings)[:, :10] / 1024 for each in steady if each.settled]
+        found = [np.fft.rfft(each.readings)[:, :10] / 1024 for each in steady if each.periodic]
         solution = true.solve(names, parameters)
         assert solution is not None
         assert len(found) == len(DWELLS)
@@ -156,7 +156,8 @@ def test_a_whole_foreign_trial(tmp_path: Path) -> None:
     """Of a rig with small errors, recorded first, then diagnosed: sealed, opened, marked, and no alarm."""
     with with_kept_programs():
         job = Job(1, 7, 1, None, (1.0, 0.0, 0.0, 0.0), 9, False, False, foreign=True)
-        (folder,) = record_trials(job, draw_and_record, tmp_path)
+        plan = plan_of(job, rig_content(default_rig_path()), tmp_path / FILE)
+        folder = record_trial(plan, draw_and_record, tmp_path, 1)
         answer = json.loads((folder / "answer.json").read_text())["answer"]
         recorded = (folder / "campaign" / "campaign.csv.gz").read_bytes()
         study = si.blind(tmp_path, 1, seed=7, shares=(1.0, 0.0, 0.0, 0.0), every=9, foreign=True, jobs=1)

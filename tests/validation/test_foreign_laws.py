@@ -115,15 +115,15 @@ def test_filters_are_those_of_the_books() -> None:
 
 
 def test_an_attached_mass_pulls_by_its_mount() -> None:
-    """In small motions as a spring does, and by twice that where the mount is strained so far."""
+    """In small motions as a spring does, and by twice that where the mount is deflected so far."""
     effect = FOREIGN_EFFECTS["body_hardening_oscillator"]
     p = as_values({each.name: each.value for each in effect.parameters})
     still, mass, frequency = (
         jnp.zeros(()), p["body_hardening_oscillator_mass"], p["body_hardening_oscillator_frequency"],
     )  # fmt: skip
-    strain = 1.5 * effect.port.displacement
-    for stretch, harder in ((1e-6, 1.0), (strain, 2.0)):
-        force = effect.force(p, PortSignals(jnp.asarray(stretch), still, still, still), jnp.zeros(2))
+    large = 1.5 * effect.port.displacement
+    for deflection, harder in ((1e-6, 1.0), (large, 2.0)):
+        force = effect.force(p, PortSignals(jnp.asarray(deflection), still, still, still), jnp.zeros(2))
         assert float(force) == pytest.approx(
-            float(-harder * mass * (2.0 * np.pi * frequency) ** 2 * stretch), rel=1e-6
+            float(-harder * mass * (2.0 * np.pi * frequency) ** 2 * deflection), rel=1e-6
         )

@@ -225,8 +225,8 @@ def _other_tests(record: dict[str, Any]) -> list[str]:
     lines = []
     for sweep in record["sweeps"]:
         span = sweep["frequency_hz"]
-        reach = f", response from {span[0]:.2f} to {span[1]:.2f} Hz" if span else ""
-        lines.append(f"Sweep {sweep['test']}: {sweep['duration_s']:.1f} s{reach}")
+        band = f", response from {span[0]:.2f} to {span[1]:.2f} Hz" if span else ""
+        lines.append(f"Sweep {sweep['test']}: {sweep['duration_s']:.1f} s{band}")
     lines += [f"Standstill {each['test']}: {each['duration_s']:.1f} s" for each in record["standstills"]]
     lines += [f"Other {each['test']}: {each['duration_s']:.1f} s" for each in record["others"]]
     return lines

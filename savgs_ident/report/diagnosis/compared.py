@@ -134,15 +134,16 @@ def _curves(diagnosis: Diagnosis) -> list[ModelCurve]:
     """The models, the last one first: it has the strongest line."""
     measured, answers = compared_dwells(diagnosis)
     driven = measured.harmonics[:, measured.channel(diagnosis.given.plant.inputs[0].name), 1]
-    found = []
-    for label, harmonics in (
-        (model_label(diagnosis), answers.after),
-        ("recalibrated", answers.recalibrated),
-        ("before, as given", answers.before),
-    ):
-        solved = np.all(np.isfinite(harmonics[:, :, 1]), axis=1)
-        found.append(model_curve(label, measured.frequency, harmonics, driven, solved))
-    return found
+    # Responses are those of fits, which are solved in all dwells together.
+    solved = np.ones(measured.frequency.size, dtype=np.bool_)
+    return [
+        model_curve(label, measured.frequency, harmonics, driven, solved)
+        for label, harmonics in (
+            (model_label(diagnosis), answers.after),
+            ("recalibrated", answers.recalibrated),
+            ("before, as given", answers.before),
+        )
+    ]
 
 
 def _draw_gap(axes: Axes, frequency: NDArray[np.float64], gap: FirstHarmonicGap) -> None:

@@ -237,8 +237,8 @@ def _draw_lens(axes: Axes, at: RigPoints) -> None:
     """The single link enlarged, with its gear about G, and lines from where it is."""
     centre, g, f = np.array(LENS), np.array(at.G), np.array(at.F)
     span = centre - g
-    reach = hypot(*span)
-    across = np.array([-span[1], span[0]]) / reach
+    length = hypot(*span)
+    across = np.array([-span[1], span[0]]) / length
     for side in (-1.0, 1.0):
         ends: Sequence[NDArray[np.float64]] = (g + side * 0.02 * across, centre + side * LENS_RADIUS * across)
         axes.plot(*np.array(ends).T, color=GREY, lw=0.8, zorder=3.4)

@@ -15,9 +15,8 @@ from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.presentation import Origin
 from savgs_ident.diagnosis.gap import CyclePosition, Shrink
 from savgs_ident.diagnosis.result import Diagnosis, ForceLoop, PortShare
-from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.report.by_plant import report_of
 from savgs_ident.report.diagnosis.compared import bode_picture, compared_channels, drive_picture
-from savgs_ident.report.diagnosis.drawing import rig_figure
 from savgs_ident.report.diagnosis.figures import (
     force_figure,
     gap_channels,
@@ -73,7 +72,7 @@ class PortRow:
     named: bool
     share: str
     bar: Bar
-    reach: str
+    free_input_share: str
 
 
 @dataclass(frozen=True)
@@ -228,6 +227,7 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "facts": _facts(diagnosis),
             "warnings": diagnosis.warnings,
             "rig_picture": _rig(diagnosis),
+            "rig_scale": report_of(diagnosis.given).scale,
             "ports": [port_row(each, diagnosis) for each in diagnosis.ports],
             "drive": drive_picture(diagnosis),
             "bode": [bode_picture(diagnosis, c) for c in compared_channels(diagnosis)],
@@ -303,15 +303,16 @@ def _facts(diagnosis: Diagnosis) -> tuple[dict[str, object], ...]:
 
 
 def _rig(diagnosis: Diagnosis) -> Picture | None:
-    """The ports in the drawing of the quarter car; there is none of other plants."""
-    if not isinstance(diagnosis.given, RigModel):
+    """The ports in the drawing of the plant, where there is one."""
+    draw = report_of(diagnosis.given).ports_figure
+    if draw is None:
         return None
     shares = ", ".join(
         f"{port_words(diagnosis, each.port)} {percentage(each.share, 0)}" for each in diagnosis.ports
     )
     named = " and ".join(port_words(diagnosis, port) for port in diagnosis.verdict.ports) or "none"
     words = f"The rig with its ports. Named port: {named}. Shares of the gap: {shares or 'not known'}."
-    return embed(rig_figure(diagnosis), words)
+    return embed(draw(diagnosis), words)
 
 
 def _loop(diagnosis: Diagnosis, loop: ForceLoop) -> Picture:

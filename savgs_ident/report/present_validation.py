@@ -1,18 +1,23 @@
-"""Reports of studies of rigs with nothing missing: false alarms, and the calibration of the posterior."""
+"""Reports of studies of rigs with nothing missing: false alarms, and the calibration of the posterior.
+
+What draws is loaded when something is drawn.
+"""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from rich.console import Group, RenderableType
 from scipy.stats import binom
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.report.presenters import AbstractPresenter, Figures
 from savgs_ident.report.text import decimal, percentage, plain, table
-from savgs_ident.report.theme import BLUE, INK, ORANGE, PALE, new_figure, printable, styled
 from savgs_ident.validation.calibration import BINS, INTERVAL, RANKED, CalibrationStudy
 from savgs_ident.validation.false_alarms import CONFIDENCE, AlarmStudy
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def alarms_record(study: AlarmStudy) -> dict[str, Any]:
@@ -53,8 +58,10 @@ def alarms_text(record: Mapping[str, Any]) -> str:
     )
 
 
-def alarms_figure(study: AlarmStudy) -> Figure:
+def alarms_figure(study: AlarmStudy) -> "Figure":
     """Histogram of the log odds of the draws, with those of the campaign and the threshold."""
+    from savgs_ident.report.theme import BLUE, INK, ORANGE, new_figure, styled
+
     solved, odds = np.array(study.solved), study.odds
     with styled():
         figure = new_figure(6.4, 3.4)
@@ -72,6 +79,25 @@ def alarms_figure(study: AlarmStudy) -> Figure:
         axes.set_title(f"{solved.size} campaigns with nothing missing, diagnosed")
         axes.legend(loc="upper center", fontsize=8)
     return figure
+
+
+class _AlarmStudy(AbstractPresenter[AlarmStudy]):
+    stem = "false_alarms"
+
+    def record(self, result: AlarmStudy) -> Mapping[str, Any]:
+        return alarms_record(result)
+
+    def text(self, result: AlarmStudy) -> RenderableType:
+        return plain(alarms_text(self.record(result)))
+
+    def doubts(self, result: AlarmStudy) -> tuple[str, ...]:
+        return () if result.trusted else ("there are more false alarms than there may be.",)
+
+    def figures(self, result: AlarmStudy) -> Figures:
+        return {"false_alarms": lambda: alarms_figure(result)}
+
+
+ALARM_STUDY = _AlarmStudy()
 
 
 def calibration_record(study: CalibrationStudy) -> dict[str, object]:
@@ -116,8 +142,10 @@ def calibration_text(record: Mapping[str, Any]) -> RenderableType:
     return Group(table("Calibration", headers, rows, texts=(0,)), plain(words))
 
 
-def calibration_figure(study: CalibrationStudy) -> Figure:
+def calibration_figure(study: CalibrationStudy) -> "Figure":
     """Rank histograms of all parameters; the band holds 95 % of the bars of an even one."""
+    from savgs_ident.report.theme import BLUE, INK, PALE, new_figure, printable, styled
+
     ranked, names = [trial for trial in study.trials if trial.found], study.names
     columns = 6
     rows = max(1, -(-len(names) // columns))
@@ -142,3 +170,22 @@ def calibration_figure(study: CalibrationStudy) -> Figure:
         figure.supxlabel(f"rank of the true value [0 to {RANKED}]", fontsize=9)
         figure.supylabel("campaigns", fontsize=9)
     return figure
+
+
+class _CalibrationStudy(AbstractPresenter[CalibrationStudy]):
+    stem = "calibration"
+
+    def record(self, result: CalibrationStudy) -> Mapping[str, Any]:
+        return calibration_record(result)
+
+    def text(self, result: CalibrationStudy) -> RenderableType:
+        return calibration_text(self.record(result))
+
+    def doubts(self, result: CalibrationStudy) -> tuple[str, ...]:
+        return () if result.trusted else ("coverage or ranks are not what they should be.",)
+
+    def figures(self, result: CalibrationStudy) -> Figures:
+        return {"calibration": lambda: calibration_figure(result)}
+
+
+CALIBRATION_STUDY = _CalibrationStudy()

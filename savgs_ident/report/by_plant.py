@@ -1,0 +1,64 @@
+"""What reports have of one kind of plant alone: a drawing with its ports, and a file of the identified plant.
+
+    draw = report_of(diagnosis.given).ports_figure
+    figure = None if draw is None else draw(diagnosis)
+
+A plant declares what there is of it in one line of :data:`PLANT_REPORTS`; reports on other plants leave it out. What
+draws is loaded when something is drawn.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+from savgs_ident.plants.base import AbstractPlant
+from savgs_ident.plants.model import Model
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from savgs_ident.diagnosis.result import Diagnosis
+    from savgs_ident.fit.result import Fit
+    from savgs_ident.plants.quarter_car.model import RigModel
+
+
+@dataclass(frozen=True)
+class PlantReport:
+    """What reports have of a plant; None where there is nothing.
+
+    Attributes:
+        ports_figure: draws the plant with its ports, for a diagnosis of it.
+        scale: a sentence that says what in that drawing is to scale.
+        write_model: writes the identified plant into a folder; the files.
+    """
+
+    ports_figure: Callable[["Diagnosis"], "Figure"] | None = None
+    scale: str = ""
+    write_model: Callable[["Fit", Path], Iterator[Path]] | None = None
+
+
+def _rig_figure(diagnosis: "Diagnosis") -> "Figure":
+    from savgs_ident.report.diagnosis.drawing import rig_figure
+
+    return rig_figure(diagnosis)
+
+
+def _write_rig(fit: "Fit", folder: Path) -> Iterator[Path]:
+    from savgs_ident.plants.quarter_car.rig import write_rig
+
+    write_rig(cast("RigModel", fit.model).rig, folder / "model.toml")
+    yield folder / "model.toml"
+
+
+PLANT_REPORTS: Mapping[type[AbstractPlant], PlantReport] = {
+    QuarterCar: PlantReport(_rig_figure, "Linkage, wheel and carriages to scale.", _write_rig),
+}
+"""By the plant's class."""
+
+
+def report_of(model: Model) -> PlantReport:
+    """What reports have of the plant of a model; nothing of a plant that declares nothing."""
+    plant = model.plant
+    return PLANT_REPORTS.get(plant if isinstance(plant, type) else type(plant), PlantReport())
