@@ -26,11 +26,11 @@ from savgs_ident.control.linear_equivalent import AlphaMap
 from savgs_ident.export.document import json_text
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.json_export import model_record, read_model_json, write_json
-from savgs_ident.export.linear_models import LINEAR
+from savgs_ident.export.linear_models import EQUATION_8, EXACT
 from savgs_ident.export.public import gathered, model_to_export
 from savgs_ident.export.python_control_export import KIND, SCHEMA, load_python_control, resting_point
 from savgs_ident.plants.quarter_car.catalogue import MODELS, model_parameters
-from savgs_ident.plants.quarter_car.model import load_model
+from savgs_ident.plants.quarter_car.model import RigModel, load_model
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig, rig_text
 
 ESTIMATED = ("mu_r", "mu_t", "ydot_Hth", "c_sd", "k_t")
@@ -93,7 +93,7 @@ def python_control() -> Original:
         "schema": SCHEMA,
         "kind": KIND,
         "model": model,
-        "state_spaces": dict.fromkeys(LINEAR, space),
+        "state_spaces": dict.fromkeys((EQUATION_8, EXACT), space),
         "at_rest": {"x": [0.0] * states, "u": [0.0] * inputs},
     }
     return Original((json_text(record).encode(),))
@@ -138,7 +138,7 @@ def read_posterior(path: Path) -> object:
 def read_exported(path: Path) -> object:
     """The model of a document, and how it would be exported again."""
     found = read_model_json(path)
-    return found.rig.parameters, found.samples, found.table, found.effects
+    return found.samples, found.table, found.effects
 
 
 def read_python_control(path: Path) -> object:
@@ -150,7 +150,7 @@ def read_python_control(path: Path) -> object:
 def read_diagnosis_file(path: Path) -> object:
     """The diagnosis, and the model with what it names, as an export has it."""
     found = gathered(model_to_export(default_rig_path(), None, path), None, DRAWS, path)
-    return found.model.rig.parameters, found.model.effects, found.said, found.doubts
+    return found.model.table, found.model.effects, found.said, found.doubts
 
 
 def identified_rig() -> Rig:
@@ -187,9 +187,8 @@ def _model() -> ExportedModel:
         for name, value in zip(ESTIMATED, _values(), strict=True)
     }
     effects = (*EFFECTS, "mount_compliance")
-    return ExportedModel(
-        identified_rig(), effects, samples, _diagnosis("effect", ["mount_compliance"], ["strut"])
-    )
+    model = RigModel(identified_rig(), effects)
+    return ExportedModel(model, samples, _diagnosis("effect", ["mount_compliance"], ["strut"]))
 
 
 def _written(write: Callable[[Path], tuple[Path, ...]]) -> Original:

@@ -34,7 +34,9 @@ if TYPE_CHECKING:
     from savgs_ident.diagnosis.result import Diagnosis
     from savgs_ident.effects.base import Number, Port, PortKind, PortSignals
     from savgs_ident.effects.effect import Effect, generic_effects
+    from savgs_ident.export.json_export import read_model_json
     from savgs_ident.export.public import Exported, export
+    from savgs_ident.export.python_control_export import load_python_control, resting_point
     from savgs_ident.fit.public import Comparison, compare, demo, fit
     from savgs_ident.fit.result import Fit
     from savgs_ident.fit.sampling import sample
@@ -107,6 +109,10 @@ _PLACES = {
     "export": "export.public",
     "run_campaigns": "campaigns.run",
     "plot_bode": "report.presenters",
+    # What was exported, read back.
+    "read_model_json": "export.json_export",
+    "load_python_control": "export.python_control_export",
+    "resting_point": "export.python_control_export",
     # Campaigns of rigs whose truth is known.
     "DWELLS": "simulate.public",
     "draw_truth": "validation.virtual_campaign",
@@ -196,8 +202,11 @@ __all__ = [
     "load_campaign",
     "load_model",
     "load_motion",
+    "load_python_control",
     "load_rig",
     "plot_bode",
+    "read_model_json",
+    "resting_point",
     "run_campaigns",
     "sample",
     "simulate",

@@ -65,16 +65,14 @@ def export(
     Example: savgs-ident export out/fit/model.toml --to json mat --posterior out/posterior/posterior.nc
     """
     import savgs_ident as si
-    from savgs_ident.export.public import check_formats, model_to_export
 
     reporter = Reporter(json, quiet)
-    check_formats(to)
-    shown = model_to_export(model_file, effects_of(model), diagnosis)
     with reporter.working() as progress:
         exported = si.export(
-            shown,
+            model_file,
             to,
             out,
+            effects=effects_of(model),
             posterior=posterior,
             samples=samples,
             diagnosis=diagnosis,

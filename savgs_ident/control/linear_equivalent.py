@@ -43,11 +43,12 @@ from jaxtyping import Array, Float
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from savgs_ident.control.linearisation import nominal_rest, slopes
+from savgs_ident.control.linearisation import RIG_SIGNALS
 from savgs_ident.core.small_root import Root
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.kinematics import installation_ratio, strut_length, suspension_travel
 from savgs_ident.plants.quarter_car.plant import QuarterCar, static_equilibrium
+from savgs_ident.simulate.linearisation import nominal_rest, slopes
 
 Scalar = Float[Array, ""]
 
@@ -108,6 +109,12 @@ INPUTS = ("road_velocity", "lin_velocity")
 """[m/s] both."""
 OUTPUTS = ("sprung_accel", "susp_deflection", "tyre_deflection", "lin_position")
 """[m/s^2], [m], [m], [m]."""
+UNITS = dict(zip(STATES, ("m/s", "m/s", "m", "m", "m"), strict=True)) | {
+    "road_velocity": "m/s",
+    "lin_velocity": "m/s",
+    "sprung_accel": "m/s^2",
+}
+"""Units of all these by name."""
 
 
 class TwoMasses(NamedTuple):
@@ -166,7 +173,7 @@ def with_distributed_masses(model: QuarterCar, p: Values, masses: TwoMasses) -> 
     """The same with wishbones and upright as rigid bodies: the mass matrix couples the two velocities."""
     bare, rig = QuarterCar(model.damper), model.effective(p)
     at = nominal_rest(bare, rig)
-    inertia = -np.asarray(slopes(bare, rig, at).residual_y)
+    inertia = -np.asarray(slopes(bare, rig, at, RIG_SIGNALS.read).residual_y)
     travel = float(jax.grad(suspension_travel, argnums=1)(rig, at.q.theta_LW))
     turn: NDArray[np.float64] = np.array([[1.0, 0.0], [-1.0 / travel, 1.0 / travel]])
     return masses._replace(mass=turn.T @ inertia @ turn)

@@ -32,7 +32,6 @@ from savgs_ident.control.linearisation import (
     first_harmonic,
     linearise,
     motions_on_cam,
-    nominal_rest,
     quasi_linear_response,
 )
 from savgs_ident.core.errors import InputError
@@ -40,6 +39,7 @@ from savgs_ident.core.presentation import Result
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.simulate.linearisation import nominal_rest
 
 CHANNELS = ("sprung_accel", "susp_deflection")
 """[m/s^2] and [m], per metre of road."""

@@ -28,7 +28,7 @@ from savgs_ident.export.json_export import write_json
 def write_casadi(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
     """Write rates, outputs and residual (.casadi), signals.json, and the whole model in model.json.
 
-    Raises :class:`InputError` if one cannot be written, or the rig has no static equilibrium.
+    Raises :class:`InputError` if one cannot be written, or the plant finds no rest.
     """
     record = signals_record(model)
     files = []
@@ -49,7 +49,7 @@ STEM = "savgs_model"
 def write_c(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
     """Write savgs_model.c, savgs_model.h and signals.json, and the whole model in model.json.
 
-    Raises :class:`InputError` if one cannot be written, or the rig has no static equilibrium.
+    Raises :class:`InputError` if one cannot be written, or the plant finds no rest.
     """
     record = signals_record(model)
     with scratch_folder() as scratch, contextlib.chdir(scratch):

@@ -1,4 +1,4 @@
-"""What is exported: an identified rig with all that is known about it, and its equations as functions of vectors.
+"""What is exported: a model with all that is known about it, and its equations as functions of vectors.
 
 Every export takes one :class:`ExportedModel` and a folder, and writes files there. The posterior and the
 diagnosis are included as far as a format can hold them. Formats with equations share the values at rest, where a
@@ -35,10 +35,13 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.small_root import Root, solve_dense
 from savgs_ident.core.values import as_values
 from savgs_ident.effects.base import AbstractInputLaw, Fundamental, InputSignal
-from savgs_ident.plants.base import AbstractPlant, Motion, find_rest, nominal_inputs
-from savgs_ident.plants.quarter_car.catalogue import build_model, model_parameters
-from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.effects.effect import Effect
+from savgs_ident.effects.learned import learned_effect
+from savgs_ident.effects.learned_functions import functions_at
+from savgs_ident.plants.base import AbstractPlant, Motion, nominal_inputs
+from savgs_ident.plants.model import Model
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.simulate.linearisation import rate_name, rest_or_origin
 from savgs_ident.symbolic.translate import to_casadi
 
 NEWTON_STEPS = 5
@@ -142,8 +145,7 @@ def build_equations(model: AbstractPlant, parameters: Iterable[str]) -> Equation
     inputs: list[Signal] = []
     for each in model.inputs:
         inputs.append(Signal(each.name, each.unit, each.details or each.about))
-        rate = each.rate_name or f"{each.name}_rate"
-        inputs.append(Signal(rate, f"{each.unit}/s", f"rate of: {each.details or each.about}"))
+        inputs.append(Signal(rate_name(each), f"{each.unit}/s", f"rate of: {each.details or each.about}"))
     if any(isinstance(effect.law, AbstractInputLaw) for effect in model.effects):
         inputs += FUNDAMENTAL_INPUTS
     readings = [
@@ -162,29 +164,37 @@ def build_equations(model: AbstractPlant, parameters: Iterable[str]) -> Equation
 
 @dataclass(frozen=True)
 class ExportedModel:
-    """An identified rig to be exported.
+    """A model to be exported, of any plant.
 
     Attributes:
-        rig: the rig, as drawn or identified.
-        effects: names of the effects in the model besides the frictionless rig, a diagnosed effect included.
+        model: the model, as drawn or identified, a diagnosed effect included.
         samples: draws of a posterior by parameter, each (n,), SI; empty without a posterior.
         diagnosis: the document of a diagnosis; empty without one.
     """
 
-    rig: Rig
-    effects: tuple[str, ...]
+    model: Model
     samples: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     diagnosis: Mapping[str, object] = field(default_factory=dict)
 
     @property
     def table(self) -> ParameterTable:
         """All parameters of the model."""
-        return model_parameters(self.rig, self.effects)
+        return self.model.table
 
     @property
-    def plant(self) -> QuarterCar:
-        """The rig with its effects."""
-        return build_model(self.rig, self.effects)
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects in the model."""
+        return self.model.effects
+
+    @property
+    def plant(self) -> AbstractPlant:
+        """The plant with its effects."""
+        return self.model.build()
+
+    @property
+    def quarter_car(self) -> RigModel | None:
+        """The model, if it is one of the paper's rig, of which some formats say more; else None."""
+        return self.model if isinstance(self.model, RigModel) else None
 
     @property
     def equations(self) -> Equations:
@@ -197,10 +207,27 @@ class ExportedModel:
 
         Empty for a drawing.
         """
-        carried = self.rig.provenance.get("covariance")
+        carried = self.model.provenance.get("covariance")
         if not isinstance(carried, Mapping):
             return (), np.zeros((0, 0))
         return tuple(carried["names"]), np.array(carried["matrix"], dtype=np.float64)
+
+
+def learned_effects(model: Model) -> dict[str, Effect]:
+    """The corrections by name that a diagnosis learns at the ports of the model's plant."""
+    found = (learned_effect(port) for port in model.plant.ports if functions_at(port))
+    return {effect.name: effect for effect in found}
+
+
+def with_effects(model: Model, names: Iterable[str]) -> Model:
+    """The model with more effects: of its catalogue, or learned at its ports.
+
+    Raises :class:`InputError` for another name.
+    """
+    learned = learned_effects(model)
+    for name in names:
+        model = model + (name if name in model.catalogue else learned.get(name, name))
+    return model
 
 
 def resting_state(model: ExportedModel) -> list[float]:
@@ -210,7 +237,7 @@ def resting_state(model: ExportedModel) -> list[float]:
     """
     p = as_values(model.table.as_dict())
     plant = model.plant
-    rest = find_rest(plant, p, nominal_inputs(plant, p))
+    rest = rest_or_origin(plant, p, nominal_inputs(plant, p))
     check_rest(rest.root, model)
     return [*map(float, rest.q), *(0.0 for _ in rest.q), *map(float, rest.s)]
 
@@ -223,9 +250,9 @@ def check_rest(found: Root, model: ExportedModel) -> None:
             for each in model.plant.inputs
             if each.rest
         ]
+        state = f"its nominal state ({', '.join(nominal)})" if nominal else "its nominal state"
         raise InputError(
-            f"the rig finds no rest in its nominal state ({', '.join(nominal)})",
-            remedy="mend its spring (k_sd, l_free), masses or hardpoints",
+            f"the rig finds no rest in {state}", remedy="mend its springs, its masses or its geometry"
         )
 
 
@@ -271,7 +298,7 @@ def casadi_functions(model: ExportedModel) -> dict[str, Function]:
     equations = model.equations
     x, u = np.zeros(len(equations.states)), np.zeros(len(equations.inputs))
     given = {"x": x, "u": u, "p": np.array(model.table.values_of(equations.parameters))}
-    implicit = {"x": x, "y": np.zeros(x.size - 2)} | given
+    implicit = {"x": x, "y": np.zeros(x.size - len(equations.model.coordinates))} | given
     translations: tuple[tuple[str, Callable[..., Any], dict[str, np.ndarray], str], ...] = (
         ("rates", equations.rates, given, "dx"),
         ("outputs", equations.read, given, "outputs"),

@@ -25,7 +25,7 @@ from savgs_ident.export.exported_model import ExportedModel, casadi_functions, r
 from savgs_ident.export.json_export import write_json
 
 BASE = ("kg", "m", "s", "A", "rad")
-"""Base units of FMI that a rig uses."""
+"""Base units of FMI that plants use."""
 
 _DERIVED: Mapping[str, Mapping[str, int]] = MappingProxyType(
     {
@@ -45,12 +45,18 @@ _PART = re.compile(r"([A-Za-z]+)(?:\^(\d+))?")
 
 
 def base_units(unit: str) -> dict[str, int]:
-    """Exponents of the base units in a unit of a rig file; empty for "1". An unknown unit is a KeyError."""
+    """Exponents of the base units in a unit; empty for "1". Raises :class:`InputError` for one that FMI lacks."""
     total: Counter[str] = Counter()
     above, _, below = unit.partition("/")
     for side, sign in ((above, 1), (below, -1)):
         for symbol, power in _PART.findall(side):
-            parts = {symbol: 1} if symbol in BASE else _DERIVED[symbol]
+            parts = {symbol: 1} if symbol in BASE else _DERIVED.get(symbol)
+            if parts is None:
+                raise InputError(
+                    f"the unit '{unit}' is not made of those of FMI",
+                    source="--to fmu",
+                    remedy="declare the plant in " + ", ".join((*BASE, *_DERIVED)),
+                )
             for base, exponent in parts.items():
                 total[base] += sign * exponent * int(power or 1)
     return {base: total[base] for base in BASE if total[base]}
@@ -68,9 +74,11 @@ _DESCRIPTION = "modelDescription.xml"
 def write_fmu(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
     """Write savgs_rig.fmu, for the platform of this machine.
 
-    Raises :class:`InputError` without FMPy, without a C compiler, or if the rig has no static equilibrium.
+    Raises :class:`InputError` without FMPy, without a C compiler, if the plant finds no rest, or for names and
+    units that FMI cannot hold.
     """
     headers, starts = _headers(), _starts(model)
+    _check_names(model)
     builder = _builder(model, starts)
     with scratch_folder() as scratch, contextlib.chdir(scratch):
         files = builder.export_fmu({"no_warning": True})
@@ -86,6 +94,22 @@ def write_fmu(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
             builder.pack_fmu({**compiled, document.name: f"{EXTRA}/{document.name}"}, {})
         ).read_bytes()
     return (write_bytes(folder / f"{NAME}.fmu", packed),)
+
+
+def _check_names(model: ExportedModel) -> None:
+    """Raise :class:`InputError` where two variables have one name, or a unit is none of FMI."""
+    equations, table = model.equations, model.table
+    signals = (*equations.inputs, *equations.states, *equations.outputs)
+    names = [*equations.parameters, *(each.name for each in signals)]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(
+            f"two variables have the name '{twice}', and in an FMU each has its own",
+            source="--to fmu",
+            remedy="rename the coordinate, input, channel, output or parameter",
+        )
+    for unit in (*(table[name].unit for name in equations.parameters), *(each.unit for each in signals)):
+        base_units(unit)
 
 
 def _headers() -> Path:
@@ -131,7 +155,7 @@ def _builder(model: ExportedModel, starts: Mapping[str, float]) -> ca.DaeBuilder
 
 
 def _starts(model: ExportedModel) -> dict[str, float]:
-    """Start values by name: the parameters, and the rig at rest."""
+    """Start values by name: the parameters, and the plant at rest."""
     equations, starts = model.equations, model.table.as_dict()
     for signals, values in (
         (equations.inputs, resting_inputs(model)),

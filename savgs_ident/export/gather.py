@@ -1,4 +1,4 @@
-"""Collect what is known about a model before it is exported: rig file, posterior, diagnosis.
+"""Collect what is known about a model before it is exported: model file, posterior, diagnosis.
 
 The three may come from different runs. What they say about each other is checked here and reported: ``said`` are
 sentences on the origin of the numbers, ``doubts`` are reasons not to trust them.
@@ -7,7 +7,7 @@ A diagnosis is the ``diagnosis.json`` that ``savgs-ident diagnose`` wrote. What 
 when it is read; the rest is carried along unchanged. Effects that its verdict names are added to the model,
 together with all numbers of the fit in which they were found: numbers that were fitted without an effect
 compensate for its absence (a soft tyre for a soft mount) and do not belong to the model with it. So
-``identified`` of the diagnosis replaces the numbers of the rig file, and the covariance of the earlier fit is
+``identified`` of the diagnosis replaces the numbers of the model, and the covariance of the earlier fit is
 dropped. Something unknown is added as the force that was learned at its port. Where no force could be learned,
 the diagnosis is carried along as data and the model is not changed.
 """
@@ -21,7 +21,7 @@ from typing import Any
 from savgs_ident.core.errors import InputError
 from savgs_ident.effects.base import AbstractSensorLaw
 from savgs_ident.export.document import JsonValue, read_document
-from savgs_ident.export.exported_model import ExportedModel
+from savgs_ident.export.exported_model import ExportedModel, learned_effects, with_effects
 from savgs_ident.inference.result import (
     FAR,
     Draws,
@@ -31,8 +31,7 @@ from savgs_ident.inference.result import (
     source_name,
     thin_draws,
 )
-from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, EFFECTS, LEARNED, model_parameters
-from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.model import Model
 
 DIAGNOSIS_SCHEMAS = (1, 2)
 """The schemas of the diagnoses that can be read: the second one adds to the first."""
@@ -66,54 +65,56 @@ class Diagnosed:
     """A model after a diagnosis.
 
     Attributes:
-        rig: with the numbers of the diagnosis, where effects were added.
-        effects: all in the model.
+        model: with the effects and the numbers of the diagnosis, where effects were added.
         added: those that the diagnosis added.
         said: what was done, a sentence each, for reports and files.
         taken: names of the parameters whose numbers come from the diagnosis.
     """
 
-    rig: Rig
-    effects: tuple[str, ...]
+    model: Model
     added: tuple[str, ...]
     said: tuple[str, ...]
     taken: tuple[str, ...] = ()
 
 
 def gather(
-    rig: Rig,
-    effects: tuple[str, ...],
+    model: Model,
     diagnosis: Mapping[str, object] = MappingProxyType({}),
     posterior: DrawSource | None = None,
     count: int | None = None,
 ) -> Gathered:
-    """The model of a rig with ``effects``, what a ``diagnosis`` adds to it, and ``count`` draws of its posterior.
+    """A model, what a ``diagnosis`` adds to it, and ``count`` draws of its posterior.
 
-    The sentences are also the ``notes`` in the provenance of the model's rig, so that they are part of the files.
+    The sentences are also the ``notes`` in the provenance of the model, so that they are part of the files.
     Raises :class:`InputError` for a diagnosis of another model or draws that cannot be used.
     """
-    found = with_diagnosis(rig, effects, diagnosis) if diagnosis else Diagnosed(rig, effects, (), ())
-    model = ExportedModel(found.rig, found.effects, diagnosis=diagnosis)
-    doubts = [*_doubts_of_fit(rig, found), *_doubts_of_diagnosis(diagnosis)]
+    found = with_diagnosis(model, diagnosis) if diagnosis else Diagnosed(model, (), ())
+    exported = ExportedModel(found.model, diagnosis=diagnosis)
+    doubts = [*_doubts_of_fit(model, found), *_doubts_of_diagnosis(diagnosis)]
     if posterior is not None:
-        draws = read_draws(posterior, tuple(model.table))
-        doubts += _doubts_of_draws(model, draws, found.added, posterior)
-        model = replace(model, samples=thin_draws(draws, count))
-    said = (*_other_model(rig, effects), *found.said, *_sensors(model))
+        draws = read_draws(posterior, tuple(exported.table))
+        doubts += _doubts_of_draws(exported, draws, found.added, posterior)
+        exported = replace(exported, samples=thin_draws(draws, count))
+    said = (*_other_model(model), *found.said, *_sensors(exported))
     notes = [*said, *doubts]
     if notes:
-        noted = replace(model.rig, provenance={**model.rig.provenance, "notes": notes})
-        model = replace(model, rig=noted)
-    return Gathered(model, said, tuple(doubts))
+        noted = found.model.with_provenance({**found.model.provenance, "notes": notes})
+        exported = replace(exported, model=noted)
+    return Gathered(exported, said, tuple(doubts))
 
 
-def _other_model(rig: Rig, effects: tuple[str, ...]) -> tuple[str, ...]:
-    """Whether the rig file was identified with other effects than those asked for."""
-    known = rig.provenance.get("effects")
+def _source_of(model: Model) -> str:
+    """What the numbers of a model are read from, in words."""
+    return "rig file" if model.origin().model else "model"
+
+
+def _other_model(model: Model) -> tuple[str, ...]:
+    """Whether the model was identified with other effects than those asked for."""
+    known, effects = model.provenance.get("effects"), model.effects
     if not isinstance(known, list | tuple) or set(map(str, known)) == set(effects):
         return ()
     return (
-        f"The rig file was identified with {listed(known) or 'no friction'} and is taken with"
+        f"The {_source_of(model)} was identified with {listed(known) or 'no friction'} and is taken with"
         f" {listed(effects) or 'no friction'}: what the model has of its numbers is of that fit.",
     )
 
@@ -121,34 +122,34 @@ def _other_model(rig: Rig, effects: tuple[str, ...]) -> tuple[str, ...]:
 def _sensors(model: ExportedModel) -> tuple[str, ...]:
     """The sensor effects that the equations leave out."""
     return tuple(
-        f"{name} is an error of a sensor, not of the rig: the outputs of the equations are without it."
-        for name in model.effects
-        if isinstance(EFFECTS[name].law, AbstractSensorLaw)
+        f"{effect.name} is an error of a sensor, not of the rig: the outputs of the equations are without it."
+        for effect in model.plant.effects
+        if isinstance(effect.law, AbstractSensorLaw)
     )
 
 
-def _doubts_of_fit(rig: Rig, found: Diagnosed) -> tuple[str, ...]:
-    if rig.provenance.get("trusted", True):
+def _doubts_of_fit(model: Model, found: Diagnosed) -> tuple[str, ...]:
+    if model.provenance.get("trusted", True):
         return ()
-    moved = _moved_by_fit(rig)
+    moved = _moved_by_fit(model)
     left = [name for name in moved if name not in found.taken]
     if moved and not left:  # The diagnosis fitted all of them anew.
         return ()
-    said = rig.provenance
+    said = model.provenance
     why = said.get("doubt", said.get("status", "no status"))
-    doubt = f"The rig file's own fit is not to be trusted ({why})"
+    doubt = f"The {_source_of(model)}'s own fit is not to be trusted ({why})"
     if not found.added:
         return (f"{doubt}.",)
     names = f" ({', '.join(left[:LISTED])}{', ...' if len(left) > LISTED else ''})" if left else ""
     return (f"{doubt}, and some of its numbers{names} are in the model still: the diagnosis has no others.",)
 
 
-def _moved_by_fit(rig: Rig) -> tuple[str, ...]:
-    """Names of the parameters that the fit of the rig file moved, as far as the file records them.
+def _moved_by_fit(model: Model) -> tuple[str, ...]:
+    """Names of the parameters that the fit of the model moved, as far as its provenance records them.
 
     Those that were held by a tolerance are included.
     """
-    recorded = (rig.provenance.get(name) for name in ("free", "before"))
+    recorded = (model.provenance.get(name) for name in ("free", "before"))
     names = [str(name) for each in recorded if isinstance(each, list | tuple | Mapping) for name in each]
     return tuple(dict.fromkeys(names))
 
@@ -161,7 +162,9 @@ def _doubts_of_draws(
     model: ExportedModel, draws: Mapping[str, Draws], added: tuple[str, ...], path: DrawSource
 ) -> list[str]:
     """Whether the draws, all of them, are those of this model."""
-    own = [entry.name for name in added for entry in EFFECTS[name].parameters]
+    own = [
+        entry.name for effect in model.plant.effects if effect.name in added for entry in effect.parameters
+    ]
     lacking = [name for name in own if name not in draws]
     doubts = []
     if lacking:
@@ -178,64 +181,61 @@ def _doubts_of_draws(
     return doubts
 
 
-def with_diagnosis(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> Diagnosed:
-    """The model of ``effects`` with what the diagnosis names; see the module.
+def with_diagnosis(model: Model, diagnosis: Mapping[str, Any]) -> Diagnosed:
+    """The model with what the diagnosis names; see the module.
 
     ``diagnosis`` is the document of :func:`read_diagnosis`. Raises
     :class:`InputError` if it is one of another model, or lacks a number that its effects need.
     """
-    verdict = diagnosis["verdict"]
+    verdict, source = diagnosis["verdict"], _source_of(model)
     if verdict["kind"] == "none":
-        said = "The diagnosis finds nothing missing: the numbers are those of the rig file."
-        return Diagnosed(rig, effects, (), (said,))
+        said = f"The diagnosis finds nothing missing: the numbers are those of the {source}."
+        return Diagnosed(model, (), (said,))
     if verdict["kind"] == "unknown" or (diagnosis.get("learned") and not verdict.get("law_known", True)):
-        return _with_unknown(rig, effects, diagnosis)
+        return _with_unknown(model, diagnosis)
     named = tuple(verdict["effects"])
-    added = tuple(name for name in named if name not in effects)
+    added = tuple(name for name in named if name not in model.effects)
     if not added:
-        said = f"{listed(named)}, named by the diagnosis, is in the model already: the numbers are the rig file's."
-        return Diagnosed(rig, effects, (), (said,))
+        said = f"{listed(named)}, named by the diagnosis, is in the model already: the numbers are the {source}'s."
+        return Diagnosed(model, (), (said,))
     fitted = _fitted(frozenset(named), diagnosis["which"])
-    return _with_effects(rig, effects, added, diagnosis, fitted, diagnosis.get("identified", {}))
+    return _with_effects(model, added, diagnosis, fitted, diagnosis.get("identified", {}))
 
 
-def _with_unknown(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> Diagnosed:
+def _with_unknown(model: Model, diagnosis: Mapping[str, Any]) -> Diagnosed:
     """The model with the force that was learned for something unknown, if one was."""
     ports, learned = diagnosis["verdict"]["ports"], diagnosis.get("learned")
     if learned is None:
         said = (
             f"The diagnosis finds something that the catalogue does not have (at {', '.join(ports) or 'no port'}) and"
             " that no force there explains: it travels along as data, the equations are without it and the numbers"
-            " those of the rig file."
+            f" those of the {_source_of(model)}."
         )
-        return Diagnosed(rig, effects, (), (said,))
-    if learned["effect"] in effects:
-        return Diagnosed(
-            rig, effects, (), (f"{learned['effect']}, learned before, is in the model already.",)
-        )
+        return Diagnosed(model, (), (said,))
+    if learned["effect"] in model.effects:
+        return Diagnosed(model, (), (f"{learned['effect']}, learned before, is in the model already.",))
     fitted = {name: float(entry["value"]) for name, entry in learned["parameters"].items()}
-    found = _with_effects(rig, effects, (learned["effect"],), diagnosis, fitted, learned["identified"])
+    found = _with_effects(model, (learned["effect"],), diagnosis, fitted, learned["identified"])
     held = "It is held at the edge of the motion in the campaign: beyond, it is a guess."
     return replace(found, said=(*found.said, held))
 
 
 def _with_effects(
-    rig: Rig,
-    effects: tuple[str, ...],
+    model: Model,
     added: tuple[str, ...],
     diagnosis: Mapping[str, Any],
     fitted: Mapping[str, float],
     identified: Mapping[str, float],
 ) -> Diagnosed:
     """The model with ``added`` effects: their own numbers ``fitted``, and all ``identified`` along with them [SI]."""
-    _check_baseline(effects, diagnosis)
-    whole = (*effects, *added)
-    values = {**identified, **fitted}
-    for name in (each.name for effect in added for each in EFFECTS[effect].parameters):
-        if name not in values and name not in rig.parameters:
+    _check_baseline(model.effects, diagnosis)
+    whole, values = with_effects(model, added), {**identified, **fitted}
+    for name in whole.table:
+        if name not in values and name not in model.table:
             raise InputError(f"gives no value for '{name}', a parameter of what it names")
-    table = model_parameters(rig, whole).with_values(values)
-    own = [name for name in values if name not in fitted]
+    diagnosed = whole.with_values(values)
+    table = diagnosed.table
+    own, source = [name for name in values if name not in fitted], _source_of(model)
     said = [
         f"{listed(added)} joins the model as the diagnosis found it: "
         + ", ".join(
@@ -246,27 +246,35 @@ def _with_effects(
     if own:
         said.append(
             f"{len(own)} more numbers ({', '.join(own[:4])}, ...) are those that the diagnosis fitted along with it; "
-            "all others are those of the rig file."
+            f"all others are those of the {source}."
         )
     else:
         said.append(
-            "The diagnosis does not say what else it fitted: all other numbers are those of the rig file."
+            f"The diagnosis does not say what else it fitted: all other numbers are those of the {source}."
         )
-    if "covariance" in rig.provenance:
-        said.append("The covariance of the rig file is of the fit without it and is left out.")
-    identified_rig = Rig(
-        rig.name, table, rig.damper_velocity, rig.damper_force, _provenance(rig, whole, diagnosis)
-    )
-    return Diagnosed(identified_rig, whole, added, tuple(said), tuple(values))
+    if "covariance" in model.provenance:
+        said.append(f"The covariance of the {source} is of the fit without it and is left out.")
+    diagnosed = diagnosed.with_provenance(_provenance(model, whole.effects, diagnosis))
+    return Diagnosed(diagnosed, added, tuple(said), tuple(values))
 
 
 def _fitted(effects: frozenset[str], candidates: list[Mapping[str, Any]]) -> dict[str, float]:
     """The parameters of the hypothesis that the verdict names."""
     for each in candidates:
-        names = each.get("effects") or each["effect"].split(" + ")
-        if frozenset(names) == effects and each["parameters"]:
+        if frozenset(_effects_of(each)) == effects and each["parameters"]:
             return {name: float(entry["value"]) for name, entry in each["parameters"].items()}
     raise InputError(f"holds no fitted parameters of {listed(sorted(effects))}")
+
+
+def _effects_of(candidate: Mapping[str, Any]) -> Iterable[str]:
+    """The effects of a hypothesis."""
+    named: Iterable[str] = candidate.get("effects") or ()
+    return named or _effects_in_words(candidate["effect"])
+
+
+def _effects_in_words(effect: str) -> Iterable[str]:
+    """The effects of a hypothesis of an older file, or of one of the contract alone, which has no list of them."""
+    return effect.split(" + ")
 
 
 def _check_baseline(effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> None:
@@ -279,12 +287,12 @@ def _check_baseline(effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> N
         )
 
 
-def _provenance(rig: Rig, effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> dict[str, object]:
+def _provenance(model: Model, effects: tuple[str, ...], diagnosis: Mapping[str, Any]) -> dict[str, object]:
     """The origin of the numbers: the diagnosis, and the provenance of the earlier fit."""
     origin = diagnosis.get("provenance", {})
     found: dict[str, object] = {"effects": list(effects), "from": "diagnosis"}
     found |= {name: origin[name] for name in ("data", "data_sha256", "model", "versions") if name in origin}
-    before = {name: value for name, value in rig.provenance.items() if name not in _OF_THE_FIT}
+    before = {name: value for name, value in model.provenance.items() if name not in _OF_THE_FIT}
     return found | ({"fit_before": before} if before else {})
 
 
@@ -293,13 +301,18 @@ def listed(names: Iterable[object]) -> str:
     return " and ".join(map(str, names))
 
 
-def read_diagnosis(path: Path) -> dict[str, object]:
-    """The whole document. Raises :class:`InputError` for a file that cannot be read or is no diagnosis."""
-    return read_document(path, DIAGNOSIS_REMEDY, parse_diagnosis)
+def read_diagnosis(path: Path, model: Model) -> dict[str, object]:
+    """The whole document, of a diagnosis of the ``model`` with any effects.
+
+    Raises :class:`InputError` for a file that cannot be read or is no diagnosis.
+    """
+    return read_document(path, DIAGNOSIS_REMEDY, lambda place: parse_diagnosis(place, model))
 
 
-def parse_diagnosis(place: JsonValue) -> dict[str, object]:
-    """The document at a place. Raises :class:`InputError` for what is no diagnosis."""
+def parse_diagnosis(place: JsonValue, model: Model) -> dict[str, object]:
+    """The document at a place. Raises :class:`InputError` for what is no diagnosis of such a model."""
+    learned = tuple(learned_effects(model))
+    named = tuple(name for name in model.catalogue if name not in learned)
     fields = place.table(_DIAGNOSIS_KEYS, free=True)
     schema = fields["schema"]
     if schema.value not in DIAGNOSIS_SCHEMAS or isinstance(schema.value, bool):
@@ -308,14 +321,14 @@ def parse_diagnosis(place: JsonValue) -> dict[str, object]:
     baseline["model"].text()
     _numbers(baseline["parameters"])
     if "effects" in baseline:
-        baseline["effects"].names(tuple(EFFECTS))
-    _check_verdict(fields["verdict"])
+        baseline["effects"].names((*named, *learned))
+    _check_verdict(fields["verdict"], named)
     for candidate in fields["which"].items():
         _check_candidate(candidate)
     if "identified" in fields:
         _numbers(fields["identified"])
     if "learned" in fields and fields["learned"].value is not None:
-        _check_learned(fields["learned"])
+        _check_learned(fields["learned"], learned)
     if "converged" in fields and not isinstance(fields["converged"].value, bool):
         raise fields["converged"].wrong("true or false")
     if "provenance" in fields:
@@ -323,10 +336,10 @@ def parse_diagnosis(place: JsonValue) -> dict[str, object]:
     return dict(_as_table(place))
 
 
-def _check_verdict(place: JsonValue) -> None:
+def _check_verdict(place: JsonValue, known: tuple[str, ...]) -> None:
     fields = place.table(_VERDICT_KEYS, free=True)
     kind = fields["kind"].text(VERDICT_KINDS)
-    named = fields["effects"].names(tuple(CATALOGUE))
+    named = fields["effects"].names(known)
     if (kind in ("effect", "several")) != bool(named):
         raise fields["effects"].wrong(f"what belongs to a verdict of the kind '{kind}'")
     fields["ports"].names()
@@ -346,9 +359,9 @@ def _check_candidate(place: JsonValue) -> None:
         entry.table(("value", "unit"), free=True)["value"].number()
 
 
-def _check_learned(place: JsonValue) -> None:
+def _check_learned(place: JsonValue, learned: tuple[str, ...]) -> None:
     fields = place.table(("effect", "parameters", "identified"), free=True)
-    fields["effect"].text(tuple(LEARNED))
+    fields["effect"].text(learned)
     for entry in fields["parameters"].entries().values():
         entry.table(("value", "unit"), free=True)["value"].number()
     _numbers(fields["identified"])

@@ -1,23 +1,24 @@
-"""The linear models in an export: equation (8) of the paper, and the exact linearisation without friction.
+"""The linear models in an export: the exact linearisation without friction, and of the rig equation (8), too.
 
-Both are linearised at the nominal link angle. The exact one keeps what a diagnosis added except friction: a compliant
+They are of the nominal state. The exact one keeps what a diagnosis added except friction: a compliant
 mount is in it, with its state, and of a learned force the stiffness and the damping. In a JSON document a state space
 is its matrices, and its signals with their units in order.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import control
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.control import linearisation
 from savgs_ident.control.linear_equivalent import (
+    UNITS,
     Equivalent,
     nominal_equivalent,
     paper_masses,
     quarter_car_space,
 )
+from savgs_ident.control.linearisation import linear_signals
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import AbstractInputLaw, Family
@@ -26,33 +27,17 @@ from savgs_ident.effects.learned import LearnedForce
 from savgs_ident.effects.learned_functions import frictions_at
 from savgs_ident.export.document import JsonValue
 from savgs_ident.export.exported_model import ExportedModel, check_rest
-from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.base import AbstractPlant
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.simulate.linearisation import linearise_plant, nominal_rest
 
 EQUIVALENT_UNITS = {"k_eq": "N/m", "c_eq": "N s/m", "alpha": "m/rad", "ratio": "1"}
 """Units of the linear equivalent."""
 
-_UNITS = {
-    "sprung_velocity": "m/s",
-    "unsprung_velocity": "m/s",
-    "wishbone_velocity": "rad/s",
-    "road_velocity": "m/s",
-    "lin_velocity": "m/s",
-    "link_velocity": "rad/s",
-    "susp_deflection": "m",
-    "tyre_deflection": "m",
-    "sprung_position": "m",
-    "lin_position": "m",
-    "road_height": "m",
-    "wishbone_angle": "rad",
-    "link_angle": "rad",
-    "sprung_accel": "m/s^2",
-    "tyre_load": "N",
-    "link_torque": "N m",
-}
-
-
-LINEAR = ("equation_8", "exact")
-"""Names of the linear models."""
+EQUATION_8 = "equation_8"
+"""Name of the paper's model."""
+EXACT = "exact"
+"""Name of the exact linearisation."""
 
 
 @dataclass(frozen=True)
@@ -82,12 +67,12 @@ def is_friction(effect: Effect) -> bool:
     return effect.law.family is Family.FRICTION
 
 
-def without_friction(model: QuarterCar) -> QuarterCar:
-    """The model without dry friction, and without the faults of its cam."""
+def without_friction(model: AbstractPlant) -> AbstractPlant:
+    """The plant without dry friction, and without what its inputs are beside what is recorded of them."""
     kept = [
         each for each in model.effects if not is_friction(each) and not isinstance(each.law, AbstractInputLaw)
     ]
-    return QuarterCar(model.damper, effects=tuple(kept))
+    return replace(model, effects=tuple(kept))
 
 
 def values_without_friction(model: ExportedModel) -> Values:
@@ -97,42 +82,41 @@ def values_without_friction(model: ExportedModel) -> Values:
     return as_values(model.table.as_dict() | dict.fromkeys(frictions, 0.0))
 
 
-def linear_equivalent(model: ExportedModel) -> Equivalent:
+def linear_equivalent(model: RigModel) -> Equivalent:
     """k_eq, c_eq, alpha and R in the nominal state; see :data:`EQUIVALENT_UNITS`."""
-    return nominal_equivalent(model.plant, as_values(model.table.as_dict()))
+    return nominal_equivalent(model.build(), as_values(model.table.as_dict()))
 
 
-def equation_8(model: ExportedModel) -> LinearModel:
+def equation_8(model: RigModel) -> LinearModel:
     """Equation (8) with the model's numbers."""
-    p = as_values(model.table.as_dict())
-    space = quarter_car_space(paper_masses(model.plant, p))
+    space = quarter_car_space(paper_masses(model.build(), as_values(model.table.as_dict())))
     about = "equation (8): two masses, the linear equivalent between them, the link as an actuator in series"
-    return _linear(about, space, {})
+    return LinearModel(about, space, dict(UNITS))
 
 
 def exact(model: ExportedModel) -> LinearModel:
-    """The exact linearisation at rest, the link at its nominal angle, without friction.
+    """The exact linearisation at rest in the nominal state, without friction.
 
-    Raises :class:`InputError` where the rig has none, or no static equilibrium.
+    Raises :class:`InputError` where the plant has none, or no rest.
     """
     p, bare = values_without_friction(model), without_friction(model.plant)
-    at = linearisation.nominal_rest(bare, p)
+    at, signals = nominal_rest(bare, p), linear_signals(bare)
     check_rest(at.root, model)
-    space = linearisation.linearise(bare, p, at)
-    internal = {f"{place}_{state.name}": state.unit for place, state in enumerate(bare.states)}
-    about = "exact linearisation of the rig at rest, the link at its nominal angle, without friction"
-    return _linear(about, space, internal)
+    found = linearise_plant(bare, p, at, signals)
+    about = f"exact linearisation of the rig at rest, {signals.nominal}, without friction"
+    return LinearModel(about, found.space, found.units)
+
+
+def linear_names(model: ExportedModel) -> tuple[str, ...]:
+    """Names of the linear models of a plant."""
+    return (EXACT,) if model.quarter_car is None else (EQUATION_8, EXACT)
 
 
 def linear_models(model: ExportedModel) -> dict[str, LinearModel]:
     """All of them by name."""
-    return dict(zip(LINEAR, (equation_8(model), exact(model)), strict=True))
-
-
-def _linear(about: str, space: control.StateSpace, internal: dict[str, str]) -> LinearModel:
-    known = _UNITS | internal
-    names = (*space.state_labels, *space.input_labels, *space.output_labels)
-    return LinearModel(about, space, {name: known[name] for name in names})
+    car = model.quarter_car
+    found = (exact(model),) if car is None else (equation_8(car), exact(model))
+    return dict(zip(linear_names(model), found, strict=True))
 
 
 LAW = "dx/dt = A x + B u, y = C x + D u"

@@ -9,7 +9,7 @@ Nested records (a diagnosis, the provenance) are JSON: jsondecode(model.diagnosi
 """
 
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import control
@@ -26,6 +26,8 @@ from savgs_ident.export.document import as_plain, json_text
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.json_export import covariance_record, provenance_record
 from savgs_ident.export.linear_models import LinearModel, linear_models
+from savgs_ident.plants.base import AbstractPlant
+from savgs_ident.plants.quarter_car.model import RigModel
 
 NAME = "model.mat"
 """The name of the file."""
@@ -41,6 +43,12 @@ KEYWORDS = frozenset(
 )  # fmt: skip
 """Reserved words of MATLAB."""
 
+DECADE = 10.0
+"""Ratio by which responses are given beyond the typical frequencies of a plant [1]."""
+
+COUNT = 81
+"""Number of their frequencies."""
+
 _HEAD = b"MATLAB 5.0 MAT-file, written by savgs_ident"
 _HEAD_BYTES = 116
 
@@ -48,8 +56,8 @@ _HEAD_BYTES = 116
 def write_mat(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
     """Write model.mat.
 
-    Raises :class:`InputError` if it cannot be written, a parameter's name is invalid in MATLAB, or the rig has no
-    static equilibrium or no motion on the cam.
+    Raises :class:`InputError` if it cannot be written, a parameter's name is invalid in MATLAB, or the plant has no
+    rest or, for the rig, no motion on the cam.
     """
     stream = io.BytesIO()
     savemat(stream, mat_record(model), long_field_names=True, do_compression=True, oned_as="column")
@@ -60,7 +68,7 @@ def write_mat(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
 
 def mat_record(model: ExportedModel) -> dict[str, object]:
     """The variables of the file: numbers as arrays, lists of names as cells."""
-    rig, equations = model.rig, model.equations
+    car, equations = model.quarter_car, model.equations
     covariance_record(model)  # Raises for an invalid one.
     names, covariance = model.covariance
     parameters = {
@@ -70,10 +78,10 @@ def mat_record(model: ExportedModel) -> dict[str, object]:
     linear = linear_models(model)
     return {
         "schema": 1.0,
-        "name": rig.name,
+        "name": model.model.plant_name,
         "effects": _cell(model.effects),
         "parameters": parameters,
-        "damper": {"velocity": np.array(rig.damper_velocity), "force": np.array(rig.damper_force)},
+        **({} if car is None else {"damper": _damper(car)}),
         "signals": {
             "states": _cell(signal.name for signal in equations.states),
             "inputs": _cell(signal.name for signal in equations.inputs),
@@ -82,19 +90,35 @@ def mat_record(model: ExportedModel) -> dict[str, object]:
         "covariance": {"names": _cell(names), "matrix": covariance},
         "samples": {_field(name): values for name, values in model.samples.items()},
         "state_spaces": {name: _space(each) for name, each in linear.items()},
-        "frequency_responses": {
-            "frequency_hz": FREQUENCY,
-            **{name: each.response(FREQUENCY) for name, each in linear.items()},
-            "on_cam": _on_cam(model),
-        },
+        "frequency_responses": _responses(model, linear),
         "diagnosis": _json(as_plain(dict(model.diagnosis), "diagnosis")),
-        "provenance": _json(provenance_record(rig)),
+        "provenance": _json(provenance_record(model)),
     }
 
 
-def _on_cam(model: ExportedModel) -> dict[str, object]:
+def _damper(model: RigModel) -> dict[str, object]:
+    rig = model.rig
+    return {"velocity": np.array(rig.damper_velocity), "force": np.array(rig.damper_force)}
+
+
+def _responses(model: ExportedModel, linear: Mapping[str, LinearModel]) -> dict[str, object]:
+    """Frequency responses of the linear models and, of the rig, the nonlinear one's on its cam."""
+    car = model.quarter_car
+    frequency = frequencies(model.plant) if car is None else FREQUENCY
+    responses = {name: each.response(frequency) for name, each in linear.items()}
+    on_cam = {} if car is None else {"on_cam": _on_cam(car)}
+    return {"frequency_hz": frequency, **responses, **on_cam}
+
+
+def frequencies(plant: AbstractPlant) -> NDArray[np.float64]:
+    """Frequencies [Hz], (F,), about those of the typical motion of the plant's coordinates."""
+    typical = [each.rate_size / each.size / (2.0 * np.pi) for each in plant.coordinates]
+    return np.geomspace(min(typical) / DECADE, max(typical) * DECADE, COUNT)
+
+
+def _on_cam(model: RigModel) -> dict[str, object]:
     """First harmonics of the nonlinear rig on the cam of the test, per metre of road, all effects included."""
-    nonlinear, p = model.plant, as_values(model.table.as_dict())
+    nonlinear, p = model.build(), as_values(model.table.as_dict())
     cam = model.table["cam_peak_to_peak"].value
     motions = motions_on_cam(nonlinear, p, TEST_FREQUENCY, cam)
     return {

@@ -20,7 +20,8 @@ from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.gather import DIAGNOSIS_REMEDY, Gathered, gather, read_diagnosis
 from savgs_ident.export.json_export import covariance_record
 from savgs_ident.inference.result import DrawSource, Posterior
-from savgs_ident.plants.quarter_car.model import RigModel, load_rig, model_of
+from savgs_ident.plants.model import Model
+from savgs_ident.plants.quarter_car.model import load_rig, model_of
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
@@ -94,21 +95,24 @@ class Exported(Result):
 
 
 def export(
-    model: RigModel,
+    model: Model | str | Path,
     formats: str | Sequence[str],
     folder: str | Path,
     *,
+    effects: Sequence[str] | None = None,
     posterior: Posterior | str | Path | None = None,
     samples: int = 500,
     diagnosis: Diagnosis | str | Path | None = None,
     progress: Progress = no_progress,
 ) -> Exported:
-    """Export a model: parameters with covariance, draws, linear models, equations.
+    """Export a model of any plant: parameters with covariance, draws, linear models, equations.
 
     Args:
-        model: the rig with its effects, identified or drawn.
+        model: a plant with its effects, identified or drawn; or a rig file.
         formats: one or several of "json", "mat", "python-control", "casadi", "c" and "fmu".
         folder: where the files are written.
+        effects: with which effects a rig file is taken; those that it was fitted with if left out, and for a drawing
+            those of the model that was diagnosed, else those of the paper's SimTR.
         posterior: a posterior or a ``posterior.nc`` whose draws travel along.
         samples: how many of them, evenly spread over all.
         diagnosis: a diagnosis or a ``diagnosis.json``: the effects that it names, or the force that it learned, join
@@ -119,22 +123,22 @@ def export(
     hold, and for files that cannot be used or do not belong together.
     """
     names = (formats,) if isinstance(formats, str) else tuple(dict.fromkeys(formats))
-    check_formats(names)
+    _check_formats(names)
+    known = model_to_export(model, effects, diagnosis)
     out = prepare_folder(Path(folder))
-    found = gathered(model, posterior, samples, diagnosis)
-    _check_covariance(found.model, model.rig.source)
+    found, origin = gathered(known, posterior, samples, diagnosis), known.origin()
+    _check_covariance(found.model, origin.model)
     use_persistent_cache()
     written = {}
     for name in names:
         progress(f"writing {name}")
-        # What names no file of its own is a fault of the rig's numbers.
-        with blamed_on(model.rig.source):
+        # What names no file of its own is a fault of the model's numbers.
+        with blamed_on(origin.model):
             written[name] = _write(name, found.model, out)
-    origin = replace(model.origin(), effects=found.model.effects)
-    return Exported(found, written, origin=origin)
+    return Exported(found, written, origin=replace(origin, effects=found.model.effects))
 
 
-def check_formats(names: Sequence[str]) -> None:
+def _check_formats(names: Sequence[str]) -> None:
     """Raise :class:`InputError` for a format that does not exist."""
     for name in names:
         if name not in EXPORTS:
@@ -144,17 +148,27 @@ def check_formats(names: Sequence[str]) -> None:
 
 
 def model_to_export(
-    path: str | Path, effects: Sequence[str] | None = None, diagnosis: str | Path | None = None
-) -> RigModel:
-    """The model of a rig file: with ``effects``, else its own, else, for a drawing, those that were diagnosed."""
-    rig = load_rig(path)
+    model: Model | str | Path,
+    effects: Sequence[str] | None = None,
+    diagnosis: Diagnosis | str | Path | None = None,
+) -> Model:
+    """A model as it is, or that of a rig file: with ``effects``, else its own, else those that were diagnosed.
+
+    Raises :class:`InputError` for a file that cannot be used, and for ``effects`` beside a model, which has its own.
+    """
+    if not isinstance(model, str | Path):
+        if effects is not None:
+            raise InputError("effects go with a rig file only", remedy="add them to the model with +")
+        return model
+    rig = load_rig(model)
+    known = model_of(rig, effects)
     if effects is None and "effects" not in rig.provenance:
-        effects = diagnosis_document(diagnosis).get("baseline", {}).get("effects")
-    return model_of(rig, effects)
+        known = model_of(rig, diagnosis_document(diagnosis, known).get("baseline", {}).get("effects"))
+    return known
 
 
 def gathered(
-    model: RigModel,
+    model: Model,
     posterior: Posterior | str | Path | None = None,
     samples: int = 500,
     diagnosis: Diagnosis | str | Path | None = None,
@@ -162,30 +176,30 @@ def gathered(
     """A model with what a posterior and a diagnosis say of it; raises as :func:`export` does."""
     source: DrawSource | None = Path(posterior) if isinstance(posterior, str) else posterior
     try:
-        return gather(model.rig, model.effects, diagnosis_document(diagnosis), source, samples)
+        return gather(model, diagnosis_document(diagnosis, model), source, samples)
     except InputError as error:
-        # What has no source is a fault of the diagnosis: the rig has been read, and draws name their file.
+        # What has no source is a fault of the diagnosis: the model has been read, and draws name their file.
         blamed = diagnosis if isinstance(diagnosis, str | Path) else ""
         raise InputError(
             error.what, source=error.source or blamed, remedy=error.remedy or DIAGNOSIS_REMEDY
         ) from None
 
 
-def diagnosis_document(diagnosis: Diagnosis | str | Path | None) -> dict[str, Any]:
-    """What ``diagnosis.json`` says; empty without a diagnosis. Raises :class:`InputError` for a file that is none."""
+def diagnosis_document(diagnosis: Diagnosis | str | Path | None, model: Model) -> dict[str, Any]:
+    """What ``diagnosis.json`` says of a model; empty without one. Raises :class:`InputError` for no such file."""
     if diagnosis is None:
         return {}
     if isinstance(diagnosis, Diagnosis):
         document: dict[str, Any] = json.loads(diagnosis.to_json())
         return document
-    return read_diagnosis(Path(diagnosis))
+    return read_diagnosis(Path(diagnosis), model)
 
 
 def _check_covariance(model: ExportedModel, source: str) -> None:
     try:
         covariance_record(model)
     except InputError as error:
-        raise InputError(error.what, source=source, remedy="identify the rig again") from None
+        raise InputError(error.what, source=source, remedy="identify the model again") from None
 
 
 def _write(name: str, model: ExportedModel, out: Path) -> tuple[Path, ...]:

@@ -1,13 +1,14 @@
 """python-control: the linear models as state spaces, the nonlinear one as a system of differential equations.
 
-    systems = load_python_control("model-control.json")
-    systems["equation_8"], systems["exact"]          # control.StateSpace
+    systems = si.load_python_control("model-control.json")
+    systems["exact"]                                 # control.StateSpace; of the rig "equation_8", too
     rig = systems["nonlinear"]                       # control.NonlinearIOSystem, friction included
-    x0, u0 = resting_point("model-control.json")
+    x0, u0 = si.resting_point("model-control.json")
     control.input_output_response(rig, t, u, x0, params={"k_t": 2.6e5})
 
-The file holds numbers and names, no code: the equations are those of this package, compiled by JAX, with the rig and
-the effects that the file names. Every parameter of the rig can be changed through ``params``.
+The file holds numbers and names, no code: the equations are those of this package, compiled by JAX, with the
+parameters and the effects that the file names. Another plant than the quarter car is given to the call as a model of
+it. Every parameter can be changed through ``params``.
 """
 
 from collections.abc import Mapping
@@ -23,7 +24,8 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.export.document import JsonValue, read_document, write_json_text
 from savgs_ident.export.exported_model import ExportedModel, resting_inputs, resting_state
 from savgs_ident.export.json_export import model_record, parse_model
-from savgs_ident.export.linear_models import LINEAR, linear_models, parse_space, space_record
+from savgs_ident.export.linear_models import linear_models, linear_names, parse_space, space_record
+from savgs_ident.plants.model import Model
 
 SCHEMA = 1
 """The version of the file; another one is refused."""
@@ -48,7 +50,7 @@ Vector = NDArray[np.float64]
 def write_python_control(model: ExportedModel, folder: Path) -> tuple[Path, ...]:
     """Write model-control.json.
 
-    Raises :class:`InputError` if it cannot be written, or the rig has no static equilibrium.
+    Raises :class:`InputError` if it cannot be written, or the plant finds no rest.
     """
     record = {
         "schema": SCHEMA,
@@ -60,20 +62,24 @@ def write_python_control(model: ExportedModel, folder: Path) -> tuple[Path, ...]
     return (write_json_text(folder / NAME, record),)
 
 
-def load_python_control(path: str | Path) -> dict[str, System]:
+def load_python_control(path: str | Path, model: Model | None = None) -> dict[str, System]:
     """The systems by name, signals named: those in the file's ``state_spaces``, and ``nonlinear``.
+
+    Args:
+        path: the model-control.json that an export to "python-control" wrote.
+        model: for a plant other than the quarter car, a model of it, which gets the values of the file.
 
     Raises :class:`InputError`, with file, place and remedy, for any other file.
     """
-    return read_document(Path(path), REMEDY, _systems)
+    return read_document(Path(path), REMEDY, lambda place: _systems(place, model))
 
 
-def resting_point(path: str | Path) -> tuple[Vector, Vector]:
-    """States and inputs of ``nonlinear`` at rest, the link at its nominal angle: the initial state of a simulation.
+def resting_point(path: str | Path, model: Model | None = None) -> tuple[Vector, Vector]:
+    """States (n,) and inputs (k,) [SI] of ``nonlinear`` at rest, inputs nominal: the start of a simulation.
 
-    Raises as :func:`load_python_control` does. States are (n,), inputs (k,), both SI.
+    Takes and raises what :func:`load_python_control` does.
     """
-    return read_document(Path(path), REMEDY, lambda place: _at_rest(_fields(place)))
+    return read_document(Path(path), REMEDY, lambda place: _at_rest(_fields(place), model))
 
 
 def nonlinear_system(model: ExportedModel) -> control.NonlinearIOSystem:
@@ -104,12 +110,12 @@ def nonlinear_system(model: ExportedModel) -> control.NonlinearIOSystem:
     )
 
 
-def _systems(document: JsonValue) -> dict[str, System]:
+def _systems(document: JsonValue, known: Model | None) -> dict[str, System]:
     fields = _fields(document)
-    systems: dict[str, System] = {
-        name: parse_space(place, name) for name, place in fields["state_spaces"].table(LINEAR).items()
-    }
-    return systems | {NONLINEAR: nonlinear_system(parse_model(fields["model"]))}
+    model = parse_model(fields["model"], known)
+    spaces = fields["state_spaces"].table(linear_names(model))
+    systems: dict[str, System] = {name: parse_space(place, name) for name, place in spaces.items()}
+    return systems | {NONLINEAR: nonlinear_system(model)}
 
 
 def _fields(document: JsonValue) -> dict[str, JsonValue]:
@@ -121,8 +127,8 @@ def _fields(document: JsonValue) -> dict[str, JsonValue]:
     return fields
 
 
-def _at_rest(fields: Mapping[str, JsonValue]) -> tuple[Vector, Vector]:
-    equations, rest = parse_model(fields["model"]).equations, fields["at_rest"].table(("x", "u"))
+def _at_rest(fields: Mapping[str, JsonValue], known: Model | None) -> tuple[Vector, Vector]:
+    equations, rest = parse_model(fields["model"], known).equations, fields["at_rest"].table(("x", "u"))
     (x,) = JsonValue([rest["x"].value], rest["x"].where).matrix(1, len(equations.states))
     (u,) = JsonValue([rest["u"].value], rest["u"].where).matrix(1, len(equations.inputs))
     return x, u

@@ -53,8 +53,15 @@ class Model(Protocol):
         """All parameters, those of the plant and those that its effects bring along."""
 
     @property
+    def provenance(self) -> Mapping[str, Any]:
+        """Where its numbers come from; empty for a drawing."""
+
+    @property
     def is_drawing(self) -> bool:
         """Whether it comes from no fit."""
+
+    def __add__(self, effect: Any) -> Self:
+        """The same model with one more effect, by its name in the catalogue."""
 
     @property
     def identified(self) -> tuple[tuple[str, ...], dict[str, float]]:

@@ -68,7 +68,7 @@ def test_files_and_record_are_written_and_reported(invoke: Invoke) -> None:
     assert record["files"] == ["out/export/model.json"]
     assert (record["samples"], record["covariance"], record["trusted"]) == (20, 1, True)
     model = read_model_json(folder / "model.json")
-    assert model.rig == read_rig("model.toml")
+    assert model.model.rig == read_rig("model.toml")
     assert list(model.effects) == SIMTR == record["effects"]
     assert {name: values.size for name, values in model.samples.items()} == {"mu_r": 20, "k_t": 20}
     assert "writing json" in done.stderr
@@ -111,11 +111,11 @@ def test_a_diagnosed_effect_joins_and_the_output_says_with_which_numbers(invoke:
         assert words in done.stdout
     model = read_model_json("o/model.json")
     assert list(model.effects) == [*SIMTR, "mount_compliance"]
-    assert model.rig.parameters["k_t"].value == MOUNT["identified"]["k_t"]
+    assert model.model.rig.parameters["k_t"].value == MOUNT["identified"]["k_t"]
     assert model.diagnosis == MOUNT
     record = json.loads(Path("o/export.json").read_text())
     assert record["verdict"] == MOUNT["verdict"]
-    assert model.rig.provenance["notes"] == record["said"]
+    assert model.model.rig.provenance["notes"] == record["said"]
 
 
 def test_something_unknown_travels_along_as_data_and_that_is_said(invoke: Invoke) -> None:

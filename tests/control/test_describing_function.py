@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import control
 import numpy as np
 import pytest
 
@@ -10,18 +9,15 @@ from savgs_ident.control import linear_study
 from savgs_ident.control.linear_study import TEST_FREQUENCY, SmallMotions
 from savgs_ident.control.linearisation import (
     ELEMENTS,
-    QUASI_LINEAR_OUTPUTS,
     DescribingFunctions,
     describe,
     linearise,
     quasi_linear_response,
-    quasi_linear_space,
     resting,
 )
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.quarter_car.catalogue import build_model, model_parameters
 from savgs_ident.plants.quarter_car.inputs import cam_excitation
-from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, harmonics, simulate_periodic
 
@@ -97,13 +93,6 @@ def test_a_rig_with_its_own_damping_for_gains_is_the_exact_linearisation(straigh
     assert found == pytest.approx(exact.T * seen, rel=1e-7)
 
 
-PLACES = (0, 6, 13)
-
-
-def _space(model: QuarterCar, p: Values, described: DescribingFunctions, place: int) -> control.StateSpace:
-    return quasi_linear_space(model, p, described.damping[place], described.stiffness[place])
-
-
 @pytest.mark.slow
 def test_it_has_the_first_harmonics_of_the_nonlinear_rig_on_the_cam(
     at_test: linear_study.CamMotions,
@@ -124,27 +113,6 @@ def test_the_small_motion_s_model_is_far_off_at_the_size_of_the_test(
 @pytest.mark.slow
 def test_friction_takes_energy_at_every_frequency(at_test: linear_study.CamMotions) -> None:
     assert np.all(at_test.described.damping > 0.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("place", PLACES)
-def test_its_state_space_is_its_response_at_its_own_frequency(
-    friction: QuarterCar, numbers: Values, at_test: linear_study.CamMotions, place: int
-) -> None:
-    iw = 2j * np.pi * at_test.described.frequency[place]
-    space = _space(friction, numbers, at_test.described, place)
-    assert tuple(space.output_labels) == QUASI_LINEAR_OUTPUTS
-    assert space(iw)[:, 0] * iw == pytest.approx(at_test.quasi_linear[place], rel=1e-9)
-
-
-@pytest.mark.slow
-def test_its_state_space_is_stable_but_for_the_height_of_the_road(
-    friction: QuarterCar, numbers: Values, at_test: linear_study.CamMotions
-) -> None:
-    for place in range(TEST_FREQUENCY.size):
-        poles = np.sort_complex(_space(friction, numbers, at_test.described, place).poles())
-        assert np.all(poles[:-1].real < 0.0)
-        assert poles[-1] == 0.0
 
 
 @pytest.mark.slow

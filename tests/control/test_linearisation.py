@@ -10,14 +10,16 @@ import pytest
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.control.linearisation import INPUTS, OUTPUTS, OperatingPoint, linearise, resting
+from savgs_ident.control.linearisation import RIG_OUTPUTS, linearise, resting
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
+from savgs_ident.effects.base import InputSignal
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
 from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
 from savgs_ident.plants.quarter_car.kinematics import strut_length, suspension_travel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.simulate.linearisation import OperatingPoint
 from savgs_ident.simulate.transient import solve_rates
 
 STEPS = (1e-7, 3e-7, 1e-5, 3e-5, 1e-6, 1e-5, 1e-4, 1e-3)
@@ -47,9 +49,10 @@ def _point(model: QuarterCar, p: Values, place: Place) -> OperatingPoint:
     if model.states and place.velocity[0]:
         # The anchor of the bristle a micrometre away: it neither sticks at its centre nor slides fully.
         s = s.at[0].set(at.q.z_s - 1e-6)
-    return at._replace(
-        qd=Coordinates(zd_s, omega), s=s, road=Road(at.road.height, road), link=Link(at.link.angle, link)
+    signals = tuple(
+        InputSignal(each.value, rate) for each, rate in zip(at.signals, (road, link), strict=True)
     )
+    return at._replace(qd=Coordinates(zd_s, omega), s=s, signals=signals)
 
 
 @eqx.filter_jit
@@ -72,8 +75,8 @@ def _differences(model: QuarterCar, p: Values, at: OperatingPoint) -> NDArray[np
     The damper's curvature jumps where it stands still, which central differences feel to first order in the step:
     that is extrapolated away.
     """
-    centre = np.array([*at.q, *at.qd, *np.asarray(at.s), *at.road, *at.link], dtype=float)
-    centre[-3:-1] = centre[-2], centre[-3]
+    values, rates = zip(*at.signals, strict=True)
+    centre = np.array([*at.q, *at.qd, *np.asarray(at.s), *values, *rates], dtype=float)
     columns = []
     for place, step in enumerate((*STEPS[:4], *[1e-8] * len(model.states), *STEPS[4:])):
         direction = step * np.eye(centre.size)[place]
@@ -114,8 +117,8 @@ def test_with_friction_it_has_the_slopes_of_the_rates(
 @pytest.mark.slow
 def test_its_signals_have_names(frictionless: QuarterCar, numbers: Values) -> None:
     space = linearise(frictionless, numbers, resting(frictionless, numbers, np.pi / 2.0))
-    assert tuple(space.input_labels) == INPUTS
-    assert tuple(space.output_labels) == OUTPUTS
+    assert space.input_labels == ["road_velocity", "link_velocity"]
+    assert space.output_labels == [each.name for each in RIG_OUTPUTS]
     assert space.state_labels[-2:] == ["road_height", "link_angle"]
     turned = space["link_angle", "link_velocity"](2j * np.pi)
     assert complex(turned) == pytest.approx(1.0 / (2j * np.pi))

@@ -16,7 +16,7 @@ from scipy.linalg import expm
 
 from savgs_ident.control.closed_loop.run import Loop, Signals
 from savgs_ident.control.design import DigitalController
-from savgs_ident.control.linearisation import INPUTS, linearise, resting
+from savgs_ident.control.linearisation import linearise, resting
 from savgs_ident.core.values import Values
 from savgs_ident.plants.profiles import Constant
 from savgs_ident.plants.quarter_car.drive import Drive
@@ -32,7 +32,7 @@ SMALL = 2e-6
 
 FREQUENCIES = (0.5, 1.0, 2.0, 3.5)
 MEASURED = ("sprung_accel", "susp_deflection", "link_angle")
-ROAD, LINK = (INPUTS.index(name) for name in ("road_velocity", "link_velocity"))
+ROAD, LINK = range(2)
 SAMPLE = 1e-3
 
 Matrix = NDArray[np.float64]

@@ -21,6 +21,7 @@ from savgs_ident.export import public
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.plants.base import Excitation, find_rest, nominal_inputs, standing
 from savgs_ident.plants.quarter_car.catalogue import build_model
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.plants.two_mass import TwoMass
@@ -166,7 +167,7 @@ def test_the_export_can_be_read_back(rig: Rig, tmp_path: Path, monkeypatch: pyte
     write = _example("table_export").write_table
     table = public.Exporter("parameters as a table", write)
     monkeypatch.setattr(public, "EXPORTS", {**public.EXPORTS, "table": table})
-    (path,) = public.EXPORTS["table"].write(ExportedModel(rig, ("rail_coulomb",)), tmp_path)
+    (path,) = public.EXPORTS["table"].write(ExportedModel(RigModel(rig, ("rail_coulomb",))), tmp_path)
     lines = path.read_text().splitlines()
     assert lines[0] == "name,value,unit"
     values = {name: float(value) for name, value, _ in (line.split(",") for line in lines[1:])}

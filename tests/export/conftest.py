@@ -8,6 +8,7 @@ import pytest
 
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 
 from ..relaxed import with_kept_programs
@@ -51,4 +52,4 @@ def model(identified: Rig) -> ExportedModel:
         name: value * (1.0 + 0.01 * random.standard_normal(DRAWS))
         for name, value in zip(ESTIMATED, identified.parameters.values_of(ESTIMATED), strict=True)
     }
-    return ExportedModel(identified, effects, samples, MOUNT)
+    return ExportedModel(RigModel(identified, effects), samples, MOUNT)

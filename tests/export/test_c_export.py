@@ -10,7 +10,10 @@ import pytest
 from savgs_ident.export.casadi_export import STEM, write_c
 from savgs_ident.export.exported_model import ExportedModel, casadi_functions, resting_inputs, resting_state
 from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
+
+from .c_library import call
 
 pytestmark = pytest.mark.slow
 
@@ -20,7 +23,7 @@ COMPILER = shutil.which("cc") or shutil.which("gcc")
 @pytest.fixture(scope="module")
 def model(rig: Rig) -> ExportedModel:
     """The rig with its friction."""
-    return ExportedModel(rig, MODELS["simtr"])
+    return ExportedModel(RigModel(rig, MODELS["simtr"]))
 
 
 @pytest.fixture(scope="module")
@@ -37,22 +40,6 @@ def library(model: ExportedModel, tmp_path_factory: pytest.TempPathFactory) -> c
     return ctypes.CDLL(str(shared))
 
 
-def _call(library: ctypes.CDLL, name: str, arguments: list[np.ndarray], size: int) -> np.ndarray:
-    work = (ctypes.c_longlong * 4)()
-    pointers = [ctypes.byref(work, 8 * place) for place in range(4)]
-    assert getattr(library, f"{name}_work")(*pointers) == 0
-    sz_arg, sz_res, sz_iw, sz_w = work
-    result = np.zeros(size)
-    double = ctypes.POINTER(ctypes.c_double)
-    arg, res = (double * sz_arg)(), (double * sz_res)()
-    for place, value in enumerate(arguments):
-        arg[place] = value.ctypes.data_as(double)
-    res[0] = result.ctypes.data_as(double)
-    iw, w = (ctypes.c_longlong * max(sz_iw, 1))(), (ctypes.c_double * max(sz_w, 1))()
-    assert getattr(library, name)(arg, res, iw, w, 0) == 0
-    return result
-
-
 def test_the_compiled_functions_are_the_functions(library: ctypes.CDLL, model: ExportedModel) -> None:
     functions = casadi_functions(model)
     rest, still = np.array(resting_state(model)), np.array(resting_inputs(model))
@@ -63,5 +50,5 @@ def test_the_compiled_functions_are_the_functions(library: ctypes.CDLL, model: E
             x = rest + 1e-2 * random.standard_normal(rest.size)
             u = still + 1e-2 * random.standard_normal(still.size)
             expected = functions[name](x, u, p).full().ravel()
-            reported = _call(library, name, [x, u, p], expected.size)
+            reported = call(library, name, [x, u, p], expected.size)
             assert reported == pytest.approx(expected, rel=1e-9, abs=1e-6)

@@ -19,6 +19,7 @@ from savgs_ident.plants.base import Motion
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.dynamics import Coordinates
 from savgs_ident.plants.quarter_car.forces import Inputs, Link, Road
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.transient import solve_rates
 
@@ -33,7 +34,7 @@ def written(
     rig: Rig, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[ExportedModel, Path]:
     """A model and the folder with its functions."""
-    model = ExportedModel(rig, MODELS[request.param])
+    model = ExportedModel(RigModel(rig, MODELS[request.param]))
     folder = tmp_path_factory.mktemp(request.param)
     write_casadi(model, folder)
     return model, folder

@@ -16,6 +16,7 @@ from savgs_ident.export.fmu_export import base_units, write_fmu
 from savgs_ident.export.json_export import read_model_json
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.inputs import RigSource, flat_road, held_link
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_toml import KNOWN_UNITS
 from savgs_ident.simulate.transient import TransientSolution, simulate_transient, unpack_state
@@ -36,7 +37,7 @@ LIFT, DURATION = 0.02, 2.0
 @pytest.fixture(scope="module")
 def exported(rig: Rig, tmp_path_factory: pytest.TempPathFactory) -> tuple[ExportedModel, Path]:
     """A model and its FMU."""
-    model = ExportedModel(rig, MODELS["simtr"])
+    model = ExportedModel(RigModel(rig, MODELS["simtr"]))
     (file,) = write_fmu(model, tmp_path_factory.mktemp("simtr"))
     return model, file
 
@@ -116,7 +117,7 @@ def test_what_is_known_about_the_model_travels_inside(
     with ZipFile(file) as archive:
         inside = Path(archive.extract(f"{fmu_export.EXTRA}/model.json", tmp_path))
     found = read_model_json(inside)
-    assert found.rig == model.rig
+    assert found.model == model.model
     assert found.effects == model.effects
 
 
@@ -126,7 +127,7 @@ def test_without_the_headers_of_fmi_it_says_what_to_install(
 ) -> None:
     monkeypatch.setattr(fmu_export, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"savgs-ident\[fmu\]"):
-        write_fmu(ExportedModel(rig, ()), tmp_path)
+        write_fmu(ExportedModel(RigModel(rig, ())), tmp_path)
 
 
 @over("unit", sorted(KNOWN_UNITS))

@@ -5,6 +5,7 @@ import copy
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +18,24 @@ from jsonschema import Draft202012Validator
 from savgs_ident.core.errors import InputError
 from savgs_ident.export.document import JsonValue, json_text
 from savgs_ident.export.exported_model import ExportedModel
-from savgs_ident.export.json_export import json_schema, model_record, parse_model, read_model_json, write_json
+from savgs_ident.export.gather import DIAGNOSIS_SCHEMAS
+from savgs_ident.export.json_export import model_record, parse_model, read_model_json, write_json
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig, read_rig, write_rig
 
 from ..in_one_test import over
 from .diagnoses import MOUNT, UNKNOWN
 
 Document = dict[str, Any]
+
+
+def json_schema() -> Document:
+    """The JSON Schema (draft 2020-12) of the document of a quarter car."""
+    schema: Document = json.loads(
+        files("savgs_ident.export").joinpath("model.schema.json").read_text("utf-8")
+    )
+    return schema
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +55,7 @@ def validator() -> Draft202012Validator:
 
 
 def _same(found: ExportedModel, model: ExportedModel) -> None:
-    assert found.rig == model.rig
+    assert found.model == model.model
     assert found.effects == model.effects
     assert found.samples.keys() == model.samples.keys()
     for name, values in model.samples.items():
@@ -65,16 +76,16 @@ def test_the_model_comes_back_to_the_last_digit(model: ExportedModel, tmp_path: 
 def test_a_drawing_comes_back_whatever_its_effects(
     rig: Rig, tmp_path: Path, effects: tuple[str, ...]
 ) -> None:
-    drawing = ExportedModel(rig, effects)
+    drawing = ExportedModel(RigModel(rig, effects))
     (path,) = write_json(drawing, tmp_path)
     _same(read_model_json(path), drawing)
 
 
 def test_a_rig_file_with_fitted_effects_comes_back(model: ExportedModel, tmp_path: Path) -> None:
     """Effects that were fitted stand in the rig's file, and after the round trip, too."""
-    rig = replace(model.rig, parameters=model.table.with_values({"mount_compliance": 2e-6}))
+    rig = replace(model.model.rig, parameters=model.table.with_values({"mount_compliance": 2e-6}))
     write_rig(rig, tmp_path / "model.toml")
-    read = ExportedModel(read_rig(tmp_path / "model.toml"), model.effects)
+    read = ExportedModel(RigModel(read_rig(tmp_path / "model.toml"), model.effects))
     (path,) = write_json(read, tmp_path)
     _same(read_model_json(path), read)
     assert json.loads(path.read_text())["parameters"]["mount_compliance"]["section"] == "effects"
@@ -90,7 +101,7 @@ def test_the_document_holds_what_is_known(document: Document, model: ExportedMod
     k_t = document["parameters"]["k_t"]
     assert (k_t["value"], k_t["unit"], k_t["section"]) == (1.01 * 2.75e5, "N/m", "tyre")
     assert document["parameters"]["mount_compliance"]["section"] == "catalogue"
-    assert document["covariance"] == model.rig.provenance["covariance"]
+    assert document["covariance"] == model.model.rig.provenance["covariance"]
     assert "covariance" not in document["provenance"]
     assert document["samples"]["count"] == 7
     assert document["diagnosis"]["verdict"]["effects"] == ["mount_compliance"]
@@ -113,7 +124,10 @@ def test_documents_are_what_the_schema_describes(
     document: Document, validator: Draft202012Validator, rig: Rig
 ) -> None:
     validator.validate(document)
-    validator.validate(model_record(ExportedModel(rig, (), diagnosis=UNKNOWN)))
+    for schema in DIAGNOSIS_SCHEMAS:
+        validator.validate(
+            model_record(ExportedModel(RigModel(rig, ()), diagnosis=UNKNOWN | {"schema": schema}))
+        )
 
 
 def _set(*place: Any, value: Any) -> Callable[[Document], None]:
@@ -254,14 +268,14 @@ def test_what_is_no_readable_file_is_refused(tmp_path: Path) -> None:
 def test_a_provenance_that_json_cannot_say_is_refused(rig: Rig, tmp_path: Path) -> None:
     dated = replace(rig, provenance={"seen": [float("nan")]})
     with pytest.raises(InputError, match=r"provenance.seen\[0\] is nan, which JSON cannot say"):
-        write_json(ExportedModel(dated, ()), tmp_path)
+        write_json(ExportedModel(RigModel(dated, ())), tmp_path)
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("carried", [{}, 3, {"names": ["k_t"]}, {"names": ["x"], "matrix": [[1.0]]}])
 def test_a_covariance_that_is_none_is_refused(rig: Rig, tmp_path: Path, carried: object) -> None:
     with pytest.raises(InputError, match=r"provenance\.covariance"):
-        write_json(ExportedModel(replace(rig, provenance={"covariance": carried}), ()), tmp_path)
+        write_json(ExportedModel(RigModel(replace(rig, provenance={"covariance": carried}), ())), tmp_path)
 
 
 junk = st.recursive(

@@ -25,6 +25,7 @@ from savgs_ident.export.linear_models import (
     without_friction,
 )
 from savgs_ident.plants.quarter_car.catalogue import EFFECTS, LEARNED, MODELS, build_model
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.ports import RAIL
 from savgs_ident.plants.quarter_car.rig import Rig
 
@@ -41,18 +42,18 @@ def test_friction_is_what_holds_at_rest() -> None:
 
 
 def test_both_are_those_of_the_control_stage(rig: Rig) -> None:
-    model = ExportedModel(rig, MODELS["simtr"])
+    model = ExportedModel(RigModel(rig, MODELS["simtr"]))
     p, bare = as_values(rig.parameters.as_dict()), build_model(rig, ())
     printed = quarter_car_space(paper_masses(bare, p))
     linear = linearise(bare, p, resting(bare, p, p["psi_nominal"]))
-    for found, wanted in ((equation_8(model).space, printed), (exact(model).space, linear)):
+    for found, wanted in ((equation_8(model.model).space, printed), (exact(model).space, linear)):
         for name in "ABCD":
             assert np.array_equal(getattr(found, name), getattr(wanted, name))
         assert found.state_labels == wanted.state_labels
 
 
 def test_every_signal_has_its_unit(model: ExportedModel) -> None:
-    for each in (equation_8(model), exact(model)):
+    for each in (equation_8(model.model), exact(model)):
         space = each.space
         assert set(each.units) == {*space.state_labels, *space.input_labels, *space.output_labels}
     assert exact(model).units["0_mount_deflection"] == "m"
@@ -61,8 +62,8 @@ def test_every_signal_has_its_unit(model: ExportedModel) -> None:
 def _sag(rig: Rig, compliance: float) -> float:
     """Suspension deflection per acceleration of the body [s^2] in a slow motion, on a mount of a compliance [m/N]."""
     effects = (*MODELS["simtr"], "mount_compliance")
-    table = ExportedModel(rig, effects).table.with_values({"mount_compliance": compliance})
-    found = exact(ExportedModel(replace(rig, parameters=table), effects)).response(np.array([1e-3]))
+    table = ExportedModel(RigModel(rig, effects)).table.with_values({"mount_compliance": compliance})
+    found = exact(ExportedModel(RigModel(replace(rig, parameters=table), effects))).response(np.array([1e-3]))
     return float(np.real(found[1, 0, 0] / found[0, 0, 0]))
 
 
@@ -74,14 +75,14 @@ def test_a_mount_that_gives_way_is_in_the_exact_one(rig: Rig) -> None:
     assert softer[1] / softer[0] == pytest.approx(series[1] / series[0], rel=1e-4)
     # Nearly all stiffness is the spring's.
     assert softer[0] == pytest.approx(series[0], rel=0.1)
-    stiff = exact(ExportedModel(rig, MODELS["simtr"])).response(np.array([1e-3]))
+    stiff = exact(ExportedModel(RigModel(rig, MODELS["simtr"]))).response(np.array([1e-3]))
     assert float(np.real(stiff[1, 0, 0] / stiff[0, 0, 0])) == pytest.approx(_sag(rig, 0.0), rel=1e-4)
 
 
 def _with(rig: Rig, effect: str, numbers: dict[str, float]) -> ExportedModel:
     """The rig with an effect of certain numbers [SI]."""
-    table = ExportedModel(rig, (effect,)).table.with_values(numbers)
-    return ExportedModel(replace(rig, parameters=table), (effect,))
+    table = ExportedModel(RigModel(rig, (effect,))).table.with_values(numbers)
+    return ExportedModel(RigModel(replace(rig, parameters=table), (effect,)))
 
 
 def _steepness(model: ExportedModel, effect: Effect, p: Values) -> float:
@@ -139,13 +140,13 @@ def _response(space: Any, frequency: float) -> np.ndarray:
 
 
 def test_the_cam_behind_its_encoder_is_not_linearised(rig: Rig) -> None:
-    model = ExportedModel(rig, ("cam_harmonic", "cam_scale", "rail_viscous"))
+    model = ExportedModel(RigModel(rig, ("cam_harmonic", "cam_scale", "rail_viscous")))
     kept = without_friction(model.equations.model).effects
     assert [effect.name for effect in kept] == ["rail_viscous"]
 
 
 def test_a_response_is_outputs_by_inputs_by_frequencies(model: ExportedModel) -> None:
-    linear = equation_8(model)
+    linear = equation_8(model.model)
     frequency = np.array([1.0, 2.0, 3.0])
     found = linear.response(frequency)
     assert found.shape == (4, 2, 3)

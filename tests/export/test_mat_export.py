@@ -18,6 +18,7 @@ from savgs_ident.core.values import as_values
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.linear_models import linear_models
 from savgs_ident.export.mat_export import write_mat
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 
 FIELD = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
@@ -45,9 +46,9 @@ def test_parameters_come_with_their_units(found: dict[str, Any], model: Exported
 
 
 def test_rig_covariance_and_draws_are_those_of_the_model(found: dict[str, Any], model: ExportedModel) -> None:
-    assert (found["name"], list(found["effects"])) == (model.rig.name, list(model.effects))
-    assert np.array_equal(found["damper"]["velocity"], model.rig.damper_velocity)
-    assert np.array_equal(found["damper"]["force"], model.rig.damper_force)
+    assert (found["name"], list(found["effects"])) == (model.model.rig.name, list(model.effects))
+    assert np.array_equal(found["damper"]["velocity"], model.model.rig.damper_velocity)
+    assert np.array_equal(found["damper"]["force"], model.model.rig.damper_force)
     names, covariance = model.covariance
     assert list(found["covariance"]["names"]) == list(names)
     assert np.array_equal(found["covariance"]["matrix"], covariance)
@@ -58,7 +59,7 @@ def test_rig_covariance_and_draws_are_those_of_the_model(found: dict[str, Any], 
 
 def test_texts_are_json(found: dict[str, Any], model: ExportedModel) -> None:
     assert json.loads(found["diagnosis"]) == model.diagnosis
-    reported = {name: value for name, value in model.rig.provenance.items() if name != "covariance"}
+    reported = {name: value for name, value in model.model.rig.provenance.items() if name != "covariance"}
     assert json.loads(found["provenance"]) == reported
 
 
@@ -114,7 +115,7 @@ def test_every_field_is_a_name_to_matlab(found: dict[str, Any]) -> None:
 def test_a_parameter_that_matlab_cannot_name_is_refused(rig: Rig, tmp_path: Path, name: str) -> None:
     odd = ParameterTable((*rig.parameters.entries, Parameter(name, 1.0, "m")))
     with pytest.raises(InputError, match="cannot be a field in MATLAB"):
-        write_mat(ExportedModel(replace(rig, parameters=odd), ()), tmp_path)
+        write_mat(ExportedModel(RigModel(replace(rig, parameters=odd), ())), tmp_path)
     assert not list(tmp_path.iterdir())
 
 
@@ -122,13 +123,13 @@ def test_a_parameter_that_matlab_cannot_name_is_refused(rig: Rig, tmp_path: Path
 def test_long_names_are_kept(rig: Rig, tmp_path: Path) -> None:
     name = "a" * 63
     long = ParameterTable((*rig.parameters.entries, Parameter(name, 2.0, "m")))
-    (path,) = write_mat(ExportedModel(replace(rig, parameters=long), ()), tmp_path)
+    (path,) = write_mat(ExportedModel(RigModel(replace(rig, parameters=long), ())), tmp_path)
     assert loadmat(path, simplify_cells=True)["parameters"][name]["value"] == 2.0
 
 
 @pytest.mark.slow
 def test_a_drawing_has_nothing_of_a_fit(rig: Rig, tmp_path: Path) -> None:
-    (path,) = write_mat(ExportedModel(rig, ()), tmp_path)
+    (path,) = write_mat(ExportedModel(RigModel(rig, ())), tmp_path)
     found = loadmat(path, simplify_cells=True)
     assert np.size(found["covariance"]["matrix"]) == 0
     assert found["samples"] == {}

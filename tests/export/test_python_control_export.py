@@ -17,6 +17,7 @@ from savgs_ident.export.linear_models import linear_models
 from savgs_ident.export.python_control_export import load_python_control, resting_point, write_python_control
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.inputs import RigSource, cam_road, held_link
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.transient import simulate_transient
 
@@ -175,7 +176,7 @@ def test_a_rest_that_does_not_fit_is_refused(path: Path, tmp_path: Path) -> None
 
 
 def test_a_rig_without_friction_has_the_same_systems(rig: Rig, tmp_path: Path) -> None:
-    (path,) = write_python_control(ExportedModel(rig, MODELS["simqc"]), tmp_path)
+    (path,) = write_python_control(ExportedModel(RigModel(rig, MODELS["simqc"])), tmp_path)
     found = load_python_control(path)
     assert set(found) == {"equation_8", "exact", "nonlinear"}
     # Without friction, the exact linearisation is that of the nonlinear system, for which python-control has its own.

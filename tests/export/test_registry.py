@@ -1,7 +1,9 @@
 """The contract of all formats: what is said to be written is written, whole, and nothing else."""
 
 import importlib
+import shutil
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from savgs_ident.export import public
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.public import EXPORTS
 from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 
 from ..in_one_test import over
@@ -19,13 +22,10 @@ HERE = Path(__file__).parent
 
 
 def _write(name: str, model: ExportedModel, folder: Path) -> tuple[Path, ...]:
-    """Write a format; without what it needs on this machine, the test is skipped."""
-    try:
-        return EXPORTS[name].write(model, folder)
-    except InputError as error:
-        if error.source != f"--to {name}":
-            raise
-        pytest.skip(str(error))
+    """Write a format; where an FMU cannot be compiled, the test is skipped."""
+    if name == "fmu" and (find_spec("fmpy") is None or shutil.which("gcc") is None):
+        pytest.skip("needs FMPy and gcc")
+    return EXPORTS[name].write(model, folder)
 
 
 COMPILED = ("casadi", "c", "fmu", "mat", "python-control")
@@ -92,5 +92,5 @@ def test_a_rig_that_finds_no_rest_is_refused_before_anything_is_written(
     with pytest.raises(
         InputError, match=r"no rest in its nominal state \(link angle 1\.571 rad\)\. Remedy: mend its spring"
     ):
-        _write(name, ExportedModel(soft, MODELS["simtr"]), tmp_path)
+        _write(name, ExportedModel(RigModel(soft, MODELS["simtr"])), tmp_path)
     assert not list(tmp_path.iterdir())

@@ -36,7 +36,6 @@ PARSERS = (
 NO_DATA = {
     "validation.blind_trial.diagnose_folder": "reads back what it has just written, in memory",
     "export.public.diagnosis_document": "reads back what it has just written, in memory",
-    "export.json_export.json_schema": "a file of the package",
     "inference.samplers.nuts.save_state": "writes",
     "inference.samplers.chains.Checkpoint.publish": "writes to the scratch file of its own run",
     "inference.samplers.emcee.sample_by_emcee": "goes on from what open_checkpoint took, as chain-emcee reads it",

@@ -78,6 +78,11 @@ class RigModel:
         return model_parameters(self.rig, self.effects)
 
     @property
+    def provenance(self) -> Mapping[str, Any]:
+        """Where the rig's numbers come from; empty for a drawing."""
+        return self.rig.provenance
+
+    @property
     def is_drawing(self) -> bool:
         """Whether the rig comes from no fit."""
         return "effects" not in self.rig.provenance
