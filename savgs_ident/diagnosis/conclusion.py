@@ -267,8 +267,9 @@ def _fitted_gap(problem: DiagnosisProblem) -> float:
 
 
 def _compared(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> list[LaplaceFit]:
-    """The baseline and the two best fitted hypotheses: those that predict tests that were left out."""
-    return [problem.base, *sorted(evidence.findings.modes, key=lambda each: -each.evidence)[:2]]
+    """The baseline and the best fitted hypotheses: those that predict tests that were left out."""
+    ranked = sorted(evidence.findings.modes, key=lambda each: -each.evidence)
+    return [problem.base, *ranked[: problem.constants.held_out_fits]]
 
 
 def _held_out(

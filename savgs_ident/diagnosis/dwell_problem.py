@@ -287,7 +287,7 @@ class DwellProblem(AbstractProblem):
             for port in self.plant.ports
             if port.damped
             for piece in pieces_of_curve(
-                np.asarray(seen[port.name].velocity), np.asarray(seen[port.name].load)
+                np.asarray(seen[port.name].velocity), np.asarray(seen[port.name].load), self.constants
             )
         ]
         return impose(model, self.likelihood, self.orders, p, warm_start, fields).T
@@ -309,10 +309,10 @@ class DwellProblem(AbstractProblem):
             return {f"learned_{port.name}_fastest": fastest}
         signals, loads = node_loads(self.model(()), self.values(values), warm_start)
         if port.kind is PortKind.FORCE:
-            return spans_of_force(port, signals[port.name])
+            return spans_of_force(port, signals[port.name], self.constants)
         if port.kind is PortKind.SERIES and not port.resonant:
-            carried = largest_with_margin(np.asarray(loads[port.name].beyond_rest))
-            return {f"learned_{port.name}_carried": carried}
+            beyond = np.asarray(loads[port.name].beyond_rest)
+            return {f"learned_{port.name}_carried": largest_with_margin(beyond, self.constants.motion_margin)}
         return None
 
     def gap_map(self, data: Data, rows: NDArray[np.float64]) -> tuple[MapCell, ...]:
@@ -326,7 +326,7 @@ class DwellProblem(AbstractProblem):
     def regimes(self, data: Data, fit: LaplaceFit) -> tuple[Regime, ...]:
         """In which regimes the baseline misses: of the cycle, of the tests, and over time."""
         steady = without_drifts(data, len(self.free))
-        return find_regimes(dwell_cycles(self, fit), data, fit, self.free, steady)
+        return find_regimes(dwell_cycles(self, fit), data, fit, self.free, steady, constants=self.constants)
 
     def loops(
         self,

@@ -8,7 +8,7 @@ import numpy as np
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.model_selection import nearest_effect
-from savgs_ident.diagnosis.result import NONE, UNKNOWN, Verdict
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Verdict
 from savgs_ident.diagnosis.search import hypothesis_of, left_over
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.diagnosis.verdict import alarm_odds, most_probable, probabilities
@@ -43,13 +43,17 @@ def _verdict(
 ) -> Verdict:
     if evidence.kind == "none":
         sentence = _nothing_missing(problem, evidence, gap)
-        nothing = sum(_probability(evidence, str(each)) for each in (NONE, *evidence.immaterial))
+        nothing = sum(_probability(evidence, each) for each in (NONE, *evidence.immaterial))
         return Verdict("none", (), (), (), sentence, probability=nothing)
     if evidence.kind == "unknown":
         ports = evidence.indistinguishable_ports(problem.constants)
         sentence = _something_unknown(problem, evidence, gap)
         offered = evidence.offered
-        families = () if offered is None or offered.location != evidence.port else (str(offered.hypothesis),)
+        families = (
+            ()
+            if offered is None or offered.location != evidence.port
+            else problem.families(offered.hypothesis)
+        )
         return Verdict(
             "unknown",
             (),
@@ -59,7 +63,7 @@ def _verdict(
             ports,
             families=families,
             law_known=False,
-            probability=sum(_probability(evidence, str(each)) for each in (UNKNOWN, *evidence.insufficient)),
+            probability=sum(_probability(evidence, each) for each in (UNKNOWN, *evidence.insufficient)),
         )
     member = evidence.named_law
     if member is not None:
@@ -71,9 +75,9 @@ def _verdict(
             confusable_with=(),
             sentence=_law_missing(problem, evidence, member, nearest, gap),
             confusable_ports=evidence.indistinguishable_ports(problem.constants),
-            families=(str(member.hypothesis),),
+            families=problem.families(member.hypothesis),
             law_known=False,
-            probability=_probability(evidence, str(member.hypothesis)),
+            probability=_probability(evidence, member.hypothesis),
         )
     hypothesis = evidence.chosen.hypothesis
     return Verdict(
@@ -83,15 +87,15 @@ def _verdict(
         confusable_with=tuple(alternatives),
         sentence=_effects_missing(problem, evidence, alternatives, gap),
         families=problem.families(hypothesis),
-        probability=_probability(evidence, str(hypothesis)),
+        probability=_probability(evidence, hypothesis),
     )
 
 
-def _probability(evidence: DiagnosisEvidence, hypothesis: str) -> float:
+def _probability(evidence: DiagnosisEvidence, hypothesis: Hypothesis) -> float:
     """The probability [1] of a hypothesis among all."""
     shares = probabilities(evidence.weighed)
     both = zip(evidence.weighed, shares, strict=True)
-    return float(next(share for each, share in both if str(each.hypothesis) == hypothesis))
+    return float(next(share for each, share in both if each.hypothesis == hypothesis))
 
 
 def _law_missing(

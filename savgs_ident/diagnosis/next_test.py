@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.executor import in_parallel
 from savgs_ident.diagnosis.result import NextTest
+from savgs_ident.diagnosis.search import hypothesis_of
 from savgs_ident.effects.base import AbstractInputLaw
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Prediction
@@ -27,21 +28,15 @@ from savgs_ident.simulate.periodic import PeriodicSolution
 if TYPE_CHECKING:
     from savgs_ident.diagnosis.dwell_problem import DwellProblem
 
-DWELLS = 4
-"""Dwells of a proposed test."""
-
-PROPOSED = 2
-"""Tests that are proposed for a pair."""
-
 
 def next_tests(
     search: Search, problem: "DwellProblem", one: LaplaceFit, other: LaplaceFit
 ) -> tuple[NextTest, ...]:
     """The tests that separate two hypotheses best, most significant first."""
-    pair = " + ".join(one.terms) or "none", " + ".join(other.terms) or "none"
-    drafts = sorted(_drafts(search, problem, one, other), key=lambda each: -each.raw)[:PROPOSED]
+    pair = hypothesis_of(one), hypothesis_of(other)
+    drafts = sorted(_drafts(search, problem, one, other), key=lambda each: -each.raw)
     found = []
-    for draft in drafts:
+    for draft in drafts[: problem.constants.proposed_tests]:
         hertz = ", ".join(f"{f:.3g}" for f in np.sort(np.asarray(problem.excitation.frequency)[draft.tests]))
         text = f"dwells at {hertz} Hz, {draft.condition.text}"
         found.append(NextTest(text, pair, _expected(search, problem, other, draft)))
@@ -70,7 +65,7 @@ def _drafts(search: Search, problem: "DwellProblem", one: LaplaceFit, other: Lap
             return None
         miss = found.rows - rival.rows
         by_test = np.bincount(search.data.test, miss**2 / search.data.variance)
-        tests = np.argsort(by_test)[::-1][:DWELLS]
+        tests = np.argsort(by_test)[::-1][: problem.constants.proposed_dwells]
         return _Draft(condition, tests, miss, float(np.sqrt(by_test[tests].sum())), rival.warm_start)
 
     return [each for each in in_parallel(draft, problem.plant.conditions) if each is not None]

@@ -22,6 +22,7 @@ from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint
 from savgs_ident.diagnosis.motion_problem import MotionProblem, further_motion, motion_problem
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
@@ -43,6 +44,7 @@ def diagnose(
     without: Sequence[str] = (),
     orders: int = 9,
     max_frequency: float | None = None,
+    constants: DecisionConstants = DEFAULTS,
     progress: Progress = no_progress,
 ) -> Diagnosis:
     """Diagnose the sim-to-real gap: where it lies, which unmodelled effect causes it, how far it shrinks.
@@ -59,6 +61,7 @@ def diagnose(
         without: effects to leave out of the catalogue.
         orders: highest harmonic order to compare.
         max_frequency: leave out faster dwells [Hz].
+        constants: what the verdict is decided by, each with its origin: priors, thresholds, limits of the search.
         progress: called with a sentence on what is being done.
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a campaign that cannot be used, for names that
@@ -66,7 +69,7 @@ def diagnose(
     """
     use_persistent_cache()
     if isinstance(measured, DrivenMotion):
-        return _diagnose_motion(model, measured, held_out, without, progress)
+        return _diagnose_motion(model, measured, held_out, without, constants, progress)
     if held_out is not None:
         raise InputError(
             "a held-out motion goes with a measured motion alone", remedy="diagnose each campaign by itself"
@@ -74,12 +77,12 @@ def diagnose(
     response = measured_response(measured, model.plant, orders, max_frequency, progress)
     campaign, warnings = campaign_of(measured), response.warnings
     if isinstance(model, RigModel):
-        rig, settings, values = baseline_of(model, orders, without)
+        rig, settings, values = baseline_of(model, orders, without, constants)
         sweep, found_in_sweep = (None, ()) if campaign is None else first_sweep(campaign, model.plant)
         warnings += found_in_sweep
         found = diagnose_response(response, rig, settings, values, progress, sweep)
     else:
-        given, settings, values = model.before, *_asked(model, orders, without)
+        given, settings, values = model.before, *_asked(model, orders, without, constants)
         bare = replace(model.build(), effects=())
         plant, data = baseline_problem(response, bare, given.table, model.catalogue, settings)
         found = diagnose_dwells(plant, data, response, given, settings, values, progress)
@@ -91,6 +94,7 @@ def _diagnose_motion(
     motion: DrivenMotion,
     held_out: DrivenMotion | None,
     without: Sequence[str],
+    constants: DecisionConstants,
     progress: Progress,
 ) -> Diagnosis:
     """Diagnose a plant from the force of its drive along a measured motion."""
@@ -101,9 +105,11 @@ def _diagnose_motion(
             source=motion.source,
             remedy="give a recording of dwells, or a plant that is driven along the measured motion",
         )
-    settings, values = _asked(model, 0, without)
+    settings, values = _asked(model, 0, without, constants)
     offered = offered_effects(model.catalogue, settings)
-    problem, data = motion_problem(motion, bare, given.table, offered, model.effects, settings.free)
+    problem, data = motion_problem(
+        motion, bare, given.table, offered, model.effects, settings.free, settings.constants
+    )
 
     def predict(there: AbstractProblem, points: Sequence[ModelPoint]) -> FurtherShrink:
         assert isinstance(there, MotionProblem)
@@ -116,18 +122,22 @@ def _diagnose_motion(
 
 
 def baseline_of(
-    model: RigModel, orders: int = 9, without: Sequence[str] = ()
+    model: RigModel,
+    orders: int = 9,
+    without: Sequence[str] = (),
+    constants: DecisionConstants = DEFAULTS,
 ) -> tuple[Rig, DiagnosisSettings, Mapping[str, float]]:
     """The rig as known before its own fit, what the baseline is, and the values that it is given with [SI]."""
-    return model.before.rig, *_asked(model, orders, without)
+    return model.before.rig, *_asked(model, orders, without, constants)
 
 
 def _asked(
-    model: Model, orders: int, without: Sequence[str]
+    model: Model, orders: int, without: Sequence[str], constants: DecisionConstants
 ) -> tuple[DiagnosisSettings, Mapping[str, float]]:
     """What the baseline is, and the values that it is given with [SI]."""
     free, values = (model.free(), {}) if model.is_drawing else model.identified
-    return DiagnosisSettings(model.name, model.effects, free, orders, tuple(without)), values
+    settings = DiagnosisSettings(model.name, model.effects, free, orders, tuple(without), constants=constants)
+    return settings, values
 
 
 SIMTR = DiagnosisSettings("simtr", MODELS["simtr"], FREE)

@@ -162,7 +162,7 @@ def singles_among(
     tried = {mode.terms for mode in findings.modes}
     fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
     others = [term for term in wanted if (term.name,) not in tried]
-    singles = fits.extended(findings.base, score_terms(search, findings.base, others))
+    singles = fits.extended(findings.base, score_terms(search, findings.base, others, constants))
     more = _findings(
         findings.base, findings.scores, fits.refined([*findings.modes, *singles]), findings.sensitivities
     )
@@ -192,7 +192,7 @@ def pairs_with(
                 for term in partners
                 if term.name not in parent.terms and hypothesis_of(parent).with_effect(term.name) not in tried
             ]
-            pairs += fits.extended(parent, score_terms(search, parent, others))
+            pairs += fits.extended(parent, score_terms(search, parent, others, constants))
     more = _findings(
         findings.base, findings.scores, fits.refined([*findings.modes, *pairs]), findings.sensitivities
     )
@@ -350,9 +350,9 @@ def _with_partners(
         for name, term in fits.terms.items()
         if name not in parent.terms and alone.with_effect(name) not in tried
     ]
-    scores = score_terms(fits.search, parent, others)
+    scores = score_terms(fits.search, parent, others, fits.constants)
     worth = [each for each in scores if each.evidence > max(parent.evidence, least)]
-    return fits.extended(parent, worth[: fits.constants.partners])
+    return fits.extended(parent, worth[: fits.constants.pairs_per_parent])
 
 
 def _with_other_partners(
@@ -394,7 +394,8 @@ def _with_small_partners(
     a fit.
     """
     others = [term for name, term in fits.terms.items() if name not in parent.terms]
-    scores = scores_of(fits.search, parent, others, [sensitivities[term.name] for term in others])
+    known = [sensitivities[term.name] for term in others]
+    scores = scores_of(fits.search, parent, others, known, fits.constants)
     least = parent.evidence + fits.constants.promising_log_evidence
     worth = [each for each in scores if each.evidence > least]
-    return fits.extended(parent, worth[: fits.constants.partners])
+    return fits.extended(parent, worth[: fits.constants.pairs_per_parent])

@@ -16,7 +16,7 @@ from savgs_ident.diagnosis.conclusion import settle
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
-from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, PortFamily
 from savgs_ident.diagnosis.score_test import PriorConflict
 from savgs_ident.diagnosis.search import Findings, LostHypothesis
 from savgs_ident.diagnosis.thresholds import DEFAULTS
@@ -34,6 +34,7 @@ from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.ports import FORCE_PORTS, LOCATION_WORDS
 
 GAP = Shrink(0.3, 0.04, 0.002, 0.0015, 0.99, (0.98, 1.0))
+RAIL_FRICTION = PortFamily("rail", Family.FRICTION)
 RAIL: Any = SimpleNamespace(name="rail", share=0.9, evidence=50.0)
 PROBLEM: Any = SimpleNamespace(
     constants=DEFAULTS,
@@ -42,8 +43,12 @@ PROBLEM: Any = SimpleNamespace(
     words=lambda location: LOCATION_WORDS[location],
     location=lambda name: CATALOGUE[name].port.location,
     locations=lambda hypothesis: tuple(CATALOGUE[name].port.location for name in hypothesis.effects),
-    families=lambda hypothesis: tuple(
-        f"{CATALOGUE[name].port.location}/{CATALOGUE[name].law.family.value}" for name in hypothesis.effects
+    families=lambda hypothesis: (
+        tuple(
+            PortFamily(CATALOGUE[name].port.location, CATALOGUE[name].law.family)
+            for name in hypothesis.effects
+        )
+        or (hypothesis.flexible,)
     ),
 )
 
@@ -153,7 +158,7 @@ def test_a_number_is_one_with_a_law_of_which_it_is_the_linear_part() -> None:
     problem = DiagnosisProblem(plant, absent, absent, absent, absent)
 
     def families(*effects: str) -> tuple[str, ...]:
-        return problem.families(Hypothesis(effects))
+        return tuple(map(str, problem.families(Hypothesis(effects))))
 
     assert families("tyre_stiffening", "tyre_stiffness") == ("tyre_radial/stiffness",)
     assert families("tyre_stiffening", "tyre_damping") == ("tyre_radial/stiffness", "tyre_radial/number")
@@ -178,7 +183,7 @@ def test_a_tolerance_that_does_not_hold_is_named(weights: dict[str, float], star
 
 def test_a_law_that_the_catalogue_does_not_have_is_reported_with_the_nearest_formula() -> None:
     weights = {"none": 0.0, "unknown": 100.0, "rail_stribeck": 900.0}
-    hypothesis = Hypothesis(flexible="rail/friction")
+    hypothesis = Hypothesis(flexible=RAIL_FRICTION)
     mode = _mode(990.0, "learned_rail")
     law: Any = SimpleNamespace(mode=mode, port=CATALOGUE["rail_stribeck"].port, family=Family.FRICTION)
     member = FlexibleMember(law, 980.0, 0.004)
@@ -190,7 +195,7 @@ def test_a_law_that_the_catalogue_does_not_have_is_reported_with_the_nearest_for
         patch.setattr(narrative, "left_over", lambda *args: 0.04)
         verdict = write_verdict(problem, evidence, (), GAP)
     assert verdict.effects == ("rail_stribeck",)
-    assert verdict.families == ("rail/friction",)
+    assert verdict.families == (RAIL_FRICTION,)
     assert not verdict.law_known
     assert verdict.probability == pytest.approx(1.0)
     assert verdict.sentence.startswith(
