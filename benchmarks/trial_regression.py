@@ -140,7 +140,7 @@ def regressions_of(measured: HarmonicResponse, rig: Rig) -> dict[Variant, Regres
     plant, data = quarter_car_problem(measured, rig, SIMTR)
     problem = recalibrate(plant, data, {}, lambda line: None)
     base, terms = problem.base, problem.plant.candidates
-    changes = problem.plant.columns((), base.values, base.prediction.warm_start, terms)
+    changes = problem.plant.sensitivities((), base.values, base.prediction.warm_start, terms)
     columns: dict[Shapes, _Columns] = {
         "typical": _columns(terms, [each[len(each) // 2 :][:1] for each in changes]),
         "tried": _columns(terms, changes),

@@ -1,9 +1,9 @@
 """The background: small errors that every model has, in every hypothesis, so that they are no gap.
 
 No table of a damper is exact, no recorded road arrives without a phase error, no friction is the same at the end of a
-campaign. Such errors are small, and many rows of the data share them; rows taken for independent would turn each into
-tens of nats of evidence for something missing. So all hypotheses, *nothing is missing* among them, carry the same
-random errors, each normal about zero:
+campaign. Such errors are small, and many rows of the data share them; rows treated as independent would turn each
+into tens of nats of evidence for something missing. So all hypotheses, *nothing is missing* among them, carry the
+same random errors, each normal about zero:
 
     at a port     any sum of the functions that a law there may consist of
     at an input   amplitude and phase, in each test their own

@@ -22,7 +22,7 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import joint_status
 from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.background import pieces_of_curve, with_background, without_drifts
-from savgs_ident.diagnosis.effect_sensitivities import columns_with_states, impose, node_loads, rehearse
+from savgs_ident.diagnosis.effect_sensitivities import impose, node_loads, rehearse, sensitivities_with_states
 from savgs_ident.diagnosis.gap import CyclePosition, MapCell, cycle_positions, gap_map
 from savgs_ident.diagnosis.localisation import InputLocation, Localisation
 from savgs_ident.diagnosis.location_hypotheses import input_locations
@@ -198,7 +198,7 @@ class DwellProblem(AbstractProblem):
         """The problem with rows as they are on finitely many nodes."""
         return replace(self, corrections={})
 
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""
@@ -208,11 +208,11 @@ class DwellProblem(AbstractProblem):
             some = [term for term in candidates if len(term.tried) > one]
             shapes = {name: value for term in some for name, value in term.tried[one].items()}
             p = placed(self.values(dict(values) | shapes))
-            for term, columns in self._columns(model, p, warm_start, some).items():
+            for term, columns in self._sensitivities(model, p, warm_start, some).items():
                 found[term].append(columns)
         return [np.stack(found[term.name]) for term in candidates]
 
-    def _columns(
+    def _sensitivities(
         self, model: AbstractPlant, p: Values, warm_start: PeriodicSolution, candidates: Sequence[Term]
     ) -> dict[str, NDArray[np.float64]]:
         """The same for the shapes in ``p``, by name, (m, amplitudes)."""
@@ -228,7 +228,9 @@ class DwellProblem(AbstractProblem):
             {each.name: each.centre + size * each.scale for each in term.amplitudes} for term in with_states
         ]
         effects = [self.catalogue[term.name] for term in with_states]
-        moved = columns_with_states(model, self.likelihood, self.orders, p, warm_start, effects, typical)
+        moved = sensitivities_with_states(
+            model, self.likelihood, self.orders, p, warm_start, effects, typical
+        )
         for term, rows in zip(with_states, moved, strict=True):
             found[term.name] = rows[:, None] / (size * term.amplitudes[0].scale)
         return found

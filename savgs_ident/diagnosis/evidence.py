@@ -76,7 +76,7 @@ class DiagnosisProblem:
         found = ((place, whole if (place, whole) in laws else family) for place, whole, family in wholes)
         return tuple(dict.fromkeys(PortFamily(place, family) for place, family in found))
 
-    def words(self, location: str) -> str:
+    def location_text(self, location: str) -> str:
         """What a reader calls a location."""
         return self.plant.plant.location_words.get(location, location)
 

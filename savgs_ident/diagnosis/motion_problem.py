@@ -112,17 +112,17 @@ class MotionProblem(AbstractProblem):
         rows = self.motion.rows(np.asarray(needed.force))
         return Prediction(rows, self._slopes(model, p, names), status, warm_start)
 
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""
         base = self.predict(terms, values, (), warm_start).rows
         return [
-            np.stack([self._columns(terms, dict(values) | shapes, base, term) for shapes in term.tried])
+            np.stack([self._sensitivities(terms, dict(values) | shapes, base, term) for shapes in term.tried])
             for term in candidates
         ]
 
-    def _columns(
+    def _sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], base: NDArray[np.float64], term: Term
     ) -> NDArray[np.float64]:
         """The same at given shapes: slopes at the null, or the secant to the typical size of one that has states."""

@@ -106,8 +106,8 @@ def _law_missing(
     gap: Shrink,
 ) -> str:
     sentence = (
-        f"The model lacks something at the {problem.words(member.location)}: {_KINDS[member.family]}, by a law that "
-        "the catalogue does not have."
+        f"The model lacks something at the {problem.location_text(member.location)}: {_KINDS[member.family]}, "
+        "by a law that the catalogue does not have."
     )
     sentence += _shrinking(evidence, gap, "a law learned there")
     fits = [mode for mode in evidence.findings.modes if mode.terms == (nearest,)]
@@ -134,12 +134,12 @@ def _words(problem: DiagnosisProblem, effect: str) -> str:
 
 
 def _not_apart(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> str:
-    """The ports that the campaign cannot tell from that of something that the catalogue lacks."""
-    ports = [problem.words(each) for each in evidence.indistinguishable_ports(problem.constants)]
+    """The ports that the campaign cannot distinguish from that of something that the catalogue lacks."""
+    ports = [problem.location_text(each) for each in evidence.indistinguishable_ports(problem.constants)]
     if not ports:
         return ""
     others = " or the ".join(ports)
-    return f" This campaign cannot distinguish the {problem.words(evidence.port)} from the {others}."
+    return f" This campaign cannot distinguish the {problem.location_text(evidence.port)} from the {others}."
 
 
 _KINDS = {
@@ -191,7 +191,7 @@ def _evidence_against(odds: float, constants: DecisionConstants) -> str:
 
 def _something_unknown(problem: DiagnosisProblem, evidence: DiagnosisEvidence, gap: Shrink) -> str:
     found = evidence.localisation
-    where = problem.words(found.name)
+    where = problem.location_text(found.name)
     sentence = "The model lacks something that no effect of the catalogue explains: "
     if gap.after < gap.recalibrated:
         sentence += (
@@ -216,7 +216,7 @@ def _nearest(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> str:
         return (
             f" {start} model would need `{conflict.parameter}` {abs(conflict.tolerances):.1f} tolerances "
             f"{'above' if conflict.tolerances > 0.0 else 'below'} its data sheet, which acts at the "
-            f"{problem.words(evidence.port)}."
+            f"{problem.location_text(evidence.port)}."
         )
     effects = hypothesis_of(most_probable(evidence.findings, problem.constants)).effects
     if not effects:
@@ -235,7 +235,7 @@ def _effects_missing(
 ) -> str:
     effects = evidence.chosen.hypothesis.effects
     one = len(effects) == 1
-    places = [problem.words(problem.location(name)) for name in effects]
+    places = [problem.location_text(problem.location(name)) for name in effects]
     words = [_words(problem, name) for name in effects]
     if one:
         sentence = f"The model lacks something at the {places[0]}: {words[0]}."
@@ -302,7 +302,7 @@ def write_warnings(
                 f"{'above' if conflict.tolerances > 0.0 else 'below'} its data sheet."
             )
         else:
-            found.append("Something more may be missing that is too small to be told what it is.")
+            found.append("Something more may be missing that is too small to be identified.")
     if evidence.kind in ("effect", "several") and evidence.left_by_named > constants.reported_share:
         found.append(
             f"The named effects leave {100.0 * evidence.left_by_named:.1f} % of the baseline's misfit beyond the "

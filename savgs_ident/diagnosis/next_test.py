@@ -1,7 +1,7 @@
 """The next test: the one that would best distinguish two hypotheses that this campaign hardly distinguishes.
 
 Both are taken as fitted to this campaign and predict further ones, under each of the conditions that the plant
-declares: a larger input, another mean of one, more payload. The difference that the rival could not make up by
+declares: a larger input, another mean of one, more payload. The difference that the other one could not make up by
 moving its parameters as far as this campaign allows, in units of the noise, is the significance to expect.
 """
 
@@ -44,9 +44,9 @@ def next_tests(
 
 
 class _Draft(NamedTuple):
-    """A test under a condition: its most telling dwells, what the hypotheses differ by, rival's motions.
+    """A test under a condition: its most significant dwells, what the hypotheses differ by, motions of the second.
 
-    ``raw`` is the significance that the rival's own freedom has not been taken from yet.
+    ``raw`` is the significance before the second hypothesis has moved its parameters.
     """
 
     condition: OperatingCondition
@@ -60,13 +60,13 @@ def _drafts(search: Search, problem: "DwellProblem", one: LaplaceFit, other: Lap
     """A draft for every condition under which both hypotheses can be solved."""
 
     def draft(condition: OperatingCondition) -> _Draft | None:
-        found, rival = (predicted(problem, mode, condition) for mode in (one, other))
-        if not (found.solved and rival.solved):
+        found, second = (predicted(problem, mode, condition) for mode in (one, other))
+        if not (found.solved and second.solved):
             return None
-        miss = found.rows - rival.rows
+        miss = found.rows - second.rows
         by_test = np.bincount(search.data.test, miss**2 / search.data.variance)
         tests = np.argsort(by_test)[::-1][: problem.constants.proposed_dwells]
-        return _Draft(condition, tests, miss, float(np.sqrt(by_test[tests].sum())), rival.warm_start)
+        return _Draft(condition, tests, miss, float(np.sqrt(by_test[tests].sum())), second.warm_start)
 
     return [each for each in in_parallel(draft, problem.plant.conditions) if each is not None]
 
@@ -117,11 +117,11 @@ def _of_an_input_at_rest(terms: Sequence[str], problem: "DwellProblem") -> dict[
 
 
 def _expected(search: Search, problem: "DwellProblem", other: LaplaceFit, draft: _Draft) -> float:
-    """Significance of a draft once the rival has moved its parameters as far as the campaign allows."""
+    """Significance of a draft once the second hypothesis has moved its parameters as far as the campaign allows."""
     names = [each.name for each in other.coordinates]
-    rival = predicted(problem, other, draft.condition, names, draft.warm_start)
+    second = predicted(problem, other, draft.condition, names, draft.warm_start)
     chosen = np.isin(search.data.test, draft.tests)
-    slopes = (rival.slopes * slopes_at(other.coordinates, other.x))[chosen]
+    slopes = (second.slopes * slopes_at(other.coordinates, other.x))[chosen]
     spread = np.diag(search.data.variance[chosen]) + slopes @ other.covariance() @ slopes.T
     miss = draft.miss[chosen]
     return float(np.sqrt(miss @ np.linalg.solve(spread, miss)))

@@ -208,7 +208,7 @@ class AbstractProblem(ABC):
         """Rows with ``terms`` at ``values`` [SI], with slopes in ``names``, from ``warm_start``."""
 
     @abstractmethod
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""

@@ -3,7 +3,7 @@
 A regime is a part of what was recorded. Within the cycle it is a third of the instants of every test, by the speed,
 the displacement or the load at a port, or the half in which the port moves in one direction; among tests it is a
 third of them, by frequency or by the size of the response. Regimes of which nine tenths coincide in a campaign cannot
-be told apart by it and are one: where the port moves like a sine, the instants of high speed are those of small
+be distinguished by it and are one: where the port moves like a sine, the instants of high speed are those of small
 stroke.
 
 For a regime R of a residual waveform w (test d, channel c, instant i) the statistic is
@@ -65,7 +65,7 @@ INSTANTS = 64
 
 @dataclass(frozen=True)
 class Cycles:
-    """The waveforms of D tests in C channels at I instants, and what regimes are told apart by.
+    """The waveforms of D tests in C channels at I instants, and what distinguishes regimes.
 
     Attributes:
         waves: turns rows (S, m) [unit of the reading] into waveforms (S, D, C, I); zero where nothing is compared.

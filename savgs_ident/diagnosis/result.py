@@ -136,7 +136,7 @@ class Regime:
     """The gap of the recalibrated baseline in a part of what was recorded.
 
     Attributes:
-        name: what distinguishes that part; several joined by "or" where this campaign cannot tell them apart.
+        name: what distinguishes that part; several joined by "or" where this campaign cannot distinguish them.
         gap_percent: relative rms of the residual there, beyond the noise [%].
         p_value: probability of a misfit as concentrated there by chance, corrected for all regimes looked at.
     """

@@ -194,7 +194,7 @@ class SurrogatePlant:
         """Nothing is started from nearby. Values are in SI."""
         return
 
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """Nothing may be added."""

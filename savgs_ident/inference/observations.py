@@ -90,7 +90,7 @@ class Plant(Protocol):
     def refined(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any) -> Any:
         """What to start from nearby, made as precise as it can be. Values are in SI."""
 
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """First-order change of the rows per unit of each candidate's amplitudes, wherever it is tried.

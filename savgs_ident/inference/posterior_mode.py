@@ -162,7 +162,7 @@ class CasePlant:
         p = problem.parameters(problem.free.to_unconstrained(values))
         return adapt(problem.model, p, warm_start, warm_start.mesh.layout, problem.iterations)
 
-    def columns(
+    def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """Nothing may be added."""

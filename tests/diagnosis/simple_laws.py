@@ -25,7 +25,7 @@ def assert_a_law_of_one_function(
     places = input_locations(plant, (), plant.values(values), start)
     (place,) = (each for each in places if each.name == port)
     (term,) = (each for each in plant.candidates if each.name == effect)
-    (columns,) = plant.columns((), values, start, [term])
+    (columns,) = plant.sensitivities((), values, start, [term])
     change = columns[0][:, 0] / data.discrepancy_scale
     laws = [each.columns[:, 0] / data.discrepancy_scale for each in place.laws if each.columns.shape[1] == 1]
     alike = [abs(law @ change) / np.linalg.norm(law) for law in laws if np.any(law)]

@@ -97,7 +97,7 @@ def test_the_column_of_a_mount_is_that_of_the_model_that_has_one(
 ) -> None:
     plant, data = plant_and_data
     term = _term(plant, "mount_compliance")
-    (columns,) = plant.columns((), {}, start, [term])
+    (columns,) = plant.sensitivities((), {}, start, [term])
     assert columns.shape == (len(MULTIPLES), data.measured.size, len(term.amplitudes))
     amplitude = term.amplitudes[0]
     small = 0.02 * amplitude.scale
@@ -139,7 +139,7 @@ def test_a_force_that_is_imposed_acts_like_the_effect_that_makes_it(
     ports, _ = node_loads(plant.complete(()), p, start)
     wave = -np.asarray(ports["rail"].velocity)
     imposed = impose(plant.complete(()), plant.likelihood, plant.orders, p, start, [("rail", wave)])[0]
-    (columns,) = plant.columns((), {}, start, [_term(plant, "rail_viscous")])
+    (columns,) = plant.sensitivities((), {}, start, [_term(plant, "rail_viscous")])
     assert _relative(imposed, columns[0][:, 0], data) < 1e-6
 
 
@@ -159,7 +159,7 @@ def test_every_port_is_a_place_and_explains_what_acts_there(
         ("bushing_stiffness", "suspension"),
         ("accel_gain", "sensor.sprung_accel"),
     ):
-        (columns,) = plant.columns((), {}, start, [_term(plant, effect)])
+        (columns,) = plant.sensitivities((), {}, start, [_term(plant, effect)])
         change = columns[0][:, 0] * weight
 
         def left(name: str, change: np.ndarray = change) -> float:

@@ -100,5 +100,5 @@ def test_an_effect_with_states_is_scored_at_its_typical_size_whatever_the_width_
             motion, si.Axis(), model.table, model.catalogue, free=model.free(), constants=constants
         )
         term = next(each for each in problem.candidates if problem.catalogue[each.name].states)
-        problem.columns((), {}, None, (term,))
+        problem.sensitivities((), {}, None, (term,))
     assert sizes == pytest.approx([sizes[0]] * len(sizes))

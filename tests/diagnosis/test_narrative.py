@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis import narrative
-from savgs_ident.diagnosis.conclusion import settle
+from savgs_ident.diagnosis.conclusion import decide_by_held_out
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
@@ -40,7 +40,7 @@ PROBLEM: Any = SimpleNamespace(
     constants=DEFAULTS,
     plant=SimpleNamespace(catalogue=CATALOGUE),
     drifts={},
-    words=lambda location: LOCATION_WORDS[location],
+    location_text=lambda location: LOCATION_WORDS[location],
     location=lambda name: CATALOGUE[name].port.location,
     locations=lambda hypothesis: tuple(CATALOGUE[name].port.location for name in hypothesis.effects),
     families=lambda hypothesis: (
@@ -108,8 +108,8 @@ def test_what_predicts_no_tests_is_unknown_at_its_port() -> None:
     strut: Any = SimpleNamespace(name="strut", share=0.9, evidence=60.0)
     evidence = replace(evidence, kind="effect", localisations=(strut, RAIL))
     gap = replace(GAP, after=0.05)
-    settled = settle(evidence, gap, gap.recalibrated, named=("rail",))
-    verdict = write_verdict(PROBLEM, settled, (), gap)
+    decided = decide_by_held_out(evidence, gap, gap.recalibrated, named=("rail",))
+    verdict = write_verdict(PROBLEM, decided, (), gap)
     assert (verdict.kind, verdict.ports) == ("unknown", ("rail",))
     # To first order a law at the strut explains more: it is not ruled out.
     assert verdict.confusable_ports == ("strut",)
@@ -223,7 +223,7 @@ def test_nothing_missing_is_reported_with_what_speaks_against_it(odds: float, re
     assert sentence.count(".") >= 2 + bool(reported)
 
 
-def test_what_could_not_be_decided_or_settled_is_a_warning() -> None:
+def test_what_could_not_be_evaluated_or_refitted_is_a_warning() -> None:
     evidence = _evidence(
         "unknown",
         "law",
@@ -281,8 +281,8 @@ def test_no_verdict_contradicts_its_numbers(
     gap = Shrink(before, recalibrated, after, floor, 0.9, (0.8, 1.0), scatter=scatter)
     # Tests that were held out are predicted worse than tests that were not.
     fitted = max((1.0 - worse) * recalibrated, floor)
-    settled = settle(replace(evidence, kind=kind, chosen=chosen), gap, fitted, named=("rail",))
-    verdict = write_verdict(PROBLEM, settled, (), gap)
+    decided = decide_by_held_out(replace(evidence, kind=kind, chosen=chosen), gap, fitted, named=("rail",))
+    verdict = write_verdict(PROBLEM, decided, (), gap)
     by_chance = DEFAULTS.sure_of_gap * scatter
     large = fitted**2 - floor**2 > DEFAULTS.material_share**2 + by_chance
     explained = left <= DEFAULTS.explained_share and change >= DEFAULTS.material_share_of_test
