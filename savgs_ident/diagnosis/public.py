@@ -1,7 +1,7 @@
 """What is missing in a model: the diagnosis of any plant (``import savgs_ident`` offers it), and of the quarter car.
 
 A response of dwells is diagnosed by the periodic motions of the plant, a measured motion by the force of its drive.
-The rig brings its catalogue along, and what a diagnosis of it may ask for.
+The model says which effects may be missing in its plant, and which such plants are known to have together.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,10 +25,8 @@ from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.model import Model
-from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
-from savgs_ident.plants.quarter_car.forces import damper_curve
+from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
-from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
@@ -76,17 +74,19 @@ def diagnose(
         )
     response = measured_response(measured, model.plant, orders, max_frequency, progress)
     campaign, warnings = campaign_of(measured), response.warnings
-    if isinstance(model, RigModel):
-        rig, settings, values = baseline_of(model, orders, without, constants)
-        sweep, found_in_sweep = (None, ()) if campaign is None else first_sweep(campaign, model.plant)
-        warnings += found_in_sweep
-        found = diagnose_response(response, rig, settings, values, progress, sweep)
-    else:
-        given, settings, values = model.before, *_asked(model, orders, without, constants)
-        bare = replace(model.build(), effects=())
-        plant, data = baseline_problem(response, bare, given.table, model.catalogue, settings)
-        found = diagnose_dwells(plant, data, response, given, settings, values, progress)
-    return replace(found, origin=model.origin(campaign, warnings))
+    given, settings, values = model.before, *_asked(model, orders, without, constants)
+    sweep, found_in_sweep = (None, ()) if campaign is None else first_sweep(campaign, model.plant)
+    plant, data = _dwell_problem(given, response, settings)
+    found = diagnose_dwells(plant, data, response, given, settings, values, progress, sweep)
+    return replace(found, origin=model.origin(campaign, (*warnings, *found_in_sweep)))
+
+
+def _dwell_problem(
+    given: Model, measured: HarmonicResponse, settings: DiagnosisSettings
+) -> tuple[DwellProblem, Data]:
+    """A plant as known before any fit, with the effects that may be missing in it, and the response as data."""
+    bare = replace(given.build(), effects=())
+    return baseline_problem(measured, bare, given.table, given.candidates, settings, given.known_models)
 
 
 def _diagnose_motion(
@@ -106,7 +106,7 @@ def _diagnose_motion(
             remedy="give a recording of dwells, or a plant that is driven along the measured motion",
         )
     settings, values = _asked(model, 0, without, constants)
-    offered = offered_effects(model.catalogue, settings)
+    offered = offered_effects(given.candidates, settings)
     problem, data = motion_problem(
         motion, bare, given.table, offered, model.effects, settings.free, settings.constants
     )
@@ -163,8 +163,8 @@ def diagnose_response(
     that do not exist, and for a rig whose baseline has no periodic motion.
     """
     settings = settings or SIMTR
-    plant, data = quarter_car_problem(measured, rig, settings)
     given = RigModel(rig, settings.baseline)
+    plant, data = _dwell_problem(given, measured, settings)
     return diagnose_dwells(plant, data, measured, given, settings, values or {}, progress, sweep, watch)
 
 
@@ -176,6 +176,4 @@ def quarter_car_problem(
     Raises :class:`InputError` for effects that do not exist, for effects of the baseline that are to be left out, and
     for a response that cannot be used.
     """
-    return baseline_problem(
-        measured, QuarterCar(damper_curve(rig)), rig.parameters, CATALOGUE, settings, MODELS.values()
-    )
+    return _dwell_problem(RigModel(rig, settings.baseline), measured, settings)
