@@ -89,7 +89,7 @@ class AbstractProblem(ABC):
         baseline: names of those that the baseline has.
         free: names of the parameters that the baseline identifies.
         models: sets of effects that such plants are known to have together.
-        constants: how wide the priors of effects are.
+        constants: what the diagnosis decides by, the widths of the priors of effects among them.
     """
 
     plant: AbstractPlant

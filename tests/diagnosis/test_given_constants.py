@@ -71,10 +71,34 @@ def test_constants_reach_the_diagnosis_of_every_plant(
 FILES = sorted(Path(str(diagnosis.__file__)).parent.glob("*.py"))
 
 
-@over("file", FILES)
-def test_no_function_decides_by_the_defaults_where_it_is_given_others(file: Path) -> None:
+TREES = {file.name: ast.parse(file.read_text()) for file in FILES}
+
+
+def _takes_constants(function: ast.FunctionDef) -> bool:
+    return any(each.arg == "constants" for each in (*function.args.args, *function.args.kwonlyargs))
+
+
+DECIDING = {
+    each.name
+    for tree in TREES.values()
+    for each in tree.body
+    if isinstance(each, ast.FunctionDef) and _takes_constants(each)
+}
+"""Functions of the diagnosis that decide by constants."""
+
+
+@over("file", TREES)
+def test_no_call_leaves_the_constants_out(file: str) -> None:
+    assert {"score_terms", "scores_of", "laws_of_functions", "motion_problem"} <= DECIDING
+    for call in ast.walk(TREES[file]):
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in DECIDING:
+            assert "constants" in ast.unparse(call), f"line {call.lineno}"
+
+
+@over("file", TREES)
+def test_no_function_decides_by_the_defaults_where_it_is_given_others(file: str) -> None:
     """The defaults are those of arguments and fields alone."""
-    for function in ast.walk(ast.parse(file.read_text())):
+    for function in ast.walk(TREES[file]):
         if isinstance(function, ast.FunctionDef):
             read = {
                 each.id for line in function.body for each in ast.walk(line) if isinstance(each, ast.Name)
