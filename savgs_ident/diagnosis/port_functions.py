@@ -22,7 +22,7 @@ from savgs_ident.effects.learned_functions import (
     OF_THE_MOTION,
     OF_WHAT_GIVES,
     STRETCHES,
-    Motion,
+    RelativeMotion,
     filters,
     values_of,
     what_gives,
@@ -194,7 +194,7 @@ def motion_functions(
     x, d, v, n = (jnp.asarray(each / max(float(np.abs(each).max()), np.finfo(float).tiny)) for each in seen)
     without = (*OF_THE_MOTION, *(OF_THE_LOAD if loaded else ()))
     functions = (*without, *OF_SLIDERS[: len(held)])
-    motion = Motion(x, d, v, n, held=[jnp.asarray(each) for each in held])
+    motion = RelativeMotion(x, d, v, n, held=[jnp.asarray(each) for each in held])
     values = [np.asarray(each) for each in values_of(functions, motion)]
     plain = (*PLAIN_FORCES, *([_LOADED_FRICTION] if loaded else []))
     sliders = range(len(without), len(functions))

@@ -56,8 +56,8 @@ from savgs_ident.effects.learned_functions import (
     SMALLEST,
     STRETCHES,
     TURN,
-    Motion,
     RelativeAngle,
+    RelativeMotion,
     filters,
     functions_at,
     values_of,
@@ -128,7 +128,7 @@ class LearnedForce(AbstractForceLaw):
         whole = jnp.abs(v["middle"]) + v["stroke"]
         d = jnp.clip(signals.displacement / whole, -1.0, 1.0)
         held = [-each.force for each in self._sliders(signals, state)]
-        seen = Motion(x, d, speed, n, v["turn"], held)
+        seen = RelativeMotion(x, d, speed, n, v["turn"], held)
         return self.port.sense * _sum(v, values_of(functions_at(self.port), seen))
 
     def rate(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:

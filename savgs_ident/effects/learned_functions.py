@@ -23,8 +23,8 @@ class Function(NamedTuple):
     Attributes:
         words: the function in words.
         family: the family to which it belongs.
-        value: the function [1] of what is seen: a :class:`Motion`, a :class:`RelativeLoad`, a :class:`RelativeAngle`
-            or s [rad/s].
+        value: the function [1] of what is seen: a :class:`RelativeMotion`, a :class:`RelativeLoad`, a
+            :class:`RelativeAngle` or s [rad/s].
         interaction: whether it is a product of the displacement and the velocity.
     """
 
@@ -57,7 +57,7 @@ SMALLEST = 1e-9
 
 
 @dataclass(frozen=True)
-class Motion:
+class RelativeMotion:
     """What functions of a force port are made of, relative to its range [1], (...) each.
 
     Attributes:
@@ -177,7 +177,7 @@ OF_THE_MOTION = (
     Function("d^5", Family.STIFFNESS, lambda m: m.d**5),
     Function("v/(v^2 + 0.0001)^(1/4)", Family.DAMPING, lambda m: m.v / (m.v**2 + 0.01**2) ** 0.25),
 )
-"""Functions of a :class:`Motion` without a past, but for those of the load."""
+"""Functions of a :class:`RelativeMotion` without a past, but for those of the load."""
 
 OF_SLIDERS = tuple(map(_slider, range(len(STRETCHES))))
 """Functions of the displacement's past: what a spring carries before it slides."""
@@ -188,7 +188,7 @@ OF_THE_LOAD = (
     Function("n", Family.DAMPING, lambda m: m.n),
     *map(_loaded_falling, FALLING),
 )
-"""Functions of a :class:`Motion` at a port with a load."""
+"""Functions of a :class:`RelativeMotion` at a port with a load."""
 
 OF_WHAT_GIVES = (
     Function("n", Family.COMPLIANCE, lambda load: load.n),
