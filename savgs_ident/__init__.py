@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from savgs_ident.core.presentation import Result
     from savgs_ident.diagnosis.public import diagnose
     from savgs_ident.diagnosis.result import Diagnosis
+    from savgs_ident.diagnosis.thresholds import DecisionConstants
     from savgs_ident.effects.base import Number, Port, PortKind, PortSignals
     from savgs_ident.effects.effect import Effect, generic_effects
     from savgs_ident.export.json_export import read_model_json
@@ -101,6 +102,7 @@ _PLACES = {
     "sample": "fit.sampling",
     "calibrate": "validation.calibration",
     "diagnose": "diagnosis.public",
+    "DecisionConstants": "diagnosis.thresholds",
     "false_alarms": "validation.false_alarms",
     "blind": "validation.blind",
     "linearise": "control.public",
@@ -158,6 +160,7 @@ __all__ = [
     "Channel",
     "Comparison",
     "Coordinate",
+    "DecisionConstants",
     "Design",
     "Diagnosis",
     "DigitalController",

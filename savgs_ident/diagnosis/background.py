@@ -1,9 +1,9 @@
 """The background: small errors that every model has, in every hypothesis, so that they are no gap.
 
 No table of a damper is exact, no recorded road arrives without a phase error, no friction is the same at the end of a
-campaign. Such errors are small, and many rows of the data share them; rows taken for independent would turn each into
-tens of nats of evidence for something missing. So all hypotheses, *nothing is missing* among them, carry the same
-random errors, each normal about zero:
+campaign. Such errors are small, and many rows of the data share them; rows treated as independent would turn each
+into tens of nats of evidence for something missing. So all hypotheses, *nothing is missing* among them, carry the
+same random errors, each normal about zero:
 
     at a port     any sum of the functions that a law there may consist of
     at an input   amplitude and phase, in each test their own
@@ -100,16 +100,15 @@ def relative_change(data: Data, channel: NDArray[np.intp], columns: Matrix) -> N
     return np.asarray(np.sqrt(np.max(squares[whole > 0.0] / whole[whole > 0.0, None], axis=0)))
 
 
-CURVE_POINTS = tuple(np.geomspace(0.01, 1.0, 16).tolist())
-"""Points of a damper's curve to either side, as shares of the largest velocity [1]: as dense as tables are."""
-
-
-def pieces_of_curve(velocity: NDArray[np.float64], force: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def pieces_of_curve(
+    velocity: NDArray[np.float64], force: NDArray[np.float64], constants: DecisionConstants = DEFAULTS
+) -> list[NDArray[np.float64]]:
     """What each point of a damper's curve contributes to its ``force`` (P,) along a motion; they sum up to it.
 
     Between points the errors are straight. Velocities and forces are in the units of their port, which they keep.
     """
-    points = np.array([*(-share for share in reversed(CURVE_POINTS)), 0.0, *CURVE_POINTS])
+    beside = constants.curve_points
+    points = np.array([*(-share for share in reversed(beside)), 0.0, *beside])
     relative = velocity / max(float(np.abs(velocity).max()), np.finfo(float).tiny)
     return [np.interp(relative, points, unit) * force for unit in np.eye(points.size)]
 

@@ -6,7 +6,15 @@ from math import nan
 import numpy as np
 
 from savgs_ident.diagnosis.held_out import HeldOut
-from savgs_ident.diagnosis.result import NONE, Candidate, Confusable, Estimate, Hypothesis, NotJudgeable
+from savgs_ident.diagnosis.result import (
+    NONE,
+    Candidate,
+    Confusable,
+    Estimate,
+    Hypothesis,
+    NotJudgeable,
+    PortFamily,
+)
 from savgs_ident.diagnosis.score_test import Score, cosine
 from savgs_ident.diagnosis.search import Findings, excess, left_over
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
@@ -16,21 +24,18 @@ from savgs_ident.inference.find_map import LaplaceFit, Search
 WITHIN = 1.959964
 """Standard deviations of a 95 % interval."""
 
-NEARLY = 1e-3
-"""Two candidates whose cosine is nearer to 1 are one."""
-
 
 def candidates_of(
     findings: Findings,
     weighed: Sequence[WeighedHypothesis],
     held: Mapping[Hypothesis, HeldOut],
     search: Search,
-    kinds: Callable[[Hypothesis], tuple[str, ...]],
+    kinds: Callable[[Hypothesis], tuple[PortFamily, ...]],
     constants: DecisionConstants = DEFAULTS,
 ) -> tuple[Candidate, ...]:
     """All hypotheses, the most probable first, with what they predict of tests left out where that was ``held``.
 
-    ``kinds`` says where a hypothesis acts and of which kind it is, as port/family each.
+    ``kinds`` says where a hypothesis acts and of which kind it is.
     """
     scores = {score.term.name: score for score in findings.scores}
     gap, found = excess(search, findings.base), []
@@ -42,31 +47,34 @@ def candidates_of(
         if mode is not None and gap > constants.negligible_misfit:
             left = left_over(search, findings.base, mode, constants)
             closed = 1.0 - left if hypothesis.effects or hypothesis.flexible else 0.0
-        there = [kind.split("/") for kind in kinds(hypothesis)]
+        there = kinds(hypothesis)
         found.append(
             Candidate(
                 hypothesis=hypothesis,
                 probability=float(share),
-                score_sigma=joint_sigma([scores[name] for name in hypothesis.effects if name in scores]),
+                score_sigma=joint_sigma(
+                    [scores[name] for name in hypothesis.effects if name in scores], constants
+                ),
                 heldout_gain=float(gain),
                 gain_beyond=float(beyond),
                 share_closed=closed,
                 parameters=() if mode is None or hypothesis.flexible else estimates_of(mode, scores),
                 refitted=mode is not None,
-                ports=tuple(dict.fromkeys(port for port, _ in there)),
-                families=tuple(dict.fromkeys(family for _, family in there)),
+                ports=tuple(dict.fromkeys(each.port for each in there)),
+                families=tuple(dict.fromkeys(each.family.value for each in there)),
             )
         )
     return tuple(found)
 
 
-def joint_sigma(scores: Sequence[Score]) -> float:
+def joint_sigma(scores: Sequence[Score], constants: DecisionConstants = DEFAULTS) -> float:
     """Significance of candidates together: what they share counts once. 0 for none of them."""
     if not scores:
         return 0.0
     sigma = np.array([each.sigma for each in scores])
     alike = np.array([[1.0 if one is other else cosine(one, other) for other in scores] for one in scores])
-    return max(float(sigma.max()), float(np.sqrt(sigma @ np.linalg.pinv(alike, rcond=NEARLY) @ sigma)))
+    independent = np.linalg.pinv(alike, rcond=constants.cosine_resolution)
+    return max(float(sigma.max()), float(np.sqrt(sigma @ independent @ sigma)))
 
 
 def estimates_of(mode: LaplaceFit, scores: Mapping[str, Score]) -> tuple[Estimate, ...]:
@@ -92,7 +100,7 @@ def not_judgeable_of(findings: Findings, constants: DecisionConstants = DEFAULTS
         amplitude = score.term.amplitudes[0]
         room = max(abs(amplitude.upper - amplitude.centre), abs(amplitude.lower - amplitude.centre))
         if score.smallest > min(
-            room, constants.judgeable_sizes * amplitude.scale / constants.amplitude_width
+            room, constants.assessable_sizes * amplitude.scale / constants.amplitude_width
         ):
             found.append(NotJudgeable(score.term.name, amplitude.name, float(score.smallest), amplitude.unit))
     return tuple(found)

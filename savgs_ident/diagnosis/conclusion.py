@@ -1,7 +1,7 @@
 """The conclusion of a diagnosis: what is named found again, tests held out, and what these leave of the evidence.
 
-Model selection has seen all tests. Here the named hypothesis and its rivals predict tests that were left out, and
-these have the last word (:func:`settle`); the gap that is reported is theirs.
+Model selection has seen all tests. Here the named hypothesis and its alternatives predict tests that were left out,
+and these have the last word (:func:`decide_by_held_out`); the gap that is reported is theirs.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -100,7 +100,7 @@ def leave_tests_out(
     progress: Progress,
     further: FurtherRecording | None,
 ) -> LeftOut:
-    """What is named found again, and tests predicted that were left out, by it and by its rivals."""
+    """What is named found again, and tests predicted that were left out, by it and by its alternatives."""
     others = [each for each in _compared(problem, selected) if each is not selected.chosen.mode]
     (refitted, evidence), (tests, held) = side_by_side(
         lambda: refit_named(problem, selected, progress),
@@ -130,9 +130,9 @@ def conclude(left_out: LeftOut, values: Mapping[str, float], further: FurtherRec
     model = _corrected_model(problem, evidence, law)
     gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
     named = problem.locations(evidence.chosen.hypothesis) if member is None else (member.location,)
-    settled = settle(evidence, gap, left_out.fitted, problem.constants, named)
-    if settled is not evidence:
-        evidence, law = settled, None
+    decided = decide_by_held_out(evidence, gap, left_out.fitted, problem.constants, named)
+    if decided is not evidence:
+        evidence, law = decided, None
         held = {**held, UNKNOWN: _held_out_unknown(evidence, held[NONE])}
         model = _corrected_model(problem, evidence, law)
         gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
@@ -145,7 +145,7 @@ def _member(evidence: DiagnosisEvidence) -> FlexibleMember | None:
     return evidence.named_law or (evidence.offered if evidence.kind == "unknown" else None)
 
 
-def settle(
+def decide_by_held_out(
     evidence: DiagnosisEvidence,
     gap: Shrink,
     fitted: float,
@@ -267,8 +267,9 @@ def _fitted_gap(problem: DiagnosisProblem) -> float:
 
 
 def _compared(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> list[LaplaceFit]:
-    """The baseline and the two best fitted hypotheses: those that predict tests that were left out."""
-    return [problem.base, *sorted(evidence.findings.modes, key=lambda each: -each.evidence)[:2]]
+    """The baseline and the best fitted hypotheses: those that predict tests that were left out."""
+    ranked = sorted(evidence.findings.modes, key=lambda each: -each.evidence)
+    return [problem.base, *ranked[: problem.constants.held_out_fits]]
 
 
 def _held_out(
@@ -366,9 +367,9 @@ def _next_tests(
         return ()
     pairs = [each.effects for each in confusable_of(evidence.findings, problem.constants)]
     alike = {name for pair in pairs if chosen.terms[0] in pair for name in pair} - {*chosen.terms}
-    rivals = [mode for mode in evidence.findings.modes if len(mode.terms) == 1 and mode.terms[0] in alike]
-    if not rivals:
+    lookalikes = [mode for mode in evidence.findings.modes if len(mode.terms) == 1 and mode.terms[0] in alike]
+    if not lookalikes:
         return ()
-    rival = max(rivals, key=lambda each: each.evidence)
-    progress(f"looking for a test that separates {chosen.terms[0]} from {rival.terms[0]}")
-    return problem.plant.next_tests(problem.search, chosen, rival)
+    other = max(lookalikes, key=lambda each: each.evidence)
+    progress(f"looking for a test that separates {chosen.terms[0]} from {other.terms[0]}")
+    return problem.plant.next_tests(problem.search, chosen, other)

@@ -5,8 +5,8 @@ The stages in order, each a whole record:
 1. the baseline recalibrated (:func:`~savgs_ident.diagnosis.model_selection.recalibrate`);
 2. hypotheses and ports compared (:func:`~savgs_ident.diagnosis.model_selection.compare_models`), once more where a
    baseline that drifts is more probable (:mod:`~savgs_ident.diagnosis.drift`), and decided among;
-3. what is named found again on a finer mesh, while the next tests are looked for and the rivals predict tests that
-   were left out;
+3. what is named found again on a finer mesh, while the next tests are looked for and the alternatives predict tests
+   that were left out;
 4. the corrected model: the named effects, or a law learned at the port of something unknown;
 5. the result, put together once from all of these.
 """

@@ -23,20 +23,12 @@ from savgs_ident.diagnosis.background import drifts_of, time_of, with_wider_drif
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem
 from savgs_ident.diagnosis.result import NONE
+from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
 from savgs_ident.inference.observations import Data
 
 TIMES = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Times of a campaign, from -1 to 1, at which the drifting baseline is solved."""
-
-ROUNDS = 6
-"""Most estimates of the drifts."""
-
-SETTLED = 0.02
-"""Change of the drifts from one estimate to the next, in their tolerances, from which on they are known."""
-
-LEAST_SHARE = 0.1
-"""Share of its value to which a parameter may fall."""
 
 
 class _Drifts(NamedTuple):
@@ -58,25 +50,25 @@ def drifting(
         return None
     none = next(each for each in evidence.weighed if each.hypothesis == NONE)
     best = max(none.weight + constants.alarm_log_odds, *(each.weight for each in evidence.weighed))
-    if np.abs(_drifts(problem.search, problem.base, len(plant.free)).x).max() < 1.0:
+    if np.abs(_drifts(problem.search, problem.base, len(plant.free)).x).max() < constants.least_drift:
         return None
     progress("looking for parameters that drift")
-    width = constants.broken_tolerance_width
+    width, known = constants.broken_tolerance_width, constants.drift_convergence
     data = with_wider_drifts(problem.data, len(plant.free), width)
     search, mode = search_of(plant, data, problem.search.given), problem.base
     drifts, moved = _Drifts(np.zeros(len(plant.free)), np.zeros(len(plant.free))), np.inf
-    for _ in range(ROUNDS):
+    for _ in range(constants.drift_rounds):
         mode = find_map(search, (), mode.values, mode.prediction.warm_start)
         before, drifts = drifts, _drifts(search, mode, len(plant.free))
         moved = float(np.abs(drifts.x - before.x).max())
-        if not mode.solved or moved < SETTLED / width:
+        if not mode.solved or moved < known / width:
             break
-        curved = _curved(plant, data, mode, drifts.x, width * constants.drift_tolerance)
+        curved = _curved(plant, data, mode, drifts.x, width * constants.drift_tolerance, constants)
         if curved is None:
             return None
         search = search_of(curved, data, problem.search.given)
     weight = mode.evidence + log(constants.prior_none) + log(constants.prior_broken_tolerance)
-    if not mode.solved or moved >= SETTLED / width or weight < best:
+    if not mode.solved or moved >= known / width or weight < best:
         return None
     assert isinstance(search.plant, DwellProblem)
     change = 2.0 * width * constants.drift_tolerance * drifts.x
@@ -101,7 +93,12 @@ def _drifts(search: Search, mode: LaplaceFit, count: int) -> _Drifts:
 
 
 def _curved(
-    plant: DwellProblem, data: Data, mode: LaplaceFit, x: NDArray[np.float64], tolerance: float
+    plant: DwellProblem,
+    data: Data,
+    mode: LaplaceFit,
+    x: NDArray[np.float64],
+    tolerance: float,
+    constants: DecisionConstants,
 ) -> DwellProblem | None:
     """The plant with what drifts ``x`` (n,), in their ``tolerance``, do to its rows beyond first order.
 
@@ -111,7 +108,7 @@ def _curved(
     without = replace(plant, beyond=None)
     levels = []
     for time in TIMES:
-        share = np.maximum(1.0 + time * tolerance * x, LEAST_SHARE)
+        share = np.maximum(1.0 + time * tolerance * x, constants.least_parameter_share)
         there = {name: centre[name] * float(each) for name, each in zip(plant.free, share, strict=True)}
         found = without.predict((), centre | there, (), start)
         if not found.solved:

@@ -22,7 +22,7 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import joint_status
 from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.background import pieces_of_curve, with_background, without_drifts
-from savgs_ident.diagnosis.effect_sensitivities import columns_with_states, impose, node_loads, rehearse
+from savgs_ident.diagnosis.effect_sensitivities import impose, node_loads, rehearse, sensitivities_with_states
 from savgs_ident.diagnosis.gap import CyclePosition, MapCell, cycle_positions, gap_map
 from savgs_ident.diagnosis.localisation import InputLocation, Localisation
 from savgs_ident.diagnosis.location_hypotheses import input_locations
@@ -208,11 +208,11 @@ class DwellProblem(AbstractProblem):
             some = [term for term in candidates if len(term.tried) > one]
             shapes = {name: value for term in some for name, value in term.tried[one].items()}
             p = placed(self.values(dict(values) | shapes))
-            for term, columns in self._columns(model, p, warm_start, some).items():
+            for term, columns in self._sensitivities(model, p, warm_start, some).items():
                 found[term].append(columns)
         return [np.stack(found[term.name]) for term in candidates]
 
-    def _columns(
+    def _sensitivities(
         self, model: AbstractPlant, p: Values, warm_start: PeriodicSolution, candidates: Sequence[Term]
     ) -> dict[str, NDArray[np.float64]]:
         """The same for the shapes in ``p``, by name, (m, amplitudes)."""
@@ -228,7 +228,9 @@ class DwellProblem(AbstractProblem):
             {each.name: each.centre + size * each.scale for each in term.amplitudes} for term in with_states
         ]
         effects = [self.catalogue[term.name] for term in with_states]
-        moved = columns_with_states(model, self.likelihood, self.orders, p, warm_start, effects, typical)
+        moved = sensitivities_with_states(
+            model, self.likelihood, self.orders, p, warm_start, effects, typical
+        )
         for term, rows in zip(with_states, moved, strict=True):
             found[term.name] = rows[:, None] / (size * term.amplitudes[0].scale)
         return found
@@ -287,7 +289,7 @@ class DwellProblem(AbstractProblem):
             for port in self.plant.ports
             if port.damped
             for piece in pieces_of_curve(
-                np.asarray(seen[port.name].velocity), np.asarray(seen[port.name].load)
+                np.asarray(seen[port.name].velocity), np.asarray(seen[port.name].load), self.constants
             )
         ]
         return impose(model, self.likelihood, self.orders, p, warm_start, fields).T
@@ -309,10 +311,10 @@ class DwellProblem(AbstractProblem):
             return {f"learned_{port.name}_fastest": fastest}
         signals, loads = node_loads(self.model(()), self.values(values), warm_start)
         if port.kind is PortKind.FORCE:
-            return spans_of_force(port, signals[port.name])
+            return spans_of_force(port, signals[port.name], self.constants)
         if port.kind is PortKind.SERIES and not port.resonant:
-            carried = largest_with_margin(np.asarray(loads[port.name].beyond_rest))
-            return {f"learned_{port.name}_carried": carried}
+            beyond = np.asarray(loads[port.name].beyond_rest)
+            return {f"learned_{port.name}_carried": largest_with_margin(beyond, self.constants.motion_margin)}
         return None
 
     def gap_map(self, data: Data, rows: NDArray[np.float64]) -> tuple[MapCell, ...]:
@@ -326,7 +328,7 @@ class DwellProblem(AbstractProblem):
     def regimes(self, data: Data, fit: LaplaceFit) -> tuple[Regime, ...]:
         """In which regimes the baseline misses: of the cycle, of the tests, and over time."""
         steady = without_drifts(data, len(self.free))
-        return find_regimes(dwell_cycles(self, fit), data, fit, self.free, steady)
+        return find_regimes(dwell_cycles(self, fit), data, fit, self.free, steady, constants=self.constants)
 
     def loops(
         self,

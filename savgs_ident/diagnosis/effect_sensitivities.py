@@ -1,6 +1,6 @@
 """What an effect would do to the response, to first order at its null, without a model that has it.
 
-An effect without states is in the model already, at its null: its columns are derivatives of the response. An
+An effect without states is in the model already, at its null: its sensitivities are derivatives of the response. An
 effect with states is marched along the port signals of the motion as it is until it repeats, at a typical size;
 what it would do at its port is then imposed on the linearised rig.
 """
@@ -45,7 +45,7 @@ BATCH = 32
 """Signals that are imposed at a time."""
 
 
-def columns_with_states(
+def sensitivities_with_states(
     model: AbstractPlant,
     likelihood: Likelihood,
     orders: int,

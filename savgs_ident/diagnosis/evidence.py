@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.problem import AbstractProblem
-from savgs_ident.diagnosis.result import NONE, Hypothesis, Kind
+from savgs_ident.diagnosis.result import NONE, Hypothesis, Kind, PortFamily
 from savgs_ident.diagnosis.search import Findings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
@@ -63,8 +63,8 @@ class DiagnosisProblem:
         """Where the effects of a hypothesis act, each location once."""
         return tuple(dict.fromkeys(self.location(name) for name in hypothesis.effects))
 
-    def families(self, hypothesis: Hypothesis) -> tuple[str, ...]:
-        """Where a hypothesis acts and of which kind it is, as location/family, each once.
+    def families(self, hypothesis: Hypothesis) -> tuple[PortFamily, ...]:
+        """Where a hypothesis acts and of which kind it is, each once.
 
         A number that is the linear part of a law beside it, as a tyre's rate of its stiffening, is one with it.
         """
@@ -74,9 +74,9 @@ class DiagnosisProblem:
         laws = {(each.port.location, each.law.family) for each in effects}
         wholes = ((each.port.location, each.linear_part_of, each.law.family) for each in effects)
         found = ((place, whole if (place, whole) in laws else family) for place, whole, family in wholes)
-        return tuple(dict.fromkeys(f"{place}/{family.value}" for place, family in found))
+        return tuple(dict.fromkeys(PortFamily(place, family) for place, family in found))
 
-    def words(self, location: str) -> str:
+    def location_text(self, location: str) -> str:
         """What a reader calls a location."""
         return self.plant.plant.location_words.get(location, location)
 
@@ -152,7 +152,7 @@ class FlexibleMember(NamedTuple):
     @property
     def hypothesis(self) -> Hypothesis:
         """As a hypothesis among others."""
-        return Hypothesis(flexible=f"{self.location}/{self.family.value}")
+        return Hypothesis(flexible=PortFamily(self.location, self.family))
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.base import Excitation
 from savgs_ident.responses.harmonic_response import SweepResponse
@@ -199,9 +200,6 @@ def _closed(
 SAMPLES = 256
 """Instants of a cycle."""
 
-REVERSAL, MID_STROKE = 0.3, 0.8
-"""Shares of the largest velocity below which the plant turns round and above which it is in mid-stroke."""
-
 DIFFERENTIATIONS = {"m/s^2": -1, "rad/s^2": -1, "m/s": 0, "rad/s": 0, "m": 1, "rad": 1}
 """How many times a channel of a unit is differentiated to be a velocity."""
 
@@ -237,6 +235,7 @@ def cycle_positions(
     ``rows`` (m,) are those that a model predicts [unit of the reading].
     """
     shape, first = problem.shape, problem.plant.channels[0]
+    constants = problem.constants
     measured = problem.likelihood.harmonics(data.measured[None], shape)[0]
     residual = problem.likelihood.harmonics((data.measured - rows)[None], shape)[0]
     if first.unit not in DIFFERENTIATIONS or not np.any(measured[:, 0]):
@@ -253,15 +252,22 @@ def cycle_positions(
         if not np.any(power):
             continue
         wave = np.real(residual[:, c] @ turns) ** 2 / np.where(power > 0.0, power, np.inf)[:, None]
-        whole = wave.sum()
-        at_reversal, at_middle = wave[speed < REVERSAL].sum() / whole, wave[speed > MID_STROKE].sum() / whole
-        between = 1.0 - at_reversal - at_middle
-        found.append(CyclePosition(channel, float(at_reversal), float(at_middle), float(between)))
+        found.append(cycle_position(channel, wave, speed, constants))
     return tuple(found)
 
 
-SWEEP_DWELLS = 6
-"""Dwells of the campaign that must lie in the sweep's range: then the motions between them can be found, too."""
+def cycle_position(
+    channel: str, squares: NDArray[np.float64], speed: NDArray[np.float64], constants: DecisionConstants
+) -> CyclePosition:
+    """Where in the cycle of a velocity the squares of a channel's gap lie.
+
+    ``speed`` is the size of that velocity over the largest [1], of the shape of the ``squares``.
+    """
+    whole = squares.sum()
+    at_reversal = float(squares[speed < constants.reversal_speed].sum() / whole)
+    at_middle = float(squares[speed > constants.mid_stroke_speed].sum() / whole)
+    return CyclePosition(channel, at_reversal, at_middle, 1.0 - at_reversal - at_middle)
+
 
 SWEEP_NAME = "recorded sweep, first harmonic"
 """What the gap of a sweep is called in reports."""
@@ -279,7 +285,8 @@ def sweep_shrink(
 
     None where too few dwells of the campaign lie in the sweep's range. NaN for a hypothesis without motion.
     """
-    frequencies = frequencies_of(np.asarray(problem.excitation.frequency), sweep)
+    fewest = problem.constants.sweep_dwells
+    frequencies = frequencies_of(np.asarray(problem.excitation.frequency), sweep, fewest)
     if frequencies is None:
         return None
     inside = (sweep.frequency >= frequencies[0]) & (sweep.frequency <= frequencies[-1])
@@ -300,15 +307,15 @@ def sweep_shrink(
     )
 
 
-def frequencies_of(dwells: Signal, sweep: SweepResponse) -> Signal | None:
+def frequencies_of(dwells: Signal, sweep: SweepResponse, fewest: int) -> Signal | None:
     """As many frequencies [Hz] as there are dwells: those in the sweep's range, its end, and what lies between.
 
     Its end is left out where all dwells lie in its range: then it is compared up to the fastest of them.
-    Frequencies are (D,).
+    Frequencies are (D,). None where the ``fewest`` dwells do not lie in its range.
     """
     lowest, highest = float(sweep.frequency.min()), float(sweep.frequency.max())
     inside = np.unique(dwells[(dwells >= lowest) & (dwells < highest)])
-    if inside.size < SWEEP_DWELLS:
+    if inside.size < fewest:
         return None
     found = inside.tolist() if inside.size == dwells.size else [*inside.tolist(), highest]
     while len(found) < dwells.size:

@@ -104,7 +104,7 @@ def predict_left_out(
 
     ``rows`` (m,) [unit of each] are those of a model fitted to the part, which it ``missed`` as independent rows,
     with ``slopes`` (m, n) in coordinates that have this ``covariance`` (n, n). Errors within tolerances are shared by
-    all tests, so that those of the part tell what they are in the others.
+    all tests, so that those of the part determine those of the others.
     """
     data = part.data
     spread = part.rows.marginal(scales.noise, scales.discrepancy)

@@ -42,18 +42,6 @@ from savgs_ident.inference.laplace import linearised_optimum, log_evidence
 from savgs_ident.inference.observations import Data, Term
 from savgs_ident.inference.prior import Linear, bounds_of
 
-STEPS = 20
-"""Most steps of the fit."""
-
-SEEN = 1e-3
-"""A function of unit size that changes the rows by less than this share of what another one does is left out.
-
-Data that hardly see a function, as a constant force, would let its coefficient be of any size.
-"""
-
-WIDTHS = (0.1, 1.0, 10.0)
-"""Widths of the prior of the functions of a family, over that of all functions."""
-
 
 @dataclass(frozen=True)
 class LearnedLaw:
@@ -81,13 +69,8 @@ class LearnedLaw:
     mode: LaplaceFit
     spans: Mapping[str, float]
     families: Mapping[Family, float]
-    log_prior: float = 0.0
-    only: Family | None = None
-
-    @property
-    def weight(self) -> float:
-        """Its log evidence, with the prior probability of its functions."""
-        return self.mode.evidence + self.log_prior
+    log_prior: float
+    only: Family | None
 
     @property
     def effect(self) -> Effect:
@@ -132,7 +115,8 @@ def learn(
 ) -> LearnedLaw | None:
     """The law at a port; ``base`` is the recalibrated baseline. None where nothing can be learned.
 
-    It is looked for from there and from the plant as ``given``. Look at the status of its mode.
+    It is looked for from there and from the plant as ``given``. Nothing can be learned at a port without learned law,
+    where the plant with one has no solution, or where the law is impossible.
     """
     spans = problem.learned_spans(port, base.values, base.prediction.warm_start)
     if spans is None:
@@ -154,19 +138,22 @@ def learn(
     blank = Term(effect.name, port.location, (), shapes)
     columns = dict(zip(names, there_now.slopes.T, strict=True))
     term = _with_amplitudes(blank, effect, search, base, columns, constants)
-    mode = find_map_from_both(search, (term,), base.values, there_now.warm_start, STEPS)
-    law = LearnedLaw(effect.name, port, term, mine, search, mode, spans, {})
+    mode = find_map_from_both(search, (term,), base.values, there_now.warm_start, constants.learned_steps)
     if not mode.solved:
-        return law
-    found = _families(search, mode, port, constants)
-    law = replace(law, families={family: each.weight for family, each in found.items()})
-    least = base.evidence + constants.alarm_log_odds
-    # To first order about all functions together the families are not known well enough to take the first.
-    likely = sorted(found, key=lambda family: -found[family].weight)[: constants.likely_families]
-    for family in likely:
-        if family is likely[0] or found[family].weight > least:
-            law = _of_one_family(law, family, _some_of(term, found[family]), found[family])
-    law = law if law.only else replace(law, families=_spared(search, mode, port))
+        return None
+    best, families = _most_probable(search, term, mode, port, base, constants)
+    law = LearnedLaw(
+        name=effect.name,
+        port=port,
+        term=best.term,
+        problem=mine,
+        search=search,
+        mode=best.mode,
+        spans=spans,
+        families=families,
+        log_prior=best.log_prior,
+        only=best.only,
+    )
     return None if _is_impossible(law) else law
 
 
@@ -193,7 +180,8 @@ def _with_amplitudes(
     ``columns`` are the change of the rows (m,) per unit of each, by name; what the data hardly see is left out.
     """
     size = {name: float(np.linalg.norm(column)) for name, column in columns.items()}
-    seen = [name for name in columns if size[name] > SEEN * max(size.values())]
+    least = constants.least_function_share * max(size.values())
+    seen = [name for name in columns if size[name] > least]
     widths = widths_of(search, base, np.stack([columns[name] for name in seen], axis=1), constants)
     units = {each.name: each.unit for each in effect.parameters}
     amplitudes = tuple(
@@ -226,19 +214,55 @@ def _some_of(term: Term, found: _FamilyAlone) -> Term:
     return replace(term, amplitudes=tuple(replace(each, scale=found.width * each.scale) for each in kept))
 
 
-def _of_one_family(law: LearnedLaw, family: Family, term: Term, found: _FamilyAlone) -> LearnedLaw:
-    """The law with functions of one family alone, those of ``term``, where that is more probable.
+class _FittedFunctions(NamedTuple):
+    """Functions fitted on the nonlinear plant: all of a port, or some of one family alone.
 
-    It is looked for from where it was ``found`` to first order.
+    Attributes:
+        term: their coefficients as a search takes them.
+        mode: the best point.
+        log_prior: log prior probability that these of the family are needed; 0 for all functions.
+        only: the family; None for all functions.
     """
-    alone = find_map(law.search, (term,), found.start, law.mode.prediction.warm_start, STEPS)
-    if not alone.solved:
-        return law
-    weight = alone.evidence + found.log_prior
-    families = {**law.families, family: weight}
-    if weight <= law.weight:
-        return replace(law, families=families)
-    return replace(law, term=term, mode=alone, families=families, log_prior=found.log_prior, only=family)
+
+    term: Term
+    mode: LaplaceFit
+    log_prior: float = 0.0
+    only: Family | None = None
+
+    @property
+    def weight(self) -> float:
+        """Their log evidence, with the prior probability of the functions."""
+        return self.mode.evidence + self.log_prior
+
+
+def _most_probable(
+    search: Search,
+    term: Term,
+    mode: LaplaceFit,
+    port: Port,
+    base: LaplaceFit,
+    constants: DecisionConstants,
+) -> tuple[_FittedFunctions, Mapping[Family, float]]:
+    """The most probable functions of a law, and what the law's ``families`` are.
+
+    All functions of the port, which are fitted with ``term`` and ``mode``, or those of a family that is likely.
+    """
+    found = _families(search, mode, port, constants)
+    weights = {family: each.weight for family, each in found.items()}
+    best, least = _FittedFunctions(term, mode), base.evidence + constants.alarm_log_odds
+    # To first order about all functions together the families are not known well enough to take the first.
+    likely = sorted(found, key=lambda family: -found[family].weight)[: constants.likely_families]
+    for family in likely:
+        each = found[family]
+        if family is not likely[0] and each.weight <= least:
+            continue
+        some, near = _some_of(term, each), best.mode.prediction.warm_start
+        alone = find_map(search, (some,), each.start, near, constants.learned_steps)
+        if alone.solved:
+            fitted = _FittedFunctions(some, alone, each.log_prior, family)
+            weights[family] = fitted.weight
+            best = fitted if fitted.weight > best.weight else best
+    return best, weights if best.only else _spared(search, mode, port)
 
 
 def _families(
@@ -275,7 +299,8 @@ def _needed(
         return _alone(search, mode, of_all.difference(functions), functions, width, log_prior)
 
     def at_its_width(functions: tuple[str, ...]) -> _FamilyAlone:
-        return max((alone(functions, width) for width in WIDTHS), key=lambda each: each.weight)
+        tried = (alone(functions, width) for width in constants.family_widths)
+        return max(tried, key=lambda each: each.weight)
 
     # Of functions that do nearly the same, one alone is needed: the best may lie beyond worse ones.
     found = [at_its_width(family)]

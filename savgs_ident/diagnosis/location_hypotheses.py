@@ -25,7 +25,6 @@ from savgs_ident.diagnosis.effect_sensitivities import impose, node_loads
 from savgs_ident.diagnosis.localisation import InputLocation, Law
 from savgs_ident.diagnosis.port_functions import (
     GAIN_AND_RATE,
-    RESONANCES,
     Functions,
     MeshPoints,
     Signal,
@@ -52,9 +51,6 @@ if TYPE_CHECKING:
 
 Fields = list[tuple[str, Signal]]
 """Ports at which something is imposed, and what, at the nodes."""
-
-FREE_ORDERS = 9
-"""Highest order of a free signal."""
 
 
 def ports_by_location(plant: AbstractPlant) -> dict[str, tuple[Port, ...]]:
@@ -134,13 +130,17 @@ def _signals(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
     port = signal_port(seen.problem.plant, name)
     assert port is not None
     fields = [seen.fields(where, each.values) for where, each in sets]
-    free = seen.fields(port, _waves(seen.nodes))
+    free = seen.fields(port, _waves(seen.nodes, seen.problem.constants.free_orders))
     columns = seen.imposed([*(each for some in fields for each in some), *free])
     laws: list[Law] = []
     start = 0
     for (where, each), some in zip(sets, fields, strict=True):
         laws += laws_of_functions(
-            columns[:, start : start + len(some)], each.families, each.plain, where.name
+            columns[:, start : start + len(some)],
+            each.families,
+            seen.problem.constants,
+            each.plain,
+            where.name,
         )
         start += len(some)
     return InputLocation(name, tuple(laws), columns[:, start:])
@@ -153,13 +153,13 @@ def _functions(port: Port, seen: _Seen) -> Iterator[Functions]:
     elif port.kind is PortKind.SERIES:
         beyond = np.asarray(seen.loads[port.name].beyond_rest)
         if port.resonant:
-            yield resonance_functions(beyond, seen.nodes)
+            yield resonance_functions(beyond, seen.nodes, seen.problem.constants)
         else:
             yield series_functions(seen.loads[port.name])
             yield damped_functions(beyond, seen.nodes, seen.solution)
     elif port.kind is PortKind.INPUT:
         yield input_shape(seen.angle, seen.nodes)
-        yield input_ripple(seen.angle)
+        yield input_ripple(seen.angle, seen.problem.constants)
 
 
 def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
@@ -167,6 +167,7 @@ def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
 
     What hangs on a mass may swing: it pulls as modes make it of the mass's acceleration.
     """
+    constants = seen.problem.constants
     inertias = [each for port in ports for each in port.inertias]
     if not inertias:
         numbers = [number for port in ports for number in port.numbers]
@@ -174,20 +175,24 @@ def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
             seen.model, placed(dict(seen.p)), seen.solution, [number.name for number in numbers]
         )
         columns = slopes * np.array([number.change for number in numbers])
-        return InputLocation(name, laws_of_functions(columns, (Family.NUMBER,) * len(numbers)), columns)
+        laws = laws_of_functions(columns, (Family.NUMBER,) * len(numbers), constants)
+        return InputLocation(name, laws, columns)
     fields, swinging = [], []
     for each in inertias:
         velocity = sum(np.asarray(seen.signals[where].velocity) for where in each.velocity)
         acceleration = rate_of(np.asarray(velocity), seen.nodes, seen.solution)
         fields.append((each.force, acceleration))
-        swinging += [(each.force, resonance(acceleration, natural, seen.nodes)) for natural in RESONANCES]
+        swinging += [
+            (each.force, resonance(acceleration, natural, constants.resonance_damping, seen.nodes))
+            for natural in constants.resonances
+        ]
     columns = seen.imposed([*fields, *swinging])
     still, moving = columns[:, : len(fields)], columns[:, len(fields) :]
-    laws = [*laws_of_functions(still, (Family.NUMBER,) * len(fields))]
-    for first in range(0, moving.shape[1], len(RESONANCES)):
-        mine = moving[:, first : first + len(RESONANCES)]
-        laws += laws_of_functions(mine, (Family.OSCILLATOR,) * mine.shape[1])
-    return InputLocation(name, tuple(laws), still)
+    laws = laws_of_functions(still, (Family.NUMBER,) * len(fields), constants)
+    count = len(constants.resonances)
+    for first in range(0, moving.shape[1], count):
+        laws += laws_of_functions(moving[:, first : first + count], (Family.OSCILLATOR,) * count, constants)
+    return InputLocation(name, laws, still)
 
 
 def free_signal(coefficients: Signal, phase: Signal) -> Signal:
@@ -199,8 +204,8 @@ def free_signal(coefficients: Signal, phase: Signal) -> Signal:
     return np.asarray(coefficients[0::2] @ np.cos(order * phase) + coefficients[1::2] @ np.sin(order * phase))
 
 
-def _waves(nodes: MeshPoints) -> list[Signal]:
-    return [wave(order * nodes.phase) for order in range(1, FREE_ORDERS + 1) for wave in (np.cos, np.sin)]
+def _waves(nodes: MeshPoints, orders: int) -> list[Signal]:
+    return [wave(order * nodes.phase) for order in range(1, orders + 1) for wave in (np.cos, np.sin)]
 
 
 def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
@@ -232,8 +237,8 @@ def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
         )
         dynamics = (Family.GAIN, *(Family.DYNAMICS,) * (dynamic.shape[1] - 1))
         laws = (
-            *laws_of_functions(dynamic, dynamics, GAIN_AND_RATE, port),
-            *laws_of_functions(static, (Family.SHAPE,) * static.shape[1], (), port),
+            *laws_of_functions(dynamic, dynamics, problem.constants, GAIN_AND_RATE, port),
+            *laws_of_functions(static, (Family.SHAPE,) * static.shape[1], problem.constants, (), port),
         )
         locations.append(InputLocation(name, laws, free))
     return locations

@@ -344,8 +344,8 @@ def _law_beside_best(
     localisations = sorted(_localised(problem, best), key=lambda each: -each.evidence)
     if left > constants.unexplained_share:
         ports = {each.name for each in localisations[: constants.nearest_ports]}
-        partners = [term for term in candidates if problem.location(term.name) in ports]
-        more = pairs_with(search, findings, best, partners, candidates, progress, constants)
+        others = [term for term in candidates if problem.location(term.name) in ports]
+        more = pairs_with(search, findings, best, others, candidates, progress, constants)
         findings = _material(problem, more)
         if hypothesis_of(most_probable(findings, constants)) != hypothesis_of(best):
             return _law_beside_best(problem, findings, progress)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values
-from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink
+from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, cycle_position
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation
 from savgs_ident.diagnosis.location_hypotheses import force_port, ports_by_location
 from savgs_ident.diagnosis.port_functions import (
@@ -31,6 +31,7 @@ from savgs_ident.diagnosis.port_functions import (
 from savgs_ident.diagnosis.problem import AbstractProblem, spans_of_force
 from savgs_ident.diagnosis.regimes import Cycles, find_regimes
 from savgs_ident.diagnosis.result import DriveForces, ForceLoop, NextTest, Regime
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Family, Port, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned_functions import STRETCHES
@@ -46,12 +47,6 @@ WIDTH = 8
 
 PRECISION = 1e-6
 """Largest Newton step that may remain in a state, in its typical size [1]."""
-
-REVERSAL, MID_STROKE = 0.3, 0.8
-"""Shares of the largest velocity below which the plant turns round and above which it is in mid-stroke."""
-
-FREE_ORDERS = 5
-"""Highest order, in a block of time, of a signal that is free in every block."""
 
 
 class _Seen(NamedTuple):
@@ -123,22 +118,23 @@ class MotionProblem(AbstractProblem):
         """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""
         base = self.predict(terms, values, (), warm_start).rows
         return [
-            np.stack([self._columns(terms, dict(values) | shapes, base, term) for shapes in term.tried])
+            np.stack([self._sensitivities(terms, dict(values) | shapes, base, term) for shapes in term.tried])
             for term in candidates
         ]
 
-    def _columns(
+    def _sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], base: NDArray[np.float64], term: Term
     ) -> NDArray[np.float64]:
-        """The same at given shapes: slopes at the null, or the secant to half a width of one that has states."""
+        """The same at given shapes: slopes at the null, or the secant to the typical size of one that has states."""
         if not self.catalogue[term.name].states:
             model, p = self.complete(terms), placed(self.values(values))
             return self._slopes(model, p, [each.name for each in term.amplitudes])
         found = []
         for each in term.amplitudes:
-            there = dict(values) | {each.name: each.centre + 0.5 * each.scale}
+            typical = self.constants.typical_coordinate * each.scale
+            there = dict(values) | {each.name: each.centre + typical}
             moved = self.predict((*terms, term.name), there, (), None).rows - base
-            found.append(moved / (0.5 * each.scale))
+            found.append(moved / typical)
         return np.stack(found, axis=1)
 
     def _slopes(self, model: AbstractPlant, p: Values, names: Sequence[str]) -> NDArray[np.float64]:
@@ -190,7 +186,7 @@ class MotionProblem(AbstractProblem):
         for port in acting:
             functions = self._functions(port, seen)
             columns = self._imposed(port, terms, values, np.stack(functions.values))
-            laws += laws_of_functions(columns, functions.families, functions.plain, port.name)
+            laws += laws_of_functions(columns, functions.families, self.constants, functions.plain, port.name)
         return InputLocation(name, tuple(laws), self._imposed(acting[0], terms, values, self._free()))
 
     def _functions(self, port: Port, seen: _Seen) -> Functions:
@@ -226,12 +222,14 @@ class MotionProblem(AbstractProblem):
         model, p = self.complete(terms), placed(self.values(values))
         columns = self._slopes(model, p, [each.name for each in numbers])
         columns = columns * np.array([each.change for each in numbers])
-        return InputLocation(name, laws_of_functions(columns, (Family.NUMBER,) * len(numbers)), columns)
+        laws = laws_of_functions(columns, (Family.NUMBER,) * len(numbers), self.constants)
+        return InputLocation(name, laws, columns)
 
     def _free(self) -> NDArray[np.float64]:
         """Waves over a block of time and a constant [1], (f, n): what a signal free in every block is made of."""
         turned = 2.0 * np.pi * self.motion.step * np.arange(self.motion.position.size)
-        waves = [wave(order * turned) for order in range(1, FREE_ORDERS + 1) for wave in (np.cos, np.sin)]
+        orders = range(1, self.constants.free_orders_along_motion + 1)
+        waves = [wave(order * turned) for order in orders for wave in (np.cos, np.sin)]
         return np.stack([np.ones_like(turned), *waves])
 
     def learned_spans(
@@ -240,7 +238,7 @@ class MotionProblem(AbstractProblem):
         """The range of what is seen at a force; nothing else is learned along a measured motion."""
         if port.kind is not PortKind.FORCE:
             return None
-        return spans_of_force(port, self.port_signals(values, warm_start)[port.name])
+        return spans_of_force(port, self.port_signals(values, warm_start)[port.name], self.constants)
 
     def gap_map(self, data: Data, rows: NDArray[np.float64]) -> tuple[()]:
         """None: the force of a drive has no harmonics of its own."""
@@ -250,11 +248,8 @@ class MotionProblem(AbstractProblem):
     def cycle_positions(self, data: Data, rows: NDArray[np.float64]) -> tuple[CyclePosition, ...]:
         """The gap at reversal, in mid-stroke and between, as shares of its square."""
         speed = np.abs(self.motion.rows(self.motion.velocity))
-        speed, square = speed / speed.max(), (data.measured - rows) ** 2
-        at_reversal, at_middle = (
-            float(square[some].sum() / square.sum()) for some in (speed < REVERSAL, speed > MID_STROKE)
-        )
-        return (CyclePosition(self.channels[0], at_reversal, at_middle, 1.0 - at_reversal - at_middle),)
+        squares = (data.measured - rows) ** 2
+        return (cycle_position(self.channels[0], squares, speed / speed.max(), self.constants),)
 
     def regimes(self, data: Data, fit: LaplaceFit) -> tuple[Regime, ...]:
         """In which regimes the baseline misses: of the motion, and over time."""
@@ -266,7 +261,7 @@ class MotionProblem(AbstractProblem):
             frequency=np.array([1.0 / self.motion.period]),
             recorded=np.arange(data.tests, dtype=np.float64),
         )
-        return find_regimes(cycles, data, fit, self.free)
+        return find_regimes(cycles, data, fit, self.free, constants=self.constants)
 
     def loops(
         self, values: Mapping[str, float], warm_start: Any, found: Localisation, effect: Effect | None
@@ -323,6 +318,7 @@ def motion_problem(
     catalogue: Mapping[str, Effect],
     baseline: tuple[str, ...] = (),
     free: tuple[str, ...] = (),
+    constants: DecisionConstants = DEFAULTS,
 ) -> tuple[MotionProblem, Data]:
     """The problem of a measured motion, and the force of its drive as data.
 
@@ -330,11 +326,11 @@ def motion_problem(
     whenever it does.
     """
     offered = {name: each for name, each in catalogue.items() if each.port.kind is not PortKind.SENSOR}
-    problem = MotionProblem(plant, parameters, offered, baseline, free, motion=motion)
+    problem = MotionProblem(plant, parameters, offered, baseline, free, motion=motion, constants=constants)
     force = motion.rows(motion.drive)
     size = float(np.sqrt(np.mean(force**2)))
-    noise, reach = (np.full(force.size, each) for each in (motion.noise**2, size))
-    return problem, Data(force, noise, reach, motion.blocks)
+    variance, scale = (np.full(force.size, each) for each in (motion.noise**2, size))
+    return problem, Data(force, variance, scale, motion.blocks)
 
 
 def further_motion(

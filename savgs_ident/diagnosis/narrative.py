@@ -8,7 +8,7 @@ import numpy as np
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.model_selection import nearest_effect
-from savgs_ident.diagnosis.result import NONE, UNKNOWN, Verdict
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Verdict
 from savgs_ident.diagnosis.search import hypothesis_of, left_over
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.diagnosis.verdict import alarm_odds, most_probable, probabilities
@@ -43,13 +43,17 @@ def _verdict(
 ) -> Verdict:
     if evidence.kind == "none":
         sentence = _nothing_missing(problem, evidence, gap)
-        nothing = sum(_probability(evidence, str(each)) for each in (NONE, *evidence.immaterial))
+        nothing = sum(_probability(evidence, each) for each in (NONE, *evidence.immaterial))
         return Verdict("none", (), (), (), sentence, probability=nothing)
     if evidence.kind == "unknown":
         ports = evidence.indistinguishable_ports(problem.constants)
         sentence = _something_unknown(problem, evidence, gap)
         offered = evidence.offered
-        families = () if offered is None or offered.location != evidence.port else (str(offered.hypothesis),)
+        families = (
+            ()
+            if offered is None or offered.location != evidence.port
+            else problem.families(offered.hypothesis)
+        )
         return Verdict(
             "unknown",
             (),
@@ -59,7 +63,7 @@ def _verdict(
             ports,
             families=families,
             law_known=False,
-            probability=sum(_probability(evidence, str(each)) for each in (UNKNOWN, *evidence.insufficient)),
+            probability=sum(_probability(evidence, each) for each in (UNKNOWN, *evidence.insufficient)),
         )
     member = evidence.named_law
     if member is not None:
@@ -71,9 +75,9 @@ def _verdict(
             confusable_with=(),
             sentence=_law_missing(problem, evidence, member, nearest, gap),
             confusable_ports=evidence.indistinguishable_ports(problem.constants),
-            families=(str(member.hypothesis),),
+            families=problem.families(member.hypothesis),
             law_known=False,
-            probability=_probability(evidence, str(member.hypothesis)),
+            probability=_probability(evidence, member.hypothesis),
         )
     hypothesis = evidence.chosen.hypothesis
     return Verdict(
@@ -83,15 +87,15 @@ def _verdict(
         confusable_with=tuple(alternatives),
         sentence=_effects_missing(problem, evidence, alternatives, gap),
         families=problem.families(hypothesis),
-        probability=_probability(evidence, str(hypothesis)),
+        probability=_probability(evidence, hypothesis),
     )
 
 
-def _probability(evidence: DiagnosisEvidence, hypothesis: str) -> float:
+def _probability(evidence: DiagnosisEvidence, hypothesis: Hypothesis) -> float:
     """The probability [1] of a hypothesis among all."""
     shares = probabilities(evidence.weighed)
     both = zip(evidence.weighed, shares, strict=True)
-    return float(next(share for each, share in both if str(each.hypothesis) == hypothesis))
+    return float(next(share for each, share in both if each.hypothesis == hypothesis))
 
 
 def _law_missing(
@@ -102,8 +106,8 @@ def _law_missing(
     gap: Shrink,
 ) -> str:
     sentence = (
-        f"The model lacks something at the {problem.words(member.location)}: {_KINDS[member.family]}, by a law that "
-        "the catalogue does not have."
+        f"The model lacks something at the {problem.location_text(member.location)}: {_KINDS[member.family]}, "
+        "by a law that the catalogue does not have."
     )
     sentence += _shrinking(evidence, gap, "a law learned there")
     fits = [mode for mode in evidence.findings.modes if mode.terms == (nearest,)]
@@ -130,12 +134,12 @@ def _words(problem: DiagnosisProblem, effect: str) -> str:
 
 
 def _not_apart(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> str:
-    """The ports that the campaign cannot tell from that of something that the catalogue lacks."""
-    ports = [problem.words(each) for each in evidence.indistinguishable_ports(problem.constants)]
+    """The ports that the campaign cannot distinguish from that of something that the catalogue lacks."""
+    ports = [problem.location_text(each) for each in evidence.indistinguishable_ports(problem.constants)]
     if not ports:
         return ""
     others = " or the ".join(ports)
-    return f" This campaign cannot distinguish the {problem.words(evidence.port)} from the {others}."
+    return f" This campaign cannot distinguish the {problem.location_text(evidence.port)} from the {others}."
 
 
 _KINDS = {
@@ -187,7 +191,7 @@ def _evidence_against(odds: float, constants: DecisionConstants) -> str:
 
 def _something_unknown(problem: DiagnosisProblem, evidence: DiagnosisEvidence, gap: Shrink) -> str:
     found = evidence.localisation
-    where = problem.words(found.name)
+    where = problem.location_text(found.name)
     sentence = "The model lacks something that no effect of the catalogue explains: "
     if gap.after < gap.recalibrated:
         sentence += (
@@ -212,7 +216,7 @@ def _nearest(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> str:
         return (
             f" {start} model would need `{conflict.parameter}` {abs(conflict.tolerances):.1f} tolerances "
             f"{'above' if conflict.tolerances > 0.0 else 'below'} its data sheet, which acts at the "
-            f"{problem.words(evidence.port)}."
+            f"{problem.location_text(evidence.port)}."
         )
     effects = hypothesis_of(most_probable(evidence.findings, problem.constants)).effects
     if not effects:
@@ -231,7 +235,7 @@ def _effects_missing(
 ) -> str:
     effects = evidence.chosen.hypothesis.effects
     one = len(effects) == 1
-    places = [problem.words(problem.location(name)) for name in effects]
+    places = [problem.location_text(problem.location(name)) for name in effects]
     words = [_words(problem, name) for name in effects]
     if one:
         sentence = f"The model lacks something at the {places[0]}: {words[0]}."
@@ -298,7 +302,7 @@ def write_warnings(
                 f"{'above' if conflict.tolerances > 0.0 else 'below'} its data sheet."
             )
         else:
-            found.append("Something more may be missing that is too small to be told what it is.")
+            found.append("Something more may be missing that is too small to be identified.")
     if evidence.kind in ("effect", "several") and evidence.left_by_named > constants.reported_share:
         found.append(
             f"The named effects leave {100.0 * evidence.left_by_named:.1f} % of the baseline's misfit beyond the "

@@ -1,7 +1,7 @@
 """The next test: the one that would best distinguish two hypotheses that this campaign hardly distinguishes.
 
 Both are taken as fitted to this campaign and predict further ones, under each of the conditions that the plant
-declares: a larger input, another mean of one, more payload. The difference that the rival could not make up by
+declares: a larger input, another mean of one, more payload. The difference that the other one could not make up by
 moving its parameters as far as this campaign allows, in units of the noise, is the significance to expect.
 """
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.executor import in_parallel
 from savgs_ident.diagnosis.result import NextTest
+from savgs_ident.diagnosis.search import hypothesis_of
 from savgs_ident.effects.base import AbstractInputLaw
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Prediction
@@ -27,21 +28,15 @@ from savgs_ident.simulate.periodic import PeriodicSolution
 if TYPE_CHECKING:
     from savgs_ident.diagnosis.dwell_problem import DwellProblem
 
-DWELLS = 4
-"""Dwells of a proposed test."""
-
-PROPOSED = 2
-"""Tests that are proposed for a pair."""
-
 
 def next_tests(
     search: Search, problem: "DwellProblem", one: LaplaceFit, other: LaplaceFit
 ) -> tuple[NextTest, ...]:
     """The tests that separate two hypotheses best, most significant first."""
-    pair = " + ".join(one.terms) or "none", " + ".join(other.terms) or "none"
-    drafts = sorted(_drafts(search, problem, one, other), key=lambda each: -each.raw)[:PROPOSED]
+    pair = hypothesis_of(one), hypothesis_of(other)
+    drafts = sorted(_drafts(search, problem, one, other), key=lambda each: -each.raw)
     found = []
-    for draft in drafts:
+    for draft in drafts[: problem.constants.proposed_tests]:
         hertz = ", ".join(f"{f:.3g}" for f in np.sort(np.asarray(problem.excitation.frequency)[draft.tests]))
         text = f"dwells at {hertz} Hz, {draft.condition.text}"
         found.append(NextTest(text, pair, _expected(search, problem, other, draft)))
@@ -49,9 +44,9 @@ def next_tests(
 
 
 class _Draft(NamedTuple):
-    """A test under a condition: its most telling dwells, what the hypotheses differ by, rival's motions.
+    """A test under a condition: its most significant dwells, what the hypotheses differ by, motions of the second.
 
-    ``raw`` is the significance that the rival's own freedom has not been taken from yet.
+    ``raw`` is the significance before the second hypothesis has moved its parameters.
     """
 
     condition: OperatingCondition
@@ -65,13 +60,13 @@ def _drafts(search: Search, problem: "DwellProblem", one: LaplaceFit, other: Lap
     """A draft for every condition under which both hypotheses can be solved."""
 
     def draft(condition: OperatingCondition) -> _Draft | None:
-        found, rival = (predicted(problem, mode, condition) for mode in (one, other))
-        if not (found.solved and rival.solved):
+        found, second = (predicted(problem, mode, condition) for mode in (one, other))
+        if not (found.solved and second.solved):
             return None
-        miss = found.rows - rival.rows
+        miss = found.rows - second.rows
         by_test = np.bincount(search.data.test, miss**2 / search.data.variance)
-        tests = np.argsort(by_test)[::-1][:DWELLS]
-        return _Draft(condition, tests, miss, float(np.sqrt(by_test[tests].sum())), rival.warm_start)
+        tests = np.argsort(by_test)[::-1][: problem.constants.proposed_dwells]
+        return _Draft(condition, tests, miss, float(np.sqrt(by_test[tests].sum())), second.warm_start)
 
     return [each for each in in_parallel(draft, problem.plant.conditions) if each is not None]
 
@@ -122,11 +117,11 @@ def _of_an_input_at_rest(terms: Sequence[str], problem: "DwellProblem") -> dict[
 
 
 def _expected(search: Search, problem: "DwellProblem", other: LaplaceFit, draft: _Draft) -> float:
-    """Significance of a draft once the rival has moved its parameters as far as the campaign allows."""
+    """Significance of a draft once the second hypothesis has moved its parameters as far as the campaign allows."""
     names = [each.name for each in other.coordinates]
-    rival = predicted(problem, other, draft.condition, names, draft.warm_start)
+    second = predicted(problem, other, draft.condition, names, draft.warm_start)
     chosen = np.isin(search.data.test, draft.tests)
-    slopes = (rival.slopes * slopes_at(other.coordinates, other.x))[chosen]
+    slopes = (second.slopes * slopes_at(other.coordinates, other.x))[chosen]
     spread = np.diag(search.data.variance[chosen]) + slopes @ other.covariance() @ slopes.T
     miss = draft.miss[chosen]
     return float(np.sqrt(miss @ np.linalg.solve(spread, miss)))

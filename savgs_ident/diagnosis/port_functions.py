@@ -13,16 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.localisation import Law
-from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.effects.base import Family, Load, Port, PortSignals
+from savgs_ident.effects.laws.resonance import relative_response
 from savgs_ident.effects.learned_functions import (
     OF_SLIDERS,
     OF_THE_LOAD,
     OF_THE_MOTION,
     OF_WHAT_GIVES,
     STRETCHES,
+    RelativeMotion,
     filters,
-    functions,
+    values_of,
     what_gives,
 )
 from savgs_ident.simulate.periodic import PeriodicSolution
@@ -54,14 +56,8 @@ def rate_of(signal: Signal, nodes: MeshPoints, solution: PeriodicSolution) -> Si
     return np.asarray(nodes.omega * (forward * behind + backward * ahead) / (ahead + behind))
 
 
-RESONANCES = (3.0, 4.0, 5.4, 7.3, 9.8, 13.0, 18.0, 24.0, 33.0, 50.0)
-"""Natural frequencies [Hz] of what may swing under its load."""
-
-WAVES = (4, 5, 6, 7, 8, 9)
-"""Orders of the ripple of an input, beyond those of its shape."""
-
 INSTANTS = 256
-"""Instants of a period at which a law of a sensor's reading is evaluated."""
+"""Instants of a period at which a law of a sensor's reading, or a load of a mode, is evaluated."""
 
 _WORDS = [each.words for each in (*OF_THE_MOTION, *OF_THE_LOAD)]
 PLAIN_FORCES = tuple(_WORDS.index(words) for words in ("tanh(v/0.01)", "v", "x"))
@@ -89,22 +85,24 @@ class Functions(NamedTuple):
 
 
 def laws_of_functions(
-    columns: NDArray[np.float64], families: Sequence[Family], plain: tuple[int, ...] = (), port: str = ""
+    columns: NDArray[np.float64],
+    families: Sequence[Family],
+    constants: DecisionConstants,
+    plain: tuple[int, ...] = (),
+    port: str = "",
 ) -> tuple[Law, ...]:
     """The laws of a set of functions: any sum of them or of those of a family, each alone, the plain ones together.
 
     The functions change the rows by ``columns`` [unit of the row], (m, q); they are of the ``families``, and
-    ``plain`` are indices among the q; ``port`` is the name of the port where they act.
+    ``plain`` are indices among the q; ``port`` is the name of the port where they act. The simple laws share the
+    prior ``simple_law_prior``: those of one function alone, equally, all of it, or half of it where there are plain
+    ones, whose sum has the other half.
     """
-    alone = [([place], families[place]) for place in range(columns.shape[1])]
-    shares = [DEFAULTS.simple_law_prior / len(alone)] * len(alone)
-    simple = [
-        Law(columns[:, places], share, False, family, port)
-        for (places, family), share in zip(alone, shares, strict=True)
-    ]
+    prior = constants.simple_law_prior / (2.0 if plain else 1.0)
+    share = prior / columns.shape[1]
+    simple = [Law(columns[:, [place]], share, False, family, port) for place, family in enumerate(families)]
     if plain:
-        simple = [each._replace(prior=each.prior / 2.0) for each in simple]
-        simple.append(Law(columns[:, list(plain)], DEFAULTS.simple_law_prior / 2.0, False, None, port))
+        simple.append(Law(columns[:, list(plain)], prior, False, None, port))
     different = dict.fromkeys(families)
     if len(different) == 1:
         return (Law(columns, 1.0, True, families[0], port), *simple)
@@ -142,9 +140,10 @@ def damped_functions(beyond: Signal, nodes: MeshPoints, solution: PeriodicSoluti
     return Functions(values, (Family.COMPLIANCE,) * len(values), (0, 1))
 
 
-def resonance_functions(beyond: Signal, nodes: MeshPoints) -> Functions:
+def resonance_functions(beyond: Signal, nodes: MeshPoints, constants: DecisionConstants) -> Functions:
     """What gives under a load [the port's unit of force], (P,), and what slightly damped modes would make of it."""
-    modes = [resonance(beyond, natural, nodes) for natural in RESONANCES]
+    damping = constants.resonance_damping
+    modes = [resonance(beyond, natural, damping, nodes) for natural in constants.resonances]
     return Functions([beyond, *modes], (Family.OSCILLATOR,) * (1 + len(modes)))
 
 
@@ -159,9 +158,9 @@ def input_shape(angle: Signal, nodes: MeshPoints) -> Functions:
     return Functions([*shapes, speed * np.cos(angle), speed * np.sin(angle)], families, (0, 1))
 
 
-def input_ripple(angle: Signal) -> Functions:
+def input_ripple(angle: Signal, constants: DecisionConstants) -> Functions:
     """Waves [1] on an input that are shorter than those of a wrong shape; ``angle`` [rad], (P,), is the test's."""
-    waves = [wave(order * angle) for order in WAVES for wave in (np.cos, np.sin)]
+    waves = [wave(order * angle) for order in constants.ripple_orders for wave in (np.cos, np.sin)]
     return Functions(waves, (Family.SHAPE,) * len(waves))
 
 
@@ -193,18 +192,17 @@ def motion_functions(
     seen = (displacement - displacement.mean(), displacement, velocity, load)
     loaded = bool(np.any(load))
     x, d, v, n = (jnp.asarray(each / max(float(np.abs(each).max()), np.finfo(float).tiny)) for each in seen)
-    found = [np.asarray(each) for each in functions(x, d, v, n)]
-    if not loaded:
-        found = found[: -len(OF_THE_LOAD)]
-    families = [each.family for each in (*OF_THE_MOTION, *OF_THE_LOAD)][: len(found)]
+    without = (*OF_THE_MOTION, *(OF_THE_LOAD if loaded else ()))
+    functions = (*without, *OF_SLIDERS[: len(held)])
+    motion = RelativeMotion(x, d, v, n, held=[jnp.asarray(each) for each in held])
+    values = [np.asarray(each) for each in values_of(functions, motion)]
     plain = (*PLAIN_FORCES, *([_LOADED_FRICTION] if loaded else []))
-    sliders = tuple(each.family for each in OF_SLIDERS[: len(held)])
-    beyond = tuple(range(len(found), len(found) + len(held)))
-    return Functions([*found, *held], (*families, *sliders), (*plain, *beyond))
+    sliders = range(len(without), len(functions))
+    return Functions(values, tuple(each.family for each in functions), (*plain, *sliders))
 
 
 def _slider(displacement: Signal, width: float, solution: PeriodicSolution) -> Signal:
-    """What a spring-slider of unit grip carries that gives by ``width`` [m] before it slides, over a period."""
+    """What a spring-slider of unit friction carries that gives by ``width`` [m] before it slides, over a period."""
     carried = np.zeros_like(displacement)
     for first, count in zip(solution.mesh.layout.starts, solution.mesh.layout.counts, strict=True):
         along = displacement[first : first + count]
@@ -214,7 +212,10 @@ def _slider(displacement: Signal, width: float, solution: PeriodicSolution) -> S
 
 
 def prandtl_element(displacement: Signal, width: float) -> Signal:
-    """What a spring and a slider of unit grip carry along a motion (n,), sliding when stretched by ``width`` [m]."""
+    """What a spring and a slider of unit friction carry along a motion (n,), which slide when stretched by ``width``.
+
+    Motion and width have the same unit.
+    """
     carried = np.zeros_like(displacement)
     moves, now = np.diff(displacement, prepend=displacement[:1]) / width, 0.0
     for place, move in enumerate(moves):
@@ -223,13 +224,14 @@ def prandtl_element(displacement: Signal, width: float) -> Signal:
     return carried
 
 
-def resonance(load: Signal, natural: float, nodes: MeshPoints) -> Signal:
+def resonance(load: Signal, natural: float, damping_ratio: float, nodes: MeshPoints) -> Signal:
     """What an oscillator of a natural frequency [Hz] makes of a load (P,)."""
-    out, grid, own = np.zeros_like(load), 2.0 * np.pi * np.arange(256) / 256, 2.0 * np.pi * natural
+    out, grid = np.zeros_like(load), 2.0 * np.pi * np.arange(INSTANTS) / INSTANTS
     for test in range(int(nodes.dwell.max()) + 1):
         rows = np.flatnonzero(nodes.dwell == test)
         spectrum = np.fft.rfft(np.interp(grid, nodes.phase[rows], load[rows], period=2.0 * np.pi))
         omega = nodes.omega[rows[0]] * np.arange(spectrum.size)
-        answer = np.fft.irfft(spectrum * own**2 / (own**2 - omega**2 + 0.2j * own * omega), 256)
+        modal = relative_response(omega, 2.0 * np.pi * natural, damping_ratio)
+        answer = np.fft.irfft(spectrum * modal, INSTANTS)
         out[rows] = np.interp(nodes.phase[rows], grid, answer, period=2.0 * np.pi)
     return out

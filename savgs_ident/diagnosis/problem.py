@@ -50,27 +50,24 @@ def term_of(effect: Effect, constants: DecisionConstants = DEFAULTS) -> Term:
     return Term(effect.name, effect.port.location, amplitudes, shapes, effect.tried)
 
 
-MARGIN = 1.5
-"""By how much a learned law reaches beyond the baseline's motion, for that of the plant with it is another."""
-
-
-def spans_of_force(port: Port, signals: PortSignals) -> dict[str, float]:
+def spans_of_force(port: Port, signals: PortSignals, constants: DecisionConstants) -> dict[str, float]:
     """The middle of the displacement, its stroke, the largest velocity and load at a force port [its units]."""
+    margin = constants.motion_margin
     displacement, velocity, load = (np.asarray(each) for each in signals[:3])
     middle = float(displacement.mean())
     spans = {
         "middle": middle,
-        "stroke": largest_with_margin(displacement - middle),
-        "speed": largest_with_margin(velocity),
+        "stroke": largest_with_margin(displacement - middle, margin),
+        "speed": largest_with_margin(velocity, margin),
     }
     if port.loaded:
-        spans["carried"] = largest_with_margin(load)
+        spans["carried"] = largest_with_margin(load, margin)
     return {f"learned_{port.name}_{name}": value for name, value in spans.items()}
 
 
-def largest_with_margin(signal: NDArray[np.float64]) -> float:
-    """The largest size of a signal, and a margin [unit of the signal]."""
-    return max(MARGIN * float(np.abs(signal).max()), SMALLEST)
+def largest_with_margin(signal: NDArray[np.float64], margin: float) -> float:
+    """So many times the largest size of a signal [unit of the signal]."""
+    return max(margin * float(np.abs(signal).max()), SMALLEST)
 
 
 def _amplitude(each: Parameter, null: float, width: float) -> Linear:
@@ -92,7 +89,7 @@ class AbstractProblem(ABC):
         baseline: names of those that the baseline has.
         free: names of the parameters that the baseline identifies.
         models: sets of effects that such plants are known to have together.
-        constants: how wide the priors of effects are.
+        constants: what the diagnosis decides by, the widths of the priors of effects among them.
     """
 
     plant: AbstractPlant

@@ -1,7 +1,7 @@
 """What is missing in a model: the diagnosis of any plant (``import savgs_ident`` offers it), and of the quarter car.
 
 A response of dwells is diagnosed by the periodic motions of the plant, a measured motion by the force of its drive.
-The rig brings its catalogue along, and what a diagnosis of it may ask for.
+The model says which effects may be missing in its plant, and which such plants are known to have together.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,12 +22,11 @@ from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint
 from savgs_ident.diagnosis.motion_problem import MotionProblem, further_motion, motion_problem
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.model import Model
-from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
-from savgs_ident.plants.quarter_car.forces import damper_curve
+from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
-from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
@@ -43,6 +42,7 @@ def diagnose(
     without: Sequence[str] = (),
     orders: int = 9,
     max_frequency: float | None = None,
+    constants: DecisionConstants = DEFAULTS,
     progress: Progress = no_progress,
 ) -> Diagnosis:
     """Diagnose the sim-to-real gap: where it lies, which unmodelled effect causes it, how far it shrinks.
@@ -59,6 +59,7 @@ def diagnose(
         without: effects to leave out of the catalogue.
         orders: highest harmonic order to compare.
         max_frequency: leave out faster dwells [Hz].
+        constants: what the verdict is decided by, each with its origin: priors, thresholds, limits of the search.
         progress: called with a sentence on what is being done.
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a campaign that cannot be used, for names that
@@ -66,24 +67,26 @@ def diagnose(
     """
     use_persistent_cache()
     if isinstance(measured, DrivenMotion):
-        return _diagnose_motion(model, measured, held_out, without, progress)
+        return _diagnose_motion(model, measured, held_out, without, constants, progress)
     if held_out is not None:
         raise InputError(
             "a held-out motion goes with a measured motion alone", remedy="diagnose each campaign by itself"
         )
     response = measured_response(measured, model.plant, orders, max_frequency, progress)
     campaign, warnings = campaign_of(measured), response.warnings
-    if isinstance(model, RigModel):
-        rig, settings, values = baseline_of(model, orders, without)
-        sweep, found_in_sweep = (None, ()) if campaign is None else first_sweep(campaign, model.plant)
-        warnings += found_in_sweep
-        found = diagnose_response(response, rig, settings, values, progress, sweep)
-    else:
-        given, settings, values = model.before, *_asked(model, orders, without)
-        bare = replace(model.build(), effects=())
-        plant, data = baseline_problem(response, bare, given.table, model.catalogue, settings)
-        found = diagnose_dwells(plant, data, response, given, settings, values, progress)
-    return replace(found, origin=model.origin(campaign, warnings))
+    given, settings, values = model.before, *_asked(model, orders, without, constants)
+    sweep, found_in_sweep = (None, ()) if campaign is None else first_sweep(campaign, model.plant)
+    plant, data = _dwell_problem(given, response, settings)
+    found = diagnose_dwells(plant, data, response, given, settings, values, progress, sweep)
+    return replace(found, origin=model.origin(campaign, (*warnings, *found_in_sweep)))
+
+
+def _dwell_problem(
+    given: Model, measured: HarmonicResponse, settings: DiagnosisSettings
+) -> tuple[DwellProblem, Data]:
+    """A plant as known before any fit, with the effects that may be missing in it, and the response as data."""
+    bare = replace(given.build(), effects=())
+    return baseline_problem(measured, bare, given.table, given.candidates, settings, given.known_models)
 
 
 def _diagnose_motion(
@@ -91,6 +94,7 @@ def _diagnose_motion(
     motion: DrivenMotion,
     held_out: DrivenMotion | None,
     without: Sequence[str],
+    constants: DecisionConstants,
     progress: Progress,
 ) -> Diagnosis:
     """Diagnose a plant from the force of its drive along a measured motion."""
@@ -101,9 +105,11 @@ def _diagnose_motion(
             source=motion.source,
             remedy="give a recording of dwells, or a plant that is driven along the measured motion",
         )
-    settings, values = _asked(model, 0, without)
-    offered = offered_effects(model.catalogue, settings)
-    problem, data = motion_problem(motion, bare, given.table, offered, model.effects, settings.free)
+    settings, values = _asked(model, 0, without, constants)
+    offered = offered_effects(given.candidates, settings)
+    problem, data = motion_problem(
+        motion, bare, given.table, offered, model.effects, settings.free, settings.constants
+    )
 
     def predict(there: AbstractProblem, points: Sequence[ModelPoint]) -> FurtherShrink:
         assert isinstance(there, MotionProblem)
@@ -116,18 +122,22 @@ def _diagnose_motion(
 
 
 def baseline_of(
-    model: RigModel, orders: int = 9, without: Sequence[str] = ()
+    model: RigModel,
+    orders: int = 9,
+    without: Sequence[str] = (),
+    constants: DecisionConstants = DEFAULTS,
 ) -> tuple[Rig, DiagnosisSettings, Mapping[str, float]]:
     """The rig as known before its own fit, what the baseline is, and the values that it is given with [SI]."""
-    return model.before.rig, *_asked(model, orders, without)
+    return model.before.rig, *_asked(model, orders, without, constants)
 
 
 def _asked(
-    model: Model, orders: int, without: Sequence[str]
+    model: Model, orders: int, without: Sequence[str], constants: DecisionConstants
 ) -> tuple[DiagnosisSettings, Mapping[str, float]]:
     """What the baseline is, and the values that it is given with [SI]."""
     free, values = (model.free(), {}) if model.is_drawing else model.identified
-    return DiagnosisSettings(model.name, model.effects, free, orders, tuple(without)), values
+    settings = DiagnosisSettings(model.name, model.effects, free, orders, tuple(without), constants=constants)
+    return settings, values
 
 
 SIMTR = DiagnosisSettings("simtr", MODELS["simtr"], FREE)
@@ -153,8 +163,8 @@ def diagnose_response(
     that do not exist, and for a rig whose baseline has no periodic motion.
     """
     settings = settings or SIMTR
-    plant, data = quarter_car_problem(measured, rig, settings)
     given = RigModel(rig, settings.baseline)
+    plant, data = _dwell_problem(given, measured, settings)
     return diagnose_dwells(plant, data, measured, given, settings, values or {}, progress, sweep, watch)
 
 
@@ -166,6 +176,4 @@ def quarter_car_problem(
     Raises :class:`InputError` for effects that do not exist, for effects of the baseline that are to be left out, and
     for a response that cannot be used.
     """
-    return baseline_problem(
-        measured, QuarterCar(damper_curve(rig)), rig.parameters, CATALOGUE, settings, MODELS.values()
-    )
+    return _dwell_problem(RigModel(rig, settings.baseline), measured, settings)

@@ -3,7 +3,7 @@
 A regime is a part of what was recorded. Within the cycle it is a third of the instants of every test, by the speed,
 the displacement or the load at a port, or the half in which the port moves in one direction; among tests it is a
 third of them, by frequency or by the size of the response. Regimes of which nine tenths coincide in a campaign cannot
-be told apart by it and are one: where the port moves like a sine, the instants of high speed are those of small
+be distinguished by it and are one: where the port moves like a sine, the instants of high speed are those of small
 stroke.
 
 For a regime R of a residual waveform w (test d, channel c, instant i) the statistic is
@@ -40,6 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.result import Regime
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import PortKind
 from savgs_ident.inference.find_map import LaplaceFit
 from savgs_ident.inference.observations import Data
@@ -58,22 +59,13 @@ FLOOR_DRAWS = 200
 
 SEED = 11
 
-SMALL = 1.96
-"""The 95 % quantile of a half-normal prior, in its width."""
-
 INSTANTS = 64
 """Instants of a cycle: six to a period of the tenth order."""
-
-ALIKE = 0.9
-"""Share of their union from which two regimes are one; correlation from which time and frequency are."""
-
-FEWEST_TESTS = 4
-"""A trend over fewer tests has no scatter to be compared with."""
 
 
 @dataclass(frozen=True)
 class Cycles:
-    """The waveforms of D tests in C channels at I instants, and what regimes are told apart by.
+    """The waveforms of D tests in C channels at I instants, and what distinguishes regimes.
 
     Attributes:
         waves: turns rows (S, m) [unit of the reading] into waveforms (S, D, C, I); zero where nothing is compared.
@@ -99,6 +91,7 @@ def find_regimes(
     free: Sequence[str] = (),
     steady: Data | None = None,
     draws: int = DRAWS,
+    constants: DecisionConstants = DEFAULTS,
 ) -> tuple[Regime, ...]:
     """The regimes of a campaign with the gap in each, the most significant first.
 
@@ -107,21 +100,25 @@ def find_regimes(
     are the data less the drifts that they tolerate, where they do.
     """
     residual = (data.measured - fit.prediction.rows)[None]
-    drawn, noise = drawn_residuals(data, fit, draws), drawn_noise(data)
+    drawn, noise = drawn_residuals(data, fit, draws, constants=constants), drawn_noise(data)
     waves = cycles.waves(np.concatenate([residual, *drawn]))
     floor = np.mean(cycles.waves(noise) ** 2, axis=(0, 3))
-    named = _joined(dict(_masks(cycles, data)))
+    named = _joined(dict(_masks(cycles, data)), constants.same_regime_share)
     names, masks = list(named), list(named.values())
-    spread = _spread(cycles, data, fit, floor)
+    spread = _spread(cycles, data, fit, floor, constants)
     p_values = [max(_p_values(each, len(drawn))) for each in concentrations(waves, spread, masks)]
     gaps = [_gap(cycles, data, waves[0] ** 2, floor, mask) for mask in masks]
-    without = drawn if steady is None else drawn_residuals(data, fit, draws, source=steady)
+    without = drawn
+    if steady is not None:
+        without = drawn_residuals(data, fit, draws, source=steady, constants=constants)
     columns = [n for n, each in enumerate(fit.coordinates) if each.name in free or not free]
     rows = np.concatenate([residual, *without, noise])
-    trend = _trend(data, fit, rows, fit.slopes[:, columns], cycles.recorded)
+    trend = None
+    if data.tests >= constants.fewest_trend_tests:
+        trend = _trend(data, fit, rows, fit.slopes[:, columns], cycles.recorded)
     if trend is not None:
         some = len(rows) - len(noise)
-        names.append(_drift_name(cycles))
+        names.append(_drift_name(cycles, constants.same_regime_share))
         p_values.append(
             max(_p_values(trend.size[:some], len(without))[0], _p_values(trend.t[:some], len(without))[-1])
         )
@@ -131,7 +128,12 @@ def find_regimes(
 
 
 def drawn_residuals(
-    data: Data, fit: LaplaceFit, draws: int, seed: int = SEED, source: Data | None = None
+    data: Data,
+    fit: LaplaceFit,
+    draws: int,
+    seed: int = SEED,
+    source: Data | None = None,
+    constants: DecisionConstants = DEFAULTS,
 ) -> tuple[Array, ...]:
     """Residuals (S, m) [unit of each row] of data drawn from the fitted error model, after a fit like ``fit``.
 
@@ -139,7 +141,8 @@ def drawn_residuals(
     ``source`` where that is given, otherwise those of ``data``.
     """
     source = data if source is None else source
-    random, noise, discrepancy = np.random.default_rng(seed), fit.noise_scales.noise, _small(data, fit)
+    random, noise = np.random.default_rng(seed), fit.noise_scales.noise
+    discrepancy = _small_discrepancy(data, fit, constants)
     weighted = data.turned(fit.slopes) / fit.noise_scales.spread[:, None]
     shares = source.shared is not None or source.tolerated is not None
     found = []
@@ -151,9 +154,9 @@ def drawn_residuals(
     return tuple(found)
 
 
-def _small(data: Data, fit: LaplaceFit) -> float:
+def _small_discrepancy(data: Data, fit: LaplaceFit, constants: DecisionConstants) -> float:
     """The discrepancy [1] of the fit, as far as its prior has it for small errors."""
-    return min(fit.noise_scales.discrepancy, SMALL * data.scales.discrepancy)
+    return min(fit.noise_scales.discrepancy, constants.small_discrepancy * data.scales.discrepancy)
 
 
 def drawn_noise(data: Data) -> Array:
@@ -162,10 +165,11 @@ def drawn_noise(data: Data) -> Array:
     return np.sqrt(data.variance) * random.standard_normal((FLOOR_DRAWS, data.variance.size))
 
 
-def _spread(cycles: Cycles, data: Data, fit: LaplaceFit, floor: Array) -> Array:
+def _spread(cycles: Cycles, data: Data, fit: LaplaceFit, floor: Array, constants: DecisionConstants) -> Array:
     """s^2 (D, C) [unit of the reading squared] of noise with a mean square of ``floor`` and a discrepancy."""
     power = np.var(cycles.waves(data.measured[None])[0], axis=2)
-    return np.asarray(fit.noise_scales.noise**2 * floor + _small(data, fit) ** 2 * power)
+    discrepancy = _small_discrepancy(data, fit, constants)
+    return np.asarray(fit.noise_scales.noise**2 * floor + discrepancy**2 * power)
 
 
 def concentrations(waves: Array, spread: Array, regimes: Sequence[Mask]) -> Array:
@@ -228,12 +232,12 @@ def _thirds(low: str, high: str, values: Array) -> Iterator[tuple[str, Mask]]:
     yield high, rank >= count - count // 3
 
 
-def _joined(masks: Mapping[str, Mask]) -> dict[str, Mask]:
-    """The same with those that coincide as one, under both names."""
+def _joined(masks: Mapping[str, Mask], least: float) -> dict[str, Mask]:
+    """The same with those as one, under both names, that have at least this share of their union in common."""
     found: list[tuple[list[str], Mask]] = []
     for name, mask in masks.items():
         for names, other in found:
-            if np.sum(mask & other) >= ALIKE * np.sum(mask | other):
+            if np.sum(mask & other) >= least * np.sum(mask | other):
                 names.append(name)
                 break
         else:
@@ -274,10 +278,10 @@ class _Trend(NamedTuple):
 def _trend(data: Data, fit: LaplaceFit, rows: Array, slopes: Array, recorded: Array) -> _Trend | None:
     """Linear trends over time in residuals ``rows`` (S, m) [unit of each row].
 
-    ``slopes`` (m, q) [unit of each row] are the directions whose coefficients are regressed. None where there are too
-    few tests.
+    ``slopes`` (m, q) [unit of each row] are the directions whose coefficients are regressed. None where all tests
+    were recorded at one time, or see none of the directions.
     """
-    if data.tests < FEWEST_TESTS or np.ptp(recorded) == 0.0:
+    if np.ptp(recorded) == 0.0:
         return None
     weighted = slopes / data.marginal(fit.noise_scales.noise, fit.noise_scales.discrepancy)[:, None]
     mine = [data.test == test for test in range(data.tests)]
@@ -305,12 +309,12 @@ def _gap_of_trend(cycles: Cycles, data: Data, trend: Array, noise: Array) -> flo
     return _percent(cycles, data, found - floor, np.ones(floor.shape, bool))
 
 
-def _drift_name(cycles: Cycles) -> str:
+def _drift_name(cycles: Cycles, least: float) -> str:
     """A drift; with a warning where the tests were recorded in the order of their frequencies."""
     if cycles.frequency.size < 3:
         return "drift over time"
     both = np.stack([np.argsort(np.argsort(each)) for each in (cycles.recorded, cycles.frequency)])
-    alike = abs(float(np.asarray(np.corrcoef(both))[0, 1])) >= ALIKE
+    alike = abs(float(np.asarray(np.corrcoef(both))[0, 1])) >= least
     return "drift over time or frequency" if alike else "drift over time"
 
 

@@ -12,7 +12,7 @@ True
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import nan
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,22 @@ from numpy.typing import NDArray
 from savgs_ident.core.presentation import Result
 from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, MapCell, Shrink
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.effects.base import Family
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import PeriodicSettings
 
 Kind = Literal["none", "effect", "several", "unknown"]
+
+
+class PortFamily(NamedTuple):
+    """What kind of thing acts where: a location and a family of laws; as text port/family."""
+
+    port: str
+    family: Family
+
+    def __str__(self) -> str:
+        return f"{self.port}/{self.family.value}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +47,12 @@ class Hypothesis:
     Attributes:
         effects: names of the effects; none of them if nothing is missing.
         unknown: whether it is something else. Then there are no effects.
-        flexible: port/family of a learned law; empty where there is none. Then there are no effects either.
+        flexible: port and family of a learned law; None where there is none. Then there are no effects either.
     """
 
     effects: tuple[str, ...] = ()
     unknown: bool = False
-    flexible: str = ""
+    flexible: PortFamily | None = None
 
     def __eq__(self, other: object) -> bool:
         """Whether the other one has the same effects."""
@@ -53,14 +64,16 @@ class Hypothesis:
 
     def __str__(self) -> str:
         """The effects joined by plus signs, a port/family, "none" or "unknown"."""
-        return "unknown" if self.unknown else self.flexible or " + ".join(self.effects) or "none"
+        if self.unknown:
+            return "unknown"
+        return str(self.flexible) if self.flexible else " + ".join(self.effects) or "none"
 
     def with_effect(self, name: str) -> Self:
         """The hypothesis with one more effect."""
         return type(self)((*self.effects, name))
 
     @property
-    def _key(self) -> tuple[frozenset[str], bool, str]:
+    def _key(self) -> tuple[frozenset[str], bool, PortFamily | None]:
         return frozenset(self.effects), self.unknown, self.flexible
 
 
@@ -82,7 +95,7 @@ class Verdict:
         confusable_with: effects that this campaign cannot distinguish from those named.
         sentence: the verdict in one sentence.
         confusable_ports: of something unknown, ports that this campaign cannot distinguish from the one named.
-        families: the kinds of what is missing, each as port/family.
+        families: the kinds of what is missing, each with its port.
         law_known: whether what is named acts by the law of the catalogue; otherwise that is the nearest.
         probability: of what is said, all hypotheses summing to 1.
     """
@@ -93,7 +106,7 @@ class Verdict:
     confusable_with: tuple[str, ...]
     sentence: str
     confusable_ports: tuple[str, ...] = ()
-    families: tuple[str, ...] = ()
+    families: tuple[PortFamily, ...] = ()
     law_known: bool = True
     probability: float = 1.0
 
@@ -123,7 +136,7 @@ class Regime:
     """The gap of the recalibrated baseline in a part of what was recorded.
 
     Attributes:
-        name: what distinguishes that part; several joined by "or" where this campaign cannot tell them apart.
+        name: what distinguishes that part; several joined by "or" where this campaign cannot distinguish them.
         gap_percent: relative rms of the residual there, beyond the noise [%].
         p_value: probability of a misfit as concentrated there by chance, corrected for all regimes looked at.
     """
@@ -208,10 +221,10 @@ class Candidate:
 
 @dataclass(frozen=True)
 class NextTest:
-    """A test that would separate effects, with the significance to expect from it."""
+    """A test that would separate two hypotheses, with the significance to expect from it."""
 
     test: str
-    separates: tuple[str, str]
+    separates: tuple[Hypothesis, Hypothesis]
     expected_sigma: float
 
 

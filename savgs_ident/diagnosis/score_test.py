@@ -56,28 +56,28 @@ def score_terms(
     search: Search, mode: LaplaceFit, terms: list[Term], constants: DecisionConstants = DEFAULTS
 ) -> list[Score]:
     """Scores of candidates about a fit, best first."""
-    columns = search.plant.sensitivities(mode.terms, mode.values, mode.prediction.warm_start, terms)
-    return scores_of(search, mode, terms, columns, constants)
+    sensitivities = search.plant.sensitivities(mode.terms, mode.values, mode.prediction.warm_start, terms)
+    return scores_of(search, mode, terms, sensitivities, constants)
 
 
 def scores_of(
     search: Search,
     mode: LaplaceFit,
     terms: Sequence[Term],
-    columns: Sequence[NDArray[np.float64]],
+    sensitivities: Sequence[NDArray[np.float64]],
     constants: DecisionConstants = DEFAULTS,
 ) -> list[Score]:
-    """The same with known ``columns``, (tries, m, amplitudes) of each term, best first.
+    """The same with known ``sensitivities``, (tries, m, amplitudes) of each term, best first.
 
-    Columns are in the units of the rows per unit of the amplitude.
+    They are in the units of the rows per unit of the amplitude.
     """
     sigma = constants.visible_sigma
-    found = [_score(search, mode, term, each, sigma) for term, each in zip(terms, columns, strict=True)]
+    found = [_score(search, mode, term, each, sigma) for term, each in zip(terms, sensitivities, strict=True)]
     return sorted(found, key=lambda each: -each.evidence)
 
 
 def _score(
-    search: Search, mode: LaplaceFit, term: Term, columns: NDArray[np.float64], visible: float
+    search: Search, mode: LaplaceFit, term: Term, sensitivities: NDArray[np.float64], visible: float
 ) -> Score:
     residual, inside = search.missed(mode.prediction), search.turned(mode.slopes)
     count = len(term.amplitudes)
@@ -87,7 +87,7 @@ def _score(
     )
     scales = np.array([each.scale for each in term.amplitudes])
     best: Score | None = None
-    for shapes, column in zip(term.tried, columns, strict=True):
+    for shapes, column in zip(term.tried, sensitivities, strict=True):
         if not np.isfinite(column).all():
             continue
         moved = search.turned(column * scales)

@@ -3,8 +3,9 @@
 Forward selection. The linear evidence of the scores says which single effects are worth a full fit. If the best of
 them leaves more than the noise, or pulls a parameter away from its tolerance, pairs are fitted:
 
-1. the best single effects, each with the partners that score best beside it;
-2. members of the best pairs that are no single effect of step 1, with other partners: the other may be a stand-in;
+1. the best single effects, each with the effects that score best beside it;
+2. members of the best pairs that are no single effect of step 1, with other effects: the second member may be a
+   stand-in;
 3. the best pair with either member exchanged for its lookalikes.
 
 Every hypothesis that is fitted in full comes out with its evidence; one whose fit found no solution of the plant is
@@ -53,11 +54,6 @@ class Findings:
     lost: tuple[LostHypothesis, ...] = ()
     sensitivities: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
-    @property
-    def best(self) -> LaplaceFit:
-        """The hypothesis with the greatest evidence."""
-        return max((self.base, *self.modes), key=lambda mode: mode.evidence)
-
 
 def hypothesis_of(mode: LaplaceFit) -> Hypothesis:
     """What a fit assumes to be missing."""
@@ -86,19 +82,6 @@ def left_over(
     if left <= constants.negligible_misfit:
         return 0.0
     return left / whole if whole > 0.0 else np.inf
-
-
-def forward_selection(
-    search: Search,
-    base: LaplaceFit,
-    terms: Sequence[Term],
-    progress: Progress,
-    known: Sequence[tuple[str, ...]] = (),
-    constants: DecisionConstants = DEFAULTS,
-) -> Findings:
-    """Hypotheses about what is missing in the recalibrated baseline ``base``: single effects, then pairs."""
-    singles = single_effects(search, base, terms, progress, known, constants)
-    return with_pairs(search, singles, terms, progress, constants)
 
 
 def single_effects(
@@ -162,7 +145,7 @@ def singles_among(
     tried = {mode.terms for mode in findings.modes}
     fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
     others = [term for term in wanted if (term.name,) not in tried]
-    singles = fits.extended(findings.base, score_terms(search, findings.base, others))
+    singles = fits.extended(findings.base, score_terms(search, findings.base, others, constants))
     more = _findings(
         findings.base, findings.scores, fits.refined([*findings.modes, *singles]), findings.sensitivities
     )
@@ -173,26 +156,26 @@ def pairs_with(
     search: Search,
     findings: Findings,
     best: LaplaceFit,
-    partners: Sequence[Term],
+    others: Sequence[Term],
     terms: Sequence[Term],
     progress: Progress,
     constants: DecisionConstants = DEFAULTS,
 ) -> Findings:
-    """The findings, and pairs of each member of the hypothesis ``best`` with each of the ``partners``.
+    """The findings, and pairs of each member of the hypothesis ``best`` with each of the ``others``.
 
-    Beside a stand-in the right partner explains little: it has to be fitted beside the right member alone.
+    Beside a stand-in the right second effect explains little: it has to be fitted beside the right member alone.
     """
     fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
     tried = {hypothesis_of(mode) for mode in findings.modes}
     pairs: list[LaplaceFit] = []
     for parent in findings.modes:
         if len(parent.terms) == 1 and parent.terms[0] in best.terms:
-            others = [
+            untried = [
                 term
-                for term in partners
+                for term in others
                 if term.name not in parent.terms and hypothesis_of(parent).with_effect(term.name) not in tried
             ]
-            pairs += fits.extended(parent, score_terms(search, parent, others))
+            pairs += fits.extended(parent, score_terms(search, parent, untried, constants))
     more = _findings(
         findings.base, findings.scores, fits.refined([*findings.modes, *pairs]), findings.sensitivities
     )
@@ -325,37 +308,37 @@ def _pairs(
         parents = [mode for mode in singles[: fits.constants.parents if wanting else 1] if mode.solved]
         pairs: list[LaplaceFit] = []
         for parent in parents:
-            pairs += _with_partners(fits, parent, pairs, least)
+            pairs += _with_second_effects(fits, parent, pairs, least)
         pairs = fits.refined(pairs)
         if pairs and not fits.is_spotless(pairs[0]):
-            pairs = _with_other_partners(fits, pairs, {hypothesis_of(mode) for mode in parents}, least)
+            pairs = _with_other_second_effects(fits, pairs, {hypothesis_of(mode) for mode in parents}, least)
     else:
-        pairs = fits.refined(_with_small_partners(fits, best, sensitivities))
+        pairs = fits.refined(_with_small_second_effects(fits, best, sensitivities))
     if pairs and pairs[0].evidence > best.evidence:
         pairs = _with_lookalikes(fits, pairs, scores)
     return pairs
 
 
-def _with_partners(
+def _with_second_effects(
     fits: _Fits, parent: LaplaceFit, known: Sequence[LaplaceFit], least: float
 ) -> list[LaplaceFit]:
-    """Pairs of a fitted term with the partners that score best beside it, and more than ``least``.
+    """Pairs of a fitted term with the effects that score best beside it, and more than ``least``.
 
     Less those that are ``known``.
     """
-    fits.progress(f"partners of {hypothesis_of(parent)}")
+    fits.progress(f"effects beside {hypothesis_of(parent)}")
     tried, alone = {hypothesis_of(mode) for mode in known}, hypothesis_of(parent)
     others = [
         term
         for name, term in fits.terms.items()
         if name not in parent.terms and alone.with_effect(name) not in tried
     ]
-    scores = score_terms(fits.search, parent, others)
+    scores = score_terms(fits.search, parent, others, fits.constants)
     worth = [each for each in scores if each.evidence > max(parent.evidence, least)]
-    return fits.extended(parent, worth[: fits.constants.partners])
+    return fits.extended(parent, worth[: fits.constants.pairs_per_parent])
 
 
-def _with_other_partners(
+def _with_other_second_effects(
     fits: _Fits, pairs: list[LaplaceFit], parents: set[Hypothesis], least: float
 ) -> list[LaplaceFit]:
     """The pairs, and those that keep a member of the best ones and exchange the other.
@@ -368,7 +351,7 @@ def _with_other_partners(
     }
     for parent in in_parallel(lambda name: fits.fitted_alone(name, members[name]), list(members)):
         if parent.solved:
-            pairs = [*pairs, *_with_partners(fits, parent, pairs, least)]
+            pairs = [*pairs, *_with_second_effects(fits, parent, pairs, least)]
     return fits.refined(pairs)
 
 
@@ -385,16 +368,17 @@ def _with_lookalikes(fits: _Fits, pairs: list[LaplaceFit], scores: Sequence[Scor
     return fits.refined([*pairs, *in_parallel(lambda each: fits.exchanged(best, *each), exchanges)])
 
 
-def _with_small_partners(
+def _with_small_second_effects(
     fits: _Fits, parent: LaplaceFit, sensitivities: Mapping[str, NDArray[np.float64]]
 ) -> list[LaplaceFit]:
-    """Pairs of a term that explains nearly all with partners so small that one alone does not show the other.
+    """Pairs of a term that explains nearly all with effects so small that one alone does not show the other.
 
-    What a partner does is taken from the ``sensitivities`` about the baseline: near enough to say whether it is worth
-    a fit.
+    What such an effect does is taken from the ``sensitivities`` about the baseline: near enough to say whether it is
+    worth a fit.
     """
     others = [term for name, term in fits.terms.items() if name not in parent.terms]
-    scores = scores_of(fits.search, parent, others, [sensitivities[term.name] for term in others])
+    known = [sensitivities[term.name] for term in others]
+    scores = scores_of(fits.search, parent, others, known, fits.constants)
     least = parent.evidence + fits.constants.promising_log_evidence
     worth = [each for each in scores if each.evidence > least]
-    return fits.extended(parent, worth[: fits.constants.partners])
+    return fits.extended(parent, worth[: fits.constants.pairs_per_parent])

@@ -8,17 +8,22 @@ turn those weights, and the change of the response that a hypothesis makes, into
 - widths of the priors of an effect's parameters, and of those that a linearised law is compared under;
 - limits of the search: how many hypotheses are fitted in full.
 
-The first three kinds can change a verdict about the same fits; the last can only miss a hypothesis.
+The first three kinds can change a verdict about the same fits, or what is said beside it; the last can only miss a
+hypothesis. Tolerances of solvers, meshes, numbers of draws and their seeds decide nothing and stay where they are
+used.
 
 "Misfit" below is the mean square of the residuals in noise variances, less one: what the noise does not explain.
 "Response" is the measured response of a channel, all harmonics and tests together.
 
-Each docstring says where a value comes from, and what is known of the verdict when it is halved or doubled. Values
-"by choice" were chosen by the authors and kept because the labelled recordings and blind trials came out right;
-blind trials had been looked at when some were chosen, so that these trials are no evidence for them.
+Each docstring says where a value comes from, and what is known of the verdict when it is halved or doubled; where it
+says nothing of that, it was not measured. Values "by choice" were chosen by the authors and kept because the labelled
+recordings and blind trials came out right; blind trials had been looked at when some were chosen, so that these
+trials are no evidence for them.
 """
 
 from dataclasses import dataclass
+
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -56,9 +61,9 @@ class DecisionConstants:
 
     It is that of a baseline that drifts by more than is tolerated, too.
 
-    Origin: by choice; before, it had the prior of something unknown, ten times as much. It bounds the
-    probability of *unknown* from below where nothing is missing. Halved or doubled: log odds of a broken tolerance
-    move by 0.7 nat.
+    Origin: by choice; before, it had the prior of something unknown, ten times as much. It bounds the probability
+    of *unknown* from below where nothing is missing. Halved or doubled: log odds of a broken tolerance move by 0.7
+    nat.
     """
 
     # Priors of what an effect brings
@@ -66,15 +71,15 @@ class DecisionConstants:
     amplitude_width: float = 2.0
     """Width of the prior of an effect's amplitude, in its typical sizes.
 
-    Origin: by choice: an effect of twice its typical size is one standard deviation away. Halved or doubled: Occam's
-    factor moves by 0.7 nat for every amplitude; verdicts are not measured.
+    Origin: by choice: an effect of twice its typical size is one standard deviation away. Halved or doubled:
+    Occam's factor moves by 0.7 nat for every amplitude; verdicts are not measured.
     """
 
     shape_width: float = 0.7
     """Width of the prior of the logarithm of what shapes an effect [1].
 
-    Origin: by choice, a factor of two to either side (log 2 = 0.69). Halved or doubled: Occam's factor moves by up to
-    0.7 nat for every shape that the campaign identifies; verdicts are not measured.
+    Origin: by choice, a factor of two to either side (log 2 = 0.69). Halved or doubled: Occam's factor moves by up
+    to 0.7 nat for every shape that the campaign identifies; verdicts are not measured.
     """
 
     width_uncertainty: float = 0.7
@@ -86,21 +91,28 @@ class DecisionConstants:
     weights alone, or towards one half.
     """
 
+    family_widths: tuple[float, ...] = (0.1, 1.0, 10.0)
+    """Widths tried for the prior of one family's functions, over that of all functions of a learned law.
+
+    Origin: by choice, a factor of ten apart. Halved or doubled: Occam's factor moves by up to 0.7 nat a
+    coefficient.
+    """
+
     # Thresholds on log odds
 
     alarm_log_odds: float = 4.0
     """Log odds against *none* from which on something is reported missing.
 
-    Origin: Markov's inequality. Where nothing is missing, and priors and noise are what they are taken for, the
-    odds reach exp(4) in at most exp(-4) = 1.8 % of all campaigns, or 2.7 % where "something" is given the prior
-    odds of 1.5 that it has here. Halved: at most 13.5 % (20 %). Doubled: at most 0.03 % (0.05 %). What that does
-    to missed effects is not measured.
+    Origin: Markov's inequality. Where nothing is missing, and priors and noise are as assumed, the odds reach
+    exp(4) in at most exp(-4) = 1.8 % of all campaigns, or 2.7 % where "something" is given the prior odds of 1.5
+    that it has here. Halved: at most 13.5 % (20 %). Doubled: at most 0.03 % (0.05 %). What that does to missed
+    effects is not measured.
     """
 
     indistinguishable_log_odds: float = 5.0
     """Log odds within which two hypotheses, or two ports, are reported as not distinguishable by the campaign.
 
-    Origin: by choice; exp(5) is about 150 to 1. Halved or doubled: not measured.
+    Origin: by choice; exp(5) is about 150 to 1.
     """
 
     # Thresholds on the change of the response
@@ -110,21 +122,20 @@ class DecisionConstants:
 
     A gap in held-out tests that exceeds the noise by as much is no small one: then the verdict is not *none*.
 
-    Origin: by choice, for campaigns whose noise is 0.14 % of the response. Halved or doubled: not measured.
+    Origin: by choice, for campaigns whose noise is 0.14 % of the response.
     """
 
     material_share_of_test: float = 0.02
     """The same within the one test where the effect changes most.
 
-    Origin: by choice; a friction that shows in the slow tests alone reaches it. Halved or doubled: not measured.
+    Origin: by choice; a friction that shows in the slow tests alone reaches it.
     """
 
     sure_of_gap: float = 3.0
     """Standard deviations, by chance, of the noise's mean square by which a gap must exceed what matters.
 
     Below, a gap is no sign that something is missing. Origin: by choice, the convention of three sigma; with few
-    tests and much noise the square of a gap of the noise alone scatters by more than ``material_share``. Halved or
-    doubled: not measured.
+    tests and much noise the square of a gap of the noise alone scatters by more than ``material_share``.
     """
 
     # The background of small errors
@@ -132,32 +143,37 @@ class DecisionConstants:
     material_error: float = 0.002
     """Width of the prior of the errors that a model has at each port, as a share of the response.
 
-    Origin: by choice, two thirds of what an effect must change to matter. Halved or doubled: not measured.
+    Origin: by choice, two thirds of what an effect must change to matter.
     """
 
     input_error: float = 0.0005
     """The same of the amplitude and the phase [rad] of a test's input.
 
-    Origin: by choice: a recorded road is known to half a per mille. Halved or doubled: not measured.
+    Origin: by choice: a recorded road is known to half a per mille.
     """
 
     curve_tolerance: float = 0.02
     """Tolerance of a damper's curve, point by point, as a share of its force.
 
-    Origin: by choice, what a dynamometer's table is good for. Halved or doubled: not measured.
+    Origin: by choice, what a dynamometer's table is good for.
+    """
+
+    curve_points: tuple[float, ...] = tuple(np.geomspace(0.01, 1.0, 16).tolist())
+    """Points of a damper's curve to either side that err by themselves, as shares of the largest velocity.
+
+    Origin: by choice, as dense as tables are.
     """
 
     drift_tolerance: float = 0.05
     """Change of an identified parameter from the middle of a campaign to its ends, as a share of it.
 
-    Origin: by choice: friction and damping of parts that become warm. Halved or doubled: not measured.
+    Origin: by choice: friction and damping of parts that become warm.
     """
 
     independent_error: float = 0.3
     """Errors that each harmonic has by itself, in those that it shares with others.
 
-    Origin: by choice, so that they stay below the noise of a campaign at the material size. Halved or doubled: not
-    measured.
+    Origin: by choice, so that they stay below the noise of a campaign at the material size.
     """
 
     significant_drift: float = 3.0
@@ -166,20 +182,37 @@ class DecisionConstants:
     Origin: by choice, the convention of three sigma. It changes no verdict.
     """
 
+    least_drift: float = 1.0
+    """Drift of a parameter to first order, in its tolerance, from which on a drifting baseline is fitted.
+
+    Origin: by definition, as a smaller drift is tolerated.
+    """
+
+    drift_rounds: int = 6
+    """Most estimates of the drifts. Origin: computing time; drifts that take more count as no explanation."""
+
+    drift_convergence: float = 0.02
+    """Change of the drifts from one estimate to the next, in their tolerances, from which on they are known.
+
+    Origin: by choice, small against one tolerance.
+    """
+
+    least_parameter_share: float = 0.1
+    """Share of its value to which a drifting parameter may fall. Origin: by choice, as none is negative."""
+
     # Thresholds on the misfit
 
     negligible_misfit: float = 0.3
     """Misfit that counts as none [1].
 
-    Origin: by choice, for noise known from few periods and the plant's own discretisation. Halved or doubled: not
-    measured.
+    Origin: by choice, for noise known from few periods and the plant's own discretisation.
     """
 
     explained_share: float = 0.01
     """Share of the baseline's misfit that a hypothesis may leave and still count as explaining all.
 
     It decides whether further effects and pairs are fitted, and whether a law is looked for beside one effect.
-    Origin: by choice. Halved or doubled: not measured.
+    Origin: by choice.
     """
 
     reported_share: float = 0.005
@@ -191,35 +224,30 @@ class DecisionConstants:
     unexplained_share: float = 0.05
     """Share of the baseline's misfit left by the best effects beyond which the verdict is *unknown*.
 
-    Origin: by choice. Halved or doubled: not measured.
+    Origin: by choice.
     """
 
     unexplained_share_flexible: float = 0.1
     """The same for a learned law at a port.
 
-    Origin: by choice: what closes nine tenths of the gap's square is offered as a correction. Halved or doubled: not
-    measured.
+    Origin: by choice: what closes nine tenths of the gap's square is offered as a correction.
     """
 
     explained_share_flexible: float = 0.02
     """Share of the baseline's misfit that a learned law may leave and still count as explaining all.
 
-    Then only those pairs of effects are fitted whose scores promise to be more probable. Origin: by choice. Halved or
-    doubled: not measured.
+    Then only those pairs of effects are fitted whose scores promise to be more probable. Origin: by choice.
     """
 
     # Localisation
 
     location_folds: int = 4
-    """Parts into which tests are split where a law learned at a port predicts tests left out.
-
-    Origin: by choice. Halved or doubled: not measured.
-    """
+    """Parts into which tests are split where a law learned at a port predicts tests left out. Origin: by choice."""
 
     law_widths: tuple[float, ...] = (0.3, 3.0, 30.0)
     """Prior widths of a law's coefficients, in rms of the residuals in their sd, over which evidence is averaged.
 
-    Origin: by choice, a factor of ten apart. Halved or doubled: not measured.
+    Origin: by choice, a factor of ten apart.
     """
 
     free_input_width: float = 100.0
@@ -228,19 +256,49 @@ class DecisionConstants:
     Origin: by choice. It changes no verdict.
     """
 
+    free_orders: int = 9
+    """Highest order of an input that is free in every dwell. Origin: the orders compared. It changes no verdict."""
+
+    free_orders_along_motion: int = 5
+    """The same in a block of time of a measured motion. Origin: by choice. It changes no verdict."""
+
+    resonances: tuple[float, ...] = (3.0, 4.0, 5.4, 7.3, 9.8, 13.0, 18.0, 24.0, 33.0, 50.0)
+    """Natural frequencies [Hz] at which something is looked for that swings under its load.
+
+    Origin: by choice, about a third apart.
+    """
+
+    resonance_damping: float = 0.1
+    """Damping ratio of what swings there. Origin: by choice, that of slightly damped modes."""
+
+    ripple_orders: tuple[int, ...] = (4, 5, 6, 7, 8, 9)
+    """Orders of the ripple of an input. Origin: those compared, beyond the three of its shape."""
+
+    least_function_share: float = 1e-3
+    """A function of a learned law that changes the rows by less than this share of the strongest one is left out.
+
+    Origin: by choice: data that hardly see a function, as a constant force, allow its coefficient any size.
+    """
+
+    motion_margin: float = 1.5
+    """Range of a learned law over that of the baseline's motion; beyond its range its functions stay constant.
+
+    Origin: by choice, as the motion of the plant with the law is another.
+    """
+
     simple_law_prior: float = 0.1
     """Prior probability of a family's simple laws together, relative to the sum of all its functions.
 
-    Origin: by choice: most of what is so simple is in the catalogue. Halved or doubled: log odds between a
-    simple law and a general one move by 0.7 nat.
+    Origin: by choice: most of what is so simple is in the catalogue. Halved or doubled: log odds between a simple
+    law and a general one move by 0.7 nat.
     """
 
     unlisted_family_prior: float = 0.1
     """Prior probability of a learned law of a family that no effect of the catalogue has at its location.
 
-    Relative to that of a family which the catalogue has there. Origin: by choice: engineers know what can be missing
-    where. Stops are in struts, what hardens is rubber in joints, and the data hardly distinguish a force in a strut
-    from one beside it in the joints. Halved or doubled: log odds between such locations move by 0.7 nat.
+    Relative to that of a family which the catalogue has there. Origin: by choice: engineers know what can be
+    missing where. Stops are in struts, what hardens is rubber in joints, and the data hardly distinguish a force in
+    a strut from one beside it in the joints. Halved or doubled: log odds between such locations move by 0.7 nat.
     """
 
     # Scores
@@ -251,7 +309,7 @@ class DecisionConstants:
     Origin: by choice, the convention of five sigma. It changes no verdict: it says what cannot be assessed.
     """
 
-    judgeable_sizes: float = 10.0
+    assessable_sizes: float = 10.0
     """An effect that is visible only beyond so many typical sizes cannot be assessed in this campaign.
 
     Origin: by choice. It changes no verdict.
@@ -267,8 +325,43 @@ class DecisionConstants:
     lookalike_cosine: float = 0.9
     """Cosine between what two effects do to the campaign from which on they look alike.
 
-    Where one explains all, its lookalikes are fitted too. Origin: by choice. Halved or doubled: not measured.
+    Where one explains all, its lookalikes are fitted too. Origin: by choice.
     """
+
+    cosine_resolution: float = 1e-3
+    """Effects whose cosine is nearer to one count as one where several are significant together.
+
+    Origin: by choice, above the rounding of the sensitivities. It changes no verdict.
+    """
+
+    # What is said beside the verdict: none of these changes it
+
+    reversal_speed: float = 0.3
+    """Share of the largest velocity below which the plant turns round. Origin: by choice."""
+
+    mid_stroke_speed: float = 0.8
+    """Share of the largest velocity above which the plant is in mid-stroke. Origin: by choice."""
+
+    small_discrepancy: float = 1.96
+    """Discrepancy of small errors at most, in the width of its prior. Origin: its 95 % quantile, half-normal."""
+
+    same_regime_share: float = 0.9
+    """Share of their union from which on two regimes are one, and correlation from which on time and frequency are.
+
+    Origin: by choice.
+    """
+
+    fewest_trend_tests: int = 4
+    """Fewest tests with a trend over time. Origin: fewer have no scatter to compare it with."""
+
+    sweep_dwells: int = 6
+    """Dwells that must lie in a sweep's range for it to be predicted. Origin: motions between them are found then."""
+
+    proposed_tests: int = 2
+    """Tests that are proposed to distinguish two hypotheses. Origin: by choice."""
+
+    proposed_dwells: int = 4
+    """Dwells of a proposed test. Origin: by choice."""
 
     # Limits of the search
 
@@ -281,21 +374,18 @@ class DecisionConstants:
     promising_log_evidence: float = 2.0
     """Rise of the log evidence, by the score, from which on an effect is fitted in full.
 
-    The same rise by a broken tolerance makes the search look for pairs. Origin: by choice, well below the
-    threshold of an alarm. Halved or doubled: not measured.
+    The same rise by a broken tolerance makes the search look for pairs. Origin: by choice, well below the threshold
+    of an alarm.
     """
 
     pair_log_evidence: float = 10.0
-    """Rise of the log evidence by the best single effect from which on pairs are looked for.
+    """Rise of the log evidence by the best single effect from which on pairs are looked for. Origin: by choice."""
 
-    Origin: by choice. Halved or doubled: not measured.
-    """
-
-    partners: int = 3
-    """Partners fitted with an effect that leaves something. Origin: computing time."""
+    pairs_per_parent: int = 3
+    """Pairs fitted with an effect that leaves something. Origin: computing time."""
 
     parents: int = 2
-    """Best single effects, or pairs, that get partners. Origin: computing time."""
+    """Best single effects, or best pairs, of whose members pairs are made. Origin: computing time."""
 
     refined_fits: int = 3
     """Best hypotheses that are fitted again on a mesh adapted to their own motion. Origin: computing time."""
@@ -303,13 +393,13 @@ class DecisionConstants:
     refined_log_evidence: float = 300.0
     """Log evidence below the best from which on a hypothesis is not refined.
 
-    Origin: by choice, more than an unadapted mesh costs. Halved or doubled: not measured.
+    Origin: by choice, more than an unadapted mesh costs.
     """
 
     nearest_ports: int = 2
     """Ports at which a law explains most of what a hypothesis leaves, whose effects are tried beside its members.
 
-    Origin: a stand-in of the hypothesis may act at the first. Halved or doubled: not measured.
+    Origin: a stand-in of the hypothesis may act at the first.
     """
 
     learned_fits: int = 4
@@ -318,17 +408,20 @@ class DecisionConstants:
     Origin: computing time. Fewer may miss the port of something strong, which explains little to first order.
     """
 
+    learned_steps: int = 20
+    """Most steps of the fit of a learned law. Origin: computing time."""
+
     function_prior: float = 0.2
     """Prior probability that a learned law of a family needs one of its functions, each independent of the others.
 
-    Origin: by choice: laws are simple. Halved or doubled: not measured.
+    Origin: by choice: laws are simple.
     """
 
     interaction_prior: float = 0.04
     """The same of a product of displacement and velocity.
 
-    Origin: by choice, the square of ``function_prior``: effects of one signal are more probable than interactions of
-    two (Chipman 1996, Bayesian variable selection with related predictors). No law of the catalogue is such a
+    Origin: by choice, the square of ``function_prior``: effects of one signal are more probable than interactions
+    of two (Chipman 1996, Bayesian variable selection with related predictors). No law of the catalogue is such a
     product, but a force beside another one acts through a lever that changes over the stroke, and looks like one.
     Halved or doubled: log odds between ports that do nearly the same move by up to 0.7 nat.
     """
@@ -339,10 +432,13 @@ class DecisionConstants:
     # Held-out tests
 
     held_out_folds: int = 3
-    """Parts into which the tests are split: each is left out once. Origin: computing time; not measured."""
+    """Parts into which the tests are split: each is left out once. Origin: computing time."""
 
     held_out_steps: int = 3
-    """Most steps of a fit without a part, from the fit to all tests. Origin: computing time; not measured."""
+    """Most steps of a fit without a part, from the fit to all tests. Origin: computing time."""
+
+    held_out_fits: int = 2
+    """Best hypotheses that predict tests left out, besides the baseline. Origin: computing time."""
 
     @property
     def typical_coordinate(self) -> float:

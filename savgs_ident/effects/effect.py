@@ -186,6 +186,37 @@ def effect_at(
     return Effect(name, port, law, (*own, *brings), named, states, symptom, reference)
 
 
+def typical_effect(
+    name: str,
+    port: Port,
+    law: AbstractLaw,
+    given: Mapping[str, str | float] | None = None,
+    *,
+    symptom: str = "",
+    reference: str = "",
+) -> Effect:
+    """A law at a port with its typical numbers there.
+
+    Parameters and states are named after the effect and their role. Roles that are ``given`` are a parameter of the
+    plant, by name, or a number [SI] instead. Raises :class:`ValueError` as :func:`effect_at` does.
+    """
+    numbers: dict[str, Parameter | str | float] = {
+        role: replace(each, name=f"{name}_{role}") if isinstance(each, Parameter) else each
+        for role, each in law.typical(port).items()
+    }
+    numbers |= given or {}
+    order = [role.name for role in law.roles]
+    return effect_at(
+        name,
+        port,
+        law,
+        {role: numbers[role] for role in sorted(numbers, key=order.index)},
+        states=tuple(f"{name}_{state.name}" for state in law.states(port)),
+        symptom=symptom,
+        reference=reference,
+    )
+
+
 LAWS: tuple[AbstractLaw, ...] = (
     Coulomb(),
     Preload(),
@@ -236,16 +267,11 @@ def _pairs(ports: Iterable[Port]) -> Iterator[tuple[AbstractLaw, Port, str]]:
 
 def _effect(law: AbstractLaw, port: Port, number: str) -> Effect:
     name = "_".join(part for part in (port.name, number, law.name) if part)
-    numbers: dict[str, Parameter | str | float] = {"number": number} if number else {}
-    for role, given in law.typical(port).items():
-        numbers[role] = replace(given, name=f"{name}_{role}") if isinstance(given, Parameter) else given
-    states = tuple(f"{name}_{state.name}" for state in law.states(port))
-    return effect_at(
+    return typical_effect(
         name,
         port,
         law,
-        numbers,
-        states=states,
+        {"number": number} if number else {},
         symptom=f"{law.family.value} at {port.location}",
         reference="the law's own",
     )

@@ -15,10 +15,10 @@ nothing about what lies beyond.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Complex, Float
@@ -45,7 +45,7 @@ from savgs_ident.effects.base import (
     Role,
     bristle,
 )
-from savgs_ident.effects.effect import Effect, effect_at
+from savgs_ident.effects.effect import Effect, typical_effect
 from savgs_ident.effects.learned_functions import (
     OF_SLIDERS,
     OF_THE_ANGLE,
@@ -53,13 +53,14 @@ from savgs_ident.effects.learned_functions import (
     OF_THE_LOAD,
     OF_THE_MOTION,
     OF_WHAT_GIVES,
-    ORDERS,
     SMALLEST,
     STRETCHES,
     TURN,
+    RelativeAngle,
+    RelativeMotion,
     filters,
-    functions,
     functions_at,
+    values_of,
     what_gives,
 )
 
@@ -126,10 +127,9 @@ class LearnedForce(AbstractForceLaw):
         n = jnp.clip(signals.load / v["carried"], -1.0, 1.0) if self.port.loaded else jnp.zeros_like(x)
         whole = jnp.abs(v["middle"]) + v["stroke"]
         d = jnp.clip(signals.displacement / whole, -1.0, 1.0)
-        found = functions(x, d, speed, n, v["turn"])
-        motion, load = found[: len(OF_THE_MOTION)], found[len(OF_THE_MOTION) :]
-        sliders = [-each.force for each in self._sliders(signals, state)]
-        return self.port.sense * _sum(v, [*motion, *sliders, *(load if self.port.loaded else [])])
+        held = [-each.force for each in self._sliders(signals, state)]
+        seen = RelativeMotion(x, d, speed, n, v["turn"], held)
+        return self.port.sense * _sum(v, values_of(functions_at(self.port), seen))
 
     def rate(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:
         """Velocities of the anchors [m/s]."""
@@ -197,15 +197,13 @@ class LearnedInput(AbstractInputLaw):
 
     def shift(self, v: Values, signal: InputSignal, fundamental: Fundamental) -> InputSignal:
         """The learned value and its rate."""
-        angle, speed = fundamental
-        relative = speed / v["fastest"]
-        value, slope = [], []
-        for order in ORDERS:
-            value += [jnp.cos(order * angle), jnp.sin(order * angle)]
-            slope += [-order * jnp.sin(order * angle), order * jnp.cos(order * angle)]
-        value += [relative * jnp.sin(angle), relative * jnp.cos(angle)]
-        slope += [relative * jnp.cos(angle), -relative * jnp.sin(angle)]
-        return InputSignal(_sum(v, value), speed * _sum(v, slope))
+        relative = fundamental.speed / v["fastest"]
+
+        def learned(angle: Float[Array, ""]) -> Float[Array, ""]:
+            return _sum(v, values_of(OF_THE_ANGLE, RelativeAngle(angle, relative)))
+
+        value, slope = jax.jvp(learned, (fundamental.angle,), (jnp.ones_like(fundamental.angle),))
+        return InputSignal(value, fundamental.speed * slope)
 
 
 class LearnedTransfer(AbstractSensorLaw):
@@ -243,17 +241,10 @@ _LAWS: Mapping[PortKind, Callable[[Port], _Law]] = {
 
 def learned_effect(port: Port) -> Effect:
     """The learned law of a port, with nothing learned yet: ``learned_rail`` at the port ``rail``."""
-    law, name = _LAWS[port.kind](port), f"learned_{port.name}"
-    numbers = {
-        role: replace(given, name=f"{name}_{role}") if isinstance(given, Parameter) else given
-        for role, given in law.typical(port).items()
-    }
-    return effect_at(
-        name,
+    return typical_effect(
+        f"learned_{port.name}",
         port,
-        law,
-        numbers,
-        states=tuple(f"{name}_{each.name}" for each in law.states(port)),
+        _LAWS[port.kind](port),
         symptom="no effect of the catalogue explains what is measured",
         reference="this project: linear regression on functions of what the port sees",
     )

@@ -1,9 +1,14 @@
-"""The functions of learned laws, in words, in numbers, and by family.
+"""The functions of learned laws: a row each, with its words, its family and the function itself.
 
-The laws themselves, which are sums of them, are in :mod:`savgs_ident.effects.learned`.
+The laws themselves, which are sums of them, are in :mod:`savgs_ident.effects.learned`. The number of a coefficient is
+the place of its function in the rows of the port (:func:`functions_at`), so that rows are added at the end of a table
+alone.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 from jax import lax
@@ -18,15 +23,18 @@ class Function(NamedTuple):
     Attributes:
         words: the function in words.
         family: the family to which it belongs.
+        value: the function [1] of what is seen: a :class:`RelativeMotion`, a :class:`RelativeLoad`, a
+            :class:`RelativeAngle` or s [rad/s].
         interaction: whether it is a product of the displacement and the velocity.
     """
 
     words: str
     family: Family
+    value: Callable[[Any], Array]
     interaction: bool = False
 
 
-SHARP = (0.01, 0.1)
+SHARP, BLUNT = 0.01, 0.1
 """Velocities over which friction-like functions turn round, as shares of the largest [1]."""
 
 TURN = 0.03
@@ -44,79 +52,169 @@ SOFT_GAPS = (0.0, 0.4)
 STRETCHES = (0.01, 0.03, 0.07, 0.2)
 """How far a spring-slider gives before it slides, as shares of the port's typical displacement [1]."""
 
+SMALLEST = 1e-9
+"""Least stroke [m], speed [m/s] and load [N] by which is divided."""
+
+
+@dataclass(frozen=True)
+class RelativeMotion:
+    """What functions of a force port are made of, relative to its range [1], (...) each.
+
+    Attributes:
+        x: (displacement - middle)/stroke.
+        d: displacement over the largest, which is the size of the middle and the stroke.
+        v: velocity/speed.
+        n: load/carried.
+        turn: the width w of a reversal.
+        held: what the spring-sliders carry, one for each of :data:`STRETCHES`, or for the first of them.
+    """
+
+    x: Float[Array, "*n"]
+    d: Float[Array, "*n"]
+    v: Float[Array, "*n"]
+    n: Float[Array, "*n"]
+    turn: Float[Array, ""] | float = TURN
+    held: Sequence[Float[Array, "*n"]] = ()
+
+    @cached_property
+    def sharp(self) -> Float[Array, "*n"]:
+        """A friction that turns round over the smallest velocity."""
+        return jnp.tanh(self.v / SHARP)
+
+    @cached_property
+    def turned(self) -> Float[Array, "*n"]:
+        """A friction that turns round over the width that is estimated along."""
+        return jnp.tanh(self.v / self.turn)
+
+    def beyond(self, gap: float, side: float) -> Float[Array, "*n"]:
+        """How far a stop at a gap is compressed, at the upper ``side`` 1 or the lower one -1."""
+        return jnp.maximum(side * self.x - gap, 0.0)
+
+
+class RelativeLoad(NamedTuple):
+    """The load n beyond that at rest, the whole one N, and that at rest, in units of the largest [1], (...) each."""
+
+    n: Float[Array, "*n"]
+    whole: Float[Array, "*n"]
+    rest: Float[Array, "*n"]
+
+    def clearance(self, steepness: float) -> Float[Array, "*n"]:
+        """What a clearance gives that is crossed over a small load; nothing at rest."""
+        return jnp.tanh(steepness * self.whole) - jnp.tanh(steepness * self.rest)
+
+
+class RelativeAngle(NamedTuple):
+    """The angle a of the fundamental [rad], and its speed w in units of the largest [1], (...) each."""
+
+    angle: Float[Array, "*n"]
+    speed: Float[Array, "*n"]
+
+
+_SIDES = (("", 1.0), ("-", -1.0))
+
+
+def _falling(width: float) -> Function:
+    words = f"tanh(v/{SHARP:g}) exp(-(v/{width:g})^2)"
+    return Function(words, Family.FRICTION, lambda m: m.sharp * jnp.exp(-((m.v / width) ** 2)))
+
+
+def _loaded_falling(width: float) -> Function:
+    words = f"n tanh(v/{SHARP:g}) exp(-|v|/{width:g})"
+    return Function(words, Family.FRICTION, lambda m: m.n * m.sharp * jnp.exp(-jnp.abs(m.v) / width))
+
+
+def _stop(gap: float, sign: str, side: float) -> Function:
+    return Function(f"max({sign}x - {gap:g}, 0)", Family.STOP, lambda m: m.beyond(gap, side))
+
+
+def _soft_stop(gap: float, sign: str, side: float) -> Function:
+    return Function(f"max({sign}x - {gap:g}, 0)^2", Family.STOP, lambda m: m.beyond(gap, side) ** 2)
+
+
+def _slider(place: int) -> Function:
+    words = f"a spring-slider that gives by {STRETCHES[place]:g} typical displacements"
+    return Function(words, Family.FRICTION, lambda m: m.held[place])
+
+
+def _wave(name: str, wave: Callable[[Array], Array], order: int) -> Function:
+    return Function(f"{name}({order} a)", Family.SHAPE, lambda at: wave(order * at.angle))
+
+
+def _lag(c: float) -> Function:
+    return Function(f"1/(1 + s/{c:g}) - 1", Family.DYNAMICS, lambda s: 1.0 / (1.0 + s / c) - 1.0)
+
+
+def _second_order_lag(c: float) -> Function:
+    words = f"1/(1 + 1.4 s/{c:g} + (s/{c:g})^2) - 1"
+    return Function(words, Family.DYNAMICS, lambda s: 1.0 / (1.0 + 1.4 * s / c + (s / c) ** 2) - 1.0)
+
+
 OF_THE_MOTION = (
-    Function("tanh(v/0.01)", Family.FRICTION),
-    Function("tanh(v/0.1)", Family.FRICTION),
-    Function("v", Family.DAMPING),
-    Function("v|v|", Family.DAMPING),
-    Function("v^2", Family.DAMPING),
-    Function("x", Family.STIFFNESS),
-    Function("x^2", Family.STIFFNESS),
-    Function("x^3", Family.STIFFNESS),
-    Function("x tanh(v/0.01)", Family.FRICTION, interaction=True),
-    Function("x v", Family.DAMPING, interaction=True),
-    Function("x^2 v", Family.DAMPING, interaction=True),
-    Function("tanh(v/0.01) exp(-(v/0.05)^2)", Family.FRICTION),
-    Function("tanh(v/0.01) exp(-(v/0.2)^2)", Family.FRICTION),
-    Function("|v|", Family.DAMPING),
-    *(Function(f"max({side}x - {gap:g}, 0)", Family.STOP) for gap in GAPS for side in ("", "-")),
-    Function("x^4", Family.STIFFNESS),
-    *(Function(f"max({side}x - {gap:g}, 0)^2", Family.STOP) for gap in SOFT_GAPS for side in ("", "-")),
-    Function("x^5", Family.STIFFNESS),
-    Function("x^9", Family.STIFFNESS),
-    Function("v/(v^2 + 0.01)^(1/4)", Family.DAMPING),
-    Function("tanh(v/w)", Family.FRICTION),
-    Function("tanh(v/0.01)^2", Family.FRICTION),
-    Function("tanh(v/w)^2", Family.FRICTION),
-    *(Function(f"d^{power}", Family.STIFFNESS) for power in (2, 3, 5)),
-    Function("v/(v^2 + 0.0001)^(1/4)", Family.DAMPING),
+    Function(f"tanh(v/{SHARP:g})", Family.FRICTION, lambda m: m.sharp),
+    Function(f"tanh(v/{BLUNT:g})", Family.FRICTION, lambda m: jnp.tanh(m.v / BLUNT)),
+    Function("v", Family.DAMPING, lambda m: m.v),
+    Function("v|v|", Family.DAMPING, lambda m: m.v * jnp.abs(m.v)),
+    Function("v^2", Family.DAMPING, lambda m: m.v**2),
+    Function("x", Family.STIFFNESS, lambda m: m.x),
+    Function("x^2", Family.STIFFNESS, lambda m: m.x**2),
+    Function("x^3", Family.STIFFNESS, lambda m: m.x**3),
+    Function(f"x tanh(v/{SHARP:g})", Family.FRICTION, lambda m: m.x * m.sharp, interaction=True),
+    Function("x v", Family.DAMPING, lambda m: m.x * m.v, interaction=True),
+    Function("x^2 v", Family.DAMPING, lambda m: m.x**2 * m.v, interaction=True),
+    *map(_falling, FALLING),
+    Function("|v|", Family.DAMPING, lambda m: jnp.abs(m.v)),
+    *(_stop(gap, *side) for gap in GAPS for side in _SIDES),
+    Function("x^4", Family.STIFFNESS, lambda m: m.x**4),
+    *(_soft_stop(gap, *side) for gap in SOFT_GAPS for side in _SIDES),
+    Function("x^5", Family.STIFFNESS, lambda m: m.x**5),
+    Function("x^9", Family.STIFFNESS, lambda m: m.x**9),
+    Function("v/(v^2 + 0.01)^(1/4)", Family.DAMPING, lambda m: m.v / (m.v**2 + 0.1**2) ** 0.25),
+    Function("tanh(v/w)", Family.FRICTION, lambda m: m.turned),
+    Function(f"tanh(v/{SHARP:g})^2", Family.FRICTION, lambda m: m.sharp**2),
+    Function("tanh(v/w)^2", Family.FRICTION, lambda m: m.turned**2),
+    Function("d^2", Family.STIFFNESS, lambda m: m.d**2),
+    Function("d^3", Family.STIFFNESS, lambda m: m.d**3),
+    Function("d^5", Family.STIFFNESS, lambda m: m.d**5),
+    Function("v/(v^2 + 0.0001)^(1/4)", Family.DAMPING, lambda m: m.v / (m.v**2 + 0.01**2) ** 0.25),
 )
-"""Functions of x = (displacement - middle)/stroke, v = velocity/speed and d = displacement/(|middle| + stroke).
+"""Functions of a :class:`RelativeMotion` without a past, but for those of the load."""
 
-The width w of a reversal is estimated along.
-"""
-
-OF_SLIDERS = tuple(
-    Function(f"a spring-slider that gives by {width:g} typical displacements", Family.FRICTION)
-    for width in STRETCHES
-)
+OF_SLIDERS = tuple(map(_slider, range(len(STRETCHES))))
 """Functions of the displacement's past: what a spring carries before it slides."""
 
 OF_THE_LOAD = (
-    Function("n tanh(v/0.01)", Family.FRICTION),
-    Function("n v", Family.DAMPING),
-    Function("n", Family.DAMPING),
-    Function("n tanh(v/0.01) exp(-|v|/0.05)", Family.FRICTION),
-    Function("n tanh(v/0.01) exp(-|v|/0.2)", Family.FRICTION),
+    Function(f"n tanh(v/{SHARP:g})", Family.FRICTION, lambda m: m.n * m.sharp),
+    Function("n v", Family.DAMPING, lambda m: m.n * m.v),
+    Function("n", Family.DAMPING, lambda m: m.n),
+    *map(_loaded_falling, FALLING),
 )
-"""Functions with n = load/carried, at a port with a load."""
+"""Functions of a :class:`RelativeMotion` at a port with a load."""
 
 OF_WHAT_GIVES = (
-    Function("n", Family.COMPLIANCE),
-    Function("n|n|", Family.COMPLIANCE),
-    Function("n^2", Family.COMPLIANCE),
-    Function("n^3", Family.COMPLIANCE),
-    Function("tanh(50 N)", Family.PLAY),
-    Function("tanh(5 N)", Family.PLAY),
+    Function("n", Family.COMPLIANCE, lambda load: load.n),
+    Function("n|n|", Family.COMPLIANCE, lambda load: load.n * jnp.abs(load.n)),
+    Function("n^2", Family.COMPLIANCE, lambda load: load.n**2),
+    Function("n^3", Family.COMPLIANCE, lambda load: load.n**3),
+    Function("tanh(50 N)", Family.PLAY, lambda load: load.clearance(50.0)),
+    Function("tanh(5 N)", Family.PLAY, lambda load: load.clearance(5.0)),
 )
-"""Functions of the load n beyond that at rest and of the whole load N, in units of the largest, at a series port."""
+"""Functions of a :class:`RelativeLoad` at a series port, nothing at rest."""
 
 ORDERS = tuple(range(1, 10))
 """Orders of a learned input."""
 
 OF_THE_ANGLE = (
+    Function("cos(1 a)", Family.GAIN, lambda at: jnp.cos(at.angle)),
+    Function("sin(1 a)", Family.DYNAMICS, lambda at: jnp.sin(at.angle)),
     *(
-        Function(f"{wave}({order} a)", family)
-        for order in ORDERS
-        for wave, family in (
-            ("cos", Family.GAIN if order == 1 else Family.SHAPE),
-            ("sin", Family.DYNAMICS if order == 1 else Family.SHAPE),
-        )
+        _wave(name, wave, order)
+        for order in ORDERS[1:]
+        for name, wave in (("cos", jnp.cos), ("sin", jnp.sin))
     ),
-    Function("w sin(a)", Family.DYNAMICS),
-    Function("w cos(a)", Family.DYNAMICS),
+    Function("w sin(a)", Family.DYNAMICS, lambda at: at.speed * jnp.sin(at.angle)),
+    Function("w cos(a)", Family.DYNAMICS, lambda at: at.speed * jnp.cos(at.angle)),
 )
-"""Functions of the angle a of the fundamental and of its speed w, in units of the largest, at an input."""
+"""Functions of a :class:`RelativeAngle` at an input."""
 
 CORNERS = (2.0, 6.0, 20.0, 60.0, 180.0)
 """Corner frequencies [rad/s] of the lags of first order of a learned transfer function."""
@@ -128,56 +226,30 @@ RATE = 20.0
 """Angular frequency [rad/s] in units of which it has rates."""
 
 OF_THE_FREQUENCY = (
-    Function("1", Family.GAIN),
-    Function("s/20", Family.DYNAMICS),
-    Function("(s/20)^2", Family.DYNAMICS),
-    *(Function(f"1/(1 + s/{c:g}) - 1", Family.DYNAMICS) for c in CORNERS),
-    *(Function(f"1/(1 + 1.4 s/{c:g} + (s/{c:g})^2) - 1", Family.DYNAMICS) for c in SECOND_CORNERS),
+    Function("1", Family.GAIN, jnp.ones_like),
+    Function(f"s/{RATE:g}", Family.DYNAMICS, lambda s: s / RATE),
+    Function(f"(s/{RATE:g})^2", Family.DYNAMICS, lambda s: (s / RATE) ** 2),
+    *map(_lag, CORNERS),
+    *map(_second_order_lag, SECOND_CORNERS),
 )
 """Functions of s = j 2 pi f [rad/s] at a sensor."""
 
-SMALLEST = 1e-9
-"""Least stroke [m], speed [m/s] and load [N] by which is divided."""
 
-
-def functions(
-    x: Float[Array, "*n"],
-    d: Float[Array, "*n"],
-    v: Float[Array, "*n"],
-    n: Float[Array, "*n"],
-    turn: Float[Array, ""] | float = TURN,
-) -> list[Float[Array, "*n"]]:
-    """The values of all functions [1] that have no past, those of the motion first, then those of the load.
-
-    ``turn`` is the width w of a reversal.
-    """
-    sharp, blunt, turned = (jnp.tanh(v / width) for width in (*SHARP, turn))
-    falling = [sharp * jnp.exp(-((v / width) ** 2)) for width in FALLING]
-    smooth = [v, v * jnp.abs(v), v**2, x, x**2, x**3, x * sharp, x * v, x**2 * v]
-    stops = [jnp.maximum(side * x - gap, 0.0) for gap in GAPS for side in (1.0, -1.0)]
-    soft = [jnp.maximum(side * x - gap, 0.0) ** 2 for gap in SOFT_GAPS for side in (1.0, -1.0)]
-    directed = [turned, sharp**2, turned**2]
-    late, early = (v / (v**2 + width**2) ** 0.25 for width in (0.1, 0.01))
-    further = [x**4, *soft, x**5, x**9, late, *directed, d**2, d**3, d**5, early]
-    loaded = [n * sharp, n * v, n, *(n * sharp * jnp.exp(-jnp.abs(v) / width) for width in FALLING)]
-    return [sharp, blunt, *smooth, *falling, jnp.abs(v), *stops, *further, *loaded]
+def values_of(functions: Sequence[Function], seen: object) -> list[Array]:
+    """The values [1] of functions of what is ``seen``, in their order."""
+    return [each.value(seen) for each in functions]
 
 
 def what_gives(
     n: Float[Array, "*n"], whole: Float[Array, "*n"], rest: Float[Array, "*n"]
 ) -> list[Float[Array, "*n"]]:
     """The functions of a load beyond that at rest ``n``, of the whole and of that at rest [1]: nothing at rest."""
-    plays = [jnp.tanh(steep * whole) - jnp.tanh(steep * rest) for steep in (50.0, 5.0)]
-    return [n, n * jnp.abs(n), n**2, n**3, *plays]
+    return values_of(OF_WHAT_GIVES, RelativeLoad(n, whole, rest))
 
 
 def filters(omega: Float[Array, "*f"]) -> list[Complex[Array, "*f"]]:
     """The functions of a sensor at angular frequencies [rad/s]."""
-    s = lax.complex(jnp.zeros_like(omega), omega)
-    rate = s / RATE
-    first = [1.0 / (1.0 + s / corner) - 1.0 for corner in CORNERS]
-    second = [1.0 / (1.0 + 1.4 * s / corner + (s / corner) ** 2) - 1.0 for corner in SECOND_CORNERS]
-    return [jnp.ones_like(s), rate, rate**2, *first, *second]
+    return values_of(OF_THE_FREQUENCY, lax.complex(jnp.zeros_like(omega), omega))
 
 
 def functions_at(port: Port) -> tuple[Function, ...]:

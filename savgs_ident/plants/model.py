@@ -49,6 +49,14 @@ class Model(Protocol):
         """The effects, by name, that it may have."""
 
     @property
+    def candidates(self) -> Mapping[str, Effect]:
+        """The effects, by name, that a diagnosis looks for."""
+
+    @property
+    def known_models(self) -> tuple[tuple[str, ...], ...]:
+        """Sets of effects, by name, that such plants are known to have together."""
+
+    @property
     def table(self) -> ParameterTable:
         """All parameters, those of the plant and those that its effects bring along."""
 
@@ -151,6 +159,16 @@ class PlantModel:
     def channels(self) -> tuple[Channel, ...]:
         """What the plant's sensors read."""
         return self.plant.channels
+
+    @property
+    def candidates(self) -> Mapping[str, Effect]:
+        """The effects, by name, that a diagnosis looks for: all that the model may have."""
+        return self.catalogue
+
+    @property
+    def known_models(self) -> tuple[tuple[str, ...], ...]:
+        """No sets of effects: nothing is known of such plants."""
+        return ()
 
     @property
     def table(self) -> ParameterTable:

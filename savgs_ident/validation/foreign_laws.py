@@ -11,7 +11,7 @@ and inputs are in this file, those of forces in :mod:`savgs_ident.validation.for
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import pi
 from types import MappingProxyType
 from typing import ClassVar
@@ -32,7 +32,7 @@ from savgs_ident.effects.base import (
     Port,
     Role,
 )
-from savgs_ident.effects.effect import Effect, effect_at
+from savgs_ident.effects.effect import Effect, typical_effect
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.ports import (
     ACCEL,
@@ -190,12 +190,7 @@ def _foreign(
 
     Right are the port's location and the law's family, or those given.
     """
-    numbers: dict[str, Parameter | str | float] = {}
-    for role, given in law.typical(port).items():
-        numbers[role] = replace(given, name=f"{name}_{role}") if isinstance(given, Parameter) else given
-    states = tuple(f"{name}_{state.name}" for state in law.states(port))
-    numbers |= named or {}
-    effect = effect_at(name, port, law, numbers, states=states, symptom=law.name, reference="the law's own")
+    effect = typical_effect(name, port, law, named, symptom=law.name, reference="the law's own")
     accepted = families or (law.family,)
     return ForeignEffect(effect, ports or (port.location,), tuple(family.value for family in accepted))
 

@@ -28,7 +28,7 @@ from scipy.optimize import lsq_linear
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.transforms import known_to_tolerance
 from savgs_ident.core.values import Values
-from savgs_ident.diagnosis.effect_sensitivities import columns_with_states
+from savgs_ident.diagnosis.effect_sensitivities import sensitivities_with_states
 from savgs_ident.diagnosis.problem import term_of
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.likelihood import Likelihood
@@ -259,7 +259,7 @@ def _marched(
     special = [term for term in terms if CATALOGUE[term.name].states]
     effects, size = [CATALOGUE[term.name] for term in special], DEFAULTS.typical_coordinate
     typical = [{each.name: each.centre + size * each.scale for each in term.amplitudes} for term in special]
-    rows = columns_with_states(model, _all_rows(bench), ORDERS, p, solution, effects, typical)
+    rows = sensitivities_with_states(model, _all_rows(bench), ORDERS, p, solution, effects, typical)
     return {
         term.name: each[:, None] / (size * term.amplitudes[0].scale)
         for term, each in zip(special, rows, strict=True)

@@ -113,11 +113,16 @@ def varied_into(found: dict[str, Any]) -> Watch:
     def watch(problem: DiagnosisProblem, fitted: FittedHypotheses) -> None:
         varied = vary_constants(problem, fitted, {})
         found[KEY] = {
-            name: {str(factor): asdict(verdict) for factor, verdict in verdicts.items()}
+            name: {str(factor): _written(verdict) for factor, verdict in verdicts.items()}
             for name, verdicts in varied.items()
         }
 
     return watch
+
+
+def _written(verdict: Verdict) -> dict[str, Any]:
+    """The verdict as a ``diagnosis.json`` has it."""
+    return asdict(verdict) | {"families": [str(each) for each in verdict.families]}
 
 
 def moved_marks(trials: Sequence[tuple[Score, Answer, Mapping[str, Any]]]) -> tuple[MovedMarks, ...]:

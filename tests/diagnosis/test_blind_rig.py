@@ -127,7 +127,7 @@ def _present(drawing: Drawing, name: str, **parameters: float) -> Present:
 
 
 @pytest.mark.slow
-def test_twins_imitate_each_other(drawing: Drawing) -> None:
+def test_lookalikes_imitate_each_other(drawing: Drawing) -> None:
     gain = _present(drawing, "accel_gain", accel_gain_error=-0.1)
     tilt = _present(drawing, "accel_tilt", accel_tilt_versine=0.04)
     lag = _present(drawing, "accel_lag", accel_lag_time=0.01)

@@ -180,7 +180,7 @@ def test_intervals_of_rates_are_those_of_wilson(total: int, data: st.DataObject)
     assert rate.high == pytest.approx(expected.high, abs=1e-6)
 
 
-def test_who_is_taken_for_whom() -> None:
+def test_what_is_confused_with_what() -> None:
     confusion = confusion_of(_scores(), tuple(CATALOGUE))
     assert confusion.truths == (NOTHING, "cam_scale", "accel_lag", TWO, UNKNOWN)
     assert confusion.verdicts == (

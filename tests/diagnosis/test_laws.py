@@ -1,5 +1,7 @@
 """Sets of functions: what all of one cost, one of them does not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,24 +28,27 @@ def test_a_simple_cause_is_found_at_its_place_and_not_where_few_functions_imitat
         (found,) = localise(search, base, [InputLocation("spring", laws, many)])
         return found.evidence
 
-    imitation = evidence(laws_of_functions(few, (Family.NUMBER,) * 2))
+    imitation = evidence(laws_of_functions(few, (Family.NUMBER,) * 2, DEFAULTS))
     assert evidence((Law(many),)) < imitation
-    assert evidence(laws_of_functions(many, (Family.STIFFNESS,) * 17)) > imitation + 5.0
+    assert evidence(laws_of_functions(many, (Family.STIFFNESS,) * 17, DEFAULTS)) > imitation + 5.0
 
 
 @pytest.mark.parametrize("plain", [(), (0, 2)])
-def test_simple_laws_are_so_probable_together(plain: tuple[int, ...]) -> None:
+@pytest.mark.parametrize("prior", [DEFAULTS.simple_law_prior, 0.3])
+def test_simple_laws_are_so_probable_together(plain: tuple[int, ...], prior: float) -> None:
     columns = np.arange(12.0).reshape(3, 4)
-    whole, *few = laws_of_functions(columns, (Family.FRICTION,) * 4, plain)
+    constants = replace(DEFAULTS, simple_law_prior=prior)
+    whole, *few = laws_of_functions(columns, (Family.FRICTION,) * 4, constants, plain)
     assert whole.columns is columns
-    assert sum(each.prior for each in few) == pytest.approx(DEFAULTS.simple_law_prior * whole.prior)
+    assert sum(each.prior for each in few) == pytest.approx(prior * whole.prior)
     assert [each.columns.shape[1] for each in few] == [1, 1, 1, 1, *([2] if plain else [])]
     np.testing.assert_array_equal(np.concatenate([each.columns for each in few[:4]], axis=1), columns)
 
 
 def test_every_family_of_several_functions_has_a_law_of_its_own() -> None:
     families = (Family.FRICTION, Family.DAMPING, Family.FRICTION, Family.STOP)
-    whole, friction, *alone = laws_of_functions(np.arange(12.0).reshape(3, 4), families, (), "rail")
+    columns = np.arange(12.0).reshape(3, 4)
+    whole, friction, *alone = laws_of_functions(columns, families, DEFAULTS, (), "rail")
     assert whole.family is None
     assert friction.family is Family.FRICTION
     assert friction.columns.shape[1] == 2

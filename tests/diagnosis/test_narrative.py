@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis import narrative
-from savgs_ident.diagnosis.conclusion import settle
+from savgs_ident.diagnosis.conclusion import decide_by_held_out
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
-from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, PortFamily
 from savgs_ident.diagnosis.score_test import PriorConflict
 from savgs_ident.diagnosis.search import Findings, LostHypothesis
 from savgs_ident.diagnosis.thresholds import DEFAULTS
@@ -34,16 +34,21 @@ from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.ports import LOCATION_WORDS, STRUT, SUSPENSION
 
 GAP = Shrink(0.3, 0.04, 0.002, 0.0015, 0.99, (0.98, 1.0))
+RAIL_FRICTION = PortFamily("rail", Family.FRICTION)
 RAIL: Any = SimpleNamespace(name="rail", share=0.9, evidence=50.0)
 PROBLEM: Any = SimpleNamespace(
     constants=DEFAULTS,
     plant=SimpleNamespace(catalogue=CATALOGUE),
     drifts={},
-    words=lambda location: LOCATION_WORDS[location],
+    location_text=lambda location: LOCATION_WORDS[location],
     location=lambda name: CATALOGUE[name].port.location,
     locations=lambda hypothesis: tuple(CATALOGUE[name].port.location for name in hypothesis.effects),
-    families=lambda hypothesis: tuple(
-        f"{CATALOGUE[name].port.location}/{CATALOGUE[name].law.family.value}" for name in hypothesis.effects
+    families=lambda hypothesis: (
+        tuple(
+            PortFamily(CATALOGUE[name].port.location, CATALOGUE[name].law.family)
+            for name in hypothesis.effects
+        )
+        or (hypothesis.flexible,)
     ),
 )
 
@@ -103,8 +108,8 @@ def test_what_predicts_no_tests_is_unknown_at_its_port() -> None:
     strut: Any = SimpleNamespace(name="strut", share=0.9, evidence=60.0)
     evidence = replace(evidence, kind="effect", localisations=(strut, RAIL))
     gap = replace(GAP, after=0.05)
-    settled = settle(evidence, gap, gap.recalibrated, named=("rail",))
-    verdict = write_verdict(PROBLEM, settled, (), gap)
+    decided = decide_by_held_out(evidence, gap, gap.recalibrated, named=("rail",))
+    verdict = write_verdict(PROBLEM, decided, (), gap)
     assert (verdict.kind, verdict.ports) == ("unknown", ("rail",))
     # To first order a law at the strut explains more: it is not ruled out.
     assert verdict.confusable_ports == ("strut",)
@@ -153,7 +158,7 @@ def test_a_number_is_one_with_a_law_of_which_it_is_the_linear_part() -> None:
     problem = DiagnosisProblem(plant, absent, absent, absent, absent)
 
     def families(*effects: str) -> tuple[str, ...]:
-        return problem.families(Hypothesis(effects))
+        return tuple(map(str, problem.families(Hypothesis(effects))))
 
     assert families("tyre_stiffening", "tyre_stiffness") == ("tyre_radial/stiffness",)
     assert families("tyre_stiffening", "tyre_damping") == ("tyre_radial/stiffness", "tyre_radial/number")
@@ -178,7 +183,7 @@ def test_a_tolerance_that_does_not_hold_is_named(weights: dict[str, float], star
 
 def test_a_law_that_the_catalogue_does_not_have_is_reported_with_the_nearest_formula() -> None:
     weights = {"none": 0.0, "unknown": 100.0, "rail_stribeck": 900.0}
-    hypothesis = Hypothesis(flexible="rail/friction")
+    hypothesis = Hypothesis(flexible=RAIL_FRICTION)
     mode = _mode(990.0, "learned_rail")
     law: Any = SimpleNamespace(mode=mode, port=CATALOGUE["rail_stribeck"].port, family=Family.FRICTION)
     member = FlexibleMember(law, 980.0, 0.004)
@@ -190,7 +195,7 @@ def test_a_law_that_the_catalogue_does_not_have_is_reported_with_the_nearest_for
         patch.setattr(narrative, "left_over", lambda *args: 0.04)
         verdict = write_verdict(problem, evidence, (), GAP)
     assert verdict.effects == ("rail_stribeck",)
-    assert verdict.families == ("rail/friction",)
+    assert verdict.families == (RAIL_FRICTION,)
     assert not verdict.law_known
     assert verdict.probability == pytest.approx(1.0)
     assert verdict.sentence.startswith(
@@ -218,7 +223,7 @@ def test_nothing_missing_is_reported_with_what_speaks_against_it(odds: float, re
     assert sentence.count(".") >= 2 + bool(reported)
 
 
-def test_what_could_not_be_decided_or_settled_is_a_warning() -> None:
+def test_what_could_not_be_evaluated_or_refitted_is_a_warning() -> None:
     evidence = _evidence(
         "unknown",
         "law",
@@ -276,8 +281,8 @@ def test_no_verdict_contradicts_its_numbers(
     gap = Shrink(before, recalibrated, after, floor, 0.9, (0.8, 1.0), scatter=scatter)
     # Tests that were held out are predicted worse than tests that were not.
     fitted = max((1.0 - worse) * recalibrated, floor)
-    settled = settle(replace(evidence, kind=kind, chosen=chosen), gap, fitted, named=("rail",))
-    verdict = write_verdict(PROBLEM, settled, (), gap)
+    decided = decide_by_held_out(replace(evidence, kind=kind, chosen=chosen), gap, fitted, named=("rail",))
+    verdict = write_verdict(PROBLEM, decided, (), gap)
     by_chance = DEFAULTS.sure_of_gap * scatter
     large = fitted**2 - floor**2 > DEFAULTS.material_share**2 + by_chance
     explained = left <= DEFAULTS.explained_share and change >= DEFAULTS.material_share_of_test

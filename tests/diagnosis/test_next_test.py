@@ -7,7 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
-from savgs_ident.diagnosis.next_test import PROPOSED, next_tests, predicted
+from savgs_ident.diagnosis.next_test import next_tests, predicted
+from savgs_ident.diagnosis.result import Hypothesis
+from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.base import OperatingCondition
@@ -44,10 +46,10 @@ def fitted(plant_and_data: tuple[DwellProblem, Data], start: PeriodicSolution) -
 def test_the_most_significant_tests_are_proposed_with_their_dwells(fitted: Fitted) -> None:
     search, plant, one, other = fitted
     found = next_tests(search, plant, one, other)
-    assert len(found) == PROPOSED
+    assert len(found) == DEFAULTS.proposed_tests
     assert [each.expected_sigma for each in found] == sorted((e.expected_sigma for e in found), reverse=True)
     for each in found:
-        assert each.separates == ("spring_rate", "bushing_stiffness")
+        assert each.separates == (Hypothesis(("spring_rate",)), Hypothesis(("bushing_stiffness",)))
         assert each.test.startswith("dwells at ")
         assert sum(each.test.endswith(condition.text) for condition in plant.plant.conditions) == 1
         assert each.expected_sigma > 0.0

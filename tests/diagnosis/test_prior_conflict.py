@@ -42,7 +42,7 @@ def test_it_is_the_gain_of_a_wider_prior(a: float, seed: int) -> None:
     )
 
 
-def test_what_a_tolerance_allows_strains_nothing() -> None:
+def test_what_a_tolerance_allows_is_no_conflict() -> None:
     search = search_of(PLANT, draw(PLANT, {"a": 1.2}, NOISE, 4))
     assert prior_conflict(find_map(search, (), {}, None), PLANT.nuisances).gain < 0.0
 

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 from savgs_ident.diagnosis import gap as module
 from savgs_ident.diagnosis.gap import along, first_harmonic, frequencies_of, sweep_shrink
+from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
@@ -79,17 +80,18 @@ def _sweep(
 
 
 def test_motions_are_found_at_the_dwells_in_range_and_between() -> None:
-    found = frequencies_of(DWELLS, _sweep())
+    found = frequencies_of(DWELLS, _sweep(), DEFAULTS.sweep_dwells)
     assert found is not None
     assert found.size == DWELLS.size
     assert (np.diff(found) > 0.0).all()
     assert set(DWELLS[DWELLS < 2.95]) <= set(found.tolist())
     assert found[-1] == pytest.approx(2.95)
-    assert frequencies_of(DWELLS[4:], _sweep()) is None
+    assert frequencies_of(DWELLS[4:], _sweep(), DEFAULTS.sweep_dwells) is None
+    assert frequencies_of(DWELLS[4:], _sweep(), 4) is not None
 
 
 def test_where_all_dwells_lie_in_the_sweep_it_is_compared_as_far_as_they_reach() -> None:
-    found = frequencies_of(DWELLS[:7], _sweep())
+    found = frequencies_of(DWELLS[:7], _sweep(), DEFAULTS.sweep_dwells)
     assert found is not None
     assert found.tolist() == DWELLS[:7].tolist()
 
@@ -97,7 +99,8 @@ def test_where_all_dwells_lie_in_the_sweep_it_is_compared_as_far_as_they_reach()
 def test_the_gap_is_relative_to_the_response_and_leaves_out_what_no_dwell_reaches(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    plant = cast(Any, SimpleNamespace(excitation=SimpleNamespace(frequency=DWELLS), channels=CHANNELS))
+    excitation = SimpleNamespace(frequency=DWELLS)
+    plant = cast(Any, SimpleNamespace(excitation=excitation, channels=CHANNELS, constants=DEFAULTS))
     sweep = _sweep()
 
     def reported(plant: Any, sweep: SweepResponse, frequencies: Any, terms: Any, values: Any) -> Any:
@@ -135,7 +138,7 @@ def test_the_rig_swept_in_time_answers_as_predicted(rig: Rig, nominal_campaign) 
         )
     }
     sweep = estimate_sweep_response(Recording("sweep", "sweep", None, channels), "road_height")
-    frequencies = frequencies_of(np.asarray(plant.excitation.frequency), sweep)
+    frequencies = frequencies_of(np.asarray(plant.excitation.frequency), sweep, DEFAULTS.sweep_dwells)
     assert frequencies is not None
     reported = first_harmonic(plant, sweep, frequencies, (), {})
     assert reported is not None

@@ -14,7 +14,7 @@ from savgs_ident.diagnosis.held_out import HeldOut, hold_out, predict_left_out, 
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation, anywhere, localise
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import cosine, score_terms
-from savgs_ident.diagnosis.search import Findings, excess, forward_selection, left_over, pairs_with
+from savgs_ident.diagnosis.search import Findings, excess, left_over, pairs_with
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
 from savgs_ident.inference.likelihood import noise_scales
@@ -22,7 +22,7 @@ from savgs_ident.inference.observations import Prediction, Term
 from savgs_ident.inference.prior import Linear
 
 from ..in_one_test import over
-from .toy import TERMS, ToyPlant, draw
+from .toy import TERMS, ToyPlant, best_of, draw, forward_selection
 
 PLANT = ToyPlant()
 NOISE = 0.02
@@ -35,11 +35,11 @@ def _silent(line: str) -> None:
 def _found(values: dict[str, float], seed: int) -> tuple[Search, Findings]:
     search = search_of(PLANT, draw(PLANT, values, NOISE, seed))
     base = find_map(search, (), {}, None)
-    return search, forward_selection(search, base, TERMS, _silent)
+    return search, forward_selection(search, base, TERMS)
 
 
 def _names(findings: Findings) -> tuple[str, ...]:
-    best = findings.best
+    best = best_of(findings)
     return best.terms if best.evidence > findings.base.evidence + 5.0 else ()
 
 
@@ -62,8 +62,8 @@ def test_what_is_missing_is_named(values: dict[str, float], names: tuple[str, ..
 def test_two_that_are_missing_are_both_named(seed: int) -> None:
     search, findings = _found({"a": 0.9, "c": 0.3, "s": 0.15, "w": 8.0}, seed)
     assert set(_names(findings)) == {"bend", "ripple"}
-    assert left_over(search, findings.base, findings.best) < 0.02
-    assert excess(search, findings.best) < 0.5
+    assert left_over(search, findings.base, best_of(findings)) < 0.02
+    assert excess(search, best_of(findings)) < 0.5
 
 
 @over("seed", range(5))
@@ -298,7 +298,7 @@ class _Breaking(ToyPlant):
 def test_a_fit_without_motion_is_lost_and_a_column_that_is_no_number_not_scored() -> None:
     plant = _Breaking()
     search = search_of(plant, draw(plant, {"a": 1.0, "t": -0.8}, NOISE, 1))
-    findings = forward_selection(search, find_map(search, (), {}, None), TERMS, _silent)
+    findings = forward_selection(search, find_map(search, (), {}, None), TERMS)
     assert (Hypothesis(("twist",)), Status.STALLED) in findings.lost
     assert all("twist" not in mode.terms and np.isfinite(mode.evidence) for mode in findings.modes)
     ripple = next(each for each in findings.scores if each.term.name == "ripple")
@@ -334,37 +334,36 @@ def test_a_stand_in_for_two_does_not_keep_its_place_beside_one_of_them(seed: int
     """Alone it is nearest, so that the two are never tried together but by exchanging it."""
     plant = _Shapes()
     search = search_of(plant, draw(plant, {"a": 1.0, "b": 0.3, "d": 0.15}, NOISE, seed))
-    findings = forward_selection(search, find_map(search, (), {}, None), SHAPES, _silent)
+    findings = forward_selection(search, find_map(search, (), {}, None), SHAPES)
     assert {score.term.name for score in findings.scores[:2]} == {"stand-in", "other"}
-    assert set(findings.best.terms) == {"round", "wavy"}
+    assert set(best_of(findings).terms) == {"round", "wavy"}
 
 
 @over("seed", range(5))
-def test_what_strains_a_tolerance_is_tried_with_an_effect_that_spares_it(seed: int) -> None:
+def test_what_conflicts_with_a_tolerance_is_tried_with_an_effect_that_relieves_it(seed: int) -> None:
     plant = _Shapes()
     search = search_of(plant, draw(plant, {"a": 1.8, "b": 0.3}, NOISE, seed))
-    findings = forward_selection(search, find_map(search, (), {}, None), (SHAPES[0], SHAPES[4]), _silent)
-    assert set(findings.best.terms) == {"round", "line"}
+    findings = forward_selection(search, find_map(search, (), {}, None), (SHAPES[0], SHAPES[4]))
+    assert set(best_of(findings).terms) == {"round", "line"}
 
 
 @over("seed", range(5))
-def test_a_double_of_one_of_two_is_not_named_in_its_place(seed: int) -> None:
+def test_a_lookalike_of_one_of_two_is_not_named_in_its_place(seed: int) -> None:
     """It is nearest as long as the other is not there, and beside it leaves no more than half the noise."""
     plant = _Shapes()
     search = search_of(plant, draw(plant, {"a": 1.0, "b": 0.5, "d": 0.15}, NOISE, seed))
-    double = Term("double", "spring", (Linear("h", "N", 0.0, 0.4),))
+    lookalike = Term("lookalike", "spring", (Linear("h", "N", 0.0, 0.4),))
     findings = forward_selection(
         search,
         find_map(search, (), {}, None),
-        (SHAPES[0], SHAPES[1], double),
-        _silent,
+        (SHAPES[0], SHAPES[1], lookalike),
         constants=replace(DEFAULTS, parents=1),
     )
-    assert findings.scores[0].term.name == "double"
-    assert set(findings.best.terms) == {"round", "wavy"}
+    assert findings.scores[0].term.name == "lookalike"
+    assert set(best_of(findings).terms) == {"round", "wavy"}
 
 
-def test_a_partner_at_the_place_of_what_is_left_is_found_beside_the_right_member() -> None:
+def test_an_effect_at_the_location_of_what_is_left_is_found_beside_the_right_member() -> None:
     plant = _Shapes()
     search = search_of(plant, draw(plant, {"a": 1.0, "b": 0.3, "d": 0.15}, NOISE, 1))
     base = find_map(search, (), {}, None)
@@ -373,8 +372,8 @@ def test_a_partner_at_the_place_of_what_is_left_is_found_beside_the_right_member
     wrong = find_map(search, (by_name["round"], by_name["other"]), {}, None)
     assert left_over(search, base, wrong) > 0.0
     found = pairs_with(search, Findings(base, (), (wrong, alone)), wrong, [by_name["wavy"]], SHAPES, _silent)
-    assert found.best.terms == ("round", "wavy")
-    assert left_over(search, base, found.best) < 0.01
+    assert best_of(found).terms == ("round", "wavy")
+    assert left_over(search, base, best_of(found)) < 0.01
     assert {mode.terms for mode in found.modes} >= {wrong.terms, alone.terms}
 
 

@@ -41,4 +41,4 @@ def test_the_priors_of_all_hypotheses_sum_to_one() -> None:
 
 def test_constants_are_not_changed_in_place() -> None:
     with pytest.raises(FrozenInstanceError):
-        DEFAULTS.partners = 5  # type: ignore[misc]
+        DEFAULTS.parents = 5  # type: ignore[misc]

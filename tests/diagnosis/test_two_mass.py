@@ -11,7 +11,6 @@ from savgs_ident.core.values import as_values
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
 from savgs_ident.diagnosis.localisation import localise
 from savgs_ident.diagnosis.location_hypotheses import input_locations
-from savgs_ident.diagnosis.search import forward_selection
 from savgs_ident.diagnosis.verdict import most_probable
 from savgs_ident.effects.effect import Effect, generic_effects
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
@@ -22,6 +21,7 @@ from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_
 
 from ..relaxed import as_users_have_it
 from .simple_laws import assert_a_law_of_one_function
+from .toy import forward_selection
 
 FREQUENCY = np.array([0.7, 1.0, 1.4, 1.9, 2.6, 4.0, 8.0, 12.0])
 STROKE, ORDERS, NOISE = 0.01, 5, 1e-3
@@ -118,7 +118,7 @@ def _found_and_located(case: Case, location: str, alike: set[str]) -> None:
     assert {each.name for each in places} == LOCATIONS
     found = localise(search, base, places)
     assert max(found, key=lambda each: each.evidence).name == location
-    findings = forward_selection(search, base, problem.candidates, lambda line: None, problem.known)
+    findings = forward_selection(search, base, problem.candidates, problem.known)
     assert set(most_probable(findings).terms) <= alike
     assert len(most_probable(findings).terms) == 1
 

@@ -32,6 +32,8 @@ from savgs_ident.diagnosis.verdict import (
 )
 from savgs_ident.inference.find_map import LaplaceFit
 
+from .toy import best_of
+
 FITTED = cast(LaplaceFit, SimpleNamespace(noise_scales=SimpleNamespace(value=-np.inf)))
 
 
@@ -156,7 +158,7 @@ def test_probabilities_are_those_of_the_weights() -> None:
     )
 
 
-def test_rivals_are_single_effects_that_the_data_hardly_distinguish() -> None:
+def test_alternatives_are_single_effects_that_the_data_hardly_distinguish() -> None:
     weights = {
         "none": 0.0,
         "unknown": 99.0,
@@ -170,7 +172,7 @@ def test_rivals_are_single_effects_that_the_data_hardly_distinguish() -> None:
     assert indistinguishable(weighed, chosen) == ("gear_compliance",)
 
 
-def test_rivals_of_a_pair_stand_in_for_one_of_its_members() -> None:
+def test_alternatives_of_a_pair_stand_in_for_one_of_its_members() -> None:
     weights = {
         "none": 0.0,
         "unknown": 99.0,
@@ -184,7 +186,7 @@ def test_rivals_of_a_pair_stand_in_for_one_of_its_members() -> None:
     assert indistinguishable(weighed, weighed[0]) == ("accel_tilt",)
 
 
-def test_what_only_the_prior_speaks_against_is_a_rival() -> None:
+def test_what_only_the_prior_speaks_against_is_an_alternative() -> None:
     """A sensor that leans by 30 degrees reads as one of less gain does; nobody mounts one like that."""
     effects = {"accel_gain": (100.0, -50.0), "accel_tilt": (60.0, -50.5), "accel_lag": (40.0, -120.0)}
     weighed = [
@@ -219,7 +221,7 @@ def test_an_effect_that_does_too_little_to_matter_is_no_part_of_a_pair(
     findings = without_immaterial_members(
         Findings(_mode(0.0), (), (pair, alone)), lambda _, gone: changes[gone[0]]
     )
-    assert findings.best.terms == best
+    assert best_of(findings).terms == best
     assert alone in findings.modes
 
 

@@ -14,7 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import Parameter
+from savgs_ident.core.presentation import no_progress
 from savgs_ident.core.status import Status
+from savgs_ident.diagnosis.search import Findings, single_effects, with_pairs
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.inference.prior import Coordinates, Linear, Logarithmic, sheet_coordinate
 
@@ -80,6 +84,23 @@ class ToyPlant:
             here = [dict(values) | shapes | amplitudes for shapes in term.tried]
             found.append(np.stack([self.predict(terms, each, names, None).slopes for each in here]))
         return found
+
+
+def forward_selection(
+    search: Search,
+    base: LaplaceFit,
+    terms: Sequence[Term],
+    known: Sequence[tuple[str, ...]] = (),
+    constants: DecisionConstants = DEFAULTS,
+) -> Findings:
+    """Single effects, then pairs, as a diagnosis looks for them where no learned law explains all."""
+    singles = single_effects(search, base, terms, no_progress, known, constants)
+    return with_pairs(search, singles, terms, no_progress, constants)
+
+
+def best_of(findings: Findings) -> LaplaceFit:
+    """The hypothesis with the greatest evidence."""
+    return max((findings.base, *findings.modes), key=lambda mode: mode.evidence)
 
 
 def draw(plant: ToyPlant, values: Mapping[str, float], noise: float, seed: int, miss: float = 0.0) -> Data:

@@ -2,7 +2,7 @@
 
 The states are marched by backward Euler, which is stable for every rate there may be, until they repeat: so they
 are where they come to in use, sticking and sliding, and the energy of a cycle is that of the mechanism alone. The
-rail's grips are marched through the bristle that they load, all effects but rail friction itself on top of it.
+rail's friction limits are marched through the bristle that they load, all effects but rail friction on top of it.
 """
 
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ class Cycle:
     """A cycle of a mechanism, at NODES instants.
 
     ``drive`` is the displacement, velocity, load and rest of a port (n, 4), or for what gives way its load and that
-    at rest (n, 2); ``state`` and ``rate`` are (n, s), the bristle's anchor for a grip. ``power`` [W] is what the
+    at rest (n, 2); ``state`` and ``rate`` are (n, s), the bristle's anchor for a limit. ``power`` [W] is what the
     mechanism takes from the rig; ``open`` is by how much the states do not repeat, relative to their scale.
     """
 

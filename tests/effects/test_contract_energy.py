@@ -1,6 +1,6 @@
 """No mechanism of the catalogue gives energy over a cycle: a friction takes it, a spring gives back what it took.
 
-Whether there is energy to speak of is decided by kind: forces, grips and what gives way; changed numbers, plates
+Whether there is energy to speak of is decided by kind: forces, friction limits, compliances; changed numbers, plates
 and sensors that err are no mechanisms.
 """
 

@@ -26,9 +26,9 @@ RAIL = CATALOGUE["rail_coulomb"]
 
 @given(mu=st.floats(0.0, 0.5), load=st.floats(0.0, 1e5), velocity=st.floats(-2.0, 2.0))
 def test_it_holds_its_share_of_the_load_both_ways(mu: float, load: float, velocity: float) -> None:
-    grip = RAIL.friction_limit(typical(RAIL, mu_r=mu), signals(velocity=velocity, load=load))
-    assert float(grip.against_up) == float(grip.against_down)
-    assert float(grip.against_up) == pytest.approx(mu * load, rel=1e-15, abs=1e-290)
+    limit = RAIL.friction_limit(typical(RAIL, mu_r=mu), signals(velocity=velocity, load=load))
+    assert float(limit.against_up) == float(limit.against_down)
+    assert float(limit.against_up) == pytest.approx(mu * load, rel=1e-15, abs=1e-290)
 
 
 @pytest.mark.parametrize("theta", [-0.1, 0.1])
@@ -71,10 +71,10 @@ PRELOAD = CATALOGUE["rail_preload"]
     force=st.floats(0.0, 3000.0, allow_subnormal=False),
 )
 def test_it_holds_the_same_both_ways_at_any_load(load: float, velocity: float, force: float) -> None:
-    grip = PRELOAD.friction_limit(
+    limit = PRELOAD.friction_limit(
         typical(PRELOAD, rail_preload_force=force), signals(velocity=velocity, load=load)
     )
-    assert (float(grip.against_up), float(grip.against_down)) == (force, force)
+    assert (float(limit.against_up), float(limit.against_down)) == (force, force)
 
 
 @pytest.mark.parametrize("theta", [-0.1, 0.1])
@@ -98,9 +98,9 @@ STRIBECK_RISE, STRIBECK_SPEED = float(STRIBECK_P["stribeck_rise"]), float(STRIBE
 
 def _share(velocity: float, load: float = 5000.0) -> float:
     """What it adds, relative to the friction of fast sliding."""
-    grip = STRIBECK.friction_limit(STRIBECK_P, signals(velocity=velocity, load=load))
-    assert float(grip.against_up) == float(grip.against_down)
-    return float(grip.against_up) / (0.03 * load)
+    limit = STRIBECK.friction_limit(STRIBECK_P, signals(velocity=velocity, load=load))
+    assert float(limit.against_up) == float(limit.against_down)
+    return float(limit.against_up) / (0.03 * load)
 
 
 def test_at_rest_it_is_the_rise_and_fast_it_is_gone() -> None:
@@ -123,9 +123,9 @@ ASYMMETRY = CATALOGUE["rail_asymmetry"]
 
 @given(load=st.floats(0.0, 1e5), share=st.floats(-0.95, 0.95))
 def test_what_it_adds_up_it_takes_down(load: float, share: float) -> None:
-    grip = ASYMMETRY.friction_limit(typical(ASYMMETRY, mu_r=0.03, rail_asymmetry=share), signals(load=load))
-    assert float(grip.against_up) == -float(grip.against_down)
-    assert float(grip.against_up) == pytest.approx(share * 0.03 * load, rel=1e-12, abs=1e-290)
+    limit = ASYMMETRY.friction_limit(typical(ASYMMETRY, mu_r=0.03, rail_asymmetry=share), signals(load=load))
+    assert float(limit.against_up) == -float(limit.against_down)
+    assert float(limit.against_up) == pytest.approx(share * 0.03 * load, rel=1e-12, abs=1e-290)
 
 
 @pytest.mark.parametrize("share", [-0.5, 0.2])

@@ -130,8 +130,10 @@ def synthetic_diagnosis(measured: HarmonicResponse, kind: Kind = "effect") -> Di
         if kind == "none"
         else FurtherShrink("recorded sweep, first harmonic", 0.1881, 0.0942, 0.0132, 0.0021),
         next_tests=(
-            NextTest("dwell at 0.35 Hz, plate at half its stroke", ("rail_stribeck", "rail_preload"), 14.2),
-            NextTest("standstill, then a step of 2 mm", ("rail_stribeck", "joint_friction"), 6.1),
+            NextTest(
+                "dwell at 0.35 Hz, plate at half its stroke", _either("rail_stribeck", "rail_preload"), 14.2
+            ),
+            NextTest("standstill, then a step of 2 mm", _either("rail_stribeck", "joint_friction"), 6.1),
         ),
         not_judgeable=(
             NotJudgeable("bump_stop", "bump_stop_stiffness", 3.2e4, "N/m"),
@@ -148,6 +150,10 @@ def synthetic_diagnosis(measured: HarmonicResponse, kind: Kind = "effect") -> Di
         warnings=("The dwell at 6 Hz was left out: the wheel lifts off.",),
         wall_s=61.3,
     )
+
+
+def _either(one: str, other: str) -> tuple[Hypothesis, Hypothesis]:
+    return Hypothesis((one,)), Hypothesis((other,))
 
 
 def unconverged(diagnosis: Diagnosis) -> Diagnosis:
@@ -181,7 +187,7 @@ def hostile(diagnosis: Diagnosis, text: str) -> Diagnosis:
             *others,
         ),
         by_channel={**diagnosis.by_channel, text: SHRINK},
-        next_tests=(NextTest(text, (text, text), 3.0),),
+        next_tests=(NextTest(text, _either(text, text), 3.0),),
         not_judgeable=(NotJudgeable(text, text, 1.0, text),),
         confusable=(Confusable((text, text), 0.99),),
         loops=tuple(replace(loop, port=text, unit=text) for loop in diagnosis.loops[:1]),
@@ -198,7 +204,7 @@ def friction(velocity: NDArray[np.float64]) -> NDArray[np.float64]:
 def candidate_of(hypothesis: Hypothesis, probability: float) -> Candidate:
     """A hypothesis with a probability, with ports and families as a diagnosis gives them."""
     if hypothesis.flexible:
-        kinds = [tuple(hypothesis.flexible.split("/"))]
+        kinds = [(hypothesis.flexible.port, hypothesis.flexible.family.value)]
     else:
         effects = [CATALOGUE[name] for name in hypothesis.effects]
         kinds = [(each.port.location, each.law.family.value) for each in effects]

@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from savgs_ident.diagnosis.result import NONE, UNKNOWN, Candidate, Diagnosis, Hypothesis, Verdict
+from savgs_ident.diagnosis.result import (
+    NONE,
+    UNKNOWN,
+    Candidate,
+    Diagnosis,
+    Hypothesis,
+    PortFamily,
+    Verdict,
+)
+from savgs_ident.effects.base import Family
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.report.diagnosis.hypotheses import (
     Branch,
@@ -25,9 +34,15 @@ from .diagnosis_synthetic import candidate_of
 from .page_reader import HOSTILE, Reader
 
 LEARNED = tuple(
-    Hypothesis(flexible=kind)
-    for kind in ("rail/friction", "rail/damping", "strut/friction", "sensor.sprung_accel/dynamics")
+    Hypothesis(flexible=PortFamily(*kind))
+    for kind in (
+        ("rail", Family.FRICTION),
+        ("rail", Family.DAMPING),
+        ("strut", Family.FRICTION),
+        ("sensor.sprung_accel", Family.DYNAMICS),
+    )
 )
+RAIL_FRICTION = PortFamily("rail", Family.FRICTION)
 SINGLES = tuple(Hypothesis((name,)) for name in CATALOGUE)
 PAIRS = st.lists(st.sampled_from(sorted(CATALOGUE)), min_size=2, max_size=2, unique=True).map(
     lambda names: Hypothesis(tuple(names))
@@ -102,7 +117,7 @@ def test_a_pair_counts_at_both_ports_and_once_at_a_port_of_both(diagnosis: Diagn
         Hypothesis(("rail_stribeck", "accel_lag")): 0.5,
         Hypothesis(("rail_stribeck", "rail_viscous")): 0.2,
         Hypothesis(("rail_stribeck",)): 0.1,
-        Hypothesis(flexible="rail/friction"): 0.15,
+        Hypothesis(flexible=RAIL_FRICTION): 0.15,
         NONE: 0.04,
         UNKNOWN: 0.01,
     }
@@ -163,7 +178,7 @@ def test_small_laws_are_one_bar_where_they_matter_together(diagnosis: Diagnosis)
         (
             # The effect is the nearest one.
             Verdict(
-                "effect", ("rail_stribeck",), ("rail",), (), "", families=("rail/friction",), law_known=False
+                "effect", ("rail_stribeck",), ("rail",), (), "", families=(RAIL_FRICTION,), law_known=False
             ),
             ["rail", "friction", "learned law"],
         ),
@@ -175,7 +190,7 @@ def test_what_the_verdict_names_is_marked_and_nothing_else(
 ) -> None:
     shares = {
         Hypothesis(("rail_stribeck",)): 0.3,
-        Hypothesis(flexible="rail/friction"): 0.2,
+        Hypothesis(flexible=RAIL_FRICTION): 0.2,
         NONE: 0.2,
         UNKNOWN: 0.2,
         Hypothesis(("mount_compliance",)): 0.1,

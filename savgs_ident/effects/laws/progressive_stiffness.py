@@ -1,10 +1,10 @@
-"""A spring that stiffens as it is strained.
+"""A spring that stiffens as it is deflected.
 
     F = -k s x |x|
 
 with the port's displacement x [m], a stiffness k [N/m] and the relative rise s [1/m] of the secant stiffness.
 Together with a spring k the tangent stays positive while 1 + 2 s |x| > 0. The displacement counts from the nominal
-state, or, where it is the strain itself as a tyre's compression, from zero.
+state, or, where it is the whole deflection of the spring as a tyre's compression, from zero.
 
 Source: Pacejka 2012, Tire and Vehicle Dynamics, ch. 4, vertical load against deflection.
 """
@@ -46,5 +46,5 @@ class ProgressiveStiffness(AbstractForceLaw):
 
     def force(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, ""]:
         """The force on top of that of a linear spring [N]."""
-        strain = signals.displacement - signals.rest if self.from_rest else signals.displacement
-        return -(v["stiffness"] * v["rise"] * strain * jnp.abs(strain))
+        x = signals.displacement - signals.rest if self.from_rest else signals.displacement
+        return -(v["stiffness"] * v["rise"] * x * jnp.abs(x))

@@ -9,11 +9,12 @@ Source: Ewins 2000, Modal Testing, ch. 2, single degree of freedom.
 """
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values
@@ -61,6 +62,22 @@ class Resonance(AbstractSeriesLaw):
     ) -> Float[Array, " s"]:
         """Velocity and acceleration out of balance [m/s], [m/s^2]."""
         omega = 2.0 * jnp.pi * v["frequency"]
-        damping = 2.0 * v["damping_ratio"] * omega * state[1]
-        acceleration = v["mobility"] * load.beyond_rest - damping - omega**2 * state[0]
+        held = restoring_acceleration(state[0], state[1], omega, v["damping_ratio"])
+        acceleration = v["mobility"] * load.beyond_rest - held
         return rate - jnp.stack([state[1], acceleration])
+
+
+def restoring_acceleration(displacement: Any, velocity: Any, natural: Any, damping_ratio: Any) -> Any:
+    """What holds a mode back [m/s^2]: 2 zeta w xd + w^2 x, with the natural angular frequency w [rad/s]."""
+    return 2.0 * damping_ratio * natural * velocity + natural**2 * displacement
+
+
+def relative_response(
+    omega: NDArray[np.float64], natural: float, damping_ratio: float
+) -> NDArray[np.complex128]:
+    """Displacement under a load of angular frequencies ``omega`` [rad/s], (n,), over that under a load at rest [1].
+
+    ``natural`` is the angular frequency of the mode [rad/s].
+    """
+    moved = restoring_acceleration(1.0, 1j * omega, natural, damping_ratio) - omega**2
+    return np.asarray(natural**2 / moved)

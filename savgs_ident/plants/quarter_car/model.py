@@ -18,7 +18,7 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Origin
 from savgs_ident.effects.effect import Effect
 from savgs_ident.plants.base import Channel
-from savgs_ident.plants.quarter_car.catalogue import EFFECTS, MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, EFFECTS, MODELS, build_model, model_parameters
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig
 from savgs_ident.recordings.recording import Campaign
@@ -71,6 +71,16 @@ class RigModel:
     def catalogue(self) -> Mapping[str, Effect]:
         """The effects, by name, that it may have."""
         return EFFECTS
+
+    @property
+    def candidates(self) -> Mapping[str, Effect]:
+        """The effects, by name, that a diagnosis looks for: those that no diagnosis learned."""
+        return CATALOGUE
+
+    @property
+    def known_models(self) -> tuple[tuple[str, ...], ...]:
+        """The effects of the paper's models."""
+        return tuple(MODELS.values())
 
     @property
     def table(self) -> ParameterTable:

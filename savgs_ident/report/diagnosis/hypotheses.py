@@ -117,9 +117,9 @@ def actions_of(candidate: Candidate, catalogue: Mapping[str, Effect]) -> tuple[A
 
     An effect that the ``catalogue`` lacks acts wherever its hypothesis does.
     """
-    if candidate.hypothesis.flexible:
-        port, family = candidate.hypothesis.flexible.split("/")
-        return (Action(port, family, ""),)
+    learned = candidate.hypothesis.flexible
+    if learned:
+        return (Action(learned.port, learned.family.value, ""),)
     names = sorted(candidate.effects)
     if not all(name in catalogue for name in names):
         families = " + ".join(sorted(candidate.families))

@@ -27,7 +27,7 @@ from savgs_ident.report.diagnosis.figures import (
     shrink_figure,
     spread_loops,
 )
-from savgs_ident.report.diagnosis.hypotheses import candidate_row, nested_bars
+from savgs_ident.report.diagnosis.hypotheses import candidate_row, named_hypotheses, nested_bars
 from savgs_ident.report.diagnosis.text import (
     KIND_WORDS,
     alarm,
@@ -251,7 +251,7 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "regimes": regime_picture(diagnosis),
             "regime_note": regime_note(diagnosis),
             "next_tests": [
-                (each.test, " from ".join(each.separates), decimal(each.expected_sigma, 1))
+                (each.test, " from ".join(map(str, each.separates)), decimal(each.expected_sigma, 1))
                 for each in diagnosis.next_tests
             ],
             "confusable": [(*each.effects, signed(each.cosine, 3)) for each in diagnosis.confusable],
@@ -265,12 +265,8 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
 def _facts(diagnosis: Diagnosis) -> tuple[dict[str, object], ...]:
     """Four numbers for a first look."""
     verdict, shrink = diagnosis.verdict, diagnosis.shrink
-    said = verdict.effects or (verdict.kind,)
-    if verdict.kind == "effect" and not verdict.law_known:
-        said = verdict.families
-    named = next(
-        (each for each in diagnosis.candidates if (each.effects or (str(each.hypothesis),)) == said), None
-    )
+    said = named_hypotheses(verdict)
+    named = next((each for each in diagnosis.candidates if each.hypothesis in said), None)
     calibrated = np.isfinite(shrink.closed_by_calibration)
     return (
         {

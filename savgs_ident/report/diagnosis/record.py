@@ -28,7 +28,7 @@ def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
             "confusable_with": diagnosis.verdict.confusable_with,
             "sentence": diagnosis.verdict.sentence,
             "confusable_ports": diagnosis.verdict.confusable_ports,
-            "families": diagnosis.verdict.families,
+            "families": [str(each) for each in diagnosis.verdict.families],
             "law_known": diagnosis.verdict.law_known,
             "probability": diagnosis.verdict.probability,
             "another_law": not diagnosis.verdict.law_known,
@@ -38,7 +38,11 @@ def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
         "shrink": _shrink(diagnosis.shrink)
         | {"by_channel": {name: _shrink(each) for name, each in diagnosis.by_channel.items()}},
         "next_test": [
-            {"test": each.test, "separates": each.separates, "expected_sigma": each.expected_sigma}
+            {
+                "test": each.test,
+                "separates": [str(hypothesis) for hypothesis in each.separates],
+                "expected_sigma": each.expected_sigma,
+            }
             for each in diagnosis.next_tests
         ],
         "not_judgeable": [

@@ -71,9 +71,10 @@ def about_candidate(diagnosis: Diagnosis, candidate: Candidate) -> str:
         return " ".join(symptoms(diagnosis, candidate.effects))
     if candidate.hypothesis == NONE:
         return "The recalibrated baseline is complete."
-    if candidate.hypothesis.flexible:
-        port, family = candidate.hypothesis.flexible.split("/")
-        return f"{family.capitalize()} at {port_words(diagnosis, port)}, by a law that was learned from the data."
+    learned = candidate.hypothesis.flexible
+    if learned:
+        kind, place = learned.family.value.capitalize(), port_words(diagnosis, learned.port)
+        return f"{kind} at {place}, by a law that was learned from the data."
     return "An effect that is not in the catalogue."
 
 
@@ -315,7 +316,7 @@ def _next_tests(diagnosis: Diagnosis) -> list[RenderableType]:
     if not diagnosis.next_tests:
         return []
     rows = [
-        (each.test, " from ".join(each.separates), decimal(each.expected_sigma, 1))
+        (each.test, " from ".join(map(str, each.separates)), decimal(each.expected_sigma, 1))
         for each in diagnosis.next_tests
     ]
     return [table("Next tests", ("test", "separates", "expected\n[sd]"), rows, texts=(0, 1))]
