@@ -181,7 +181,7 @@ def test_a_loop_is_drawn_whole_over_velocity_and_displacement(diagnosis: Diagnos
     assert over.max() == pytest.approx(12.0, abs=0.01)
 
 
-def test_a_loop_without_a_law_has_one_line_and_ways_are_in_millimetres(
+def test_a_loop_without_a_law_has_one_line_and_displacements_are_in_millimetres(
     by_kind: dict[str, Diagnosis],
 ) -> None:
     loop = by_kind["unknown"].loops[0]

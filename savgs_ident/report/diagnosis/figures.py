@@ -266,7 +266,7 @@ def spread_loops(loops: tuple[ForceLoop, ...]) -> tuple[ForceLoop, ...]:
 def force_figure(diagnosis: Diagnosis, loop: ForceLoop) -> Figure:
     """One loop over velocity (left) and displacement (right), beside the law of the named effects."""
     unit, scale = _SMALL_UNITS.get(loop.unit, (loop.unit, 1.0))
-    way, factor = _SMALL_UNITS.get(loop.motion_unit, (loop.motion_unit, 1.0))
+    motion_unit, factor = _SMALL_UNITS.get(loop.motion_unit, (loop.motion_unit, 1.0))
     with styled():
         figure = new_figure(4.5, 3.0)
         figure.set_layout_engine("none")
@@ -284,8 +284,8 @@ def force_figure(diagnosis: Diagnosis, loop: ForceLoop) -> Figure:
                 _draw_law(axes, factor * motion, scale * loop.law, law_label(diagnosis, loop.port))
             axes.xaxis.set_major_locator(MaxNLocator(4))
         left.set_ylabel(printable(f"{_quantity(loop.unit)} [{unit_text(unit)}]"))
-        left.set_xlabel(f"velocity [{way}/s]")
-        right.set_xlabel(f"displacement [{way}]")
+        left.set_xlabel(f"velocity [{motion_unit}/s]")
+        right.set_xlabel(f"displacement [{motion_unit}]")
         left.yaxis.set_label_coords(-0.24, 0.5)
         handles, labels = left.get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.55, 0.925), ncols=2)
