@@ -30,7 +30,8 @@ lint: $(VENV)/.installed-test
 	$(BIN)/mypy savgs_ident
 	$(BIN)/lint-imports
 
-test-all: lint
+# The peers in the benchmarks are tested, too.
+test-all: lint $(VENV)/.installed-bench
 	HYPOTHESIS_PROFILE=thorough $(BIN)/python -m pytest -m "slow or hypothesis" $(PYTEST_ARGS)
 
 bench: $(VENV)/.installed-bench

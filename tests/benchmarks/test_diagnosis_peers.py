@@ -97,6 +97,7 @@ def test_columns_that_are_the_same_stand_under_all_their_names() -> None:
     assert found.either_sign.tolist() == [True, False]
 
 
+@pytest.mark.slow
 def test_peers_find_what_stands_out_and_keep_quiet_about_noise() -> None:
     given = regression(np.random.default_rng(5), "accel_lag", 40.0)
     for peer in (by_stlsq, by_frols):
@@ -112,6 +113,7 @@ def _lasso(library: np.ndarray, residual: np.ndarray, names: str, either_sign: b
     return said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_l1_selection_finds_the_column_among_others_like_it(sign: float) -> None:
     """Ten columns that have cosines of 0.8 with each other, one of them at 15 standard deviations."""
@@ -123,6 +125,7 @@ def test_l1_selection_finds_the_column_among_others_like_it(sign: float) -> None
         assert _lasso(library, residual, "abcdefghij", either_sign=True) == truth
 
 
+@pytest.mark.slow
 def test_l1_selection_keeps_signs_and_adds_up_what_shapes_of_an_effect_contribute() -> None:
     random = np.random.default_rng(7)
     library = random.standard_normal((ROWS, 3))
@@ -138,6 +141,7 @@ def test_l1_selection_keeps_signs_and_adds_up_what_shapes_of_an_effect_contribut
     assert _lasso(library, negative, "abc", either_sign=True) == "a"
 
 
+@pytest.mark.slow
 def test_l1_selection_keeps_something_of_pure_noise_once_in_the_root_of_the_rows() -> None:
     """0.041 of 600 rows: 4 of 100 expected, of which 10 or more have a probability of 0.008."""
     random = np.random.default_rng(8)
@@ -146,6 +150,7 @@ def test_l1_selection_keeps_something_of_pure_noise_once_in_the_root_of_the_rows
     assert sum(each is not None for each in said) < 10
 
 
+@pytest.mark.slow
 def test_a_peer_is_compared_at_its_best_on_either_kind_of_trials() -> None:
     kinds = {
         "": trials([OWN, OWN, NOTHING], ["accel_tilt", "accel_gain", ""], ["accel_tilt", None, "accel_lag"]),
