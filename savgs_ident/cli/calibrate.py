@@ -72,7 +72,8 @@ def calibrate(
             channels=channels,
             jobs=jobs,
             scheduler=scheduler,
+            command=command_line(),
             progress=progress,
-        ).made_by(command_line())
+        )
         files = study.save(out, progress)
     return reporter.conclude(study, (*files, out / "trials.jsonl"))

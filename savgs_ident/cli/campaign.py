@@ -100,12 +100,9 @@ def campaign(
 def conclude(study: "CampaignStudy", files: tuple[Path, ...], reporter: Reporter) -> int:
     """Show the study, and say of each campaign what is wrong with it; the exit code."""
     reporter.show_result(study, files)
-    for row in study.rows:
-        if row.status == "failed":
-            print_error(f"Failed: {row.name}: {row.reason}")
-        elif row.status == "not trusted":
-            print_error(f"Not to be trusted: {row.name}: {row.reason}.")
-    if all(row.unreadable for row in study.rows):
+    for line in study.failures:
+        print_error(line)
+    if study.unreadable:
         print_error("Error: no campaign could be read. Remedy: mend what is said of each above.")
         return BAD_INPUT
     if not study.doubts:

@@ -14,7 +14,7 @@ from savgs_ident.cli.options import (
     OutOption,
     QuietOption,
     command_line,
-    read_model,
+    effects_of,
 )
 
 
@@ -99,7 +99,7 @@ def closed_loop(
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    shown = read_model(model_file, model)
+    shown = si.load_model(model_file, effects_of(model))
     with reporter.working() as progress:
         study = si.close_loop(
             shown,
@@ -111,7 +111,8 @@ def closed_loop(
             posterior=posterior,
             rigs=rigs,
             causes=causes,
+            command=command_line(),
             progress=progress,
-        ).made_by(command_line())
+        )
         files = study.save(out, progress)
     return reporter.conclude(study, files)

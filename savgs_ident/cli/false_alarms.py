@@ -19,7 +19,7 @@ from savgs_ident.cli.options import (
     SchedulerOption,
     SeedOption,
     command_line,
-    read_baseline,
+    effects_of,
     read_campaign,
 )
 
@@ -63,7 +63,7 @@ def false_alarms(
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    baseline = read_baseline(rig, model)
+    baseline = si.load_baseline(rig, effects_of(model))
     with reporter.working() as progress:
         study = si.false_alarms(
             baseline,
@@ -77,7 +77,8 @@ def false_alarms(
             channels=channels,
             jobs=jobs,
             scheduler=scheduler,
+            command=command_line(),
             progress=progress,
-        ).made_by(command_line())
+        )
         files = study.save(out, progress)
     return reporter.conclude(study, (*files, out / "draws.jsonl"))

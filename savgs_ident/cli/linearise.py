@@ -10,7 +10,7 @@ from savgs_ident.cli.options import (
     OutOption,
     QuietOption,
     command_line,
-    read_model,
+    effects_of,
 )
 
 
@@ -40,8 +40,8 @@ def linearise(
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    shown = read_model(model_file, model)
+    shown = si.load_model(model_file, effects_of(model))
     with reporter.working() as progress:
-        study = si.linearise(shown, progress).made_by(command_line())
+        study = si.linearise(shown, progress, command=command_line())
         files = study.save(out, progress)
     return reporter.conclude(study, files)

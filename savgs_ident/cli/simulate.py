@@ -12,8 +12,8 @@ from savgs_ident.cli.options import (
     ModelArgument,
     OutOption,
     QuietOption,
+    effects_of,
     read_campaign,
-    read_model,
 )
 
 
@@ -52,12 +52,9 @@ def simulate(
 
     if sum((bool(frequency), sweep, campaign is not None)) > 1:
         raise typer.BadParameter("choose one of --frequency, --sweep and --campaign")
-    for value in frequency or ():
-        if not 0.0 < value < float("inf"):
-            raise typer.BadParameter(f"--frequency {value:g}: give a frequency above 0 Hz")
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    shown = read_model(model_file, model)
+    shown = si.load_model(model_file, effects_of(model))
     with reporter.working() as progress:
         found: si.SimulatedResponse | si.SimulatedSweep
         if sweep:

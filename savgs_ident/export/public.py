@@ -101,6 +101,7 @@ def export(
     posterior: Posterior | str | Path | None = None,
     samples: int = 500,
     diagnosis: Diagnosis | str | Path | None = None,
+    command: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> Exported:
     """Export a model: parameters with covariance, draws, linear models, equations.
@@ -113,6 +114,7 @@ def export(
         samples: how many of them, evenly spread over all.
         diagnosis: a diagnosis or a ``diagnosis.json``: the effects that it names, or the force that it learned, join
             the model with the numbers of its fit.
+        command: the command line that the result says it was made by.
         progress: called with a sentence on what is being done.
 
     Look at ``trusted`` of the result. Raises :class:`InputError` for an unknown format, for what a format cannot
@@ -130,7 +132,7 @@ def export(
         # What names no file of its own is a fault of the rig's numbers.
         with blamed_on(model.rig.source):
             written[name] = _write(name, found.model, out)
-    origin = replace(model.origin(), effects=found.model.effects)
+    origin = replace(model.origin(), effects=found.model.effects, command=tuple(command))
     return Exported(found, written, origin=origin)
 
 

@@ -18,9 +18,11 @@ from savgs_ident.control.design import DigitalController, controller_for
 from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS
 from savgs_ident.control.linear_equivalent import AlphaMap
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.presentation import NO_ORIGIN, no_progress
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.report.control.loop_text import alarm, saturation_words
@@ -98,12 +100,10 @@ def test_a_law_that_begins_at_another_angle_says_that_it_doubts(
     assert doubted_from(lost) == pytest.approx(6.0, abs=2e-3)
 
 
-def test_a_controller_of_another_link_angle_is_refused(
-    friction: QuarterCar, numbers: Values, controller: DigitalController
-) -> None:
+def test_a_controller_of_another_link_angle_is_refused(rig: Rig, controller: DigitalController) -> None:
     moved = replace(controller, alpha=eqx.tree_at(_nominal, controller.alpha, jnp.asarray(np.radians(80.0))))
     with pytest.raises(InputError, match="designed for a link at 80 deg, and the rig's stands at 90 deg"):
-        study_loop(friction, numbers, moved, TEST, lambda said: None)
+        study_loop(RigModel(rig, MODELS["simtr"]), moved, "moved", TEST, NO_ORIGIN, no_progress)
 
 
 def _study(**given: Any) -> Any:
