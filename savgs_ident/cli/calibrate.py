@@ -33,7 +33,7 @@ def calibrate(
     ] = 1,
     seed: SeedOption = 1,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Keep the trials that an earlier run left in --out DIR.")
+        bool, typer.Option("--resume", help="Go on from the trials that an earlier run left in --out DIR.")
     ] = False,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,

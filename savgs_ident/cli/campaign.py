@@ -61,7 +61,7 @@ def campaign(
 
     In a folder, files that are named after tests (dwell_2.35Hz.csv, standstill.csv) are one campaign; other files
     are a campaign each, and so is each subfolder. A campaign that fails is reported, the others go on. Where one
-    was identified before from the same data, rig and settings, its result is kept: a run that was stopped goes on
+    was identified before from the same data, rig and settings, its result is used: a run that was stopped goes on
     where it was when it is started again.
 
     On a Dask cluster (install the extra `cluster`) the workers must have the same version of this package and see the

@@ -90,7 +90,7 @@ def closed_loop(
     other rigs, causes.
 
     Exit code 1 if the loop or the passive rig is not stable, here or on another rig that the data allow, or the law
-    ceased to believe the link angle.
+    ceased to believe the link angle, or the rig file's own fit is not to be trusted.
 
     Example: savgs-ident closed-loop out/fit/model.toml --test sweep --rigs 5
     """

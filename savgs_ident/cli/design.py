@@ -59,7 +59,7 @@ def design(
     gamma, loop, ride, robustness and regularisation.
 
     Exit code 1 if gamma is not confirmed, or the loop is not stable with the controller as it is used, when sampled
-    or on one of the rigs.
+    or on one of the rigs, or the rig file's own fit is not to be trusted.
 
     Example: savgs-ident design out/fit/model.toml --posterior out/posterior/posterior.nc
     """

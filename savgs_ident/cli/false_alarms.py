@@ -37,7 +37,7 @@ def false_alarms(
     orders: OrdersOption = 9,
     seed: SeedOption = 1,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Keep the draws that an earlier run left in --out DIR.")
+        bool, typer.Option("--resume", help="Go on from the draws that an earlier run left in --out DIR.")
     ] = False,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,

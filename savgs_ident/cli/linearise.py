@@ -31,7 +31,8 @@ def linearise(
     Writes linearise.json (with the state space of equation (8)), linearise.html (the report), and as .png and
     .pdf alpha, responses and, with friction, described.
 
-    Exit code 1 if the exact linearisation is not the nonlinear model at small motions.
+    Exit code 1 if the exact linearisation is not the nonlinear model at small motions, or the rig file's own fit is
+    not to be trusted.
 
     Example: savgs-ident linearise out/fit/model.toml
     """

@@ -43,7 +43,7 @@ def simulate(
 
     Writes simulate.json, simulate.csv, simulate.png and simulate.pdf.
 
-    Exit code 1 if a motion was not found.
+    Exit code 1 if a motion was not found, or the rig file's own fit is not to be trusted.
 
     Example: savgs-ident simulate out/fit/model.toml --frequency 1 2 2.35
     """
