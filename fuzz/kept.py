@@ -15,9 +15,10 @@ from emcee.backends import HDFBackend
 
 from fuzz.loader import Original
 from fuzz.recordings import packed_table
-from savgs_ident.campaigns.store import FILES, Kept, MadeFrom, keep_result, kept_result
+from savgs_ident.campaigns.store import FILES, MadeFrom, StoredResult, load_result, save_result
 from savgs_ident.campaigns.study import row_of, study_campaigns
 from savgs_ident.core.files import to_json
+from savgs_ident.core.presentation import NO_ORIGIN
 from savgs_ident.inference.samplers import nuts as nuts_sampler
 from savgs_ident.inference.samplers.chains import new_checkpoint, open_checkpoint
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, rig_content
@@ -25,8 +26,7 @@ from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.report.blind import blind_record
 from savgs_ident.report.campaigns.record import campaigns_columns, campaigns_record
 from savgs_ident.report.present_validation import alarms_record, calibration_record
-from savgs_ident.validation.blind import Job as BlindJob
-from savgs_ident.validation.blind import plan_of
+from savgs_ident.validation.blind import BlindRequest, plan_of
 from savgs_ident.validation.blind_answer import Answer, Envelope, Interval, Score, score_from, sealed
 from savgs_ident.validation.blind_trial import Drawn, Plan, run_trial
 from savgs_ident.validation.calibration import CalibrationStudy, Trial, trial_reader
@@ -38,7 +38,7 @@ from savgs_ident.validation.virtual_rig import Bench
 CASE = "case"
 MARKS: dict[str, object] = {"seed": 4, "campaign": "campaign.csv.gz", "every": 1}
 _MADE_FROM = MadeFrom("ab" * 32, ("campaign.csv.gz",), None, "cd" * 32, {"effects": ["rail_coulomb"]})
-_BLIND = BlindJob(3, None, 1, None, (20.0, 50.0, 15.0, 15.0), 1, False, False, ("savgs-ident", "blind"))
+_BLIND = BlindRequest(3, None, 1, None, (20.0, 50.0, 15.0, 15.0), 1, False, False, ("savgs-ident", "blind"))
 _PLAN = Plan(default_rig_path(), rig_content(default_rig_path()), 4, _BLIND.shares, 1, False)
 _NUMBER = 1
 
@@ -118,11 +118,11 @@ def emcee_chain() -> Original:
 
 def read_result(path: Path) -> object:
     """The row of a campaign in the study of all; None if it would be identified anew."""
-    kept = kept_result(path.parent, _MADE_FROM.digest)
+    kept = load_result(path.parent, _MADE_FROM.digest)
     if kept is None:
         return None
     row = row_of("nominal", "campaign.csv.gz", kept.record, kept.start, _MADE_FROM.data_sha256)
-    study = study_campaigns([row, replace(row, name="other", start=1.7e9)], str)
+    study = study_campaigns([row, replace(row, name="other", start=1.7e9)], str, {}, NO_ORIGIN)
     to_json(campaigns_record(study, {}, ()))
     return row, campaigns_columns(study)
 
@@ -224,7 +224,7 @@ def _result() -> dict[str, bytes]:
     }
     with TemporaryDirectory() as parent:
         folder = Path(parent) / "nominal"
-        keep_result(folder, Kept(json.dumps(record), 'name = "gt_rear"\n', 1.76e9), _MADE_FROM)
+        save_result(folder, StoredResult(json.dumps(record), 'name = "gt_rear"\n', 1.76e9), _MADE_FROM)
         return {f"nominal/{each.name}": each.read_bytes() for each in folder.iterdir()}
 
 

@@ -20,7 +20,7 @@ _CDR_MCAP = (
 _MATLAB = tuple(
     f"recordings.axis_recording.{name}" for name in ("_unpacked", "_arrays", "_element", "_header")
 )
-_RESULT = ("campaigns.store.kept_result", "campaigns.store.Kept.record")
+_RESULT = ("campaigns.store.load_result", "campaigns.store.StoredResult.record")
 _TRIALS = ("validation.trials.marks_in", "validation.trials.known_trials")
 _BLIND = ("validation.blind_trial._read",)
 _EXPORT = ("export.document.read_document",)

@@ -22,16 +22,22 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from savgs_ident.campaigns.run import run_campaigns
-    from savgs_ident.campaigns.study import CampaignStudy
+    from savgs_ident.campaigns.study import CampaignRow, CampaignStudy
+    from savgs_ident.campaigns.trends import Trend
+    from savgs_ident.control.closed_loop.programme import Ride, RideGain
     from savgs_ident.control.closed_loop.study import LoopStudy
     from savgs_ident.control.design import Design, DigitalController
     from savgs_ident.control.linear_study import LinearStudy
     from savgs_ident.control.public import close_loop, design, linearise
-    from savgs_ident.core.errors import InputError
+    from savgs_ident.control.synthesis import Margins
+    from savgs_ident.core.errors import DataWarning, InputError
     from savgs_ident.core.parameter import Parameter, ParameterTable
-    from savgs_ident.core.presentation import Result
+    from savgs_ident.core.presentation import Origin, Result
+    from savgs_ident.core.status import Status
+    from savgs_ident.diagnosis.gap import Shrink
     from savgs_ident.diagnosis.public import diagnose
-    from savgs_ident.diagnosis.result import Diagnosis
+    from savgs_ident.diagnosis.result import Candidate, Diagnosis, Hypothesis, NextTest, PortShare, Verdict
+    from savgs_ident.diagnosis.result import Estimate as ParameterInterval
     from savgs_ident.diagnosis.thresholds import DecisionConstants
     from savgs_ident.effects.base import Number, Port, PortKind, PortSignals
     from savgs_ident.effects.effect import Effect, generic_effects
@@ -39,18 +45,20 @@ if TYPE_CHECKING:
     from savgs_ident.export.public import Exported, export
     from savgs_ident.export.python_control_export import load_python_control, resting_point
     from savgs_ident.fit.public import Comparison, compare, demo, fit
-    from savgs_ident.fit.result import Fit
+    from savgs_ident.fit.result import Estimate, Fit
+    from savgs_ident.fit.result import Verdict as Identifiability
     from savgs_ident.fit.sampling import sample
-    from savgs_ident.inference.result import Posterior
+    from savgs_ident.inference.result import Convergence, Marginal, Posterior
     from savgs_ident.plants.axis import Axis
     from savgs_ident.plants.base import AbstractPlant, Channel, Coordinate, Input
-    from savgs_ident.plants.model import PlantModel
+    from savgs_ident.plants.model import Model, PlantModel
     from savgs_ident.plants.quarter_car.model import RigModel as QuarterCar
-    from savgs_ident.plants.quarter_car.model import load_model, load_rig
+    from savgs_ident.plants.quarter_car.model import load_baseline, load_model, load_rig
     from savgs_ident.plants.quarter_car.rig import Rig, default_campaign_path
     from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
     from savgs_ident.plants.two_mass import TwoMass
-    from savgs_ident.recordings.recording import Campaign
+    from savgs_ident.recordings.channels import ChannelMap
+    from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording, RecordingLayout
     from savgs_ident.report.presenters import plot_bode
     from savgs_ident.responses.driven_motion import DrivenMotion, load_motion
     from savgs_ident.responses.harmonic_response import HarmonicResponse
@@ -72,8 +80,11 @@ _PLACES = {
     # What there is to work on.
     "load_rig": "plants.quarter_car.model",
     "load_model": "plants.quarter_car.model",
+    "load_baseline": "plants.quarter_car.model",
     "load_campaign": "plants.quarter_car.rig_recordings",
     "load_motion": "responses.driven_motion",
+    "ChannelMap": "recordings.channels",
+    "RecordingLayout": "recordings.recording",
     "default_campaign_path": "plants.quarter_car.rig",
     "QuarterCar": "plants.quarter_car.model:RigModel",
     # Plants of your own.
@@ -83,6 +94,7 @@ _PLACES = {
     "Coordinate": "plants.base",
     "Effect": "effects.effect",
     "Input": "plants.base",
+    "Model": "plants.model",
     "Number": "effects.base",
     "Parameter": "core.parameter",
     "ParameterTable": "core.parameter",
@@ -144,6 +156,28 @@ _PLACES = {
     "Rig": "plants.quarter_car.rig",
     "SimulatedResponse": "simulate.public",
     "SimulatedSweep": "simulate.public",
+    # What results consist of.
+    "CampaignRow": "campaigns.study",
+    "Candidate": "diagnosis.result",
+    "Convergence": "inference.result",
+    "DataWarning": "core.errors",
+    "Estimate": "fit.result",
+    "Hypothesis": "diagnosis.result",
+    "Identifiability": "fit.result:Verdict",
+    "Marginal": "inference.result",
+    "Margins": "control.synthesis",
+    "NextTest": "diagnosis.result",
+    "Origin": "core.presentation",
+    "ParameterInterval": "diagnosis.result:Estimate",
+    "PortShare": "diagnosis.result",
+    "RecordedChannel": "recordings.recording",
+    "Recording": "recordings.recording",
+    "Ride": "control.closed_loop.programme",
+    "RideGain": "control.closed_loop.programme",
+    "Shrink": "diagnosis.gap",
+    "Status": "core.status",
+    "Trend": "campaigns.trends",
+    "Verdict": "diagnosis.result",
 }
 """Where each public name is defined, with the name that it has there if that is another one."""
 
@@ -155,38 +189,62 @@ __all__ = [
     "BlindStudy",
     "CalibrationStudy",
     "Campaign",
+    "CampaignRow",
     "CampaignStudy",
     "CampaignSummary",
+    "Candidate",
     "Channel",
+    "ChannelMap",
     "Comparison",
+    "Convergence",
     "Coordinate",
+    "DataWarning",
     "DecisionConstants",
     "Design",
     "Diagnosis",
     "DigitalController",
     "DrivenMotion",
     "Effect",
+    "Estimate",
     "Exported",
     "Fit",
     "HarmonicResponse",
+    "Hypothesis",
+    "Identifiability",
     "Input",
     "InputError",
     "LinearStudy",
     "LoopStudy",
+    "Marginal",
+    "Margins",
+    "Model",
+    "NextTest",
     "Number",
+    "Origin",
     "Parameter",
+    "ParameterInterval",
     "ParameterTable",
     "PlantModel",
     "Port",
     "PortKind",
+    "PortShare",
     "PortSignals",
     "Posterior",
     "QuarterCar",
+    "RecordedChannel",
+    "Recording",
+    "RecordingLayout",
     "Result",
+    "Ride",
+    "RideGain",
     "Rig",
+    "Shrink",
     "SimulatedResponse",
     "SimulatedSweep",
+    "Status",
+    "Trend",
     "TwoMass",
+    "Verdict",
     "blind",
     "calibrate",
     "close_loop",
@@ -202,6 +260,7 @@ __all__ = [
     "generic_effects",
     "inspect",
     "linearise",
+    "load_baseline",
     "load_campaign",
     "load_model",
     "load_motion",

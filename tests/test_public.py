@@ -1,14 +1,17 @@
 """The public interface: complete, documented, loaded when it is used, and what the README does with it."""
 
+import ast
 import inspect
 import json
 import re
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import is_dataclass
 from functools import partial
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import pytest
 
@@ -70,12 +73,56 @@ def test_every_command_is_a_public_call() -> None:
     assert set(CALLS.values()) <= set(si.__all__)
 
 
+COMMAND_MAY_IMPORT = ("savgs_ident", "savgs_ident.cli", "savgs_ident.core.errors", "savgs_ident.core.files")
+"""Besides the public interface: what commands share, errors, and the folder that is made before the work begins."""
+
+
 @over("command", CALLS)
 def test_a_command_is_thin_and_makes_that_call(command: str) -> None:
-    text = (REPOSITORY / "savgs_ident/cli" / f"{command.replace('-', '_')}.py").read_text()
+    text = _source_of(command).read_text()
     called = set(re.findall(r"\bsi\.([a-z_]+)\(", text))
-    assert CALLS[command] in called or (command == "demo" and "fit" in called)
+    assert CALLS[command] in called
     assert called <= set(si.__all__)
+
+
+# The effects that a diagnosis brings along are found by the export's own functions.
+@over("source", [*(each for each in CALLS if each != "export"), "options"])
+def test_a_command_imports_nothing_deeper(source: str) -> None:
+    imported = set()
+    for node in ast.walk(ast.parse(_source_of(source).read_text())):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0
+            imported.add(str(node.module))
+        elif isinstance(node, ast.Import):
+            imported.update(each.name for each in node.names)
+    own = {each for each in imported if each.split(".")[0] == "savgs_ident"}
+    deeper = {each for each in own if not each.startswith("savgs_ident.cli.")} - set(COMMAND_MAY_IMPORT)
+    assert not deeper
+
+
+def _source_of(command: str) -> Path:
+    return REPOSITORY / "savgs_ident/cli" / f"{command.replace('-', '_')}.py"
+
+
+@over("name", [name for name in si.__all__ if inspect.isfunction(getattr(si, name))])
+def test_what_a_call_takes_and_returns_is_public(name: str) -> None:
+    """Classes of this package, also within unions and sequences."""
+    public = {getattr(si, each) for each in si.__all__ if inspect.isclass(getattr(si, each))}
+    hints = get_type_hints(getattr(si, name), localns={"Figure": object})
+    private = {
+        each
+        for hint in hints.values()
+        for each in _within(hint)
+        if inspect.isclass(each) and each.__module__.startswith("savgs_ident") and each not in public
+    }
+    assert not private
+
+
+def _within(hint: object) -> Iterator[object]:
+    """A type and all that it is made of."""
+    yield hint
+    for inner in get_args(hint):
+        yield from _within(inner)
 
 
 @over("name", [name for name in si.__all__ if inspect.isclass(getattr(si, name))])

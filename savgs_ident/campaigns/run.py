@@ -1,10 +1,10 @@
-"""Many campaigns: found, those without a result identified side by side, each kept at once, and all put together.
+"""Many campaigns: found, those without a result identified side by side, each saved at once, and all put together.
 
     study = run_campaigns(["recordings/"], "out/campaign", free=("mu_r", "c_sd"))
     print(study.trends["mu_r"].line)
 
 A campaign is identified by itself, in whichever process and on whichever machine: texts in, texts out
-(:func:`identify_one`). What becomes of it is kept before the next one is waited for, so that a run that was stopped
+(:func:`identify_one`). What becomes of it is saved before the next one is waited for, so that a run that was stopped
 goes on where it was.
 """
 
@@ -20,22 +20,22 @@ from threadpoolctl import threadpool_limits
 from savgs_ident import __version__
 from savgs_ident.campaigns.store import (
     Found,
-    Kept,
     MadeFrom,
+    StoredResult,
     check_apart,
     find_campaigns,
     forget_parts,
     has_result,
     in_natural_order,
-    keep_result,
-    kept_result,
+    load_result,
     made_from,
+    save_result,
 )
 from savgs_ident.campaigns.study import CampaignRow, CampaignStudy, RowStatus, row_of, study_campaigns
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import Lost, cores, run_tasks
 from savgs_ident.core.files import prepare_folder, spelled_out
-from savgs_ident.core.presentation import Progress, no_progress
+from savgs_ident.core.presentation import Origin, Progress, no_progress
 from savgs_ident.fit.least_squares import FitSettings
 from savgs_ident.fit.public import fit_with
 from savgs_ident.plants.quarter_car.catalogue import MODELS
@@ -57,7 +57,7 @@ FILE_NAMES = (
 
 
 @dataclass(frozen=True)
-class Job:
+class FitRequest:
     """A campaign to identify, and how.
 
     Attributes:
@@ -86,19 +86,19 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Task:
+class CampaignTask:
     """A campaign to identify as it was when the run began.
 
     Attributes:
-        job: what.
+        request: what.
         source: what to call the campaign.
-        rig: content of the rig file when the run began; its path in ``job`` is only its name.
+        rig: content of the rig file when the run began; its path in ``request`` is only its name.
         data_sha256: digest of the recordings when the run began.
         channels_sha256: the same of the map of their channels, None if there was none.
         version: of this package where the run began.
     """
 
-    job: Job
+    request: FitRequest
     source: str
     rig: bytes
     data_sha256: str
@@ -114,20 +114,20 @@ class Failure:
     unreadable: bool = False
 
 
-Outcome = Kept | Failure
+Outcome = StoredResult | Failure
 """What becomes of a campaign."""
 
-Work = Callable[[Task], Outcome]
-Spread = Callable[[Work, Sequence[Task]], Generator[tuple[int, Outcome | Lost]]]
+Work = Callable[[CampaignTask], Outcome]
+Spread = Callable[[Work, Sequence[CampaignTask]], Generator[tuple[int, Outcome | Lost]]]
 """Does the work on all tasks; gives their numbers and results as they come."""
 
 
 @dataclass(frozen=True)
-class Jobs:
+class CampaignRun:
     """What to identify: ``one`` says how each, its campaign left open; ``arguments`` where they are."""
 
     arguments: tuple[Path, ...]
-    one: Job
+    one: FitRequest
     scheduler: str | None
     workers: int
 
@@ -153,7 +153,7 @@ def run_campaigns(
     Args:
         folders: campaigns as :func:`~savgs_ident.plants.quarter_car.rig_recordings.load_campaign` takes them, and
             folders of several: one in each file or subfolder.
-        out: folder in which each campaign's result is kept; a run that was stopped goes on from there.
+        out: folder in which each campaign's result is saved; a run that was stopped goes on from there.
         rig: rig file to start from; the shipped one if left out.
         model: "simtr", with rail and tyre friction, or "simqc", without.
         free: names of the parameters to identify; the paper's if empty.
@@ -169,7 +169,7 @@ def run_campaigns(
     A campaign that fails is a row that says why, the others go on. Raises :class:`InputError` for what concerns all:
     an argument, the rig, the settings, the folder, the cluster.
     """
-    one = Job(
+    one = FitRequest(
         Path(),
         Path(rig) if rig is not None else default_rig_path(),
         None if channels is None else Path(channels),
@@ -180,17 +180,17 @@ def run_campaigns(
         tuple(command),
     )
     given = [folders] if isinstance(folders, str | Path) else folders
-    jobs = Jobs(tuple(map(Path, given)), one, scheduler, workers or cores())
-    return identify_all(jobs, identify_one, spread_of(jobs), Path(out), progress)
+    run = CampaignRun(tuple(map(Path, given)), one, scheduler, workers or cores())
+    return identify_all(run, identify_one, spread_of(run), Path(out), progress)
 
 
-def spread_of(jobs: Jobs) -> Spread:
-    """The executor with what the jobs say of it."""
-    return partial(run_tasks, workers=jobs.workers, scheduler=jobs.scheduler)
+def spread_of(run: CampaignRun) -> Spread:
+    """The executor with what the run says of it."""
+    return partial(run_tasks, workers=run.workers, scheduler=run.scheduler)
 
 
 def identify_all(
-    jobs: Jobs, work: Work, spread: Spread, out: Path, progress: Progress = no_progress
+    run: CampaignRun, work: Work, spread: Spread, out: Path, progress: Progress = no_progress
 ) -> CampaignStudy:
     """Identify what has no result in the folder ``out`` yet, and put all together.
 
@@ -198,24 +198,23 @@ def identify_all(
     :func:`run_campaigns` does.
     """
     # As it is now: a change during the run concerns no campaign.
-    rig = rig_content(jobs.one.rig)
-    settings = _settings(jobs.one, rig)
-    found = find_campaigns(jobs.arguments, FILE_NAMES)
-    check_apart(out, jobs.arguments, found, FILE_NAMES)
+    rig = rig_content(run.one.rig)
+    settings = _settings(run.one, rig)
+    found = find_campaigns(run.arguments, FILE_NAMES)
+    check_apart(out, run.arguments, found, FILE_NAMES)
     prepare_folder(out)
     forget_parts(out, FILE_NAMES)
-    rows, pending = _what_is_there(jobs.one.channels, found, rig, settings, out, progress)
+    rows, pending = _what_is_there(run.one.channels, found, rig, settings, out, progress)
     if pending:
         progress(f"identifying {_campaigns(len(pending))}")
-        with closing(spread(work, [_task(jobs, each, rig) for each in pending])) as outcomes:
+        with closing(spread(work, [_task(run, each, rig) for each in pending])) as outcomes:
             for number, outcome in outcomes:
                 rows.append(_conclude(pending[number], outcome, out))
                 progress(f"{len(rows)} of {len(found)} done; {rows[-1]}")
-    study = study_campaigns(rows, in_natural_order)
-    return replace(study, settings=settings).made_by(jobs.one.command)
+    return study_campaigns(rows, in_natural_order, settings, Origin(command=run.one.command))
 
 
-def identify_one(task: Task) -> Outcome:
+def identify_one(task: CampaignTask) -> Outcome:
     """Fit the campaign; whatever goes wrong with it is its result and ends nothing else."""
     try:
         # There are as many of these as there are cores.
@@ -237,31 +236,38 @@ def one_line(text: object) -> str:
     return spelled_out(" ".join(str(text).split()))
 
 
-def _identified(task: Task) -> Kept:
+def _identified(task: CampaignTask) -> StoredResult:
     if task.version != __version__:
         raise InputError(
             f"a worker has version {__version__} of savgs-ident, the run began with {task.version}",
             source=task.source,
             remedy="install the same version for every worker",
         )
-    job = task.job
-    campaign = load_campaign(job.campaign, job.channels)
+    request = task.request
+    campaign = load_campaign(request.campaign, request.channels)
     if campaign.sha256 != task.data_sha256:
         raise InputError(
             "is not what it was when the run began",
             source=task.source,
             remedy="let the recording end, and run again",
         )
-    if map_digest(job.campaign, job.channels) != task.channels_sha256:
+    if map_digest(request.campaign, request.channels) != task.channels_sha256:
         raise InputError(
             "the map of its channels is not what it was when the run began",
             source=task.source,
             remedy="run again",
         )
-    found = fit_with(job.model_of(task.rig), campaign, job.free, job.settings, job.max_frequency)
-    named = replace(found, origin=replace(found.origin, data=task.source, command=job.command))
+    found = fit_with(
+        request.model_of(task.rig),
+        # The worker of a cluster has it under another path.
+        replace(campaign, source=task.source),
+        request.free,
+        request.settings,
+        request.max_frequency,
+        request.command,
+    )
     # A fit gives a model of the kind that it was given.
-    return Kept(named.to_json(), rig_text(cast(RigModel, named.model).rig), campaign.start)
+    return StoredResult(found.to_json(), rig_text(cast(RigModel, found.model).rig), campaign.start)
 
 
 @dataclass(frozen=True)
@@ -272,7 +278,7 @@ class _Pending:
     origin: MadeFrom
 
 
-def _settings(one: Job, content: bytes) -> dict[str, Any]:
+def _settings(one: FitRequest, content: bytes) -> dict[str, Any]:
     """What a result depends on besides data and rig, this program's version among it; checks them, too."""
     if one.channels is not None:
         read_channel_map(one.channels, RIG_LAYOUT)
@@ -304,12 +310,12 @@ def _what_is_there(
             message = error if isinstance(error, InputError) else f"{each.source}: {error.strerror or error}"
             rows.append(_failed(each, one_line(message), unreadable=True))
             continue
-        kept = kept_result(out / each.name, origin.digest)
-        if kept is None:
+        stored = load_result(out / each.name, origin.digest)
+        if stored is None:
             pending.append(_Pending(each, origin))
             others += has_result(out / each.name)
         else:
-            rows.append(_fitted(each, kept, origin))
+            rows.append(_fitted(each, stored, origin))
     there = len(found) - len(pending) - sum(each.unreadable for each in rows)
     if there:
         progress(
@@ -320,27 +326,29 @@ def _what_is_there(
     return rows, pending
 
 
-def _task(jobs: Jobs, pending: _Pending, rig: bytes) -> Task:
-    path, channels = pending.found.path, jobs.one.channels
-    if jobs.scheduler is not None:
+def _task(run: CampaignRun, pending: _Pending, rig: bytes) -> CampaignTask:
+    path, channels = pending.found.path, run.one.channels
+    if run.scheduler is not None:
         # Workers of a cluster run in other folders.
         path, channels = path.absolute(), None if channels is None else channels.absolute()
-    one = replace(jobs.one, campaign=path, channels=channels)
+    one = replace(run.one, campaign=path, channels=channels)
     origin = pending.origin
-    return Task(one, pending.found.source, rig, origin.data_sha256, origin.channels_sha256, __version__)
+    return CampaignTask(
+        one, pending.found.source, rig, origin.data_sha256, origin.channels_sha256, __version__
+    )
 
 
 def _conclude(pending: _Pending, outcome: Outcome | Lost, out: Path) -> CampaignRow:
-    """Keep a result; a campaign without one is a failed one."""
-    if isinstance(outcome, Kept):
-        keep_result(out / pending.found.name, outcome, pending.origin)
+    """Save a result; a campaign without one is a failed one."""
+    if isinstance(outcome, StoredResult):
+        save_result(out / pending.found.name, outcome, pending.origin)
         return _fitted(pending.found, outcome, pending.origin)
     unreadable = isinstance(outcome, Failure) and outcome.unreadable
     return _failed(pending.found, one_line(outcome.reason), unreadable)
 
 
-def _fitted(found: Found, kept: Kept, origin: MadeFrom) -> CampaignRow:
-    return row_of(found.name, found.source, kept.record, kept.start, origin.data_sha256)
+def _fitted(found: Found, stored: StoredResult, origin: MadeFrom) -> CampaignRow:
+    return row_of(found.name, found.source, stored.record, stored.start, origin.data_sha256)
 
 
 def _failed(found: Found, reason: str, unreadable: bool) -> CampaignRow:

@@ -1,4 +1,4 @@
-"""Campaigns on disk: which ones the arguments of ``campaign`` mean, what each is called, and what is kept of it.
+"""Campaigns on disk: which ones the arguments of ``campaign`` mean, what each is called, and what is stored of it.
 
 A file is a campaign. A folder is one too, or holds several: a campaign in each subfolder, and
 
@@ -209,7 +209,7 @@ class MadeFrom:
 
 
 @dataclass(frozen=True)
-class Kept:
+class StoredResult:
     """A result: what is in its two files, and when the recording began [s since 1970, UTC], None if not known."""
 
     fit: str
@@ -238,7 +238,7 @@ def made_from(path: Path, channels: Path | None, rig: bytes, settings: Mapping[s
     )
 
 
-def kept_result(folder: Path, digest: str) -> Kept | None:
+def load_result(folder: Path, digest: str) -> StoredResult | None:
     """The result in ``folder``, if it is whole and made from what has this ``digest``."""
     try:
         seal = json.loads((folder / _SEAL).read_text("utf-8"))
@@ -246,8 +246,8 @@ def kept_result(folder: Path, digest: str) -> Kept | None:
         if seal["digest"] != digest or seal["files"] != _digests(texts):
             return None
         start = None if seal["start"] is None else unix_time(float(seal["start"]))
-        kept = Kept(texts[0].decode("utf-8"), texts[1].decode("utf-8"), start)
-        return kept if "parameters" in kept.record else None
+        stored = StoredResult(texts[0].decode("utf-8"), texts[1].decode("utf-8"), start)
+        return stored if "parameters" in stored.record else None
     except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return None
 
@@ -257,7 +257,7 @@ def has_result(folder: Path) -> bool:
     return (folder / _SEAL).is_file()
 
 
-def keep_result(folder: Path, result: Kept, origin: MadeFrom) -> None:
+def save_result(folder: Path, result: StoredResult, origin: MadeFrom) -> None:
     """Write a result in the place of one that may be there; raises :class:`InputError` if it cannot be written."""
     texts = [result.fit.encode("utf-8", "backslashreplace"), result.model.encode("utf-8")]
     seal = {

@@ -5,7 +5,7 @@ trend is one over the number in that order.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, ClassVar
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.campaigns.trends import Trend, common_share, follow
-from savgs_ident.core.presentation import Result
+from savgs_ident.core.presentation import Origin, Result
 
 _HOUR, _DAY = 3600.0, 86400.0
 _LONG = 2.0 * _DAY
@@ -76,6 +76,13 @@ class CampaignRow:
     data_sha256: str = ""
     unreadable: bool = False
 
+    @property
+    def failure(self) -> str:
+        """What is wrong with it, in a line; empty if nothing is."""
+        if self.status is RowStatus.failed:
+            return f"Failed: {self.name}: {self.reason}"
+        return "" if self.status is RowStatus.ok else f"Not to be trusted: {self.name}: {self.reason}."
+
     def __str__(self) -> str:
         if self.status is RowStatus.failed:
             return f"{self.name} failed: {self.reason}"
@@ -107,12 +114,22 @@ class CampaignStudy(Result):
     per: str
     trends: Mapping[str, Trend]
     notes: tuple[str, ...]
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any]
 
     @property
     def trusted(self) -> bool:
         """Whether every campaign was identified and is to be trusted."""
         return all(row.status is RowStatus.ok for row in self.rows)
+
+    @property
+    def unreadable(self) -> bool:
+        """Whether no campaign could be read."""
+        return all(row.unreadable for row in self.rows)
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What is wrong with each campaign that failed or is not to be trusted, a line each."""
+        return tuple(row.failure for row in self.rows if row.failure)
 
     @property
     def units(self) -> dict[str, str]:
@@ -165,8 +182,13 @@ def row_of(
     )
 
 
-def study_campaigns(rows: Sequence[CampaignRow], order: Callable[[str], Any]) -> CampaignStudy:
-    """Put the campaigns in order and follow every free parameter; ``order`` is the key that sorts names."""
+def study_campaigns(
+    rows: Sequence[CampaignRow], order: Callable[[str], Any], settings: Mapping[str, Any], origin: Origin
+) -> CampaignStudy:
+    """Put the campaigns in order and follow every free parameter; ``order`` is the key that sorts names.
+
+    ``settings`` and ``origin`` are those of the result.
+    """
     by_name = sorted(rows, key=lambda row: order(row.name))
     read = [row.start for row in by_name if row.status is not RowStatus.failed]
     starts = [start for start in read if start is not None]
@@ -183,7 +205,7 @@ def study_campaigns(rows: Sequence[CampaignRow], order: Callable[[str], Any]) ->
     names = dict.fromkeys(name for row in by_name for name in row.parameters)
     trends = {name: trend for name in names if (trend := _followed(by_name, place, name)) is not None}
     notes = (*_order_notes(by_time, starts, read), *_copies(by_name))
-    return CampaignStudy(tuple(by_name), by_time, place, per, trends, notes)
+    return CampaignStudy(tuple(by_name), by_time, place, per, trends, notes, settings, origin=origin)
 
 
 def _identified(name: str, record: Mapping[str, Any]) -> Identified:

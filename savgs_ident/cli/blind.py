@@ -1,6 +1,5 @@
 """``savgs-ident blind``: how often the diagnosis is right about effects that it does not know."""
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -58,7 +57,9 @@ def blind(
     ] = False,
     again: Annotated[
         bool,
-        typer.Option("--again", help="Diagnose the recordings in --out DIR anew; keep none of the marks."),
+        typer.Option(
+            "--again", help="Diagnose the recordings in --out DIR anew; the marks there are replaced."
+        ),
     ] = False,
     sensitivity: Annotated[
         bool,
@@ -90,9 +91,6 @@ def blind(
 
     Example: savgs-ident blind --foreign --trials 60 --seed 1
     """
-    # Checks that call back into Python from a compiled program would keep it from being kept for the next run; a
-    # failed one gives NaN then, which is looked for. Has to be said before the libraries are loaded.
-    os.environ.setdefault("EQX_ON_ERROR", "nan")
     import savgs_ident as si
 
     reporter = Reporter(json, quiet)
@@ -110,7 +108,8 @@ def blind(
             sensitivity=sensitivity,
             jobs=jobs,
             scheduler=scheduler,
+            command=command_line(),
             progress=progress,
-        ).made_by(command_line())
+        )
         files = study.save(out, progress)
     return reporter.conclude(study, (*files, out / "trials.jsonl"))

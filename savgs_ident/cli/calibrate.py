@@ -33,7 +33,7 @@ def calibrate(
     ] = 1,
     seed: SeedOption = 1,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Keep the trials that an earlier run left in --out DIR.")
+        bool, typer.Option("--resume", help="Go on from the trials that an earlier run left in --out DIR.")
     ] = False,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
@@ -72,7 +72,8 @@ def calibrate(
             channels=channels,
             jobs=jobs,
             scheduler=scheduler,
+            command=command_line(),
             progress=progress,
-        ).made_by(command_line())
+        )
         files = study.save(out, progress)
     return reporter.conclude(study, (*files, out / "trials.jsonl"))

@@ -61,7 +61,7 @@ def campaign(
 
     In a folder, files that are named after tests (dwell_2.35Hz.csv, standstill.csv) are one campaign; other files
     are a campaign each, and so is each subfolder. A campaign that fails is reported, the others go on. Where one
-    was identified before from the same data, rig and settings, its result is kept: a run that was stopped goes on
+    was identified before from the same data, rig and settings, its result is used: a run that was stopped goes on
     where it was when it is started again.
 
     On a Dask cluster (install the extra `cluster`) the workers must have the same version of this package and see the
@@ -100,12 +100,9 @@ def campaign(
 def conclude(study: "CampaignStudy", files: tuple[Path, ...], reporter: Reporter) -> int:
     """Show the study, and say of each campaign what is wrong with it; the exit code."""
     reporter.show_result(study, files)
-    for row in study.rows:
-        if row.status == "failed":
-            print_error(f"Failed: {row.name}: {row.reason}")
-        elif row.status == "not trusted":
-            print_error(f"Not to be trusted: {row.name}: {row.reason}.")
-    if all(row.unreadable for row in study.rows):
+    for line in study.failures:
+        print_error(line)
+    if study.unreadable:
         print_error("Error: no campaign could be read. Remedy: mend what is said of each above.")
         return BAD_INPUT
     if not study.doubts:

@@ -14,7 +14,7 @@ from savgs_ident.cli.options import (
     OutOption,
     QuietOption,
     command_line,
-    read_model,
+    effects_of,
 )
 
 
@@ -90,7 +90,7 @@ def closed_loop(
     other rigs, causes.
 
     Exit code 1 if the loop or the passive rig is not stable, here or on another rig that the data allow, or the law
-    ceased to believe the link angle.
+    ceased to believe the link angle, or the rig file's own fit is not to be trusted.
 
     Example: savgs-ident closed-loop out/fit/model.toml --test sweep --rigs 5
     """
@@ -99,7 +99,7 @@ def closed_loop(
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    shown = read_model(model_file, model)
+    shown = si.load_model(model_file, effects_of(model))
     with reporter.working() as progress:
         study = si.close_loop(
             shown,
@@ -111,7 +111,8 @@ def closed_loop(
             posterior=posterior,
             rigs=rigs,
             causes=causes,
+            command=command_line(),
             progress=progress,
-        ).made_by(command_line())
+        )
         files = study.save(out, progress)
     return reporter.conclude(study, files)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from savgs_ident.cli.console import Reporter, ends_with_code
-from savgs_ident.cli.options import JsonOption, OutOption, QuietOption, command_line, read_campaign
+from savgs_ident.cli.options import JsonOption, OutOption, QuietOption, command_line
 
 
 @ends_with_code
@@ -23,7 +23,6 @@ def demo(out: OutOption = Path("out/demo"), json: JsonOption = False, quiet: Qui
     reporter = Reporter(json, quiet)
     prepare_folder(out)
     with reporter.working() as progress:
-        campaign = read_campaign(si.default_campaign_path(), None, progress)
-        found = si.fit(si.load_model(), campaign, progress=progress).made_by(command_line())
+        found = si.demo(progress, command=command_line())
         files = found.save(out, progress)
     return reporter.conclude(found, files)

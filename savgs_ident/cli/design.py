@@ -13,11 +13,8 @@ from savgs_ident.cli.options import (
     OutOption,
     QuietOption,
     command_line,
-    read_model,
+    effects_of,
 )
-
-SLOWEST, FASTEST = 20.0, 1e6
-"""Rates of a computer that a controller is sampled for [Hz]."""
 
 
 @ends_with_code
@@ -62,18 +59,16 @@ def design(
     gamma, loop, ride, robustness and regularisation.
 
     Exit code 1 if gamma is not confirmed, or the loop is not stable with the controller as it is used, when sampled
-    or on one of the rigs.
+    or on one of the rigs, or the rig file's own fit is not to be trusted.
 
     Example: savgs-ident design out/fit/model.toml --posterior out/posterior/posterior.nc
     """
     import savgs_ident as si
     from savgs_ident.core.files import prepare_folder
 
-    if not SLOWEST <= rate <= FASTEST:
-        raise typer.BadParameter(f"--rate {rate:g}: give a rate from {SLOWEST:g} to {FASTEST:g} Hz")
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    shown = read_model(model_file, model)
+    shown = si.load_model(model_file, effects_of(model))
     with reporter.working() as progress:
         found = si.design(
             shown,
@@ -82,7 +77,8 @@ def design(
             rigs=rigs,
             order=order,
             rate=rate,
+            command=command_line(),
             progress=progress,
-        ).made_by(command_line())
+        )
         files = found.save(out, progress)
     return reporter.conclude(found, files)

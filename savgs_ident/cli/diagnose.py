@@ -20,7 +20,7 @@ from savgs_ident.cli.options import (
     PlantName,
     QuietOption,
     command_line,
-    read_baseline,
+    effects_of,
     read_campaign,
 )
 
@@ -98,8 +98,9 @@ def diagnose(
             without=without or (),
             orders=orders,
             max_frequency=max_frequency,
+            command=command_line(),
             progress=progress,
-        ).made_by(command_line())
+        )
         files = found.save(out, progress)
     return reporter.conclude(found, files)
 
@@ -111,7 +112,7 @@ def _baseline(
     import savgs_ident as si
 
     if plant is PlantName.quarter_car:
-        return reduce(add, beside, read_baseline(rig, model))
+        return reduce(add, beside, si.load_baseline(rig, effects_of(model)))
     if rig is not None or model is not None:
         raise si.InputError(f"--rig and --model are no options of the {plant.value}", remedy="leave them out")
     return reduce(add, beside, si.PlantModel(si.Axis(), si.Axis.parameters))

@@ -76,7 +76,8 @@ def export(
             posterior=posterior,
             samples=samples,
             diagnosis=diagnosis,
+            command=command_line(),
             progress=progress,
-        ).made_by(command_line())
+        )
         files = exported.save(out, progress)
     return reporter.conclude(exported, files)

@@ -19,7 +19,7 @@ from savgs_ident.cli.options import (
     SchedulerOption,
     SeedOption,
     command_line,
-    read_baseline,
+    effects_of,
     read_campaign,
 )
 
@@ -37,7 +37,7 @@ def false_alarms(
     orders: OrdersOption = 9,
     seed: SeedOption = 1,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Keep the draws that an earlier run left in --out DIR.")
+        bool, typer.Option("--resume", help="Go on from the draws that an earlier run left in --out DIR.")
     ] = False,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
@@ -63,7 +63,7 @@ def false_alarms(
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    baseline = read_baseline(rig, model)
+    baseline = si.load_baseline(rig, effects_of(model))
     with reporter.working() as progress:
         study = si.false_alarms(
             baseline,
@@ -77,7 +77,8 @@ def false_alarms(
             channels=channels,
             jobs=jobs,
             scheduler=scheduler,
+            command=command_line(),
             progress=progress,
-        ).made_by(command_line())
+        )
         files = study.save(out, progress)
     return reporter.conclude(study, (*files, out / "draws.jsonl"))

@@ -66,7 +66,8 @@ def fit(
             peak_to_peak=peak_to_peak,
             fixed_tolerances=fixed_tolerances,
             max_frequency=max_frequency,
+            command=command_line(),
             progress=progress,
-        ).made_by(command_line())
+        )
         files = found.save(out, progress)
     return reporter.conclude(found, files)

@@ -10,7 +10,7 @@ from savgs_ident.cli.options import (
     OutOption,
     QuietOption,
     command_line,
-    read_model,
+    effects_of,
 )
 
 
@@ -31,7 +31,8 @@ def linearise(
     Writes linearise.json (with the state space of equation (8)), linearise.html (the report), and as .png and
     .pdf alpha, responses and, with friction, described.
 
-    Exit code 1 if the exact linearisation is not the nonlinear model at small motions.
+    Exit code 1 if the exact linearisation is not the nonlinear model at small motions, or the rig file's own fit is
+    not to be trusted.
 
     Example: savgs-ident linearise out/fit/model.toml
     """
@@ -40,8 +41,8 @@ def linearise(
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    shown = read_model(model_file, model)
+    shown = si.load_model(model_file, effects_of(model))
     with reporter.working() as progress:
-        study = si.linearise(shown, progress).made_by(command_line())
+        study = si.linearise(shown, progress, command=command_line())
         files = study.save(out, progress)
     return reporter.conclude(study, files)

@@ -7,15 +7,14 @@ import sys
 from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from savgs_ident.cli.console import Progress, print_error
-from savgs_ident.core.errors import InputError
+from savgs_ident.cli.console import Progress
 
 if TYPE_CHECKING:
-    from savgs_ident import Campaign, QuarterCar
+    from savgs_ident import Campaign
 
 
 class ModelName(StrEnum):
@@ -115,47 +114,9 @@ def read_campaign(path: Path, channels: Path | None, progress: Progress) -> "Cam
     return si.load_campaign(path, channels, progress=progress.fraction(f"reading {path}"))
 
 
-def effects_of(model: ModelName | None) -> tuple[str, ...] | None:
-    """The effects that make a model; None for None."""
-    from savgs_ident.plants.quarter_car.catalogue import MODELS
-
-    return None if model is None else MODELS[model.value]
-
-
-def read_model(path: Path | None, model: ModelName | None) -> "QuarterCar":
-    """The model of a rig file, or of the shipped one; one line on standard error if its own fit is doubtful.
-
-    Raises :class:`InputError` if the file cannot be read or what it says of effects is no list of known ones.
-    """
-    import savgs_ident as si
-
-    found = si.load_model(path, effects_of(model))
-    provenance = found.rig.provenance
-    if not provenance.get("trusted", True):
-        why = provenance.get("doubt", provenance.get("status", "no status"))
-        print_error(f"Warning: {path}: its own fit is not to be trusted ({why}).")
-    return found
-
-
-def read_baseline(path: Path | None, model: ModelName | None) -> "QuarterCar":
-    """The baseline of a diagnosis: a drawing with the effects of ``model``, or an identified rig with its own.
-
-    Raises :class:`InputError` for an identified rig of another model than was asked for.
-    """
-    import savgs_ident as si
-    from savgs_ident.plants.quarter_car.model import model_of
-
-    rig = si.load_rig(path)
-    if "effects" not in rig.provenance:
-        return si.QuarterCar(rig, effects_of(model or ModelName.simtr) or ())
-    found = model_of(rig)
-    if model is not None and set(effects_of(model) or ()) != set(found.effects):
-        raise InputError(
-            f"was identified with {', '.join(found.effects) or 'no friction'}, which is not {model.value}",
-            source=rig.source,
-            remedy="leave --model out, or give the drawing that the rig was identified from",
-        )
-    return found
+def effects_of(model: ModelName | None) -> Literal["simqc", "simtr"] | None:
+    """What an option says of the effects; None where it is left out."""
+    return None if model is None else model.value
 
 
 def _is_name(word: str) -> bool:

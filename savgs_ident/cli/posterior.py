@@ -92,8 +92,9 @@ def posterior(
                 seed=seed,
                 chain=chain,
                 resume=resume,
+                command=command_line(),
                 progress=progress,
-            ).made_by(command_line())
+            )
             files = found.save(out, progress)
     except KeyboardInterrupt:
         if chain.exists():

@@ -12,8 +12,8 @@ from savgs_ident.cli.options import (
     ModelArgument,
     OutOption,
     QuietOption,
+    effects_of,
     read_campaign,
-    read_model,
 )
 
 
@@ -43,7 +43,7 @@ def simulate(
 
     Writes simulate.json, simulate.csv, simulate.png and simulate.pdf.
 
-    Exit code 1 if a motion was not found.
+    Exit code 1 if a motion was not found, or the rig file's own fit is not to be trusted.
 
     Example: savgs-ident simulate out/fit/model.toml --frequency 1 2 2.35
     """
@@ -55,7 +55,7 @@ def simulate(
         raise typer.BadParameter("choose one of --frequency, --sweep and --campaign")
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    shown = read_model(model_file, model)
+    shown = si.load_model(model_file, effects_of(model))
     with reporter.working() as progress:
         found: si.SimulatedResponse | si.SimulatedSweep
         if sweep:

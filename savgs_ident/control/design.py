@@ -7,8 +7,8 @@ are the controller as a file: everything that a computer needs to run it, with u
 """
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
@@ -45,7 +45,7 @@ from savgs_ident.control.synthesis import (
 )
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.core.presentation import Result
+from savgs_ident.core.presentation import Origin, Progress, Result
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.inference.result import (
     FAR,
@@ -202,6 +202,7 @@ class Design(Result):
     """A controller with the checks of it.
 
     Attributes:
+        model: what it was designed for.
         masses: the parameters of eq. (8) of the design.
         bandwidth: of the actuator [Hz].
         weights: the weights.
@@ -217,6 +218,7 @@ class Design(Result):
 
     presenter: ClassVar[str] = "DESIGN"
 
+    model: RigModel
     masses: TwoMasses
     bandwidth: float
     weights: ParameterTable
@@ -228,7 +230,6 @@ class Design(Result):
     rigs: Rigs
     robustness: Robustness
     regularisation: tuple[RegularisationEffect, ...]
-    model: RigModel | None = field(default=None, kw_only=True)
 
     @property
     def plant(self) -> control.StateSpace:
@@ -263,11 +264,11 @@ class Design(Result):
 
 
 def design_controller(
-    model: QuarterCar,
-    p: Values,
+    model: RigModel,
     rigs: Rigs,
     weights: ParameterTable,
-    progress: Callable[[str], None],
+    origin: Origin,
+    progress: Progress,
     order: int | None = None,
     rate: float = RATE,
 ) -> Design:
@@ -276,34 +277,36 @@ def design_controller(
     ``rate`` [1/s] is that of the computer. Raises :class:`InputError` where the weights admit no controller or the
     order is not possible.
     """
-    masses, bandwidth = paper_masses(model, p), float(p["motor_reference_bandwidth"])
+    plant, p = model.build(), as_values(model.table.as_dict())
+    masses, bandwidth = paper_masses(plant, p), float(p["motor_reference_bandwidth"])
     space = quarter_car_space(masses)
     progress("H-infinity synthesis")
     synthesis = synthesise_hinf(generalised_plant(space, bandwidth, weights))
     controller = synthesis.controller if order is None else reduce_order(synthesis.controller, order)
-    plant = design_loop(space, bandwidth)
+    loop = design_loop(space, bandwidth)
     sampled = discretise(controller, rate)
     progress(f"robustness on {len(rigs.values)} rigs")
     robustness = assess_robustness(
-        controller, (paper_masses(model, as_values(each)) for each in rigs.values), bandwidth, weights
+        controller, (paper_masses(plant, as_values(each)) for each in rigs.values), bandwidth, weights
     )
     progress("effect of the regularising weights")
+    regularisation = tuple(
+        _regularised(space, bandwidth, weights, name, factor) for name in REGULARISATION for factor in FACTORS
+    )
     return Design(
-        masses,
-        bandwidth,
-        weights,
-        synthesis,
-        controller,
-        compute_margins(plant, controller),
-        DigitalController(sampled, alpha_map(model, p)),
-        compute_margins(sampled_plant(plant, rate), sampled),
-        rigs,
-        robustness,
-        tuple(
-            _regularised(space, bandwidth, weights, name, factor)
-            for name in REGULARISATION
-            for factor in FACTORS
-        ),
+        model=model,
+        masses=masses,
+        bandwidth=bandwidth,
+        weights=weights,
+        synthesis=synthesis,
+        controller=controller,
+        margins=compute_margins(loop, controller),
+        digital=DigitalController(sampled, alpha_map(plant, p)),
+        digital_margins=compute_margins(sampled_plant(loop, rate), sampled),
+        rigs=rigs,
+        robustness=robustness,
+        regularisation=regularisation,
+        origin=origin,
     )
 
 

@@ -5,8 +5,8 @@ parabolas approximate them (Fig. 7); how far equation (8) and the exact linearis
 small motions, and why; how far the rig with describing functions is from it at the amplitude of the test.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import ClassVar
 
 import jax
@@ -35,8 +35,8 @@ from savgs_ident.control.linearisation import (
     quasi_linear_response,
 )
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.presentation import Result
-from savgs_ident.core.values import Values
+from savgs_ident.core.presentation import Origin, Progress, Result
+from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.simulate.linearisation import nominal_rest
@@ -157,14 +157,14 @@ class CamMotions:
 
 @dataclass(frozen=True)
 class LinearStudy(Result):
-    """All three studies; ``at_test`` is None for a rig without friction."""
+    """All three studies of a ``model``; ``at_test`` is None for a rig without friction."""
 
     presenter: ClassVar[str] = "LINEAR_STUDY"
 
+    model: RigModel
     equivalents: EquivalentStudy
     small: SmallMotions
     at_test: CamMotions | None
-    model: RigModel | None = field(default=None, kw_only=True)
 
     @property
     def trusted(self) -> bool:
@@ -172,16 +172,17 @@ class LinearStudy(Result):
         return self.small.error("exact linearisation") <= EXACT
 
 
-def study_linear(model: QuarterCar, p: Values, progress: Callable[[str], None]) -> LinearStudy:
+def study_linear(model: RigModel, origin: Origin, progress: Progress) -> LinearStudy:
     """All three studies. Raises :class:`InputError` where the rig has no static equilibrium or no periodic motion."""
+    plant, p = model.build(), as_values(model.table.as_dict())
     progress("linear equivalent over the link angle")
-    over_angles = study_equivalents(model, p)
+    over_angles = study_equivalents(plant, p)
     progress("small motions: equation (8), exact linearisation, nonlinear rig")
-    small = study_small_motions(model, p)
-    if not model.effects:
-        return LinearStudy(over_angles, small, None)
+    small = study_small_motions(plant, p)
+    if not plant.effects:
+        return LinearStudy(model, over_angles, small, None, origin=origin)
     progress("motions of the test: describing functions, nonlinear rig")
-    return LinearStudy(over_angles, small, study_test_motions(model, p))
+    return LinearStudy(model, over_angles, small, study_test_motions(plant, p), origin=origin)
 
 
 def study_equivalents(model: QuarterCar, p: Values) -> EquivalentStudy:

@@ -1,6 +1,6 @@
 """What ``import savgs_ident`` offers of control: linear models, a controller, the loop on the nonlinear rig."""
 
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -34,19 +34,24 @@ from savgs_ident.inference.result import Posterior
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
+FREQUENT = (20.0, 1e6)
+"""Rates of a computer that a controller is sampled for [Hz]."""
 
-def linearise(model: RigModel, progress: Progress = no_progress) -> LinearStudy:
+
+def linearise(
+    model: RigModel, progress: Progress = no_progress, *, command: Sequence[str] = ()
+) -> LinearStudy:
     """Linearise a model: stiffness, damping and link at the wheel, and how far linear models are from the rig.
 
     The linear equivalent over the link angle with the constants and parabolas that stand for it; equation (8) of the
     paper and the exact linearisation against the nonlinear model at small motions; friction and damper as describing
-    functions at the size of the test.
+    functions at the size of the test. ``progress`` is called with a sentence on what is being done; ``command`` is
+    the command line that the result says it was made by.
 
     Raises :class:`InputError` where the rig finds no rest or no periodic motion.
     """
     use_persistent_cache()
-    study = study_linear(model.build(), as_values(model.table.as_dict()), progress)
-    return replace(study, model=model, origin=model.origin())
+    return study_linear(model, model.origin().with_command(command), progress)
 
 
 def design(
@@ -57,6 +62,7 @@ def design(
     rigs: int = 50,
     order: int | None = None,
     rate: float = 1000.0,
+    command: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> Design:
     """Design an H-infinity controller for a model: gamma with its check, margins, and how it does on other rigs.
@@ -68,23 +74,28 @@ def design(
             that an identified rig carries, or else, for a drawing, its tolerances.
         rigs: on how many rigs the controller is tried.
         order: states of the controller; as many as it gets if left out.
-        rate: of the computer that runs it [Hz].
+        rate: of the computer that runs it [Hz], from 20 to 1e6.
+        command: the command line that the result says it was made by.
         progress: called with a sentence on what is being done.
 
-    Look at ``trusted`` of the result. Raises :class:`InputError` where the weights admit no controller, the order is
-    not possible, or a file cannot be used.
+    Look at ``trusted`` of the result. Raises :class:`InputError` where the weights admit no controller, the order or
+    the rate is not possible, or a file cannot be used.
     """
-    model = _model_of(model)
-    table = model.table
+    slowest, fastest = FREQUENT
+    if not slowest <= rate <= fastest:
+        raise InputError(
+            f"a controller cannot be sampled at {rate:g} Hz",
+            source="--rate",
+            remedy=f"give a rate from {slowest:g} to {fastest:g} Hz",
+        )
+    rig = model if isinstance(model, RigModel) else model.model
     if weights is None:
         chosen = DEFAULT_WEIGHTS
     else:
         chosen = weights if isinstance(weights, ParameterTable) else read_weights(weights)
-    others = _rigs(model, posterior, rigs)
+    others = _rigs(rig, posterior, rigs)
     use_persistent_cache()
-    p = as_values(table.as_dict())
-    found = design_controller(model.build(), p, others, chosen, progress, order, rate)
-    return replace(found, model=model, origin=model.origin())
+    return design_controller(rig, others, chosen, rig.origin().with_command(command), progress, order, rate)
 
 
 def close_loop(
@@ -98,6 +109,7 @@ def close_loop(
     posterior: Posterior | str | Path | None = None,
     rigs: int = 20,
     causes: bool = False,
+    command: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> LoopStudy:
     """Run a controller on the nonlinear rig with its drive and instruments: passive, active, and with failures.
@@ -112,6 +124,7 @@ def close_loop(
         posterior: what other rigs are drawn from, as in :func:`design`.
         rigs: on how many other rigs the loop is run.
         causes: run it also without friction, limits and noise, one at a time: why it is so.
+        command: the command line that the result says it was made by.
         progress: called with a sentence on what is being done.
 
     Look at ``trusted`` of the result. Raises :class:`InputError` for a file that cannot be used and a controller that
@@ -131,16 +144,8 @@ def close_loop(
     else:
         digital, called = read_controller(Path(controller)), str(controller)
     asked = _test(LoopKind(test), float(p["cam_peak_to_peak"]), frequency, road, speed)
-    study = study_loop(plant, p, digital, asked, progress, others, causes)
-    return replace(study, model=model, controller=called, origin=model.origin())
-
-
-def _model_of(given: RigModel | LinearStudy) -> RigModel:
-    if isinstance(given, RigModel):
-        return given
-    if given.model is None:
-        raise InputError("the linear study does not say of which model it is", remedy="give the model")
-    return given.model
+    origin = model.origin().with_command(command)
+    return study_loop(model, digital, called, asked, origin, progress, others, causes)
 
 
 def _rigs(model: RigModel, posterior: Posterior | str | Path | None, count: int) -> Rigs:

@@ -57,6 +57,10 @@ TASKS = 64
 _PATIENCE_S = 5.0
 """How long a process may take to end by itself."""
 
+_ENVIRONMENT = {"EQX_ON_ERROR": "nan"}
+"""Of the processes, unless the user says otherwise. Checks that call back into Python from a compiled program would
+keep it from being stored for the next run; a failed one gives NaN then, which is looked for."""
+
 
 @dataclass(frozen=True)
 class Lost:
@@ -126,7 +130,8 @@ class _Worker(Generic[Task, Result]):
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.process: SpawnProcess = context.Process(target=_serve, args=(theirs,), daemon=True)
-        self.process.start()
+        with _environment_of_workers():
+            self.process.start()
         # With its own end closed here, the death of the process is the end of what can be read.
         theirs.close()
         self._send(work)
@@ -226,6 +231,18 @@ def _end_after_parent() -> None:
     if parent is not None:
         wait([parent.sentinel])
         os._exit(1)
+
+
+@contextmanager
+def _environment_of_workers() -> Iterator[None]:
+    """New processes inherit it; libraries read it when they are loaded, before the first task."""
+    added = {name: value for name, value in _ENVIRONMENT.items() if name not in os.environ}
+    os.environ.update(added)
+    try:
+        yield
+    finally:
+        for name in added:
+            del os.environ[name]
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from savgs_ident import __version__
 from savgs_ident.core.errors import DataWarning, InputError
@@ -77,6 +77,10 @@ class Origin:
         """The command as it was typed, quotes left out."""
         return " ".join(self.command)
 
+    def with_command(self, command: Sequence[str]) -> "Origin":
+        """The same of a result that this command line made."""
+        return replace(self, command=tuple(command))
+
     def with_versions(self, packages: Sequence[str]) -> "Origin":
         """The same with the versions of what is installed: of this package, Python and ``packages``."""
         return replace(self, versions=package_versions(packages))
@@ -91,6 +95,10 @@ def package_versions(packages: Sequence[str]) -> dict[str, str]:
         except PackageNotFoundError:
             found[package] = "unknown"
     return found
+
+
+NO_ORIGIN = Origin()
+"""Of a result that comes from no file."""
 
 
 class Presenter(Protocol):
@@ -196,10 +204,6 @@ class Result:
         What is written stays if the rest is interrupted. Raises :class:`InputError` if a file cannot be written.
         """
         return tuple(self._presenter().write(self, prepare_folder(Path(folder)), progress))
-
-    def made_by(self, command: Sequence[str]) -> Self:
-        """The same result, which says that it comes from this command line."""
-        return replace(self, origin=replace(self.origin, command=tuple(command)))
 
     def _presenter(self) -> Presenter:
         found: Presenter = getattr(importlib.import_module(_PRESENTERS), self.presenter)

@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.core.presentation import Progress, no_progress
+from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progress
 from savgs_ident.diagnosis.candidates import candidates_of, confusable_of, estimates_among, not_judgeable_of
 from savgs_ident.diagnosis.conclusion import (
     CorrectedModel,
@@ -124,12 +124,13 @@ def diagnose_dwells(
     progress: Progress = no_progress,
     sweep: SweepResponse | None = None,
     watch: Watch = nobody,
+    origin: Origin = NO_ORIGIN,
 ) -> Diagnosis:
     """Diagnose the gap between the baseline of a plant in dwells and the measured response.
 
     ``plant`` and ``data`` are what is compared, ``values`` (SI, by name) those that the baseline is given with. A
     ``sweep`` is no part of the diagnosis: it is predicted, and compared. ``given``, the model as known before any
-    fit, is handed on to the result; ``watch`` gets what the verdict was decided from.
+    fit, is handed on to the result, and so is its ``origin``; ``watch`` gets what the verdict was decided from.
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a plant whose baseline has no periodic motion.
     """
@@ -141,7 +142,7 @@ def diagnose_dwells(
         return sweep_shrink(problem, sweep, points)
 
     further = None if sweep is None else predict_sweep
-    return diagnose_problem(plant, data, given, settings, values, progress, further, measured, watch)
+    return diagnose_problem(plant, data, given, settings, values, progress, further, measured, watch, origin)
 
 
 def diagnose_problem(
@@ -154,11 +155,12 @@ def diagnose_problem(
     further: FurtherRecording | None = None,
     measured: HarmonicResponse | None = None,
     watch: Watch = nobody,
+    origin: Origin = NO_ORIGIN,
 ) -> Diagnosis:
     """Diagnose the gap between a baseline and its data, of whatever kind these are.
 
     ``further`` predicts a recording that takes no part; ``measured``, the dwells that the data come from, is handed
-    on to the result like ``given``; ``watch`` gets what the verdict was decided from.
+    on to the result like ``given`` and ``origin``; ``watch`` gets what the verdict was decided from.
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a baseline that has no solution.
     """
@@ -167,7 +169,9 @@ def diagnose_problem(
         began = time.perf_counter()
         recalibrated = recalibrate(plant, data, values, progress, settings.constants)
         problem, fitted = fit_hypotheses(recalibrated, progress)
-        found = _concluded(problem, fitted, measured, given, settings, values, progress, further, began)
+        found = _concluded(
+            problem, fitted, measured, given, settings, values, progress, further, began, origin
+        )
         watch(problem, fitted)
         return found
 
@@ -191,6 +195,7 @@ def _concluded(
     progress: Progress,
     further: FurtherRecording | None,
     began: float,
+    origin: Origin,
 ) -> Diagnosis:
     selected = decide_among(problem, fitted)
     found = conclude(leave_tests_out(problem, selected, values, progress, further), values, further)
@@ -235,6 +240,7 @@ def _concluded(
         learned=None if found.law is None else _offered(found.law),
         drifts=problem.drifts,
         wall_s=time.perf_counter() - began,
+        origin=origin,
     )
 
 

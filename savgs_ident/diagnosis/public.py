@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.presentation import Progress, no_progress
+from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progress
 from savgs_ident.diagnosis.diagnose import (
     Watch,
     baseline_problem,
@@ -43,6 +43,7 @@ def diagnose(
     orders: int = 9,
     max_frequency: float | None = None,
     constants: DecisionConstants = DEFAULTS,
+    command: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> Diagnosis:
     """Diagnose the sim-to-real gap: where it lies, which unmodelled effect causes it, how far it shrinks.
@@ -60,6 +61,7 @@ def diagnose(
         orders: highest harmonic order to compare.
         max_frequency: leave out faster dwells [Hz].
         constants: what the verdict is decided by, each with its origin: priors, thresholds, limits of the search.
+        command: the command line that the result says it was made by.
         progress: called with a sentence on what is being done.
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a campaign that cannot be used, for names that
@@ -67,7 +69,7 @@ def diagnose(
     """
     use_persistent_cache()
     if isinstance(measured, DrivenMotion):
-        return _diagnose_motion(model, measured, held_out, without, constants, progress)
+        return _diagnose_motion(model, measured, held_out, without, constants, command, progress)
     if held_out is not None:
         raise InputError(
             "a held-out motion goes with a measured motion alone", remedy="diagnose each campaign by itself"
@@ -77,8 +79,8 @@ def diagnose(
     given, settings, values = model.before, *_asked(model, orders, without, constants)
     sweep, found_in_sweep = (None, ()) if campaign is None else first_sweep(campaign, model.plant)
     plant, data = _dwell_problem(given, response, settings)
-    found = diagnose_dwells(plant, data, response, given, settings, values, progress, sweep)
-    return replace(found, origin=model.origin(campaign, (*warnings, *found_in_sweep)))
+    origin = model.origin(campaign, (*warnings, *found_in_sweep)).with_command(command)
+    return diagnose_dwells(plant, data, response, given, settings, values, progress, sweep, origin=origin)
 
 
 def _dwell_problem(
@@ -95,6 +97,7 @@ def _diagnose_motion(
     held_out: DrivenMotion | None,
     without: Sequence[str],
     constants: DecisionConstants,
+    command: Sequence[str],
     progress: Progress,
 ) -> Diagnosis:
     """Diagnose a plant from the force of its drive along a measured motion."""
@@ -117,8 +120,8 @@ def _diagnose_motion(
         return further_motion(there, held_out, points)
 
     further = None if held_out is None else predict
-    found = diagnose_problem(problem, data, given, settings, values, progress, further)
-    return replace(found, origin=replace(model.origin(), data=motion.source))
+    origin = replace(model.origin(), data=motion.source, command=tuple(command))
+    return diagnose_problem(problem, data, given, settings, values, progress, further, origin=origin)
 
 
 def baseline_of(
@@ -152,12 +155,13 @@ def diagnose_response(
     progress: Progress = no_progress,
     sweep: SweepResponse | None = None,
     watch: Watch = nobody,
+    origin: Origin = NO_ORIGIN,
 ) -> Diagnosis:
     """Diagnose the gap between a rig's baseline model and a measured response.
 
     ``rig`` is the rig as known before any fit; ``values`` (SI, by name) are those that the baseline is given with,
     the rig's own where left out. A ``sweep`` of the cam is no part of the diagnosis: it is predicted, and compared.
-    ``watch`` gets what the verdict was decided from.
+    ``watch`` gets what the verdict was decided from; ``origin`` is that of the result.
 
     Look at ``converged`` of the result. Raises :class:`InputError` for a response that cannot be used, for names
     that do not exist, and for a rig whose baseline has no periodic motion.
@@ -165,7 +169,9 @@ def diagnose_response(
     settings = settings or SIMTR
     given = RigModel(rig, settings.baseline)
     plant, data = _dwell_problem(given, measured, settings)
-    return diagnose_dwells(plant, data, measured, given, settings, values or {}, progress, sweep, watch)
+    return diagnose_dwells(
+        plant, data, measured, given, settings, values or {}, progress, sweep, watch, origin
+    )
 
 
 def quarter_car_problem(

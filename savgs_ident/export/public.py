@@ -103,6 +103,7 @@ def export(
     posterior: Posterior | str | Path | None = None,
     samples: int = 500,
     diagnosis: Diagnosis | str | Path | None = None,
+    command: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> Exported:
     """Export a model of any plant: parameters with covariance, draws, linear models, equations.
@@ -117,6 +118,7 @@ def export(
         samples: how many of them, evenly spread over all.
         diagnosis: a diagnosis or a ``diagnosis.json``: the effects that it names, or the force that it learned, join
             the model with the numbers of its fit.
+        command: the command line that the result says it was made by.
         progress: called with a sentence on what is being done.
 
     Look at ``trusted`` of the result. Raises :class:`InputError` for an unknown format, for what a format cannot
@@ -135,7 +137,8 @@ def export(
         # What names no file of its own is a fault of the model's numbers.
         with blamed_on(origin.model):
             written[name] = _write(name, found.model, out)
-    return Exported(found, written, origin=replace(origin, effects=found.model.effects))
+    origin = replace(origin, effects=found.model.effects, command=tuple(command))
+    return Exported(found, written, origin=origin)
 
 
 def _check_formats(names: Sequence[str]) -> None:

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from savgs_ident.core.presentation import Progress
+from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import as_values
 from savgs_ident.fit.identifiability import EXPLAINED, assess, weighed_by_misfit
@@ -69,7 +69,7 @@ class Outcome(NamedTuple):
     wall_s: float
 
 
-def assemble_fit(task: Task, outcome: Outcome) -> Fit:
+def assemble_fit(task: Task, outcome: Outcome, origin: Origin) -> Fit:
     """The whole, frozen result."""
     problem, best = task.problem, outcome.best
     estimates, covariance = _estimates(task, best)
@@ -97,6 +97,7 @@ def assemble_fit(task: Task, outcome: Outcome) -> Fit:
         starts=tuple((each.cost, each.status) for each in outcome.tried),
         quantity=task.settings.quantity,
         wall_s=outcome.wall_s,
+        origin=origin,
     )
 
 
@@ -150,12 +151,14 @@ def fit_least_squares(
     *,
     free: tuple[str, ...],
     settings: FitSettings | None = None,
+    origin: Origin = NO_ORIGIN,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit ``free`` parameters of a model to a measured response.
 
-    ``progress`` is called with what is being done. Raises :class:`InputError` for names that do not exist or that the
-    model does not use, and for a response that cannot be used. Look at ``trusted`` of the result.
+    ``origin`` is that of the result; ``progress`` is called with what is being done. Raises :class:`InputError` for
+    names that do not exist or that the model does not use, and for a response that cannot be used. Look at
+    ``trusted`` of the result.
     """
     began, report = time.perf_counter(), progress or _silent
     settings = settings or FitSettings()
@@ -178,7 +181,8 @@ def fit_least_squares(
     report("refining on nodes adapted to the result")
     best = _refined(task, minimiser, best, settings.steps, report)
     verdict = assess(task, minimiser, best, report)
-    return assemble_fit(task, Outcome(as_given, tuple(tried), best, verdict, time.perf_counter() - began))
+    outcome = Outcome(as_given, tuple(tried), best, verdict, time.perf_counter() - began)
+    return assemble_fit(task, outcome, origin)
 
 
 def _silent(line: str) -> None:

@@ -39,6 +39,7 @@ def fit(
     peak_to_peak: bool = False,
     fixed_tolerances: bool = False,
     max_frequency: float | None = None,
+    command: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> Fit:
     """Identify a model: parameters with errors, how well they fit, what the data identify.
@@ -53,6 +54,7 @@ def fit(
         peak_to_peak: fit peak-to-peak values only, as the paper did.
         fixed_tolerances: hold what is known to a tolerance at its value instead of estimating it along.
         max_frequency: leave out faster dwells [Hz].
+        command: the command line that the result says it was made by.
         progress: called with a sentence on what is being done.
 
     Look at ``trusted`` of the result. Raises :class:`InputError` for a campaign that cannot be used and for unknown
@@ -63,7 +65,7 @@ def fit(
         fixed_tolerances=fixed_tolerances,
         quantity="peak_to_peak" if peak_to_peak else "harmonics",
     )
-    return fit_with(model, measured, free, settings, max_frequency, progress)
+    return fit_with(model, measured, free, settings, max_frequency, command, progress)
 
 
 def fit_with(
@@ -72,6 +74,7 @@ def fit_with(
     free: Sequence[str],
     settings: FitSettings,
     max_frequency: float | None,
+    command: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> Fit:
     """The same with its settings as one record."""
@@ -79,13 +82,21 @@ def fit_with(
     drawing = model.before
     names = drawing.free(free)
     response = measured_response(measured, model.plant, settings.orders, max_frequency, progress)
-    found = fit_least_squares(response, drawing, free=names, settings=settings, progress=progress)
-    return replace(found, origin=model.origin(campaign_of(measured), response.warnings))
+    origin = model.origin(campaign_of(measured), response.warnings).with_command(command)
+    return fit_least_squares(
+        response, drawing, free=names, settings=settings, origin=origin, progress=progress
+    )
 
 
-def demo(progress: Progress = no_progress) -> Fit:
-    """Identify the rig that comes with the package from the campaign that comes with it."""
-    return fit(load_model(), load_campaign(default_campaign_path()), progress=progress)
+def demo(progress: Progress = no_progress, *, command: Sequence[str] = ()) -> Fit:
+    """Identify the rig that comes with the package from the campaign that comes with it.
+
+    ``progress`` is called with a sentence on what is being done; ``command`` is the command line that the result says
+    it was made by.
+    """
+    path = default_campaign_path()
+    progress(f"reading {path}")
+    return fit(load_model(), load_campaign(path), command=command, progress=progress)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ identify what the draws do not.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.presentation import Progress, no_progress
+from savgs_ident.core.presentation import Origin, Progress, no_progress
 from savgs_ident.fit.identifiability import (
     LARGEST_SD,
     advice_of,
@@ -48,6 +47,7 @@ def sample(
     seed: int = 1,
     chain: str | Path | None = None,
     resume: bool = False,
+    command: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> Posterior:
     """Sample the posterior of the parameters that a fit identified: intervals, trade-offs, predictions.
@@ -67,6 +67,7 @@ def sample(
         seed: of all random numbers.
         chain: file in which the chain is kept after every step.
         resume: go on with the chain that is there.
+        command: the command line that the result says it was made by.
         progress: called with a sentence on what is being done.
 
     Look at ``trusted`` of the result. Raises :class:`InputError` for a model without campaign, a campaign that cannot
@@ -85,12 +86,17 @@ def sample(
     model = identified.model if isinstance(identified, Fit) else identified
     response = _measured(identified, measured, settings.orders, max_frequency, progress)
     question = question_about(model, response)
-    kept = None if chain is None else Path(chain)
-    found = sample_posterior(question, settings, kept, resume, progress, describe_posterior)
+    origin = _origin(identified, measured, response).with_command(command)
+    checkpoint = None if chain is None else Path(chain)
+    return sample_posterior(question, settings, checkpoint, resume, progress, describe_posterior, origin)
+
+
+def _origin(identified: Fit | Model, measured: Measurements | None, response: HarmonicResponse) -> Origin:
+    """That of the fit where its own data are sampled; else that of the model and the data."""
     if measured is None and isinstance(identified, Fit):
-        return replace(found, origin=identified.origin)
-    known = None if measured is None else campaign_of(measured)
-    return replace(found, origin=model.origin(known, response.warnings))
+        return identified.origin
+    model = identified.model if isinstance(identified, Fit) else identified
+    return model.origin(None if measured is None else campaign_of(measured), response.warnings)
 
 
 def question_about(model: Model, measured: HarmonicResponse) -> Question:

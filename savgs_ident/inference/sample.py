@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from savgs_ident import __version__
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.presentation import Progress
+from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress
 from savgs_ident.inference.diagnostics import (
     assess_convergence,
     enough,
@@ -140,11 +140,12 @@ def sample_posterior(
     resume: bool = False,
     progress: Progress | None = None,
     describe: Describe | None = None,
+    origin: Origin = NO_ORIGIN,
 ) -> Posterior:
     """Sample until every identified parameter has the effective sample size asked for, or time is up.
 
     The chain is kept at the path ``chain``, after every step; with ``resume`` it is continued. ``describe`` gives the
-    sentences of the result, none by default. Look at
+    sentences of the result, none by default; ``origin`` is that of the result. Look at
     ``convergence.converged`` of the result. Raises :class:`InputError` for a question that makes no sense, a
     model without periodic motion where the search begins, and a chain of another question.
     """
@@ -157,9 +158,8 @@ def sample_posterior(
     chains = _run(expansion, settings, checkpoint, began, report)
     wall_s = time.perf_counter() - began
     report("summing up")
-    return _summed_up(
-        _Answer(task, posterior, mode, expansion, chains), question, settings, wall_s, describe or _nothing
-    )
+    answer = _Answer(task, posterior, mode, expansion, chains)
+    return _summed_up(answer, question, settings, wall_s, describe or _nothing, origin)
 
 
 def plan(question: Question, settings: SamplingSettings) -> Task:
@@ -256,7 +256,12 @@ def _run(
 
 
 def _summed_up(
-    answer: _Answer, question: Question, settings: SamplingSettings, wall_s: float, describe: Describe
+    answer: _Answer,
+    question: Question,
+    settings: SamplingSettings,
+    wall_s: float,
+    describe: Describe,
+    origin: Origin,
 ) -> Posterior:
     posterior, chains = answer.posterior, answer.chains
     roles = names_by_role(posterior.problem.free)
@@ -281,4 +286,5 @@ def _summed_up(
         measured=question.measured,
         sentences=describe(answer.task, answer.mode, marginals, draws),
         wall_s=wall_s,
+        origin=origin,
     )

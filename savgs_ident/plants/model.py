@@ -72,6 +72,10 @@ class Model(Protocol):
         """The same model with one more effect, by its name in the catalogue."""
 
     @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why its values are not to be trusted, a sentence each; empty if they are."""
+
+    @property
     def identified(self) -> tuple[tuple[str, ...], dict[str, float]]:
         """The parameters that a fit left free, and the values of all that it moved [SI]."""
 
@@ -181,6 +185,11 @@ class PlantModel:
         """Whether it comes from no fit."""
         return not self.provenance
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why its values are not to be trusted, a sentence each; empty if they are."""
+        return doubts_of_fit(self.name, self.provenance)
+
     def build(self) -> AbstractPlant:
         """The plant that solvers take, with its effects."""
         return self.plant
@@ -239,6 +248,14 @@ class PlantModel:
             return origin
         every = (*campaign.warnings, *warnings)
         return replace(origin, data=campaign.source, data_sha256=campaign.sha256, warnings=every)
+
+
+def doubts_of_fit(name: str, provenance: Mapping[str, Any]) -> tuple[str, ...]:
+    """Why the fit that made a model, by its provenance, is not to be trusted; empty if it is, or there was none."""
+    if provenance.get("trusted", True):
+        return ()
+    why = provenance.get("doubt", provenance.get("status", "no status"))
+    return (f"{name}: its own fit is not to be trusted ({why}).",)
 
 
 def _open(each: Parameter) -> bool:

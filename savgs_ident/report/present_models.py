@@ -40,7 +40,7 @@ class _SimulatedResponse(AbstractPresenter["SimulatedResponse"]):
         return response_text(result)
 
     def doubts(self, result: "SimulatedResponse") -> tuple[str, ...]:
-        return () if result.trusted else (_UNSOLVED,)
+        return result.model.doubts if result.trusted else (*result.model.doubts, _UNSOLVED)
 
     def figures(self, result: "SimulatedResponse") -> Figures:
         from savgs_ident.report.bode import response_figure
@@ -70,7 +70,7 @@ class _SimulatedSweep(AbstractPresenter["SimulatedSweep"]):
         return sweep_text(result)
 
     def doubts(self, result: "SimulatedSweep") -> tuple[str, ...]:
-        return () if result.trusted else (_UNSOLVED,)
+        return result.model.doubts if result.trusted else (*result.model.doubts, _UNSOLVED)
 
     def figures(self, result: "SimulatedSweep") -> Figures:
         from savgs_ident.report.model import sweep_figure
@@ -135,7 +135,7 @@ class _LinearStudy(AbstractPresenter["LinearStudy"]):
     def doubts(self, result: "LinearStudy") -> tuple[str, ...]:
         from savgs_ident.report.control.linear_text import alarm
 
-        return () if result.trusted else (alarm(result),)
+        return result.model.doubts if result.trusted else (*result.model.doubts, alarm(result))
 
     def page(self, result: "LinearStudy") -> str:
         from savgs_ident.report.control.linear_page import linear_html
@@ -169,7 +169,7 @@ class _Design(AbstractPresenter["Design"]):
     def doubts(self, result: "Design") -> tuple[str, ...]:
         from savgs_ident.report.control.design_text import alarm
 
-        return () if result.trusted else (alarm(result),)
+        return result.model.doubts if result.trusted else (*result.model.doubts, alarm(result))
 
     def page(self, result: "Design") -> str:
         from savgs_ident.report.control.design_page import design_html
@@ -210,7 +210,7 @@ class _LoopStudy(AbstractPresenter["LoopStudy"]):
     def doubts(self, result: "LoopStudy") -> tuple[str, ...]:
         from savgs_ident.report.control.loop_text import alarm
 
-        return () if result.trusted else (alarm(result),)
+        return result.model.doubts if result.trusted else (*result.model.doubts, alarm(result))
 
     def page(self, result: "LoopStudy") -> str:
         from savgs_ident.report.control.loop_page import loop_html
@@ -240,7 +240,7 @@ def _values(study: "LoopStudy") -> "Values":
     """The parameters of the model that was run."""
     from savgs_ident.core.values import as_values
 
-    return as_values(study.model.table.as_dict() if study.model else {})
+    return as_values(study.model.table.as_dict())
 
 
 LINEAR_STUDY = _LinearStudy()

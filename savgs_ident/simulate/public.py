@@ -7,7 +7,7 @@ widest gaps, for arrays of the same shape need no second compilation.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import jax
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.presentation import Progress, Result, no_progress
+from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, Result, no_progress
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import as_values
 from savgs_ident.plants.base import AbstractPlant, Excitation
@@ -126,12 +126,13 @@ def simulate_response(
     orders: int,
     settings: PeriodicSettings | None = None,
     layout: Layout | None = None,
+    origin: Origin = NO_ORIGIN,
 ) -> SimulatedResponse:
-    """The periodic motions of a model; the rest as in :func:`simulate_periodic`."""
+    """The periodic motions of a model, a result of this ``origin``; the rest as in :func:`simulate_periodic`."""
     plant, p = model.build(), as_values(model.table.as_dict())
     solution = simulate_periodic(plant, p, excitation, settings, layout)
     found = np.asarray(harmonics(plant, p, solution, orders))
-    return SimulatedResponse(model, excitation, found, solution.status())
+    return SimulatedResponse(model, excitation, found, solution.status(), origin=origin)
 
 
 def simulate_between(known: SimulatedResponse) -> SimulatedResponse:
@@ -232,7 +233,7 @@ def simulate(
         raise InputError(f"orders is {orders}", source="orders", remedy="ask for at least order 1")
     excitation = _excitation(model, frequency, campaign, orders, amplitude)
     progress(f"solving {excitation.frequency.shape[0]} periodic motions")
-    return replace(simulate_response(model, excitation, orders), origin=model.origin(campaign))
+    return simulate_response(model, excitation, orders, origin=model.origin(campaign))
 
 
 def simulate_sweep(

@@ -64,7 +64,7 @@ class BlindStudy(Result):
 
 
 @dataclass(frozen=True)
-class Job:
+class BlindRequest:
     """How many trials to run, of what, and how; see :func:`blind`."""
 
     trials: int
@@ -94,6 +94,7 @@ def blind(
     sensitivity: bool = False,
     jobs: int | None = None,
     scheduler: str | None = None,
+    command: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> BlindStudy:
     """Try the diagnosis on campaigns whose effect is withheld, and count how often it is right.
@@ -117,50 +118,54 @@ def blind(
         foreign: effects follow laws that the diagnosis does not have, on rigs with small errors.
         again: diagnose the recordings in the folder anew; keep none of the marks.
         sensitivity: give every new trial its verdicts by decision constants halved and doubled, too.
-        jobs: trials at a time on this machine; one for each core if left out.
+        jobs: trials at a time on this machine, each in a process of its own; one for each core if left out, 0 for
+            one after the other in this process.
         scheduler: address of a Dask cluster to work on instead, whose workers see the folder under the same path.
+        command: the command line that the result says it was made by.
         progress: called with a sentence on what is being done.
 
     Raises :class:`InputError` for a rig that cannot be read, and for a folder with trials of something else.
     """
     sheet = None if rig is None else Path(rig)
     given = shares or (FOREIGN_SHARES if foreign else SHARES)
-    asked = Job(trials, seed, jobs, sheet, given, every, sweep, again, (), scheduler, foreign)
+    asked = BlindRequest(
+        trials, seed, jobs, sheet, given, every, sweep, again, tuple(command), scheduler, foreign
+    )
     diagnose = diagnose_by_other_constants if sensitivity else diagnose_folder
     return run_blind(asked, draw_and_record, diagnose, Path(folder), progress)
 
 
 def run_blind(
-    job: Job, draw: Draw, diagnose: Diagnose, out: Path, progress: Progress = no_progress
+    request: BlindRequest, draw: Draw, diagnose: Diagnose, out: Path, progress: Progress = no_progress
 ) -> BlindStudy:
     """Run the trials that are not in the folder ``out`` yet; ``draw`` makes their rigs, ``diagnose`` is tried."""
-    check_shares(job)
-    rig = job.rig or default_rig_path()
+    check_shares(request)
+    rig = request.rig or default_rig_path()
     sheet = rig_content(rig)
     parse_rig(sheet, rig)
     prepare_folder(out)
     use_persistent_cache()
     kept = out / FILE
-    plan = plan_of(job, sheet, kept)
+    plan = plan_of(request, sheet, kept)
     done = known_trials(kept, plan.marks(), score_from)
-    if job.again or not done:
+    if request.again or not done:
         done = []
         begin_trials(kept, plan.marks())
     # Not when it is their turn, which may be in hours.
-    for number in _missing(job, done):
+    for number in _missing(request, done):
         check_trial_folder(plan, out, number)
     # Workers of a cluster run in other folders.
-    place = out if job.scheduler is None else out.absolute()
-    scores = _run(job, partial(run_trial, plan, draw, diagnose, place), out, done, progress)
-    origin = Origin(command=job.command, model=str(rig))
+    place = out if request.scheduler is None else out.absolute()
+    scores = _run(request, partial(run_trial, plan, draw, diagnose, place), out, done, progress)
+    origin = Origin(command=request.command, model=str(rig))
     moved = moved_marks(list(kept_trials(out, scores)))
     return BlindStudy(tuple(scores), plan.marks(), moved, origin=origin)
 
 
-def check_shares(job: Job) -> None:
+def check_shares(request: BlindRequest) -> None:
     """Raise :class:`InputError` for shares that are none, or that ask for what foreign trials do not have."""
-    shares = Shares(*job.shares)
-    if job.foreign and shares.two + shares.unknown > 0.0:
+    shares = Shares(*request.shares)
+    if request.foreign and shares.two + shares.unknown > 0.0:
         raise InputError(
             "foreign trials have nothing or one effect",
             source="--shares",
@@ -168,38 +173,46 @@ def check_shares(job: Job) -> None:
         )
 
 
-def plan_of(job: Job, sheet: bytes, kept: Path) -> Plan:
+def plan_of(request: BlindRequest, sheet: bytes, kept: Path) -> Plan:
     """What the trials are, with the seed of an earlier run or a secret one if none was given.
 
     ``sheet`` is what is in the rig file.
     """
-    seed = job.seed
+    seed = request.seed
     if seed is None:
         kept_seed = marks_in(kept).get("seed")
         seed = kept_seed if type(kept_seed) is int and kept_seed >= 0 else secrets.randbits(32)
-    return Plan(job.rig or default_rig_path(), sheet, seed, job.shares, job.every, job.sweep, job.foreign)
+    return Plan(
+        request.rig or default_rig_path(),
+        sheet,
+        seed,
+        request.shares,
+        request.every,
+        request.sweep,
+        request.foreign,
+    )
 
 
-def _missing(job: Job, done: Sequence[Score]) -> list[int]:
+def _missing(request: BlindRequest, done: Sequence[Score]) -> list[int]:
     """The numbers of the trials that are not ``done``."""
     there = {score.number for score in done}
-    return [number for number in range(1, job.trials + 1) if number not in there]
+    return [number for number in range(1, request.trials + 1) if number not in there]
 
 
 def _run(
-    job: Job, work: Callable[[int], Score], out: Path, done: list[Score], progress: Progress
+    request: BlindRequest, work: Callable[[int], Score], out: Path, done: list[Score], progress: Progress
 ) -> list[Score]:
     """The marks of all trials: those ``done``, and the others, each kept in ``out`` as soon as it is there."""
     scores = {score.number: score for score in done}
-    missing = _missing(job, done)
+    missing = _missing(request, done)
     if done:
         progress(f"{len(done)} trials are there from an earlier run")
     if missing:
-        progress(f"trial {missing[0]} of {job.trials}")
-    with closing(side_by_side(work, missing, job.jobs, job.scheduler)) as made:
+        progress(f"trial {missing[0]} of {request.trials}")
+    with closing(side_by_side(work, missing, request.jobs, request.scheduler)) as made:
         for score in made:
             scores[score.number] = score
             append_trial(out / FILE, asdict(score))
-            there = sum(number <= job.trials for number in scores)
-            progress(f"{there} of {job.trials} trials done; {score}")
-    return [scores[number] for number in sorted(scores) if number <= job.trials]
+            there = sum(number <= request.trials for number in scores)
+            progress(f"{there} of {request.trials} trials done; {score}")
+    return [scores[number] for number in sorted(scores) if number <= request.trials]

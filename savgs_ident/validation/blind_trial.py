@@ -174,9 +174,9 @@ def diagnose_folder(
     campaign = load_campaign(folder)
     measured = measured_response(campaign, QuarterCar, settings.orders)
     sweep, _ = first_sweep(campaign, QuarterCar)
-    diagnosis = diagnose_response(measured, rig, settings, sweep=sweep, watch=watch)
     origin = RigModel(rig, settings.baseline).origin(campaign, measured.warnings)
-    record: Mapping[str, Any] = json.loads(replace(diagnosis, origin=origin).to_json())
+    diagnosis = diagnose_response(measured, rig, settings, sweep=sweep, watch=watch, origin=origin)
+    record: Mapping[str, Any] = json.loads(diagnosis.to_json())
     return record
 
 

@@ -10,7 +10,7 @@ identified parameters are normal about the given values, with :data:`SPREAD`, an
 large as the noise. What the solver's own nodes leave open counts as discrepancy too.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -232,6 +232,7 @@ def calibrate(
     channels: str | Path | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
+    command: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> CalibrationStudy:
     """Check the posterior on synthetic campaigns: do 95 % intervals hold the truth 95 times in a hundred?
@@ -251,6 +252,7 @@ def calibrate(
         channels: the map that the campaign was read with, by which an earlier run is recognised.
         jobs: trials at a time on this machine; one for each core if left out.
         scheduler: address of a Dask cluster to work on instead.
+        command: the command line that the result says it was made by.
         progress: called with a sentence on what is being done.
 
     Raises :class:`InputError` as :func:`sample` does, and for trials of something else in the folder.
@@ -272,7 +274,7 @@ def calibrate(
     )
     ranked = next((each.rank for each in found if each.rank), {})
     names = sorted(ranked, key=lambda name: name not in question.free)
-    origin = model.origin(campaign, response.warnings)
+    origin = model.origin(campaign, response.warnings).with_command(command)
     return CalibrationStudy(tuple(found), tuple(names), origin=origin)
 
 

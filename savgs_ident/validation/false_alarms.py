@@ -215,6 +215,7 @@ def false_alarms(
     channels: str | Path | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
+    command: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> AlarmStudy:
     """Count false alarms: how often does a diagnosis find something in campaigns like this one with nothing missing?
@@ -234,6 +235,7 @@ def false_alarms(
         channels: the map that the campaign was read with, by which an earlier run is recognised.
         jobs: draws at a time on this machine; one for each core if left out.
         scheduler: address of a Dask cluster to work on instead.
+        command: the command line that the result says it was made by.
         progress: called with a sentence on what is being done.
 
     Raises :class:`InputError` as :func:`diagnose` does, and for draws of something else in the folder.
@@ -252,7 +254,8 @@ def false_alarms(
     found = run_trials(
         partial(_draw, asked), draws, file, done, jobs=jobs, scheduler=scheduler, progress=progress
     )
-    return AlarmStudy(tuple(found), bench.odds, origin=model.origin(campaign, measured.warnings))
+    origin = model.origin(campaign, measured.warnings).with_command(command)
+    return AlarmStudy(tuple(found), bench.odds, origin=origin)
 
 
 @dataclass(frozen=True)

@@ -185,13 +185,15 @@ def run_trials(
     """The trials 0 to ``count`` - 1, in order: those ``done``, and the others as ``work`` makes them.
 
     Each is written to ``file`` as soon as it is there. The work is spread, and what goes wrong with it is raised, as
-    :func:`side_by_side` says.
+    :func:`side_by_side` says; one at a time is done in this process, which has prepared it.
     """
     if file is not None and not done:
         begin_trials(file.path, file.marks)
     found = {_number(each): each for each in done}
     missing = [number for number in range(count) if number not in found]
-    with closing(side_by_side(work, missing, jobs, scheduler)) as results:
+    workers = cores() if jobs is None else jobs
+    alone = workers == 1 or len(missing) < 2
+    with closing(side_by_side(work, missing, 0 if alone else workers, scheduler)) as results:
         for made in results:
             found[_number(made)] = made
             if file is not None:
@@ -205,16 +207,14 @@ def side_by_side(
 ) -> Generator[Made]:
     """The results of ``work``, defined at the top of a module, as they come.
 
-    ``jobs`` at a time in processes of this machine, one for each core if None, or on the Dask cluster of a
-    ``scheduler``; one at a time is done in this process. An error of the work is raised here and ends the others.
-    Raises :class:`InputError` in the end, when the others are done, for what was given up because its process was
-    killed.
+    ``jobs`` at a time in processes of this machine, one for each core if None, in this process if 0, or on the Dask
+    cluster of a ``scheduler``. An error of the work is raised here and ends the others. Raises :class:`InputError`
+    in the end, when the others are done, for what was given up because its process was killed.
     """
-    workers = jobs or cores()
-    alone = scheduler is None and (workers == 1 or len(numbers) < 2)
+    workers = cores() if jobs is None else jobs
     lost: list[tuple[int, Lost]] = []
     prepared = partial(_prepared, work)
-    for place, result in run_tasks(prepared, numbers, 0 if alone else workers, scheduler, TASKS):
+    for place, result in run_tasks(prepared, numbers, workers, scheduler, TASKS):
         if isinstance(result, Lost):
             lost.append((numbers[place], result))
         else:

@@ -109,7 +109,7 @@ def record_campaign(bench: Bench, answer: Answer, random: np.random.Generator) -
     lift, angle = nominal_test(during[0])
     tests = []
     for dwell in steady_dwells(model, during, bench.programme.dwells, bench.step):
-        if not dwell.periodic:
+        if not dwell.status.ok:
             raise InputError(
                 "the motion does not become steady",
                 source=f"trial {answer.number}",

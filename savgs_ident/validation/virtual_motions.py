@@ -26,6 +26,7 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.status import Status, joint_status
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import AbstractSensorLaw
 from savgs_ident.plants.base import (
@@ -68,7 +69,7 @@ CLOSED = 2e-4
 leaves open, and about what the steps of the integration scatter by."""
 
 PATIENCE = 60.0
-"""A dwell whose motion is not periodic after so long [s] does not become so."""
+"""A dwell that is not periodic after so long [s] does not become so."""
 
 PRECISION = 1e-6
 """Relative tolerance of a step of the integration."""
@@ -82,12 +83,12 @@ class Steady:
         frequency: [Hz].
         readings: what the sensors show over a period that begins with the cam at its top, noise apart: [m/s^2]
             and [m], (2, SAMPLES).
-        periodic: whether the motion had become so.
+        status: whether the motion was found and had become periodic.
     """
 
     frequency: float
     readings: NDArray[np.float64]
-    periodic: bool
+    status: Status
 
 
 def without_sensor_faults(model: QuarterCar) -> QuarterCar:
@@ -110,39 +111,48 @@ def steady_dwells(
     _, angle = nominal_test(during[0])
     state, rise = _at_rest(mechanics, during[0], placed(held_link(angle))), STRETCH
     for frequency, p in zip(frequencies, during, strict=True):
-        apart = np.inf
+        status = Status.MAX_ITERATIONS
         for _ in range(ceil(PATIENCE / STRETCH)):
             periods = ceil(STRETCH * frequency)
-            before, state = state, _stretch(mechanics, p, state, frequency, periods, rise, step)[0]
-            apart, rise = _apart(mechanics, before, state), 0.0
-            if apart < CLOSED or np.isnan(apart):
+            before, (state, _, ended) = state, _stretch(mechanics, p, state, frequency, periods, rise, step)
+            rise = 0.0
+            if not ended.ok or _apart(mechanics, before, state) < CLOSED:
+                status = ended
                 break
-        state, truth = _stretch(mechanics, p, state, frequency, 1, rise, step)
-        yield Steady(frequency, _shown(model, p, frequency, truth), bool(apart < CLOSED))
+        state, truth, ended = _stretch(mechanics, p, state, frequency, 1, rise, step)
+        yield Steady(frequency, _shown(model, p, frequency, truth), joint_status((status, ended)))
 
 
 def _apart(model: QuarterCar, before: Array, after: Array) -> float:
-    """Largest difference of two packed states, of their typical sizes; NaN if one is not a number."""
+    """Largest difference of two packed states, of their typical sizes."""
     scale = np.array(state_sizes(model))
     return float(np.max(np.abs(np.asarray(after) - np.asarray(before)) / scale))
 
 
 def _stretch(
     model: QuarterCar, p: Values, start: Array, frequency: float, periods: int, rise: float, step: float
-) -> tuple[Array, NDArray[np.float64]]:
-    """The packed state after so many periods, and what was read on the way, (2, SAMPLES).
+) -> tuple[Array, NDArray[np.float64], Status]:
+    """The packed state after so many periods, what was read on the way, (2, SAMPLES), and how it ended.
 
     The cam's lift grows to its height during the first ``rise`` [s].
     """
     lift, angle = nominal_test(p)
     if step > 0.0:
         source = placed(RigSource(cam_road(lift, frequency, rise), held_link(angle)))
-        found = integrate_fixed(model, p, start, source, periods / frequency, SAMPLES, step)
-        return found[0], np.asarray(found[1])
+        end, readings, status = integrate_fixed(model, p, start, source, periods / frequency, SAMPLES, step)
+        return end, np.asarray(readings), status
     times = np.linspace(0.0, periods / frequency, SAMPLES + 1)
     drive = (cam_road(lift, frequency, rise), held_link(angle), jnp.asarray(times))
-    end, readings = _integrated(model, p, start, *placed(drive))
-    return end, np.asarray(readings)
+    end, readings, found = _integrated(model, p, start, *placed(drive))
+    return end, np.asarray(readings), _status_of(found, end, readings)
+
+
+def _status_of(found: RESULTS, *numbers: Array) -> Status:
+    """How an integration of controlled error ended that gave these numbers."""
+    if bool(found == RESULTS.max_steps_reached):
+        return Status.MAX_ITERATIONS
+    ended = bool(found == RESULTS.successful) and all(bool(jnp.isfinite(each).all()) for each in numbers)
+    return Status.CONVERGED if ended else Status.NOT_FINITE
 
 
 @eqx.filter_jit
@@ -154,9 +164,9 @@ def _at_rest(model: QuarterCar, p: Values, link: ImposedLink) -> Array:
 @eqx.filter_jit
 def _integrated(
     model: QuarterCar, p: Values, start: Array, road: RoadMotion, link: ImposedLink, times: Array
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, RESULTS]:
     found = simulate_transient(model, p, RigSource(road, link), times, unpack_state(model, start), PRECISION)
-    return pack_state(found.state_at(-1)), jnp.stack(found.readings)[:, :-1]
+    return pack_state(found.state_at(-1)), jnp.stack(found.readings)[:, :-1], found.result
 
 
 @eqx.filter_jit
@@ -183,29 +193,30 @@ def sweep_readings(
     lift, angle = nominal_test(p)
     road, link = sweep_road(lift, 0.0, end, duration), held_link(angle)
     if step > 0.0:
-        shown, ended = _swept_fixed(model, p, RigSource(road, link), times, step), jnp.asarray(True)
+        shown, status = _swept_fixed(model, p, RigSource(road, link), times, step)
     else:
-        shown, ended = _swept(model, p, *placed((road, link, jnp.asarray(times))))
-    if not np.isfinite(shown).all() or not bool(ended):
+        shown, found = _swept(model, p, *placed((road, link, jnp.asarray(times))))
+        status = _status_of(found, shown)
+    if not status.ok:
         raise InputError("the sweep cannot be simulated", source="sweep", remedy="draw another rig")
     return times, np.asarray(shown)
 
 
 def _swept_fixed(
     model: QuarterCar, p: Values, source: RigSource, times: NDArray[np.float64], step: float
-) -> Array:
-    """Readings (2, n) at evenly spaced instants [s]."""
+) -> tuple[Array, Status]:
+    """Readings (2, n) at evenly spaced instants [s], and how the integration ended."""
     start, lasts = _at_rest(model, p, placed(source.link)), float(times[-1]) * times.size / (times.size - 1)
-    readings = integrate_fixed(model, p, start, placed(source), lasts, times.size, step)[1]
-    return through_sensors(partial(model.transfers, p), jnp.asarray(times), readings)
+    _, readings, status = integrate_fixed(model, p, start, placed(source), lasts, times.size, step)
+    return through_sensors(partial(model.transfers, p), jnp.asarray(times), readings), status
 
 
 @eqx.filter_jit
 def _swept(
     model: QuarterCar, p: Values, road: RoadMotion, link: ImposedLink, times: Array
-) -> tuple[Array, Array]:
+) -> tuple[Array, RESULTS]:
     found = simulate_transient(model, p, RigSource(road, link), times, tolerance=PRECISION)
-    return jnp.stack(found.readings), jnp.asarray(found.result == RESULTS.successful)
+    return jnp.stack(found.readings), found.result
 
 
 State = Float[Array, " x"]
@@ -224,14 +235,17 @@ def integrate_fixed(
     duration: float,
     samples: int,
     step: float,
-) -> tuple[State, Float[Array, "C n"]]:
-    """The packed state after a ``duration`` [s], and the readings at the n ``samples`` that begin it, in SI.
+) -> tuple[State, Float[Array, "C n"], Status]:
+    """The packed state after a ``duration`` [s], the readings at its n ``samples``, in SI, and how it ended.
 
-    No step is longer than ``step`` [s]; no number is finite where there is no motion.
+    The samples are evenly spaced from its beginning; no step is longer than ``step`` [s]. Without control of the
+    error it ends well if all numbers are finite, which they are not where there is no motion.
     """
     inner = substeps_for(duration, samples, step)
     interval, steps = placed((jnp.asarray(duration / samples), jnp.asarray(inner)))
-    return _stepped(model, p, start, source, interval, steps, samples)
+    end, readings = _stepped(model, p, start, source, interval, steps, samples)
+    finite = bool(jnp.isfinite(end).all() & jnp.isfinite(readings).all())
+    return end, readings, Status.CONVERGED if finite else Status.NOT_FINITE
 
 
 @eqx.filter_jit

@@ -14,9 +14,10 @@ from savgs_ident.control.closed_loop.study import LoopStudy, study_loop
 from savgs_ident.control.design import Design, controller_for, design_controller, rigs_from_covariance
 from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS
 from savgs_ident.control.linear_study import LinearStudy, study_linear
-from savgs_ident.core.presentation import Origin
+from savgs_ident.core.presentation import NO_ORIGIN, Origin, no_progress
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.report.campaigns.page import campaigns_html
 from savgs_ident.report.control.design_page import design_html
@@ -42,26 +43,25 @@ SETTINGS = {"model": "simtr", "free": ["mu_r", "c_sd"], "max_frequency_hz": None
 
 def _linear(rig: Rig) -> LinearStudy:
     """The linear models of the shipped rig."""
-    table = model_parameters(rig, EFFECTS)
-    return study_linear(build_model(rig, EFFECTS), as_values(table.as_dict()), lambda _: None)
+    return study_linear(RigModel(rig, EFFECTS), NO_ORIGIN, no_progress)
 
 
 def _design(rig: Rig) -> Design:
     """A controller for it."""
-    table = model_parameters(rig, EFFECTS)
-    model, p = build_model(rig, EFFECTS), as_values(table.as_dict())
-    rigs = rigs_from_covariance(table, rig.provenance, 5)
-    return design_controller(model, p, rigs, DEFAULT_WEIGHTS, lambda _: None)
+    model = RigModel(rig, EFFECTS)
+    rigs = rigs_from_covariance(model.table, rig.provenance, 5)
+    return design_controller(model, rigs, DEFAULT_WEIGHTS, NO_ORIGIN, no_progress)
 
 
 def _loop(rig: Rig) -> tuple[LoopStudy, Values]:
     """A controller over a bump, on the shipped rig and on two others, with causes."""
-    table = model_parameters(rig, EFFECTS)
-    model, p = build_model(rig, EFFECTS), as_values(table.as_dict())
-    controller = controller_for(model, p, DEFAULT_WEIGHTS)
-    rigs = rigs_from_covariance(table, rig.provenance, 2)
+    model = RigModel(rig, EFFECTS)
+    p = as_values(model.table.as_dict())
+    controller = controller_for(model.build(), p, DEFAULT_WEIGHTS)
+    rigs = rigs_from_covariance(model.table, rig.provenance, 2)
     test = bump_test(DEFAULT_SPEED[LoopKind.bump])
-    return study_loop(model, p, controller, test, lambda _: None, rigs, causes=True), p
+    study = study_loop(model, controller, "as given", test, NO_ORIGIN, no_progress, rigs, causes=True)
+    return study, p
 
 
 def _campaigns(name: str) -> CampaignStudy:
@@ -82,7 +82,7 @@ def _campaigns(name: str) -> CampaignStudy:
     failed = CampaignRow(
         f"{name}x", f"{name}.csv", RowStatus.failed, f"{name}: no column is known", None, None, {}
     )
-    return study_campaigns([*rows[:3], doubtful, *rows[4:], failed], str)
+    return study_campaigns([*rows[:3], doubtful, *rows[4:], failed], str, SETTINGS, NO_ORIGIN)
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from savgs_ident.cli.console import Reporter
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.recordings.recording import RecordedChannel, Recording
-from savgs_ident.validation.blind import Job, run_blind
+from savgs_ident.validation.blind import BlindRequest, run_blind
 from savgs_ident.validation.blind_trial import Drawn, Plan
 from savgs_ident.validation.virtual_rig import Bench
 
@@ -34,11 +34,11 @@ KINDS = {
 RIGHT = {"none": "none", "effect": "effect", "two": "several", "unknown": "unknown"}
 
 
-def job(**changes: Any) -> Job:
+def request(**changes: Any) -> BlindRequest:
     given: dict[str, Any] = {
         "trials": 6,
         "seed": 4,
-        "jobs": 1,
+        "jobs": 0,
         "rig": None,
         "shares": (20.0, 50.0, 15.0, 15.0),
         "every": 1,
@@ -46,7 +46,7 @@ def job(**changes: Any) -> Job:
         "again": False,
         "command": ("savgs-ident", "blind"),
     }
-    return Job(**(given | changes))
+    return BlindRequest(**(given | changes))
 
 
 def draw(plan: Plan, bench: Bench, number: int) -> Drawn:
@@ -103,24 +103,26 @@ def always_none(folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str
 
 
 def slowly_right(seconds: float, folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
-    """Right after some time; tells in which process."""
+    """Right after some time; prints the number of its process."""
     # At once: lines of two processes would run into each other.
     os.write(1, f"{os.getpid()}\n".encode())
     time.sleep(seconds)
     return always_right(folder, rig, without)
 
 
-def concluded(job: Job, draw: Any, diagnose: Any, reporter: Reporter, out: Path) -> int:
+def concluded(request: BlindRequest, draw: Any, diagnose: Any, reporter: Reporter, out: Path) -> int:
     """The exit code of the command, with other rigs and another diagnosis."""
     with reporter.working() as progress:
-        study = run_blind(job, draw, diagnose, out, progress)
+        study = run_blind(request, draw, diagnose, out, progress)
         files = study.save(out, progress)
     return reporter.conclude(study, files)
 
 
 def _main(folder: str, trials: str, jobs: str, seconds: str) -> int:
     slow = partial(slowly_right, float(seconds))
-    return concluded(job(trials=int(trials), jobs=int(jobs)), draw, slow, Reporter(False, True), Path(folder))
+    return concluded(
+        request(trials=int(trials), jobs=int(jobs)), draw, slow, Reporter(False, True), Path(folder)
+    )
 
 
 if __name__ == "__main__":

@@ -16,8 +16,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from savgs_ident.campaigns.run import Failure, Job, Jobs, Outcome, Task, identify_all, spread_of
-from savgs_ident.campaigns.store import Kept
+from savgs_ident.campaigns.run import (
+    CampaignRun,
+    CampaignTask,
+    Failure,
+    FitRequest,
+    Outcome,
+    identify_all,
+    spread_of,
+)
+from savgs_ident.campaigns.store import StoredResult
 from savgs_ident.cli.campaign import conclude
 from savgs_ident.cli.console import Reporter
 from savgs_ident.fit.least_squares import FitSettings
@@ -36,7 +44,7 @@ def campaign_file(path: Path, value: float, start: float | None = None, **more: 
     return path
 
 
-def job(*arguments: Path, **changes: Any) -> Jobs:
+def request(*arguments: Path, **changes: Any) -> CampaignRun:
     """Identify mu_r and c_sd of the campaigns in ``arguments``; changes are of the single fit."""
     given: dict[str, Any] = {
         "campaign": Path(),
@@ -48,12 +56,12 @@ def job(*arguments: Path, **changes: Any) -> Jobs:
         "max_frequency": None,
         "command": ("savgs-ident", "campaign"),
     }
-    return Jobs(arguments, Job(**(given | changes)), None, 2)
+    return CampaignRun(arguments, FitRequest(**(given | changes)), None, 2)
 
 
-def read_number(task: Task) -> Outcome:
+def read_number(task: CampaignTask) -> Outcome:
     """What is in the file, as the result of a fit."""
-    path = task.job.campaign
+    path = task.request.campaign
     files = sorted(path.iterdir()) if path.is_dir() else [path]
     reported = json.loads(files[0].read_text())
     if "failure" in reported:
@@ -82,7 +90,7 @@ def read_number(task: Task) -> Outcome:
         "status": "converged",
         "advice": "converged",
     }
-    return Kept(json.dumps(record), f"name = {json.dumps(task.source)}\n", reported["start"])
+    return StoredResult(json.dumps(record), f"name = {json.dumps(task.source)}\n", reported["start"])
 
 
 def never(*_: object) -> Any:
@@ -90,24 +98,26 @@ def never(*_: object) -> Any:
     raise AssertionError("this is there already")
 
 
-def one_by_one(work: Callable[[Task], Outcome], tasks: Sequence[Task]) -> Iterator[tuple[int, Outcome]]:
+def one_by_one(
+    work: Callable[[CampaignTask], Outcome], tasks: Sequence[CampaignTask]
+) -> Iterator[tuple[int, Outcome]]:
     """The work in this process."""
     yield from ((number, work(task)) for number, task in enumerate(tasks))
 
 
 def run(
-    *arguments: Path, out: Path, work: Any = read_number, voice: Reporter = SILENT, **changes: Any
+    *arguments: Path, out: Path, work: Any = read_number, reporter: Reporter = SILENT, **changes: Any
 ) -> int:
     """The exit code of a run in this process."""
-    return _concluded(job(*arguments, **changes), work, one_by_one, voice, out)
+    return _concluded(request(*arguments, **changes), work, one_by_one, reporter, out)
 
 
-def _concluded(asked: Jobs, work: Any, spread: Any, voice: Reporter, out: Path) -> int:
+def _concluded(asked: CampaignRun, work: Any, spread: Any, reporter: Reporter, out: Path) -> int:
     """The command, with other work and another executor."""
-    with voice.working() as progress:
+    with reporter.working() as progress:
         study = identify_all(asked, work, spread, out, progress)
         files = study.save(out, progress)
-    return conclude(study, files, voice)
+    return conclude(study, files, reporter)
 
 
 def record_of(out: Path) -> dict[str, Any]:
@@ -122,18 +132,18 @@ def rows_of(out: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
-def slowly(seconds: float, task: Task) -> Outcome:
+def slowly(seconds: float, task: CampaignTask) -> Outcome:
     """The same after some time; leaves a file of the process that does it, named after the campaign."""
-    path = task.job.campaign
+    path = task.request.campaign
     (path.parent / f"{path.name}.{os.getpid()}").touch()
     time.sleep(seconds)
     return read_number(task)
 
 
 def _main(out: str, seconds: str, where: str, *arguments: str) -> int:
-    asked = job(*map(Path, arguments))
+    asked = request(*map(Path, arguments))
     local = where.isdecimal()
-    asked = Jobs(asked.arguments, asked.one, None if local else where, int(where) if local else 1)
+    asked = CampaignRun(asked.arguments, asked.one, None if local else where, int(where) if local else 1)
     slow = partial(slowly, float(seconds))
     return _concluded(asked, slow, spread_of(asked), Reporter(False, False), Path(out))
 

@@ -16,10 +16,10 @@ import pytest
 from savgs_ident.cli.console import NOT_TRUSTED, OK, Reporter
 from savgs_ident.core.errors import InputError
 from savgs_ident.plants.quarter_car.rig import default_rig_path
-from savgs_ident.validation.blind import Job
+from savgs_ident.validation.blind import BlindRequest
 from savgs_ident.validation.blind_trial import Drawn
 
-from .blind_fakes import always_none, always_right, concluded, draw, job
+from .blind_fakes import always_none, always_right, concluded, draw, request
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SILENT = Reporter(False, True)
@@ -35,8 +35,8 @@ def _record(out: Path) -> dict[str, Any]:
 
 
 def test_a_run_that_goes_on_equals_one_that_was_never_stopped(tmp_path: Path) -> None:
-    assert concluded(job(), draw, always_right, SILENT, tmp_path / "whole") == OK
-    concluded(job(trials=3), draw, always_right, SILENT, tmp_path / "parts")
+    assert concluded(request(), draw, always_right, SILENT, tmp_path / "whole") == OK
+    concluded(request(trials=3), draw, always_right, SILENT, tmp_path / "parts")
     kept = tmp_path / "parts" / "trials.jsonl"
     # Stopped in the middle of a line, and of the recording of the fourth trial.
     kept.write_text(kept.read_text()[:-25])
@@ -44,22 +44,22 @@ def test_a_run_that_goes_on_equals_one_that_was_never_stopped(tmp_path: Path) ->
     begun.mkdir(parents=True)
     (begun / "campaign.csv.gz").write_bytes(b"half")
     (begun / ".seal.json.abcd1_23.part").write_bytes(b"half")
-    assert concluded(job(), draw, always_right, SILENT, tmp_path / "parts") == OK
+    assert concluded(request(), draw, always_right, SILENT, tmp_path / "parts") == OK
     assert _record(tmp_path / "parts") == _record(tmp_path / "whole")
     assert (tmp_path / "parts/blind.html").read_bytes() == (tmp_path / "whole/blind.html").read_bytes()
     assert kept.read_text() == (tmp_path / "whole/trials.jsonl").read_text()
 
 
 def test_trials_that_are_there_are_neither_drawn_nor_diagnosed(tmp_path: Path) -> None:
-    concluded(job(), draw, always_right, SILENT, tmp_path)
+    concluded(request(), draw, always_right, SILENT, tmp_path)
     before = _record(tmp_path)
-    assert concluded(job(seed=None), _never, _never, SILENT, tmp_path) == OK
+    assert concluded(request(seed=None), _never, _never, SILENT, tmp_path) == OK
     assert _record(tmp_path) == before
 
 
 def test_again_diagnoses_the_same_recordings(tmp_path: Path) -> None:
-    concluded(job(), draw, always_right, SILENT, tmp_path)
-    code = concluded(job(again=True), _never, always_none, SILENT, tmp_path)
+    concluded(request(), draw, always_right, SILENT, tmp_path)
+    code = concluded(request(again=True), _never, always_none, SILENT, tmp_path)
     assert code == NOT_TRUSTED
     record = _record(tmp_path)
     assert record["trials"] == 6
@@ -67,7 +67,7 @@ def test_again_diagnoses_the_same_recordings(tmp_path: Path) -> None:
 
 
 def test_what_is_reported_is_what_was_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert concluded(job(trials=8), draw, always_right, Reporter(True, False), tmp_path) == OK
+    assert concluded(request(trials=8), draw, always_right, Reporter(True, False), tmp_path) == OK
     printed = json.loads(capsys.readouterr().out)
     assert printed == _record(tmp_path)
     assert printed["kinds"] == {"none": 2, "effect": 2, "two": 2, "unknown": 2, "foreign": 0}
@@ -89,19 +89,19 @@ def test_what_is_reported_is_what_was_found(tmp_path: Path, capsys: pytest.Captu
 
 
 def test_an_answer_that_was_changed_is_noticed(tmp_path: Path) -> None:
-    concluded(job(trials=1), draw, always_right, SILENT, tmp_path)
+    concluded(request(trials=1), draw, always_right, SILENT, tmp_path)
     path = tmp_path / "trial_0001" / "answer.json"
     path.write_text(path.read_text().replace("accel_lag", "cam_scale"))
     with pytest.raises(InputError, match="not the one that was sealed"):
-        concluded(job(trials=1, again=True), _never, always_right, SILENT, tmp_path)
+        concluded(request(trials=1, again=True), _never, always_right, SILENT, tmp_path)
 
 
 def test_recordings_that_were_changed_are_noticed(tmp_path: Path) -> None:
-    concluded(job(trials=2), draw, always_right, SILENT, tmp_path)
+    concluded(request(trials=2), draw, always_right, SILENT, tmp_path)
     data = [tmp_path / f"trial_000{n}" / "campaign" / "campaign.csv.gz" for n in (1, 2)]
     data[0].write_bytes(data[1].read_bytes())
     with pytest.raises(InputError, match="recordings are not those"):
-        concluded(job(trials=1, again=True), _never, always_none, SILENT, tmp_path)
+        concluded(request(trials=1, again=True), _never, always_none, SILENT, tmp_path)
 
 
 @pytest.mark.parametrize("name", ["mine.txt", "campaign/run.csv", "campaign/seal.json/mine", ".git/config"])
@@ -113,15 +113,15 @@ def test_a_folder_that_is_not_a_trials_is_not_removed(name: str, tmp_path: Path)
     with pytest.raises(
         InputError, match=f"trial_0002: holds {re.escape(top.removesuffix('/config'))}, which is"
     ):
-        concluded(job(trials=2), _never, _never, SILENT, tmp_path)
+        concluded(request(trials=2), _never, _never, SILENT, tmp_path)
     assert (tmp_path / "trial_0002" / name).read_text() == "mine"
 
 
 def test_notes_beside_a_recorded_trial_are_left_and_hinder_nobody(tmp_path: Path) -> None:
-    concluded(job(trials=1), draw, always_right, SILENT, tmp_path)
+    concluded(request(trials=1), draw, always_right, SILENT, tmp_path)
     notes = tmp_path / "trial_0001" / "notes.txt"
     notes.write_text("mine")
-    assert concluded(job(trials=1, again=True), _never, always_right, SILENT, tmp_path) == OK
+    assert concluded(request(trials=1, again=True), _never, always_right, SILENT, tmp_path) == OK
     assert notes.read_text() == "mine"
 
 
@@ -133,7 +133,7 @@ def test_what_is_put_into_a_trials_folder_during_the_run_is_not_removed(tmp_path
         return draw(*given)
 
     with pytest.raises(InputError, match=r"holds mine\.txt, which is not of a trial"):
-        concluded(job(trials=1), disturbed, _never, SILENT, tmp_path)
+        concluded(request(trials=1), disturbed, _never, SILENT, tmp_path)
     assert mine.read_text() == "mine"
 
 
@@ -142,7 +142,7 @@ def test_a_diagnosis_that_ends_with_an_error_counts_as_wrong(error: Exception, t
     def broken(*_: object) -> Any:
         raise error
 
-    assert concluded(job(trials=1), draw, broken, SILENT, tmp_path) == NOT_TRUSTED
+    assert concluded(request(trials=1), draw, broken, SILENT, tmp_path) == NOT_TRUSTED
     (score,) = _record(tmp_path)["scores"]
     assert (score["verdict"], score["named_right"], score["located_right"]) == ("failed", False, False)
     reported = json.loads((tmp_path / "trial_0001" / "diagnosis.json").read_text())
@@ -155,13 +155,13 @@ def test_a_disk_that_is_full_is_no_mark_of_a_diagnosis(tmp_path: Path) -> None:
         raise OSError(28, "No space left on device")
 
     with pytest.raises(OSError, match="No space left"):
-        concluded(job(trials=1), draw, full, SILENT, tmp_path)
-    assert concluded(job(trials=1), _never, always_right, SILENT, tmp_path) == OK
+        concluded(request(trials=1), draw, full, SILENT, tmp_path)
+    assert concluded(request(trials=1), _never, always_right, SILENT, tmp_path) == OK
 
 
-@pytest.mark.parametrize("other", [job(seed=5), job(every=2), job(shares=(1.0, 1.0, 0.0, 0.0))])
-def test_trials_of_other_settings_are_refused(tmp_path: Path, other: Job) -> None:
-    concluded(job(trials=1), draw, always_right, SILENT, tmp_path)
+@pytest.mark.parametrize("other", [request(seed=5), request(every=2), request(shares=(1.0, 1.0, 0.0, 0.0))])
+def test_trials_of_other_settings_are_refused(tmp_path: Path, other: BlindRequest) -> None:
+    concluded(request(trials=1), draw, always_right, SILENT, tmp_path)
     for again in (False, True):
         with pytest.raises(InputError, match="trials of another"):
             concluded(replace(other, again=again), _never, _never, SILENT, tmp_path)
@@ -170,10 +170,10 @@ def test_trials_of_other_settings_are_refused(tmp_path: Path, other: Job) -> Non
 def test_trials_of_a_rig_that_was_edited_are_refused(tmp_path: Path) -> None:
     mine, given = tmp_path / "mine.toml", default_rig_path().read_text()
     mine.write_text(given)
-    concluded(job(trials=1, rig=mine), draw, always_right, SILENT, tmp_path / "out")
+    concluded(request(trials=1, rig=mine), draw, always_right, SILENT, tmp_path / "out")
     mine.write_text(given.replace("value = 320.0", "value = 321.0"))
     with pytest.raises(InputError, match="trials of another state of the rig file"):
-        concluded(job(trials=2, rig=mine), _never, _never, SILENT, tmp_path / "out")
+        concluded(request(trials=2, rig=mine), _never, _never, SILENT, tmp_path / "out")
 
 
 def test_the_rig_is_the_one_that_was_there_when_the_run_began(tmp_path: Path) -> None:
@@ -184,13 +184,13 @@ def test_the_rig_is_the_one_that_was_there_when_the_run_began(tmp_path: Path) ->
         mine.write_text("edited")
         return draw(*given)
 
-    code = concluded(job(trials=2, rig=mine), edited, always_right, SILENT, tmp_path / "out")
+    code = concluded(request(trials=2, rig=mine), edited, always_right, SILENT, tmp_path / "out")
     assert (code, _record(tmp_path / "out")["trials"]) == (OK, 2)
 
 
 def test_a_seed_that_nobody_gave_is_another_one_each_time(tmp_path: Path) -> None:
     for name in ("one", "two"):
-        concluded(job(trials=1, seed=None), draw, always_right, SILENT, tmp_path / name)
+        concluded(request(trials=1, seed=None), draw, always_right, SILENT, tmp_path / name)
     seeds = {_record(tmp_path / name)["settings"]["seed"] for name in ("one", "two")}
     assert len(seeds) == 2
 
@@ -284,5 +284,5 @@ def test_a_stopped_run_leaves_no_process_and_loses_no_trial(tmp_path: Path, how:
     with _started(stopped, 6, 0.0) as process:
         _, said = process.communicate(timeout=120)
     assert process.returncode == OK, said
-    assert concluded(job(), draw, always_right, SILENT, whole) == OK
+    assert concluded(request(), draw, always_right, SILENT, whole) == OK
     assert _record(stopped) == _record(whole)

@@ -38,6 +38,21 @@ def test_what_is_killed_each_time_is_reported_when_the_others_are_done(tmp_path:
     assert sorted(found) == [2, 4]
 
 
+def failed_checks_give(number: int) -> tuple[int, str]:
+    """What a check of a compiled program gives where it fails, here."""
+    return number, os.environ["EQX_ON_ERROR"]
+
+
+def test_a_failed_check_of_a_program_gives_nan_in_a_process_unless_the_user_says_otherwise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("EQX_ON_ERROR", raising=False)
+    assert list(side_by_side(failed_checks_give, [1], 1)) == [(1, "nan")]
+    assert "EQX_ON_ERROR" not in os.environ
+    monkeypatch.setenv("EQX_ON_ERROR", "raise")
+    assert list(side_by_side(failed_checks_give, [1], 1)) == [(1, "raise")]
+
+
 def test_an_error_of_the_work_is_raised_here() -> None:
     with pytest.raises(InputError, match=r"is no good\. Remedy: take another\."):
         list(side_by_side(refused, [1, 2], 2))

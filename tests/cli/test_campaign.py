@@ -82,7 +82,7 @@ def test_campaigns_that_scatter_widen_the_errors_and_it_is_said(
     values = 3.0 + np.array([1.0, -1.0, 0.9, -0.8, 1.1, -1.2])
     for number, value in enumerate(values):
         campaign_file(tmp_path / "data" / f"run{number}.csv", value)
-    run(tmp_path / "data", out=tmp_path / "out", voice=TALKING)
+    run(tmp_path / "data", out=tmp_path / "out", reporter=TALKING)
     trend = record_of(tmp_path / "out")["trends"]["mu_r"]
     assert trend["scatters"] is True
     assert trend["mean"]["chi2"] == pytest.approx(np.sum((values - values.mean()) ** 2) / STDERR**2)

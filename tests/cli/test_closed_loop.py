@@ -153,7 +153,7 @@ def test_the_test_asked_for_is_the_test_that_runs(
 ) -> None:
     asked: list[LoopTest] = []
 
-    def study(_model: Any, _p: Any, _controller: Any, test: LoopTest, *_rest: Any) -> LoopStudy:
+    def study(_model: Any, _controller: Any, _called: str, test: LoopTest, *_rest: Any) -> LoopStudy:
         asked.append(test)
         return run[2]
 

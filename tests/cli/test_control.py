@@ -160,7 +160,9 @@ def test_a_rig_without_friction_has_nothing_to_describe(
     invoke: Invoke, linearised: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     study = replace(linearised[2], at_test=None)
-    monkeypatch.setattr(public, "study_linear", lambda *args: study)
+    monkeypatch.setattr(
+        public, "study_linear", lambda model, origin, _: replace(study, model=model, origin=origin)
+    )
     done = invoke("linearise", RIG, "--model", "simqc", "--json", "--out", "o")
     assert done.exit_code == 0
     record = json.loads(done.stdout)
@@ -287,7 +289,7 @@ def test_a_posterior_gives_the_rigs(invoke: Invoke, designed: Any, monkeypatch: 
         file.create_dataset("posterior/mu_r", data=draws)
     tried: list[Any] = []
 
-    def noting(model: Any, p: Any, rigs: Any, *args: Any) -> Design:
+    def noting(model: Any, rigs: Any, *args: Any) -> Design:
         tried.append(rigs)
         design: Design = designed[2]
         return design

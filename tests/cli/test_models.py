@@ -1,11 +1,14 @@
 """What a rig file says of itself, and what is reported of it; what a diagnosis starts from."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from click.testing import Result
 
-from savgs_ident.cli.options import ModelName, read_baseline, read_model
+import savgs_ident as si
+from savgs_ident.cli.options import ModelName, effects_of
 from savgs_ident.core.errors import InputError
 from savgs_ident.diagnosis.public import baseline_of
 from savgs_ident.plants.quarter_car.catalogue import MODELS
@@ -13,17 +16,25 @@ from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig, 
 
 IDENTIFIED = {"effects": ["rail_coulomb"], "status": "stalled", "trusted": False}
 DRAWING = read_rig(default_rig_path())
+Invoke = Callable[..., Result]
 
 
-@pytest.mark.parametrize(("trusted", "reported"), [(True, False), (False, True)])
-def test_a_rig_whose_fit_is_doubtful_is_reported_of(
-    rig: Rig, tmp_path: Path, capsys: pytest.CaptureFixture[str], trusted: bool, reported: bool
-) -> None:
+@pytest.mark.parametrize("trusted", [True, False])
+def test_a_rig_whose_fit_is_doubtful_says_so(rig: Rig, tmp_path: Path, trusted: bool) -> None:
     path = _file(replace(rig, provenance=IDENTIFIED | {"trusted": trusted}), tmp_path)
-    assert read_model(path, None).effects == ("rail_coulomb",)
-    said = capsys.readouterr().err
-    assert ("its own fit is not to be trusted (stalled)" in said) is reported
-    assert read_model(path, ModelName.simqc).effects == ()
+    doubts = () if trusted else (f"{path}: its own fit is not to be trusted (stalled).",)
+    model = si.load_model(path)
+    assert (model.effects, model.doubts) == (("rail_coulomb",), doubts)
+    assert si.load_model(path, effects_of(ModelName.simqc)).effects == ()
+    with pytest.raises(InputError, match=r"there is no model 'simxx'\. Remedy: choose among: simqc, simtr"):
+        si.load_model(path, "simxx")
+
+
+def test_what_follows_from_it_is_not_to_be_trusted_either(invoke: Invoke, rig: Rig, tmp_path: Path) -> None:
+    path = _file(replace(rig, provenance=IDENTIFIED), tmp_path)
+    done = invoke("simulate", path, "--frequency", "1", "--quiet", "--out", "o")
+    assert done.exit_code == 1
+    assert "its own fit is not to be trusted (stalled)." in done.stderr
 
 
 def _file(rig: Rig, folder: Path) -> Path:
@@ -43,7 +54,7 @@ def _identified(effects: list[str], folder: Path) -> Path:
     ("asked", "name"), [(None, "simtr"), (ModelName.simtr, "simtr"), (ModelName.simqc, "simqc")]
 )
 def test_a_drawing_takes_the_model_asked_for(asked: ModelName | None, name: str) -> None:
-    rig, settings, values = baseline_of(read_baseline(None, asked))
+    rig, settings, values = baseline_of(si.load_baseline(None, effects_of(asked)))
     assert rig == DRAWING
     assert (settings.model, settings.baseline, values) == (name, MODELS[name], {})
     assert settings.free == (("mu_r", "mu_t", "ydot_Hth", "c_sd") if name == "simtr" else ("c_sd",))
@@ -51,7 +62,7 @@ def test_a_drawing_takes_the_model_asked_for(asked: ModelName | None, name: str)
 
 @pytest.mark.parametrize("asked", [None, ModelName.simqc])
 def test_an_identified_rig_brings_its_own_model(asked: ModelName | None, tmp_path: Path) -> None:
-    rig, settings, values = baseline_of(read_baseline(_identified([], tmp_path), asked))
+    rig, settings, values = baseline_of(si.load_baseline(_identified([], tmp_path), effects_of(asked)))
     assert (settings.model, settings.baseline, settings.free) == ("mine", (), ("c_sd",))
     assert rig.parameters["k_sd"].value == 157614.0
     assert values == {"c_sd": 5000.0, "k_sd": 1.5e5}
@@ -62,4 +73,4 @@ def test_another_model_than_the_rig_was_identified_with_is_refused(tmp_path: Pat
     with pytest.raises(
         InputError, match=r"was identified with rail_coulomb, tyre_friction, which is not simqc"
     ):
-        read_baseline(path, ModelName.simqc)
+        si.load_baseline(path, "simqc")

@@ -19,8 +19,10 @@ from savgs_ident.control.linear_study import (
 )
 from savgs_ident.control.synthesis import Synthesis, discretise, synthesise_hinf
 from savgs_ident.core.parameter import ParameterTable
+from savgs_ident.core.presentation import NO_ORIGIN, no_progress
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 
@@ -96,10 +98,11 @@ def synthesis(plant_with: Callable[..., control.StateSpace]) -> Synthesis:
 
 
 @pytest.fixture(scope="package")
-def design(friction: QuarterCar, numbers: Values, table: ParameterTable, rig: Rig) -> Design:
+def design(table: ParameterTable, rig: Rig) -> Design:
     """The whole design on the shipped rig."""
     rigs = rigs_from_covariance(table, rig.provenance, FEW_RIGS)
-    return design_controller(friction, numbers, rigs, DEFAULT_WEIGHTS, lambda said: None)
+    model = RigModel(rig, MODELS["simtr"])
+    return design_controller(model, rigs, DEFAULT_WEIGHTS, NO_ORIGIN, no_progress)
 
 
 @pytest.fixture(scope="package")

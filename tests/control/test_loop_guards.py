@@ -11,19 +11,21 @@ import pytest
 from jaxtyping import Array
 
 from savgs_ident.control.closed_loop.laws import make_failure
-from savgs_ident.control.closed_loop.programme import compare_rides, doubted_from, measure_ride
+from savgs_ident.control.closed_loop.programme import RideGain, compare_rides, doubted_from, measure_ride
 from savgs_ident.control.closed_loop.run import Loop, loop_case, run_loop, steps_within
-from savgs_ident.control.closed_loop.study import loop_around, study_loop
+from savgs_ident.control.closed_loop.study import RigOutcome, loop_around, study_loop
 from savgs_ident.control.design import DigitalController, controller_for
 from savgs_ident.control.generalised_plant import DEFAULT_WEIGHTS
 from savgs_ident.control.linear_equivalent import AlphaMap
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.presentation import NO_ORIGIN, no_progress
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.report.control.loop_text import alarm, saturation_words
+from savgs_ident.report.control.loop_text import alarm, rigs_words, saturation_words
 
 from ..in_one_test import over
 from .loops import cam, ideal, passive, ran, with_changed
@@ -98,12 +100,10 @@ def test_a_law_that_begins_at_another_angle_says_that_it_doubts(
     assert doubted_from(lost) == pytest.approx(6.0, abs=2e-3)
 
 
-def test_a_controller_of_another_link_angle_is_refused(
-    friction: QuarterCar, numbers: Values, controller: DigitalController
-) -> None:
+def test_a_controller_of_another_link_angle_is_refused(rig: Rig, controller: DigitalController) -> None:
     moved = replace(controller, alpha=eqx.tree_at(_nominal, controller.alpha, jnp.asarray(np.radians(80.0))))
     with pytest.raises(InputError, match="designed for a link at 80 deg, and the rig's stands at 90 deg"):
-        study_loop(friction, numbers, moved, TEST, lambda said: None)
+        study_loop(RigModel(rig, MODELS["simtr"]), moved, "moved", TEST, NO_ORIGIN, no_progress)
 
 
 def _study(**given: Any) -> Any:
@@ -123,3 +123,13 @@ def test_what_is_wrong_is_reported_in_its_own_words() -> None:
         "1 of 2 rigs that the data allow."
     )
     assert saturation_words(_study(active=lost, drive=None)).startswith("What the drive did is not known")
+
+
+def test_the_gain_on_other_rigs_is_that_of_the_runs_that_ended() -> None:
+    ended = RigOutcome(RideGain(40.0, 30.0, 5.0), True, Status.CONVERGED)
+    lost = RigOutcome(RideGain(np.nan, np.nan, np.nan), False, Status.NOT_FINITE)
+    words = rigs_words(_study(rigs=SimpleNamespace(source="as drawn"), on_rigs=(ended, lost)))
+    assert words.startswith("Stable on 1 of 2 (as drawn); the acceleration falls by 40.0 to 40.0 %")
+    assert rigs_words(_study(rigs=SimpleNamespace(source="as drawn"), on_rigs=(lost,))).endswith(
+        "(as drawn)."
+    )

@@ -139,6 +139,18 @@ def test_friction_at_the_pivot_shows_in_the_third_order_and_is_found_by_the_fit(
         assert fit[name].stderr < 0.02 * true
 
 
+@pytest.mark.slow
+def test_its_posterior_holds_the_truth_and_its_friction_is_diagnosed() -> None:
+    shaken = _example("shaken_pendulum")
+    posterior, verdict = shaken.posterior, shaken.diagnosis.verdict
+    assert posterior.trusted
+    for name, true in {"c": 0.03, "pivot_friction_force": 0.015}.items():
+        assert abs(posterior[name].median - true) < 3.0 * posterior[name].sd
+        assert posterior[name].sd == pytest.approx(shaken.fit[name].stderr, rel=0.3)
+    assert shaken.diagnosis.converged
+    assert (verdict.kind, verdict.ports, verdict.families) == ("effect", ("pivot",), ("pivot/friction",))
+
+
 def test_the_reader_reads_what_is_saved_and_refuses_what_is_damaged(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,7 +12,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
 from savgs_ident.plants.quarter_car.model import FREE
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, rig_content
-from savgs_ident.validation.blind import FILE, FOREIGN_SHARES, Job, check_shares, plan_of
+from savgs_ident.validation.blind import FILE, FOREIGN_SHARES, BlindRequest, check_shares, plan_of
 from savgs_ident.validation.blind_answer import Answer
 from savgs_ident.validation.blind_draw import LARGEST, SMALLEST, Shares
 from savgs_ident.validation.blind_trial import Plan, draw_and_record, record_trial
@@ -100,10 +100,10 @@ def test_filters_and_converters_are_those_of_a_logger() -> None:
 
 
 def test_foreign_trials_have_nothing_or_one_effect() -> None:
-    job = Job(1, 1, 1, None, FOREIGN_SHARES, 1, False, False, foreign=True)
-    check_shares(job)
+    request = BlindRequest(1, 1, 1, None, FOREIGN_SHARES, 1, False, False, foreign=True)
+    check_shares(request)
     with pytest.raises(InputError, match="foreign trials have nothing or one effect"):
-        check_shares(replace(job, shares=(20.0, 50.0, 15.0, 15.0)))
+        check_shares(replace(request, shares=(20.0, 50.0, 15.0, 15.0)))
 
 
 def test_only_foreign_trials_are_marked_as_such() -> None:
@@ -144,7 +144,7 @@ def test_the_fixed_step_comes_to_the_periodic_motion(bench: Bench) -> None:
         truth = _answer(effects=names, parameters=parameters, small_errors=replace(errors, drift=0.0))
         true = true_bench(bench, truth)
         steady = steady_dwells(true.model(names), true.values_during(parameters), DWELLS, true.step)
-        found = [np.fft.rfft(each.readings)[:, :10] / 1024 for each in steady if each.periodic]
+        found = [np.fft.rfft(each.readings)[:, :10] / 1024 for each in steady if each.status.ok]
         solution = true.solve(names, parameters)
         assert solution is not None
         assert len(found) == len(DWELLS)
@@ -155,12 +155,12 @@ def test_the_fixed_step_comes_to_the_periodic_motion(bench: Bench) -> None:
 def test_a_whole_foreign_trial(tmp_path: Path) -> None:
     """Of a rig with small errors, recorded first, then diagnosed: sealed, opened, marked, and no alarm."""
     with with_kept_programs():
-        job = Job(1, 7, 1, None, (1.0, 0.0, 0.0, 0.0), 9, False, False, foreign=True)
-        plan = plan_of(job, rig_content(default_rig_path()), tmp_path / FILE)
+        request = BlindRequest(1, 7, 0, None, (1.0, 0.0, 0.0, 0.0), 9, False, False, foreign=True)
+        plan = plan_of(request, rig_content(default_rig_path()), tmp_path / FILE)
         folder = record_trial(plan, draw_and_record, tmp_path, 1)
         answer = json.loads((folder / "answer.json").read_text())["answer"]
         recorded = (folder / "campaign" / "campaign.csv.gz").read_bytes()
-        study = si.blind(tmp_path, 1, seed=7, shares=(1.0, 0.0, 0.0, 0.0), every=9, foreign=True, jobs=1)
+        study = si.blind(tmp_path, 1, seed=7, shares=(1.0, 0.0, 0.0, 0.0), every=9, foreign=True, jobs=0)
     assert (folder / "campaign" / "campaign.csv.gz").read_bytes() == recorded
     (score,) = study.scores
     assert score.effects == tuple(answer["effects"])

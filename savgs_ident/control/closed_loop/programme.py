@@ -40,7 +40,7 @@ REST = 2.0
 """Duration of the standstill at the end [s]."""
 FADE = 0.5
 """Duration of the fade of a road at its beginning and end [s]."""
-SETTLE = 4.0
+UNEVALUATED = 4.0
 """Time that is not evaluated at the beginning of a harmonic test [s]."""
 SWEEP = (0.0, 3.0, 60.0)
 """First and last frequency [Hz] and duration [s] of the sweep of Fig. 11."""
@@ -96,12 +96,12 @@ class LoopTest:
 
 def harmonic_test(peak_to_peak: float, frequency: float, duration: float = 12.0) -> LoopTest:
     """A steady cam of height ``peak_to_peak`` [m] at ``frequency`` [Hz] (Fig. 10), evaluated over whole periods."""
-    periods = max(1, int((duration - SETTLE) * frequency))
-    end = SETTLE + periods / frequency
+    periods = max(1, int((duration - UNEVALUATED) * frequency))
+    end = UNEVALUATED + periods / frequency
     end = round(end / GRID) * GRID
     road = RoadMotion(Faded(Sine(peak_to_peak / 2.0, frequency, 0.0, 0.0, 2.0), end, FADE))
     title = f"cam of {1e3 * peak_to_peak:g} mm peak to peak at {frequency:g} Hz"
-    return LoopTest(LoopKind.harmonic, title, road, SETTLE, end, 0.5 * (SETTLE + end))
+    return LoopTest(LoopKind.harmonic, title, road, UNEVALUATED, end, 0.5 * (UNEVALUATED + end))
 
 
 def sweep_test(peak_to_peak: float) -> LoopTest:
@@ -221,7 +221,7 @@ def _rms(values: Array) -> float:
     return float(np.std(values))
 
 
-def _settles(signals: Signals) -> bool:
+def _is_at_rest(signals: Signals) -> bool:
     """Whether the deflection at the end is small compared with its range."""
     time, deflection = np.asarray(signals.time), np.asarray(signals.susp_deflection)
     last = deflection[time >= time[-1] - 0.25 * REST]
@@ -247,7 +247,7 @@ def _ride(run: ClosedLoopRun, start: float, end: float) -> Ride:
         _rms(np.asarray(signals.susp_deflection)[evaluated]),
         _rms(np.asarray(signals.tyre_load)[evaluated]),
         float(np.mean(np.asarray(signals.tyre_load)[evaluated] <= 0.0)),
-        _settles(signals),
+        _is_at_rest(signals),
     )
 
 

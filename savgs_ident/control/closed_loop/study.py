@@ -6,7 +6,7 @@ passive and active, with the same controller.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
 import equinox as eqx
@@ -37,7 +37,8 @@ from savgs_ident.control.closed_loop.programme import (
 from savgs_ident.control.closed_loop.run import ClosedLoopRun, Loop, run_loop
 from savgs_ident.control.design import DigitalController, Rigs
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.presentation import Result
+from savgs_ident.core.presentation import Origin, Progress, Result
+from savgs_ident.core.status import Status, joint_status
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.quarter_car.catalogue import EFFECTS
 from savgs_ident.plants.quarter_car.model import RigModel
@@ -58,10 +59,11 @@ class FailedRun:
 
 @dataclass(frozen=True)
 class RigOutcome:
-    """The gain of the loop on one rig of a set, and whether both runs are stable."""
+    """The gain of the loop on one rig of a set, whether both runs are stable, and how their integration ended."""
 
     gain: RideGain
     stable: bool
+    status: Status
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,8 @@ class LoopStudy(Result):
     """The results of a test.
 
     Attributes:
+        model: what it was run on.
+        controller: which controller it was, in words.
         test: the test.
         passive, active: the runs.
         passive_ride, active_ride: the ride in them.
@@ -87,12 +91,12 @@ class LoopStudy(Result):
         rigs: the other rigs on which the loop was run; None for none.
         on_rigs: the results there.
         causes: the gains without one imperfection at a time; empty if not requested.
-        model: what it was run on.
-        controller: which controller it was, in words.
     """
 
     presenter: ClassVar[str] = "LOOP_STUDY"
 
+    model: RigModel
+    controller: str
     test: LoopTest
     passive: ClosedLoopRun
     active: ClosedLoopRun
@@ -106,8 +110,6 @@ class LoopStudy(Result):
     rigs: Rigs | None
     on_rigs: tuple[RigOutcome, ...]
     causes: tuple[Cause, ...]
-    model: RigModel | None = field(default=None, kw_only=True)
-    controller: str = field(default="", kw_only=True)
 
     @property
     def stable(self) -> bool:
@@ -127,30 +129,27 @@ class LoopStudy(Result):
 
 
 def study_loop(
-    model: QuarterCar,
-    p: Values,
+    model: RigModel,
     controller: DigitalController,
+    called: str,
     test: LoopTest,
-    progress: Callable[[str], None],
+    origin: Origin,
+    progress: Progress,
     rigs: Rigs | None = None,
     causes: bool = False,
 ) -> LoopStudy:
-    """Run a test of a controller on a rig, with each failure, and on ``rigs``.
+    """Run a test of a controller, which is ``called`` so in words, on a rig, with each failure, and on ``rigs``.
 
     Raises :class:`InputError` if the controller was designed for another nominal link angle, and as
     :func:`savgs_ident.control.closed_loop.run.loop_case` does.
     """
-    nominal, designed = (float(np.degrees(each)) for each in (p["psi_nominal"], controller.alpha.nominal))
-    if abs(nominal - designed) > SAME_ANGLE:
-        raise InputError(
-            f"the controller was designed for a link at {designed:g} deg, and the rig's stands at {nominal:g} deg",
-            remedy="design a controller for this rig",
-        )
+    plant, p = model.build(), as_values(model.table.as_dict())
+    _check_angle(p, controller)
     loop = loop_around(p, controller)
     hold = loop._replace(law=hold_law(p["psi_nominal"], loop.rate))
 
     def simulate(values: Values, around: Loop) -> ClosedLoopRun:
-        return run_loop(model, values, test.road, around, test.duration)
+        return run_loop(plant, values, test.road, around, test.duration)
 
     progress(f"passive: {test.title}")
     passive = simulate(p, hold)
@@ -168,31 +167,48 @@ def study_loop(
         others.append(_on_rig(as_values(values), simulate, hold, loop, test))
     found: list[Cause] = []
     if causes:
-        for cause in measure_causes(model, p, hinf_law(controller), loop, test):
+        for cause in measure_causes(plant, p, hinf_law(controller), loop, test):
             progress(f"cause: {cause.variant}")
             found.append(cause)
     return LoopStudy(
-        test,
-        passive,
-        active,
-        before,
-        after,
-        ride_after(passive, test),
-        ride_after(active, test),
-        compare_rides(before, after),
-        drive_use(active, test, p),
-        tuple(failures),
-        rigs,
-        tuple(others),
-        tuple(found),
+        model=model,
+        controller=called,
+        test=test,
+        passive=passive,
+        active=active,
+        passive_ride=before,
+        active_ride=after,
+        passive_after=ride_after(passive, test),
+        active_after=ride_after(active, test),
+        gain=compare_rides(before, after),
+        drive=drive_use(active, test, p),
+        failures=tuple(failures),
+        rigs=rigs,
+        on_rigs=tuple(others),
+        causes=tuple(found),
+        origin=origin,
     )
+
+
+def _check_angle(p: Values, controller: DigitalController) -> None:
+    nominal, designed = (float(np.degrees(each)) for each in (p["psi_nominal"], controller.alpha.nominal))
+    if abs(nominal - designed) > SAME_ANGLE:
+        raise InputError(
+            f"the controller was designed for a link at {designed:g} deg, and the rig's stands at {nominal:g} deg",
+            remedy="design a controller for this rig",
+        )
 
 
 def _on_rig(
     values: Values, simulate: Callable[[Values, Loop], ClosedLoopRun], hold: Loop, loop: Loop, test: LoopTest
 ) -> RigOutcome:
-    passive, active = (measure_ride(simulate(values, around), test) for around in (hold, loop))
-    return RigOutcome(compare_rides(passive, active), passive.stable and active.stable)
+    runs = [simulate(values, around) for around in (hold, loop)]
+    passive, active = (measure_ride(run, test) for run in runs)
+    return RigOutcome(
+        compare_rides(passive, active),
+        passive.stable and active.stable,
+        joint_status(run.status for run in runs),
+    )
 
 
 def loop_around(p: Values, controller: DigitalController) -> Loop:

@@ -11,13 +11,14 @@ its fit did: which parameters it left free (:attr:`RigModel.identified`), and wh
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from savgs_ident.core.errors import DataWarning, InputError, blamed_on
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Origin
 from savgs_ident.effects.effect import Effect
 from savgs_ident.plants.base import Channel
+from savgs_ident.plants.model import doubts_of_fit
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, EFFECTS, MODELS, build_model, model_parameters
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig
@@ -96,6 +97,11 @@ class RigModel:
     def is_drawing(self) -> bool:
         """Whether the rig comes from no fit."""
         return "effects" not in self.rig.provenance
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why its values are not to be trusted, a sentence each; empty if they are."""
+        return doubts_of_fit(self.rig.source or self.rig.name, self.rig.provenance)
 
     @property
     def name(self) -> str:
@@ -209,16 +215,49 @@ def load_rig(path: str | Path | None = None) -> Rig:
     return read_rig(path or default_rig_path())
 
 
-def load_model(path: str | Path | None = None, effects: Sequence[str] | None = None) -> RigModel:
+ModelName = Literal["simqc", "simtr"]
+"""The paper's models: the frictionless rig, and the one with friction at rail and tyre."""
+
+
+def load_model(path: str | Path | None = None, effects: ModelName | Sequence[str] | None = None) -> RigModel:
     """The model of a rig file: with ``effects``, else those that it was fitted with, else those of the paper's SimTR.
 
-    Raises :class:`InputError` if the file cannot be read or what it says of effects is no list of known ones.
+    ``effects`` are names of effects, or "simqc" or "simtr" for those of the paper's models. Raises
+    :class:`InputError` if the file cannot be read or what it says of effects is no list of known ones.
     """
     return model_of(load_rig(path), effects)
 
 
-def model_of(rig: Rig, effects: Sequence[str] | None = None) -> RigModel:
+def load_baseline(path: str | Path | None = None, model: ModelName | None = None) -> RigModel:
+    """The baseline of a diagnosis: a drawing as one of the paper's models, or an identified rig with its own effects.
+
+    A drawing is the paper's SimTR if ``model`` is left out. Raises :class:`InputError` as :func:`load_model` does,
+    and for a rig that was identified with other effects than those of ``model``.
+    """
+    rig = load_rig(path)
+    if "effects" not in rig.provenance:
+        return RigModel(rig, effects_of(model or "simtr"))
+    found = model_of(rig)
+    if model is not None and set(effects_of(model)) != set(found.effects):
+        raise InputError(
+            f"was identified with {', '.join(found.effects) or 'no friction'}, which is not {model}",
+            source=rig.source,
+            remedy="leave --model out, or give the drawing that the rig was identified from",
+        )
+    return found
+
+
+def effects_of(model: str) -> tuple[str, ...]:
+    """The effects of one of the paper's models; raises :class:`InputError` for another name."""
+    if model not in MODELS:
+        raise InputError(f"there is no model '{model}'", remedy="choose among: " + ", ".join(MODELS))
+    return MODELS[model]
+
+
+def model_of(rig: Rig, effects: ModelName | Sequence[str] | None = None) -> RigModel:
     """The same of a rig that was read already; raises as :func:`load_model` does."""
+    if isinstance(effects, str):
+        return RigModel(rig, effects_of(effects))
     if effects is not None:
         return RigModel(rig, tuple(effects))
     named = rig.provenance.get("effects", MODELS["simtr"])

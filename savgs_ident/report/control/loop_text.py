@@ -101,7 +101,7 @@ def rigs_words(study: LoopStudy) -> str:
         return "The loop was tried on no other rig."
     stable = sum(each.stable for each in study.on_rigs)
     stability = f"Stable on {stable} of {len(study.on_rigs)} ({study.rigs.source})"
-    ended = [each.gain for each in study.on_rigs if np.isfinite(each.gain.sprung_accel)]
+    ended = [each.gain for each in study.on_rigs if each.status.ok]
     if not ended:
         return f"{stability}."
     accel = [gain.sprung_accel for gain in ended]

@@ -14,7 +14,7 @@ from savgs_ident.campaigns.run import identify_one
 from savgs_ident.cli.console import BAD_INPUT, OK
 from savgs_ident.fit.least_squares import FitSettings
 
-from .campaign_fakes import TALKING, campaign_file, job, never, read_number, rows_of, run
+from .campaign_fakes import TALKING, campaign_file, never, read_number, request, rows_of, run
 
 QUICK: dict[str, Any] = {
     "free": ("c_sd",),
@@ -41,7 +41,7 @@ def test_a_second_run_keeps_what_is_done_and_says_so(
     out = tmp_path / "out"
     run(week, out=out)
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    assert run(week, out=out, work=never, voice=TALKING) == OK
+    assert run(week, out=out, work=never, reporter=TALKING) == OK
     assert "8 campaigns identified in an earlier run" in capsys.readouterr().err
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
@@ -68,7 +68,7 @@ def test_what_is_not_whole_is_done_anew(week: Path, tmp_path: Path, harm: Callab
     harm(out / "run3")
 
     def counting(task: Any) -> Any:
-        seen.append(task.job.campaign.name)
+        seen.append(task.request.campaign.name)
         return read_number(task)
 
     assert run(week, out=out, work=counting) == OK
@@ -104,12 +104,12 @@ def test_other_settings_another_rig_and_other_data_are_done_anew(
 ) -> None:
     out = tmp_path / "out"
     mine = tmp_path / "mine.toml"
-    given = job().one.rig.read_text()
+    given = request().one.rig.read_text()
     mine.write_text(given)
     seen: list[str] = []
 
     def counting(task: Any) -> Any:
-        seen.append(task.job.campaign.name)
+        seen.append(task.request.campaign.name)
         return read_number(task)
 
     def again(**changes: Any) -> int:
