@@ -394,7 +394,8 @@ def test_the_energy_is_least_at_rest(frictionless: QuarterCar, numbers: Values, 
     off = np.linalg.solve(stiffness, np.asarray(_force(numbers, q, np.float64(link))))
     assert np.max(np.abs(off)) < 1e-9
     assert np.min(np.linalg.eigvalsh(stiffness)) > 0.0
-    assert [float(part) for part in (*at.qd, *at.road, at.link.velocity)] == [0.0] * 5
+    road, turned = at.signals
+    assert [float(part) for part in (*at.qd, *road, turned.rate)] == [0.0] * 5
 
 
 @pytest.mark.slow
