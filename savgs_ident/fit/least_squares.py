@@ -198,8 +198,8 @@ def _starts(task: Task, most: int) -> list[Array]:
 
 def _from_start(task: Task, minimiser: Minimiser, u: Array, steps: int, report: Progress) -> Minimum:
     p = task.problem.parameters(u)
-    near = simulate_periodic(task.problem.model, p, task.excitation, task.settings.periodic)
-    return minimiser.minimise(u, near, steps, report, enough=ROUGHLY)
+    warm_start = simulate_periodic(task.problem.model, p, task.excitation, task.settings.periodic)
+    return minimiser.minimise(u, warm_start, steps, report, enough=ROUGHLY)
 
 
 def _refined(task: Task, minimiser: Minimiser, best: Minimum, steps: int, report: Progress) -> Minimum:
@@ -207,5 +207,5 @@ def _refined(task: Task, minimiser: Minimiser, best: Minimum, steps: int, report
         return best
     p, layout = task.problem.parameters(best.u), best.solution.mesh.layout
     limit = task.settings.periodic.iterations
-    near = adapt(task.problem.model, p, best.solution, layout, limit)
-    return minimiser.minimise(best.u, near, steps, report)
+    warm_start = adapt(task.problem.model, p, best.solution, layout, limit)
+    return minimiser.minimise(best.u, warm_start, steps, report)

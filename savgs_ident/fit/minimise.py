@@ -3,15 +3,18 @@
 Taking the steps from Python costs nothing beside the model and lets each one be reported and interrupted. The problem
 is evaluated, residuals and Jacobian, before the optimiser is asked for its step.
 
-This is not the search of :func:`savgs_ident.inference.find_map.find_map`, which has the same evaluation of the model,
-the same coordinates and the same priors, because it minimises something else and starts elsewhere:
+This is not the search of :func:`savgs_ident.inference.find_map.find_map`, which was tried in its place, with the same
+priors, rows whose noise is known and no discrepancy. Measured, with an evaluation being one solution of the model:
 
-- Its residuals have a known variance, so that chi2 is a sum of squares and a test of the model. The density that the
-  other maximises has a noise scale and a discrepancy of the model, which would take up what chi2 should show.
-- It serves peak-to-peak values too, for which there is no likelihood with a discrepancy.
-- Its starts may be far from the minimum and have no scale of their own, which asks for damping; the other starts
-  where a calibrated baseline or a fit already is, and takes whole steps to the optimum of the linearisation, within
-  the bounds that an amplitude may reach. Coordinates of a fit have no bounds to reach.
+- Where the model explains the data both do the same. Shipped campaign: 6 evaluations each, estimates within 1e-4 of
+  their standard errors, chi2 to 5e-8. Its peak-to-peak values: 17 evaluations in place of 31, within 0.03.
+- Where it does not, the sum of squares is rough with friction, and the two end apart. Recordings with Stribeck
+  friction at the rail: 71 evaluations in place of 73, chi2 off by 1e-3, estimates by up to 0.9 standard errors, for
+  a sum of squares lower by 4e-4 (this one had reached its step limit). With a compliant mount: 72 in place of 70,
+  2.5e-4, 0.15, lower by 3e-4.
+- There it takes 24 s in place of 16 s, and 23 s in place of 17 s: a step that is rejected costs it a Jacobian, for a
+  prediction has its slopes. With a lag of the accelerometer both reach their step limit, that one after 173
+  evaluations and 71 s, this one after 90 and 39 s: a step that it halves counts as one.
 
 The pins hold one coordinate for a profile by a weight, so that one compiled program serves all coordinates.
 """
@@ -111,19 +114,19 @@ class Minimiser(eqx.Module):
     def minimise(
         self,
         u: Float[Array, " n"],
-        near: PeriodicSolution,
+        warm_start: PeriodicSolution,
         steps: int,
         progress: Progress,
         pins: Pins | None = None,
         enough: float = 1e-6,
     ) -> Minimum:
-        """Minimise from ``u``, on the nodes of the solution ``near`` there, parameters pinned as given.
+        """Minimise from ``u``, on the nodes of the solution ``warm_start`` there, parameters pinned as given.
 
         The last step is the one after which the linearisation promises to lower the sum of squares by less
         than the share ``enough``, or that the optimiser takes for its last and that lowered it by no more.
         """
         pins = pins or self.problem.unpinned
-        best = trial = evaluate(self.problem, u, pins, near)
+        best = trial = evaluate(self.problem, u, pins, warm_start)
         u, state = trial.at.u, eqx.tree_at(lambda each: each.y_eval, placed(self.blank), trial.at.u)
         status, before = Status.MAX_ITERATIONS, np.inf
         for count in range(1, steps + 1):
@@ -144,9 +147,9 @@ class Minimiser(eqx.Module):
                 trial = evaluate_beside(self.problem, state.y_eval, pins, best)
         return _minimum(best, status)
 
-    def evaluate(self, u: Float[Array, " n"], near: PeriodicSolution) -> Minimum:
+    def evaluate(self, u: Float[Array, " n"], warm_start: PeriodicSolution) -> Minimum:
         """Residuals and Jacobian at free coordinates ``u`` [1], without moving."""
-        found = evaluate(self.problem, u, self.problem.unpinned, near)
+        found = evaluate(self.problem, u, self.problem.unpinned, warm_start)
         return _minimum(found, found.status)
 
 
