@@ -123,7 +123,8 @@ class Minimiser(eqx.Module):
         """Minimise from ``u``, on the nodes of the solution ``warm_start`` there, parameters pinned as given.
 
         The last step is the one after which the linearisation promises to lower the sum of squares by less
-        than the share ``enough``, or that the optimiser takes for its last and that lowered it by no more.
+        than the share ``enough``, or that the optimiser takes for its last and that lowered it by no more. It may
+        lead past points where a motion was not found, but not end at one: the status is that of the motion.
         """
         pins = pins or self.problem.unpinned
         best = trial = evaluate(self.problem, u, pins, warm_start)
@@ -133,14 +134,13 @@ class Minimiser(eqx.Module):
             u, state, done, fine = _step(self.solver, u, trial.at, state)
             best = trial if bool(jnp.all(u == trial.at.u)) else best
             cost = float(jnp.sum(best.at.residual**2))
-            evaluation = best.status
-            if not (fine and evaluation.ok):
-                status = Status.NOT_FINITE if evaluation.ok else evaluation
+            if not (fine and best.finite):
+                status = Status.NOT_FINITE if best.status.ok else best.status
                 break
             progress(f"step {count}: chi2 = {cost:.6g}")
             small = enough * cost + NOTHING
             if _left_to_gain(best.at) < small or (done and before - cost < small):
-                status = Status.CONVERGED
+                status = best.status
                 break
             before = cost
             if count < steps:
