@@ -177,7 +177,7 @@ def fit_least_squares(
             break
         report("trying another start")
         tried.append(_from_start(task, minimiser, u, min(EXPLORING, settings.steps), report))
-    best = min(tried, key=lambda each: each.cost if each.evaluation.ok else np.inf)
+    best = min(tried, key=lambda each: (not each.evaluation.ok, np.nan_to_num(each.cost, nan=np.inf)))
     report("refining on nodes adapted to the result")
     best = _refined(task, minimiser, best, settings.steps, report)
     verdict = assess(task, minimiser, best, report)
@@ -207,7 +207,8 @@ def _from_start(task: Task, minimiser: Minimiser, u: Array, steps: int, report: 
 
 
 def _refined(task: Task, minimiser: Minimiser, best: Minimum, steps: int, report: Progress) -> Minimum:
-    if not best.evaluation.ok:
+    # Motions that were not found on the first nodes may be found on those adapted to them.
+    if not np.isfinite(best.cost):
         return best
     p, layout = task.problem.parameters(best.u), best.solution.mesh.layout
     limit = task.settings.periodic.iterations

@@ -235,8 +235,12 @@ class Evaluation(NamedTuple):
         motions = joint_status(self.solution.status())
         if not motions.ok:
             return motions
-        finite = bool(jnp.isfinite(self.at.residual).all() & jnp.isfinite(self.at.jacobian).all())
-        return Status.CONVERGED if finite else Status.NOT_FINITE
+        return Status.CONVERGED if self.finite else Status.NOT_FINITE
+
+    @property
+    def finite(self) -> bool:
+        """Whether residuals and Jacobian are numbers: enough to step on from, not to end at."""
+        return bool(jnp.isfinite(self.at.residual).all() & jnp.isfinite(self.at.jacobian).all())
 
 
 def evaluate(problem: Problem, u: Float[Array, " n"], pins: Pins, warm_start: PeriodicSolution) -> Evaluation:
