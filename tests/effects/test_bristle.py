@@ -25,13 +25,13 @@ K, C, SLIDE = 1e7, 3e4, 150.0
 STEP = 2e-5
 
 
-def _at(seen: PortSignals, limit: Array, anchor: Array) -> Bristle:
-    """With the same limit both ways."""
-    return bristle(Presliding(jnp.asarray(K), jnp.asarray(C)), seen, FrictionLimit(limit, limit), anchor)
+def _at(seen: PortSignals, grip: Array, anchor: Array) -> Bristle:
+    """With the same grip both ways."""
+    return bristle(Presliding(jnp.asarray(K), jnp.asarray(C)), seen, FrictionLimit(grip, grip), anchor)
 
 
 @jax.jit
-def _march(displacement: Array, velocity: Array, limit: Array, start: Array) -> tuple[Array, Array]:
+def _march(displacement: Array, velocity: Array, grip: Array, start: Array) -> tuple[Array, Array]:
     """Force and anchor along a motion sampled every ``STEP``, by the bristle's own rate, backward Euler."""
 
     def advance(anchor: Array, at: tuple[Array, Array, Array]) -> tuple[Array, tuple[Array, Array]]:
@@ -45,15 +45,15 @@ def _march(displacement: Array, velocity: Array, limit: Array, start: Array) -> 
             now = now - defect(now) / jax.grad(defect)(now)
         return now, (_at(seen, at[2], now).force, now)
 
-    return jax.lax.scan(advance, start, (displacement, velocity, limit))[1]
+    return jax.lax.scan(advance, start, (displacement, velocity, grip))[1]
 
 
 def _follow(
-    displacement: NDArray[np.float64], limit: NDArray[np.float64] | float = SLIDE
+    displacement: NDArray[np.float64], grip: NDArray[np.float64] | float = SLIDE
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     velocity = np.gradient(displacement, STEP)
-    limits = np.broadcast_to(limit, displacement.shape).astype(float)
-    force, anchor = _march(displacement, velocity, limits, displacement[0])
+    grips = np.broadcast_to(grip, displacement.shape).astype(float)
+    force, anchor = _march(displacement, velocity, grips, displacement[0])
     return np.asarray(force), np.asarray(anchor)
 
 
@@ -101,14 +101,14 @@ def test_below_the_friction_force_it_holds() -> None:
 
 @pytest.mark.parametrize("frequency", [0.5, 2.0, 6.0])
 def test_it_is_the_play_operator_of_the_sheet(frequency: float) -> None:
-    """Along dwells with a changing limit: the drag of the anchor and its creep do not show in the force."""
+    """Along dwells with a changing grip: the drag of the anchor and its creep do not show in the force."""
     seconds = STEP * np.arange(round(1.5 / frequency / STEP))
     turn = 2.0 * np.pi * frequency * seconds
     displacement = 0.013 * (np.sin(turn) + 0.1 * np.sin(3.0 * turn))
     velocity = np.gradient(displacement, STEP)
-    limit = SLIDE * (1.0 + 0.3 * np.cos(turn + 0.4))
-    force, _ = _follow(displacement, limit)
-    expected = _play(displacement, velocity, limit)
+    grip = SLIDE * (1.0 + 0.3 * np.cos(turn + 0.4))
+    force, _ = _follow(displacement, grip)
+    expected = _play(displacement, velocity, grip)
     assert np.max(np.abs(force - expected)[2000:]) < 0.02 * SLIDE
     assert np.sqrt(np.mean((force - expected)[2000:] ** 2)) < 2e-3 * SLIDE
 
@@ -116,17 +116,17 @@ def test_it_is_the_play_operator_of_the_sheet(frequency: float) -> None:
 _force = jax.jit(
     lambda seen, up, down, anchor: bristle(Presliding(K, C), seen, FrictionLimit(up, down), anchor).force
 )
-limits = st.floats(0.0, 1e4)
+grips = st.floats(0.0, 1e4)
 
 
 @given(
     stretch=st.floats(-1e-3, 1e-3),
     velocity=st.floats(-2.0, 2.0),
-    up=limits,
-    down=limits,
+    up=grips,
+    down=grips,
     factor=st.floats(1.0, 10.0),
 )
-def test_it_resists_up_and_down_by_their_own_limits(
+def test_it_resists_up_and_down_by_their_own_grips(
     stretch: float, velocity: float, up: float, down: float, factor: float
 ) -> None:
     def force(stretch: float, velocity: float, up: float, down: float) -> float:
@@ -141,7 +141,7 @@ def test_it_resists_up_and_down_by_their_own_limits(
         assert more == pytest.approx(factor * here, rel=1e-12, abs=1e-290)
 
 
-def test_a_limit_below_zero_holds_nothing() -> None:
+def test_a_grip_below_zero_holds_nothing() -> None:
     seen = PortSignals(jnp.asarray(1e-3), jnp.asarray(0.1), jnp.zeros(()), jnp.zeros(()))
     held = bristle(Presliding(K, C), seen, FrictionLimit(jnp.asarray(-5.0), jnp.asarray(20.0)), jnp.zeros(()))
     assert float(held.force) == 0.0
@@ -161,20 +161,20 @@ def test_any_motion_loses_energy(amplitude: float, seed: int) -> None:
 
 
 def test_limits_that_meet_let_through_the_slope_of_the_limit() -> None:
-    """At a limit of zero, where ``jnp.clip`` would halve it."""
+    """At a grip of zero, where ``jnp.clip`` would halve it."""
 
-    def held(limit: Array, x: float) -> Array:
-        return held_within(jnp.asarray(x), -limit, limit)
+    def held(grip: Array, x: float) -> Array:
+        return held_within(jnp.asarray(x), -grip, grip)
 
     assert [float(jax.grad(held)(jnp.zeros(()), x)) for x in (0.3, -0.3)] == [1.0, -1.0]
 
 
-def test_the_rate_of_the_anchor_has_the_slope_of_the_limit_at_its_null() -> None:
-    """Dragged less the higher the limit, the same to either side."""
+def test_the_rate_of_the_anchor_has_the_slope_of_the_grip_at_its_null() -> None:
+    """Dragged less the more it grips, the same to either side."""
 
-    def rate(limit: Array, stretch: float) -> Array:
+    def rate(grip: Array, stretch: float) -> Array:
         seen = PortSignals(jnp.asarray(stretch), jnp.asarray(0.3), jnp.zeros(()), jnp.zeros(()))
-        return _at(seen, limit, jnp.zeros(())).rate
+        return _at(seen, grip, jnp.zeros(())).rate
 
     there, back = (float(jax.grad(rate)(jnp.zeros(()), stretch)) for stretch in (1e-4, -1e-4))
     assert there == -back
