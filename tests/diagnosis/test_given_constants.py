@@ -32,7 +32,7 @@ class _BegunError(Exception):
 def _two_mass() -> tuple[si.PlantModel, HarmonicResponse]:
     model = si.PlantModel(si.TwoMass(), si.TwoMass.parameters)
     response = si.simulate_dwells(
-        model, (1.0, 2.0), {"road_height": 0.01}, {"sprung_accel": 0.05, "susp_deflection": 1e-4}
+        model, (1.0, 2.0), {"road_height": 0.01}, {"body_accel": 0.05, "susp_deflection": 1e-4}
     )
     return model, response
 
