@@ -85,8 +85,7 @@ def test_a_command_is_thin_and_makes_that_call(command: str) -> None:
     assert called <= set(si.__all__)
 
 
-# The effects that a diagnosis brings along are found by the export's own functions.
-@over("source", [*(each for each in CALLS if each != "export"), "options"])
+@over("source", [*CALLS, "options"])
 def test_a_command_imports_nothing_deeper(source: str) -> None:
     imported = set()
     for node in ast.walk(ast.parse(_source_of(source).read_text())):
