@@ -19,7 +19,7 @@ from savgs_ident.control.design import DigitalController
 from savgs_ident.control.linearisation import linearise, resting
 from savgs_ident.core.values import Values
 from savgs_ident.plants.profiles import Constant
-from savgs_ident.plants.quarter_car.drive import Drive
+from savgs_ident.plants.quarter_car.drive import Drive, VelocityReference
 from savgs_ident.plants.quarter_car.forces import strut_at_rest
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 
@@ -65,7 +65,7 @@ def plant(frictionless: QuarterCar, smooth: Values) -> Plant:
     t, load = jnp.zeros(()), strut_at_rest(smooth).torque
 
     def drive(asked: jax.Array) -> Drive:
-        return Drive(Constant(asked), smooth["psi_nominal"])
+        return Drive(VelocityReference(Constant(asked)), smooth["psi_nominal"])
 
     def rate(x: jax.Array, asked: jax.Array, load: jax.Array) -> jax.Array:
         return drive(asked).rate(smooth, t, x, load)

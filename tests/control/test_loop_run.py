@@ -11,7 +11,7 @@ from savgs_ident.control.closed_loop.programme import compare_rides, drive_use, 
 from savgs_ident.control.closed_loop.run import ClosedLoopRun, Loop
 from savgs_ident.core.values import Values
 from savgs_ident.plants.profiles import AbstractProfile, Scalar
-from savgs_ident.plants.quarter_car.drive import Drive, inertia_at_motor
+from savgs_ident.plants.quarter_car.drive import Drive, VelocityReference, inertia_at_motor
 from savgs_ident.plants.quarter_car.inputs import RigSource, cam_excitation
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.simulate.periodic import harmonics, simulate_periodic
@@ -103,7 +103,7 @@ def test_the_active_run_is_that_of_an_error_controlled_integration(
 ) -> None:
     """Of the same rig, drive and road, by Tsitouras' method, while the drive is asked for what the law asked for."""
     p, signals = (numbers, active.signals) if with_friction else (smooth, sliding.signals)
-    drive = Drive(Held(jnp.asarray(signals.asked)), p["psi_nominal"])
+    drive = Drive(VelocityReference(Held(jnp.asarray(signals.asked))), p["psi_nominal"])
     times = np.asarray(signals.time)[:SAMPLES]
     exact = simulate_transient(friction, p, RigSource(AT_TWO.road, drive), times, tolerance=1e-6)
     assert exact.status().ok

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.values import as_values
-from savgs_ident.plants.profiles import Constant
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
-from savgs_ident.plants.quarter_car.drive import Drive
+from savgs_ident.plants.quarter_car.drive import holding_drive
 from savgs_ident.plants.quarter_car.inputs import RigSource, flat_road
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.transient import rest_state, state_rates
@@ -18,7 +17,7 @@ NOMINAL = np.pi / 2.0
 
 
 def test_a_link_mounted_off_by_an_angle_is_that_of_another_drawing(rig: Rig) -> None:
-    road, drive, zero, moved = flat_road(), Drive(Constant(0.0), NOMINAL), jnp.zeros(()), 0.05
+    road, drive, zero, moved = flat_road(), holding_drive(NOMINAL), jnp.zeros(()), 0.05
     offset = (*MODELS["simtr"], "link_offset")
     given = as_values(model_parameters(rig, offset).as_dict() | {"link_offset": moved})
     drawn = {**given, "theta_0": given["theta_0"] + moved}

@@ -10,9 +10,9 @@ from jaxtyping import Array
 
 from savgs_ident.core.status import Status
 from savgs_ident.plants.base import state_sizes
-from savgs_ident.plants.profiles import Constant, Sine
+from savgs_ident.plants.profiles import Sine
 from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
-from savgs_ident.plants.quarter_car.drive import Drive
+from savgs_ident.plants.quarter_car.drive import holding_drive
 from savgs_ident.plants.quarter_car.dynamics import section_curves, upright_mass
 from savgs_ident.plants.quarter_car.forces import Inputs
 from savgs_ident.plants.quarter_car.inputs import (
@@ -297,7 +297,7 @@ def test_deflection_counts_from_standstill_at_the_nominal_angle(simtr: Bench) ->
 @pytest.mark.slow
 def test_a_drive_holds_the_link_through_a_dwell(simtr: Bench) -> None:
     """The link gives way a little; the energy that it takes from the rig is what the drive's shaft gets."""
-    drive, road = Drive(Constant(0.0), NOMINAL), cam_road(LIFT, 2.35, rise_time=0.5)
+    drive, road = holding_drive(NOMINAL), cam_road(LIFT, 2.35, rise_time=0.5)
     times = np.linspace(0.0, 1.5, 32_769)
     solution = simulate_transient(simtr.model, simtr.p, RigSource(road, drive), times, tolerance=1e-9)
     assert solution.status().ok

@@ -39,7 +39,7 @@ from savgs_ident.effects.base import (
 )
 from savgs_ident.plants.base import Motion
 from savgs_ident.plants.profiles import Constant
-from savgs_ident.plants.quarter_car.drive import Drive, drive_state
+from savgs_ident.plants.quarter_car.drive import Drive, VelocityReference, drive_state
 from savgs_ident.plants.quarter_car.dynamics import TRAVEL, Coordinates, SectionCurves
 from savgs_ident.plants.quarter_car.forces import Inputs
 from savgs_ident.plants.quarter_car.inputs import RigSource, RoadMotion
@@ -390,7 +390,7 @@ def loop_sample(case: LoopCase, t: Array, x: Array, rates: Array, held: Array) -
 
 
 def _drive_of(case: LoopCase, asked: Array) -> Drive:
-    return Drive(Constant(asked), case.p["psi_nominal"])
+    return Drive(VelocityReference(Constant(asked)), case.p["psi_nominal"])
 
 
 def _values_at(case: LoopCase, t: Array) -> Values:

@@ -1,13 +1,13 @@
 """The drive of the single link: motor, 40:1 gear, and a velocity loop around the current loop.
 
-    reference -> filter -> speed limit -> velocity PI -> torque and power limit
+    reference -> filter -> [position loop] -> speed limit -> velocity PI -> torque and power limit
               -> current PI -> voltage limit -> motor -> gear -> link
 
-The reference is a link velocity. Limits: motor speed (3000 rpm, on the demand; the loop passes it by up to 5 % for a
-moment), torque of the drive, 500 W at the shaft when motoring, length of the voltage vector. The velocity loop does
-not integrate against a limit, or it would pass the speed limit by three times as much; the current loop gives back
-what its limit takes away. Speeds and torques of the loops are those of the motor; the state holds angle and velocity
-of the link.
+A reference is a link angle to be kept or a link velocity to be followed. Limits: motor speed (3000 rpm, on
+the demand; the loop passes it by up to 5 % for a moment), torque of the drive, 500 W at the shaft when motoring,
+length of the voltage vector. The velocity loop does not integrate against a limit, or it would pass the speed
+limit by three times as much; the current loop gives back what its limit takes away. Speeds and torques of the loops
+are those of the motor; the state holds angle and velocity of the link.
 
 The motor is a permanent-magnet synchronous one in d-q axes, in the peak-value convention, with the mechanical speed w
 and the electrical speed w_e = pole_pairs w:
@@ -20,6 +20,7 @@ Its current controller is a PI on each axis (gains by pole-zero cancellation: 50
 forward. The voltage vector cannot be longer than V_dc / sqrt(3); the integrators give back what it clips.
 """
 
+from abc import abstractmethod
 from typing import NamedTuple
 
 import equinox as eqx
@@ -27,7 +28,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from savgs_ident.core.values import Values
-from savgs_ident.plants.profiles import AbstractProfile
+from savgs_ident.plants.profiles import AbstractProfile, Constant
 from savgs_ident.plants.quarter_car.forces import Link
 from savgs_ident.plants.quarter_car.inputs import AbstractActuation
 
@@ -90,6 +91,50 @@ FRICTION_SPEED = 1.0
 
 EXCESS = 0.1
 """Share by which the torque asked for passes its limit until the velocity loop integrates no more."""
+
+
+class AbstractReference(eqx.Module):
+    """What the drive is asked for."""
+
+    @abstractmethod
+    def wanted(self, t: Scalar) -> Scalar:
+        """The reference at time ``t`` [s], before its filter."""
+
+    @abstractmethod
+    def velocity_demand(self, filtered: Scalar, angle: Scalar) -> Scalar:
+        """Link velocity [rad/s] asked of the velocity loop for a filtered reference, at a link angle [rad]."""
+
+
+class PositionReference(AbstractReference):
+    """A link angle [rad] over time, followed by a proportional loop around the velocity loop.
+
+    ``bandwidth`` [Hz] of that loop: a sixth of the velocity loop's, so that the two do not meet.
+    """
+
+    angle: AbstractProfile
+    bandwidth: float = 10.0
+
+    def wanted(self, t: Scalar) -> Scalar:
+        """The angle [rad]."""
+        return self.angle.value(t)
+
+    def velocity_demand(self, filtered: Scalar, angle: Scalar) -> Scalar:
+        """In proportion to what is missing to the angle."""
+        return 2.0 * jnp.pi * self.bandwidth * (filtered - angle)
+
+
+class VelocityReference(AbstractReference):
+    """A link velocity [rad/s] over time."""
+
+    velocity: AbstractProfile
+
+    def wanted(self, t: Scalar) -> Scalar:
+        """The velocity [rad/s]."""
+        return self.velocity.value(t)
+
+    def velocity_demand(self, filtered: Scalar, angle: Scalar) -> Scalar:
+        """The filtered velocity itself, wherever the link is."""
+        return filtered
 
 
 class DriveState(NamedTuple):
@@ -157,9 +202,9 @@ def drive_state(state: Float[Array, " 8"]) -> DriveState:
 
 
 class Drive(AbstractActuation):
-    """A drive whose link follows the velocity ``reference`` [rad/s], from rest at ``angle_at_start`` [rad]."""
+    """A drive that follows ``reference`` from a start at rest at ``angle_at_start`` [rad]."""
 
-    reference: AbstractProfile
+    reference: AbstractReference
     angle_at_start: Float[Array, ""] = eqx.field(converter=jnp.asarray)
     scales = (0.1, 1.0, 1.0, 1.0, 1.0, 1.0, 0.1, 1.0)
 
@@ -174,7 +219,7 @@ class Drive(AbstractActuation):
         zero = jnp.zeros_like(torque)
         hold = [zero, current, zero, p["motor_resistance"] * current]
         commanded = current * p["motor_torque_constant"]
-        return jnp.stack([self.angle_at_start, zero, *hold, commanded, self.reference.value(t)])
+        return jnp.stack([self.angle_at_start, zero, *hold, commanded, self.reference.wanted(t)])
 
     def link(self, t: Scalar, state: Float[Array, " 8"]) -> Link:
         """The link's angle and velocity, from the state; ``t`` [s]."""
@@ -196,13 +241,19 @@ class Drive(AbstractActuation):
     ) -> tuple[Float[Array, " 8"], DriveSignals]:
         now, ratio = drive_state(state), p["motor_gear_ratio"]
         speed = ratio * now.velocity
-        demanded, torque_rate = control_velocity(p, speed, ratio * now.reference, now.torque_integral)
+        demand = ratio * self.reference.velocity_demand(now.reference, now.angle)
+        demanded, torque_rate = control_velocity(p, speed, demand, now.torque_integral)
         wanted = Axes(jnp.zeros_like(demanded), demanded / p["motor_torque_constant"])
         voltage, voltage_rate = control_current(p, now.current, wanted, now.voltage_integral, speed)
         current = current_rate(p, now.current, voltage, speed)
         torque, at_motor = motor_torque(p, now.current), load / ratio
         friction = transmission_friction(p, speed, -at_motor)
         acceleration = (torque - friction + at_motor) / (inertia_at_motor(p) * ratio)
-        follow = 2.0 * jnp.pi * p["motor_reference_bandwidth"] * (self.reference.value(t) - now.reference)
+        follow = 2.0 * jnp.pi * p["motor_reference_bandwidth"] * (self.reference.wanted(t) - now.reference)
         rate = [now.velocity, acceleration, *current, *voltage_rate, torque_rate, follow]
         return jnp.stack(rate), DriveSignals(voltage, torque, friction, at_motor, demanded)
+
+
+def holding_drive(angle: float) -> Drive:
+    """A drive that holds the link at ``angle`` [rad], as in passive tests."""
+    return Drive(PositionReference(Constant(angle)), jnp.asarray(angle))
