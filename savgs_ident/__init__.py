@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from savgs_ident.diagnosis.thresholds import DecisionConstants
     from savgs_ident.effects.base import Number, Port, PortKind, PortSignals
     from savgs_ident.effects.effect import Effect, generic_effects
+    from savgs_ident.export.exported_model import ExportedModel
     from savgs_ident.export.json_export import read_model_json
     from savgs_ident.export.public import Exported, export
     from savgs_ident.export.python_control_export import load_python_control, resting_point
@@ -147,6 +148,7 @@ _PLACES = {
     "DigitalController": "control.design",
     "DrivenMotion": "responses.driven_motion",
     "Exported": "export.public",
+    "ExportedModel": "export.exported_model",
     "Fit": "fit.result",
     "HarmonicResponse": "responses.harmonic_response",
     "InputError": "core.errors",
@@ -207,6 +209,7 @@ __all__ = [
     "Effect",
     "Estimate",
     "Exported",
+    "ExportedModel",
     "Fit",
     "HarmonicResponse",
     "Hypothesis",

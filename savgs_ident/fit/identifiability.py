@@ -259,7 +259,7 @@ def assess(task: Task, minimiser: Minimiser, best: Minimum, progress: Progress) 
     names = problem.free.identified
     values = {name: float(value) for name, value in problem.parameters(best.u).items()}
     units = {name: table[name].unit for name in names}
-    if not best.evaluation.ok:
+    if not best.finite:
         return Verdict(False, ("The fit broke down: nothing can be said about the parameters.",))
     per_datum, missed = _chi2_per_datum(problem, best), _misfit(task, best)
     if per_datum > EXPLAINED and missed > MATERIAL_MISFIT:

@@ -52,7 +52,8 @@ class Minimum(NamedTuple):
 
     ``residual`` (m,) and ``jacobian`` (m, n) of data and priors are those at ``u`` (n,); ``solution`` is
     the model's there. All of these have no dimension [1]: coordinates are scaled, residuals whitened.
-    ``status`` says how the minimisation ended, ``evaluation`` whether residuals and Jacobian are numbers.
+    ``status`` says how the minimisation ended, ``evaluation`` how the motions and the numbers at its end were found,
+    ``finite`` whether residuals and Jacobian are numbers, as they may be where a motion was not found.
     """
 
     u: Float[Array, " n"]
@@ -61,6 +62,7 @@ class Minimum(NamedTuple):
     solution: PeriodicSolution
     status: Status
     evaluation: Status
+    finite: bool
 
     @property
     def cost(self) -> float:
@@ -157,5 +159,11 @@ def _minimum(found: Evaluation, status: Status) -> Minimum:
     u, residual, jacobian = found.at
     rows = residual.size - u.size
     return Minimum(
-        u, np.asarray(residual)[:rows], np.asarray(jacobian)[:rows], found.solution, status, found.status
+        u,
+        np.asarray(residual)[:rows],
+        np.asarray(jacobian)[:rows],
+        found.solution,
+        status,
+        found.status,
+        found.finite,
     )
