@@ -208,7 +208,7 @@ def export_text(record: Mapping[str, Any]) -> RenderableType:
     rows = [(name, ", ".join(files)) for name, files in record["formats"].items()]
     known = f"covariance of {record['covariance']}" if record["covariance"] else "no covariance"
     samples = f"{record['samples']} draws of a posterior" if record["samples"] else "no posterior"
-    title = f"{record['rig']}: frictionless rig + {' + '.join(record['effects']) or 'nothing'}"
+    title = f"{record['rig']}: {' + '.join(record['effects']) or 'without effects'}"
     return Group(
         plain(title, "bold"),
         plain(f"{record['parameters']} parameters, {known}, {samples}"),

@@ -86,7 +86,7 @@ def test_several_formats_at_once_in_both_ways_of_saying_it(invoke: Invoke) -> No
 def test_a_drawing_is_exported_with_the_model_asked_for(invoke: Invoke) -> None:
     done = invoke("export", RIG, "--to", "json", "--model", "simqc", "--out", "o")
     assert done.exit_code == 0
-    assert "gt_rear: frictionless rig + nothing" in done.stdout
+    assert "gt_rear: without effects" in done.stdout
     assert "no covariance, no posterior" in done.stdout
     assert read_model_json("o/model.json").effects == ()
 

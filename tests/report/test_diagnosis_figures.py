@@ -57,7 +57,7 @@ def test_the_bode_figure_has_units_every_model_and_every_point(diagnosis: Diagno
         assert figure.axes[2].get_xlabel() == "frequency [Hz]"
         reported = [text.get_text() for text in figure.legends[0].get_texts()]
         assert reported == [
-            "before, as given", "recalibrated", "with rail_stribeck", "measured, ± 2 sd", "noise of the measurement"
+            "before, as given", "recalibrated", "with rail_stribeck", "measured, ± 2 sd", "measurement noise"
         ]  # fmt: skip
         magnitude = {line.get_label(): line.get_ydata() for line in figure.axes[0].get_lines()}
         road = diagnosis.measured.harmonics[:, 0, 1]

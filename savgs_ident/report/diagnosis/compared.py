@@ -120,7 +120,7 @@ def _explain_models(figure: Figure, axes: Axes) -> None:
     """The models in the order in which they were made, then the measurement and its noise."""
     lines, _ = axes.get_legend_handles_labels()
     after, recalibrated, before, points = lines
-    noise = Patch(color=PALE, label="noise of the measurement")
+    noise = Patch(color=PALE, label="measurement noise")
     figure.legend(
         handles=[before, recalibrated, after, points, noise],
         loc="upper center",
@@ -217,5 +217,5 @@ def drive_picture(diagnosis: Diagnosis) -> Picture | None:
 
 def _explain_lines(figure: Figure, axes: Axes) -> None:
     lines, _ = axes.get_legend_handles_labels()
-    noise = Patch(color=PALE, label="noise of the measurement")
+    noise = Patch(color=PALE, label="measurement noise")
     figure.legend(handles=[*lines, noise], loc="outside upper center", ncols=5, columnspacing=1.2)
