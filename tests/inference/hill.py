@@ -40,3 +40,15 @@ def a_normal_hill(size: int, seed: int = 8) -> NormalHill:
     axes, _ = np.linalg.qr(random.standard_normal((size, size)))
     precision = axes @ np.diag(np.geomspace(0.5, 4.0, size)) @ axes.T
     return NormalHill(jnp.asarray(random.uniform(-1.0, 1.0, size)), jnp.asarray(precision), 7.5)
+
+
+def assert_reversible(start: np.ndarray, end: np.ndarray) -> None:
+    """E f(x) g(y) = E g(x) f(y) for draws x of a density, ``start`` (n, 2), and ends y of a kernel from there."""
+
+    def shapes(t: np.ndarray) -> list[np.ndarray]:
+        return [t[:, 0], t[:, 1], np.exp(t[:, 0]), t[:, 0] * t[:, 1], (t[:, 1] > 0.0).astype(float)]
+
+    for i, (f_start, f_end) in enumerate(zip(shapes(start), shapes(end), strict=True)):
+        for g_start, g_end in list(zip(shapes(start), shapes(end), strict=True))[:i]:
+            difference = f_start * g_end - g_start * f_end
+            assert abs(difference.mean()) < 4.0 * difference.std() / np.sqrt(len(start))
