@@ -68,24 +68,34 @@ def _march(model: AbstractPlant, p: Values, along: Samples, step: float) -> Cour
     size, n = len(model.states), len(model.coordinates)
     scale = jnp.asarray([each.scale for each in model.states])
     weight = jnp.asarray([1.0 if each.slips else FORWARD for each in model.states])
+    known = jax.lax.stop_gradient(p)
 
     def advance(before: Array, at: Samples) -> tuple[Array, Course]:
         motion, signals, fundamental = _at(model, at)
         u = model.drive(signals, fundamental)
 
-        def parts(now: Array) -> tuple[Array, Array]:
+        def parts(now: Array, before: Array) -> tuple[Array, Array]:
             return weight * now + (1.0 - weight) * before, (now - before) / step
 
-        def defect(now: Array) -> Array:
-            return model.residual(p, motion, *parts(now), u)[n:]
+        def defect(p: Values, now: Array, before: Array) -> Array:
+            return model.residual(p, motion, *parts(now, before), u)[n:]
+
+        def jacobian(now: Array) -> Array:
+            columns = [
+                jax.jvp(lambda each: defect(known, each, held), (now,), (unit,))[1]
+                for unit in jnp.unstack(jnp.eye(size))
+            ]
+            return jnp.stack(columns, axis=1)
 
         def correction(now: Array) -> Array:
-            columns = [jax.jvp(defect, (now,), (unit,))[1] for unit in jnp.unstack(jnp.eye(size))]
-            return solve_dense(jnp.stack(columns, axis=1), defect(now))
+            return solve_dense(jacobian(now), defect(known, now, held))
 
-        now = jax.lax.fori_loop(0, NEWTON_STEPS, lambda _, each: each - correction(each), before)
-        left = jnp.max(jnp.abs(correction(now)) / scale)
-        return now, Course(*parts(now), left)
+        # The last step alone is differentiated: its slopes are those of the implicit function theorem.
+        held = jax.lax.stop_gradient(before)
+        near = jax.lax.fori_loop(0, NEWTON_STEPS - 1, lambda _, each: each - correction(each), held)
+        now = near - solve_dense(jacobian(near), defect(p, near, before))
+        left = jnp.max(jnp.abs(correction(jax.lax.stop_gradient(now))) / scale)
+        return now, Course(*parts(now, before), left)
 
     if size == 0:
         none = jnp.zeros((along.q.size, 0))

@@ -40,7 +40,8 @@ def _regions(room: int) -> tuple[int, int, int]:
 
 
 def test_programs_are_let_go_where_they_are_many() -> None:
-    before, full, after = _regions(room=-1)
+    # Threads of the compiler may end meanwhile, and some regions with them.
+    before, full, after = _regions(room=-PROGRAMS // 2)
     assert full - before > PROGRAMS
     assert full - after > PROGRAMS
 
