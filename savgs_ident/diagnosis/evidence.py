@@ -174,8 +174,8 @@ class DiagnosisEvidence:
         unsupported: whether what would be named predicts tests that were held out no better than the baseline.
         unsupported_at: where it acts, if something is missing all the same; empty if not.
         refuted: what was to be named then.
-        immaterial: fitted hypotheses that change the response by too little to matter: nothing that counts is missing
-            if they are right.
+        immaterial: by hypothesis, the probability that it changes the response by too little to matter, if it is
+            right: nothing that counts is missing then.
         insufficient: fitted hypotheses that leave much: if they are right, something unknown is missing besides.
     """
 
@@ -193,7 +193,7 @@ class DiagnosisEvidence:
     unsupported: bool = False
     unsupported_at: str = ""
     refuted: Hypothesis = NONE
-    immaterial: tuple[Hypothesis, ...] = ()
+    immaterial: Mapping[Hypothesis, float] = field(default_factory=dict)
     insufficient: tuple[Hypothesis, ...] = ()
 
     @property

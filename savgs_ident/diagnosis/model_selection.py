@@ -35,7 +35,7 @@ from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
-from savgs_ident.diagnosis.score_test import prior_conflict
+from savgs_ident.diagnosis.score_test import Amplitudes, prior_conflict
 from savgs_ident.diagnosis.search import (
     Findings,
     hypothesis_of,
@@ -187,8 +187,12 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
 
 def _immaterial(
     problem: DiagnosisProblem, findings: Findings, members: Sequence[FlexibleMember]
-) -> tuple[Hypothesis, ...]:
-    """Hypotheses, fitted and more probable than nothing, that do too little to matter."""
+) -> Mapping[Hypothesis, float]:
+    """By hypothesis, the probability that it changes the response by too little to matter, if it is right.
+
+    Of what was fitted, at its best; of what was only scored, over all sizes that the data leave, so that an effect
+    which these tests do not see counts in full.
+    """
     constants, base = problem.constants, problem.base
     fits = [(hypothesis_of(mode), mode) for mode in findings.modes]
     fits += [(each.hypothesis, each.law.mode) for each in members]
@@ -196,7 +200,22 @@ def _immaterial(
     def matters(mode: LaplaceFit) -> bool:
         return _change(problem, mode.prediction.rows - base.prediction.rows).matters(constants)
 
-    return tuple(each for each, mode in fits if mode.evidence > base.evidence and not matters(mode))
+    found = {
+        Hypothesis((score.term.name,)): _chance_of_little(problem, score.amplitudes)
+        for score in findings.scores
+        if score.amplitudes is not None
+    }
+    return found | {each: float(not matters(mode)) for each, mode in fits}
+
+
+SIZES = 100
+"""Draws of an effect's size over which it is averaged whether it matters."""
+
+
+def _chance_of_little(problem: DiagnosisProblem, amplitudes: Amplitudes) -> float:
+    """The probability [1] that an effect which was only scored changes the response by too little to matter."""
+    changes = (_change(problem, rows) for rows in amplitudes.draws(SIZES).T)
+    return float(np.mean([not each.matters(problem.constants) for each in changes]))
 
 
 def _insufficient(

@@ -43,8 +43,7 @@ def _verdict(
 ) -> Verdict:
     if evidence.kind == "none":
         sentence = _nothing_missing(problem, evidence, gap)
-        nothing = sum(_probability(evidence, each) for each in (NONE, *evidence.immaterial))
-        return Verdict("none", (), (), (), sentence, probability=nothing)
+        return Verdict("none", (), (), (), sentence, probability=_probability_of_nothing(evidence))
     if evidence.kind == "unknown":
         ports = evidence.indistinguishable_ports(problem.constants)
         sentence = _something_unknown(problem, evidence, gap)
@@ -96,6 +95,13 @@ def _probability(evidence: DiagnosisEvidence, hypothesis: Hypothesis) -> float:
     shares = probabilities(evidence.weighed)
     both = zip(evidence.weighed, shares, strict=True)
     return float(next(share for each, share in both if each.hypothesis == hypothesis))
+
+
+def _probability_of_nothing(evidence: DiagnosisEvidence) -> float:
+    """The probability [1] that nothing is missing, or too little to matter."""
+    little = {NONE: 1.0, **evidence.immaterial}
+    both = zip(evidence.weighed, probabilities(evidence.weighed), strict=True)
+    return float(sum(share * little.get(each.hypothesis, 0.0) for each, share in both))
 
 
 def _law_missing(

@@ -27,6 +27,30 @@ from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import Coordinates, Sheet, bounds_of
 
 
+class Amplitudes(NamedTuple):
+    """What the data leave of the amplitudes of a candidate, to first order, on coordinates with unit-normal priors.
+
+    Attributes:
+        mean: the coordinates [1] at the best point, (k,).
+        covariance: theirs about it [1], (k, k).
+        lower: their bounds, (k,).
+        upper: the same.
+        columns: what a unit of each does to the rows [unit of the row], (m, k).
+    """
+
+    mean: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    columns: NDArray[np.float64]
+
+    def draws(self, count: int) -> NDArray[np.float64]:
+        """So many changes of the rows [their units], (m, count): normal, held at the bounds."""
+        root = np.linalg.cholesky(self.covariance)
+        random = np.random.default_rng(0).standard_normal((count, self.mean.size))
+        return np.asarray(self.columns @ np.clip(self.mean + random @ root.T, self.lower, self.upper).T)
+
+
 @dataclass(frozen=True)
 class Score:
     """A candidate's score.
@@ -41,6 +65,7 @@ class Score:
         direction: what it does to the independent rows there, nuisances projected out, in units of their sd, (m,):
             of unit length, or nothing.
         status: whether what it does to the rows could be evaluated.
+        amplitudes: what is left of its amplitudes; None where it was not evaluated.
     """
 
     term: Term
@@ -50,6 +75,7 @@ class Score:
     smallest: float
     direction: NDArray[np.float64]
     status: Status = Status.CONVERGED
+    amplitudes: Amplitudes | None = None
 
 
 def score_terms(
@@ -101,7 +127,14 @@ def _score(
             direction = _direction(mode, inside, moved @ _some(top.x[-count:]))
             sigma = _significance(mode, residual, inside, moved)
             smallest = scales[0] * visible * _per_sigma(search.rows.variance, inside, moved[:, 0])
-            best = Score(term, sigma, evidence, start, smallest, direction)
+            known = Amplitudes(
+                top.x[-count:],
+                np.linalg.inv(top.precision)[-count:, -count:],
+                bounds[0][-count:],
+                bounds[1][-count:],
+                column * scales,
+            )
+            best = Score(term, sigma, evidence, start, smallest, direction, amplitudes=known)
     return best or Score(term, 0.0, -np.inf, {}, np.inf, np.zeros(residual.size), Status.NOT_FINITE)
 
 

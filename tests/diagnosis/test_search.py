@@ -122,6 +122,34 @@ def test_the_score_is_the_drop_of_chi2_that_a_fit_brings() -> None:
     assert bend.sigma == pytest.approx(np.sqrt(chi2(np.zeros(2)) - chi2(step)), rel=1e-3)
 
 
+def test_the_sizes_that_a_score_leaves_are_those_of_a_fit() -> None:
+    """What an effect in proportion to its size does, so that to first order is exact."""
+    search = search_of(PLANT, draw(PLANT, {"a": 1.1, "c": 0.02}, NOISE, 5))
+    base = find_map(search, (), {}, None)
+    bend = next(score for score in score_terms(search, base, list(TERMS)) if score.term.name == "bend")
+    fit = find_map(search, (bend.term,), base.values, None)
+    place = [each.name for each in fit.coordinates].index("c")
+    assert bend.amplitudes is not None
+    draws = bend.amplitudes.draws(4000)
+    size = (draws.T @ PLANT.x**2) / np.sum(PLANT.x**4)
+    sd = 0.4 * np.sqrt(fit.covariance()[place, place])
+    assert size.mean() == pytest.approx(fit.values["c"], abs=0.1 * sd)
+    assert size.std() == pytest.approx(sd, rel=0.05)
+    # Nothing but the size is drawn.
+    np.testing.assert_allclose(draws, np.outer(PLANT.x**2, size), atol=1e-6)
+
+
+def test_a_size_stays_within_its_bounds() -> None:
+    search = search_of(PLANT, draw(PLANT, {"a": 1.1}, NOISE, 5))
+    base = find_map(search, (), {}, None)
+    scores = {score.term.name: score for score in score_terms(search, base, list(TERMS))}
+    ripple = scores["ripple"].amplitudes
+    assert ripple is not None
+    along = ripple.columns[:, 0] @ ripple.draws(400)
+    assert along.min() == 0.0
+    assert along.max() > 0.0
+
+
 def test_what_a_tolerance_explains_is_no_effect() -> None:
     search = search_of(PLANT, draw(PLANT, {"a": 1.35}, NOISE, 6))
     base = find_map(search, (), {}, None)

@@ -129,9 +129,10 @@ def test_nothing_is_missing() -> None:
     assert found.converged
     assert _missing(found) < DEFAULTS.material_share
     assert found.parameters["k"] == pytest.approx(TRUTH["k"], rel=0.01)
-    # That a tolerance does not hold, beside nothing, shares the prior; it is a hundredth.
-    odds = [np.log(each.probability / (1.0 - each.probability)) for each in varied["prior_none"].values()]
-    assert odds[2] - odds[0] == pytest.approx(np.log(4.0), rel=0.01)
+    # Effects too small to matter count too, and do not share its prior; that a tolerance does not hold shares it.
+    odds = [each.probability / (1.0 - each.probability) for each in varied["prior_none"].values()]
+    assert odds[2] - odds[1] == pytest.approx(2.0 * (odds[1] - odds[0]), rel=0.05)
+    assert odds[2] > 3.5 * odds[0]
 
 
 def test_an_effect_is_named() -> None:
