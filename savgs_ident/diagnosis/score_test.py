@@ -129,7 +129,7 @@ def _score(
             smallest = scales[0] * visible * _per_sigma(search.rows.variance, inside, moved[:, 0])
             known = Amplitudes(
                 top.x[-count:],
-                np.linalg.inv(top.precision)[-count:, -count:],
+                np.asarray(np.linalg.inv(top.precision)[-count:, -count:], np.float64),
                 bounds[0][-count:],
                 bounds[1][-count:],
                 column * scales,

@@ -37,7 +37,9 @@ RATE_WORDS: Mapping[str, str] = {
     "named_exactly": "Effect named strictly, without indistinguishable ones",
     "located_exactly": "Located strictly, without indistinguishable ports",
     "port_right": "Foreign effect put at a right port",
-    "port_listed": "The same, or a right port listed as not distinguishable",
+    "port_exactly": "The same strictly, without ports where the law itself would do the same",
+    "port_listed": "A right port named, or listed as not distinguishable",
+    "family_exactly": "Family right strictly, without ports where the law itself would do the same",
     "family_right": "Foreign effect given a right family",
     "hidden_left_alone": "Nothing named where calibration leaves too little of the effect to matter",
     "closed_by_effect_90": "Nine tenths of the recalibrated gap closed",
@@ -301,7 +303,9 @@ _OWN_NOTE = (
 )
 _FOREIGN_NOTE = (
     "Wilson intervals. A port is right where an engineer would rightly put the effect, a family where it would"
-    " rightly be called that. “Unknown” at a right port has the port, not the family."
+    " rightly be called that. “Unknown” at a right port has the port, not the family. Where the drawn law itself,"
+    " fitted at the named port, explains the recordings as well as at its own, no diagnosis can distinguish the two:"
+    " naming it is right if the verdict says so. The rates with “strictly” do not count that."
 )
 
 

@@ -18,7 +18,9 @@ kind of trial are None.
 In a foreign trial no name can be right, for no catalogue has the law. A port is right where an engineer would rightly
 put the effect, a family where it would rightly be called that, at such a port
 (:mod:`savgs_ident.validation.foreign_laws`). "Unknown" at a right port has the port, not the family. Of an effect of
-which calibration leaves too little to matter "none" is right: it has no port then.
+which calibration leaves too little to matter "none" is right: it has no port then. Where the drawn law itself
+explains the recordings as well at another port (:mod:`savgs_ident.validation.other_port`), no diagnosis can
+distinguish the two: naming that one counts, too, if the verdict says that it cannot.
 
 What many trials say together is in :mod:`savgs_ident.validation.blind_rates`.
 """
@@ -32,6 +34,7 @@ from typing import Any, Literal
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import record_of
+from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.validation.foreign_laws import FOREIGN
 
@@ -193,9 +196,14 @@ class Score:
         foreign: whether it is a foreign trial.
         families: what the verdict says is missing, each as port/family.
         sigmas: by how many standard deviations each effect stands out, in the order of ``effects``.
-        port_right: something is named or unknown, at ports that are right alone; of foreign trials with an effect.
-        port_listed: the same, or a right port is listed as indistinguishable from them; of the same.
-        family_right: a family is named, with ports and families that are right alone; of the same.
+        port_right: something is named or unknown, at ports that are right alone, or at one where the law itself does
+            the same, which the verdict says; of foreign trials with an effect.
+        port_exactly: the same, at ports that are right alone; of the same.
+        port_listed: the ports are right, or a right one is listed as indistinguishable from them; of the same.
+        family_right: a family is named, with ports that are right as above and families that are; of the same.
+        family_exactly: the same, at ports that are right alone; of the same.
+        elsewhere: log odds [nat] of the drawn law itself at its own port against it at the port that is named; None
+            where that was not looked at.
         probability: that the verdict states; None if it states none.
         closed_by_effect: share of the recalibrated gap that what is named closes, on tests held out; None as above.
         version: of the code that made the diagnosis.
@@ -222,8 +230,11 @@ class Score:
     families: tuple[str, ...] = ()
     sigmas: tuple[float, ...] = ()
     port_right: bool | None = None
+    port_exactly: bool | None = None
     port_listed: bool | None = None
     family_right: bool | None = None
+    family_exactly: bool | None = None
+    elsewhere: float | None = None
     probability: float | None = None
     closed_by_effect: float | None = None
     version: str = ""
@@ -266,13 +277,28 @@ def is_right(score: Score) -> bool:
 def said_right(score: Score) -> bool:
     """Whether what the verdict says is true: what its stated probability is to be compared with.
 
-    That a foreign effect is unknown, at its port, is true.
+    That a foreign effect is unknown, at its port, is true; that it is at a port where it would do the same is not.
     """
-    return is_right(score) or (score.verdict == "unknown" and score.port_right is True)
+    if score.family_right:
+        return score.family_exactly is True
+    return is_right(score) or (score.verdict == "unknown" and score.port_exactly is True)
 
 
-def score_of(answer: Answer, diagnosis: Mapping[str, Any], version: str = "") -> Score:
-    """The marks of a diagnosis, given as the object of its ``diagnosis.json``; ``version`` is that of the code."""
+def port_in_question(answer: Answer, diagnosis: Mapping[str, Any]) -> str | None:
+    """The one port that a verdict names, where it is wrong but a right one is listed as indistinguishable from it."""
+    verdict = diagnosis["verdict"]
+    if answer.kind != "foreign" or _port_exactly(answer, verdict) or not _port_listed(answer, verdict):
+        return None
+    return str(verdict["ports"][0]) if len(verdict["ports"]) == 1 else None
+
+
+def score_of(
+    answer: Answer, diagnosis: Mapping[str, Any], version: str = "", elsewhere: float | None = None
+) -> Score:
+    """The marks of a diagnosis, given as the object of its ``diagnosis.json``; ``version`` is that of the code.
+
+    ``elsewhere`` are the log odds of the drawn law at its own port against it at the :func:`port_in_question`.
+    """
     verdict = diagnosis["verdict"]
     said, true = tuple(verdict["effects"]), set(answer.effects)
     right = set(said) == true and len(said) == len(true)
@@ -283,6 +309,7 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any], version: str = "") ->
     cataloguing, foreign = kind not in ("none", "foreign"), answer.small_errors is not None
     placed = kind == "foreign" and not (answer.hidden and verdict["kind"] == "none")
     own = _intervals(answer, diagnosis) if right and verdict.get("law_known", True) else {}
+    accepted = _accepted(answer, diagnosis, elsewhere)
     return Score(
         number=answer.number,
         kind=kind,
@@ -303,9 +330,12 @@ def score_of(answer: Answer, diagnosis: Mapping[str, Any], version: str = "") ->
         foreign=foreign,
         families=families,
         sigmas=tuple(answer.sigmas[name] for name in answer.effects if name in answer.sigmas),
-        port_right=_port_right(answer, verdict) if placed else None,
+        port_right=_port_right(accepted, verdict) if placed else None,
+        port_exactly=_port_exactly(answer, verdict) if placed else None,
         port_listed=_port_listed(answer, verdict) if placed else None,
-        family_right=_family_right(answer, verdict, families) if placed else None,
+        family_right=_family_right(accepted, answer, verdict, families) if placed else None,
+        family_exactly=_family_right(answer.accepted, answer, verdict, families) if placed else None,
+        elsewhere=elsewhere,
         probability=_number_or_none(verdict.get("probability")),
         closed_by_effect=_number_or_none(diagnosis["shrink"].get("closed_by_effect")),
         version=version,
@@ -319,10 +349,23 @@ def _no_known_law(verdict: Mapping[str, Any]) -> bool:
     return learned or verdict["kind"] == "unknown"
 
 
-def _port_right(answer: Answer, verdict: Mapping[str, Any]) -> bool:
-    """Whether something is said to be missing, at ports that are right alone."""
+def _accepted(answer: Answer, diagnosis: Mapping[str, Any], elsewhere: float | None) -> tuple[str, ...]:
+    """The ports that are right, and the one in question where the drawn law itself does the same."""
+    other = port_in_question(answer, diagnosis)
+    if other is None or elsewhere is None or elsewhere >= DEFAULTS.indistinguishable_log_odds:
+        return answer.accepted
+    return (*answer.accepted, other)
+
+
+def _port_right(accepted: Sequence[str], verdict: Mapping[str, Any]) -> bool:
+    """Whether something is said to be missing, at accepted ports alone."""
     ports = set(verdict["ports"])
-    return verdict["kind"] not in ("none", FAILED) and bool(ports) and ports <= {*answer.accepted}
+    return verdict["kind"] not in ("none", FAILED) and bool(ports) and ports <= {*accepted}
+
+
+def _port_exactly(answer: Answer, verdict: Mapping[str, Any]) -> bool:
+    """Whether something is said to be missing, at ports that are right alone."""
+    return _port_right(answer.accepted, verdict)
 
 
 def _port_listed(answer: Answer, verdict: Mapping[str, Any]) -> bool:
@@ -330,14 +373,16 @@ def _port_listed(answer: Answer, verdict: Mapping[str, Any]) -> bool:
     listed = verdict["kind"] not in ("none", FAILED) and bool(
         {*verdict["confusable_ports"]} & {*answer.accepted}
     )
-    return listed or _port_right(answer, verdict)
+    return listed or _port_exactly(answer, verdict)
 
 
-def _family_right(answer: Answer, verdict: Mapping[str, Any], families: Sequence[str]) -> bool:
-    """Whether a family is named, and all that are named are right at their ports."""
-    right = {f"{port}/{family}" for port in answer.accepted for family in answer.families}
+def _family_right(
+    accepted: Sequence[str], answer: Answer, verdict: Mapping[str, Any], families: Sequence[str]
+) -> bool:
+    """Whether a family is named, and all that are named are right, at accepted ports."""
+    right = {f"{port}/{family}" for port in accepted for family in answer.families}
     named = verdict["kind"] in ("effect", "several") and bool(families)
-    return named and set(families) <= right and _port_right(answer, verdict)
+    return named and set(families) <= right and _port_right(accepted, verdict)
 
 
 def _number_or_none(found: object) -> float | None:

@@ -87,6 +87,8 @@ def _foreign_rates(scores: Sequence[Score]) -> dict[str, Rate]:
         "false_alarms": _rate([score.false_alarm for score in scores], most=0.01),
         "intervals_hold": _rate(held, least=0.92, most=0.98),
         "closed_by_effect_90": _rate(closed),
+        "port_exactly": _rate([score.port_exactly for score in scores]),
+        "family_exactly": _rate([score.family_exactly for score in scores]),
         "port_listed": _rate([score.port_listed for score in scores]),
         "hidden_left_alone": _rate([score.left_alone for score in scores if score.hidden]),
     }

@@ -39,11 +39,14 @@ from savgs_ident.validation.blind_answer import (
     envelope_of,
     failed,
     opened,
+    port_in_question,
     score_of,
     sealed,
 )
 from savgs_ident.validation.blind_draw import Shares, draw_answer
 from savgs_ident.validation.foreign_draw import draw_foreign, true_bench
+from savgs_ident.validation.foreign_laws import FOREIGN
+from savgs_ident.validation.other_port import log_odds_of_port
 from savgs_ident.validation.trials import code_version, rig_marks
 from savgs_ident.validation.varied_constants import varied_into
 from savgs_ident.validation.virtual_campaign import FILE, record_campaign, write_recordings
@@ -163,7 +166,16 @@ def run_trial(plan: Plan, draw: Draw, diagnose: Diagnose, out: Path, number: int
     envelope = _read(folder / "answer.json", envelope_of)
     with blamed_on(campaign / "seal.json"):
         answer = opened(seal, envelope, load_campaign(campaign).sha256)
-    return score_of(answer, found, code_version())
+    return score_of(answer, found, code_version(), _elsewhere(answer, found, campaign, rig))
+
+
+def _elsewhere(answer: Answer, found: Mapping[str, Any], campaign: Path, rig: Rig) -> float | None:
+    """Log odds of the drawn law at its own port against it at the port in question; None if there is none."""
+    other = port_in_question(answer, found)
+    if other is None:
+        return None
+    measured = measured_response(load_campaign(campaign), QuarterCar, SIMTR.orders)
+    return log_odds_of_port(measured, rig, FOREIGN[answer.effects[0]].effect, other, SIMTR)
 
 
 def diagnose_folder(

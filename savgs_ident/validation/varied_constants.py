@@ -19,7 +19,7 @@ from savgs_ident.diagnosis.narrative import write_verdict
 from savgs_ident.diagnosis.result import Verdict
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.diagnosis.verdict import indistinguishable
-from savgs_ident.validation.blind_answer import Answer, Score, score_of
+from savgs_ident.validation.blind_answer import Answer, Score, port_in_question, score_of
 from savgs_ident.validation.blind_rates import Rate, rates_of
 
 VARIED = (
@@ -155,7 +155,10 @@ def _moved(varied_trials: Sequence[tuple[Score, Answer, Mapping[str, Any]]]) -> 
 
 def _marked(score: Score, answer: Answer, diagnosis: Mapping[str, Any], name: str, factor: float) -> Score:
     """The score with another verdict; intervals and gaps, which were not computed again, are those of the trial."""
-    other = score_of(answer, {**diagnosis, "verdict": diagnosis[KEY][name][str(factor)]}, score.version)
+    moved = {**diagnosis, "verdict": diagnosis[KEY][name][str(factor)]}
+    # Of another port than the one that was named it was not looked at whether the law would do the same there.
+    same = port_in_question(answer, moved) == port_in_question(answer, diagnosis)
+    other = score_of(answer, moved, score.version, score.elsewhere if same else None)
     return replace(
         other,
         share_closed=score.share_closed,

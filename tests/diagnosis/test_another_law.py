@@ -15,7 +15,8 @@ import pytest
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.diagnosis.public import diagnose_response
+from savgs_ident.diagnosis.public import SIMTR, diagnose_response
+from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.effects.base import (
     AbstractFrictionLimitLaw,
     AbstractInputLaw,
@@ -35,6 +36,8 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.validation.foreign_laws import FOREIGN
+from savgs_ident.validation.other_port import log_odds_of_port
 
 from .conftest import Measure
 
@@ -73,10 +76,11 @@ WAVY = effect_at("wavy_cam", ROAD, WavyCam(), {})
 
 
 def _recorded(response: HarmonicResponse, rig: Rig, effect: Effect) -> HarmonicResponse:
-    """A response of the rig with one more effect: the periodic motion, and noise as in ``response``."""
+    """A response of the rig with one more effect of typical size: periodic, with the noise of ``response``."""
     baseline = MODELS["simtr"]
     model = build_model(rig, baseline) + effect
-    p = as_values(model_parameters(rig, baseline).as_dict())
+    typical = {each.name: each.value for each in effect.parameters}
+    p = as_values(typical | model_parameters(rig, baseline).as_dict())
     solution = simulate_periodic(model, p, measured_excitation(QuarterCar, response, rig.parameters))
     assert all(status.ok for status in solution.status())
     clean = np.asarray(harmonics(model, p, solution, response.orders))
@@ -115,3 +119,19 @@ def test_a_wave_that_no_cam_of_the_catalogue_has_is_a_shape_of_the_road(
     assert tuple(map(str, diagnosis.verdict.families)) == ("road/shape",)
     assert not diagnosis.verdict.law_known
     assert diagnosis.shrink.closed_by_effect > 0.9
+
+
+@pytest.mark.slow
+def test_a_friction_of_the_joints_would_do_the_same_in_the_strut_and_not_at_the_rail(
+    measure_few: Measure, rig: Rig
+) -> None:
+    joints = FOREIGN["joint_smooth"].effect
+    response = _recorded(measure_few("nominal"), rig, joints)
+    strut, rail, road = (
+        log_odds_of_port(response, rig, joints, each, SIMTR) for each in ("strut", "rail", "road")
+    )
+    assert strut is not None
+    assert abs(strut) < DEFAULTS.indistinguishable_log_odds
+    assert rail is not None
+    assert rail > 50.0
+    assert road is None

@@ -13,6 +13,7 @@ from savgs_ident.validation.blind_answer import (
     SmallErrors,
     failed,
     is_right,
+    port_in_question,
     said_right,
     score_from,
     score_of,
@@ -88,6 +89,41 @@ def test_a_right_port_may_be_listed_beside_the_one_that_is_named() -> None:
     assert (score.port_right, score.port_listed, score.family_right) == (False, True, False)
     assert not said_right(score)
     assert score_of(foreign("strut_buffer"), said("none", beside=["strut"])).port_listed is False
+
+
+def test_a_port_where_the_law_itself_does_the_same_counts_if_the_verdict_says_so() -> None:
+    truth, verdict = foreign("joint_smooth"), said("effect", "strut/friction", beside=["suspension"])
+    assert port_in_question(truth, verdict) == "strut"
+    not_looked_at = score_of(truth, verdict)
+    assert (not_looked_at.port_right, not_looked_at.family_right) == (False, False)
+    alike = score_of(truth, verdict, elsewhere=0.7)
+    assert (alike.port_right, alike.family_right, is_right(alike)) == (True, True, True)
+    # Strictly, and for its stated probability, it is wrong.
+    assert (alike.port_exactly, alike.family_exactly, said_right(alike)) == (False, False, False)
+    distinct = score_of(truth, verdict, elsewhere=12.0)
+    assert (distinct.port_right, distinct.family_right) == (False, False)
+    other_kind = score_of(truth, said("effect", "strut/damping", beside=["suspension"]), elsewhere=0.7)
+    assert (other_kind.port_right, other_kind.family_right) == (True, False)
+    rates = rates_of([alike, distinct])
+    assert (rates["port_right"].count, rates["port_exactly"].count) == (1, 0)
+    assert (rates["family_right"].count, rates["family_exactly"].count) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    "verdict",
+    [
+        said("effect", "strut/friction"),
+        said("effect", "suspension/friction", beside=["strut"]),
+        said("none", beside=["suspension"]),
+        said("several", "strut/friction", "rail/friction", beside=["suspension"]),
+    ],
+)
+def test_no_port_is_in_question_where_it_is_right_or_the_right_one_is_not_listed(
+    verdict: dict[str, Any],
+) -> None:
+    truth = foreign("joint_smooth")
+    assert port_in_question(truth, verdict) is None
+    assert score_of(truth, verdict, elsewhere=0.7) == replace(score_of(truth, verdict), elsewhere=0.7)
 
 
 def test_what_calibration_hides_may_be_left_alone_and_not_be_put_elsewhere() -> None:

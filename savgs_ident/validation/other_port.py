@@ -1,0 +1,64 @@
+"""Whether the recordings of a trial show at which of two ports a law acts.
+
+A force in the strut and the same beside it in the wishbone joints move the rig nearly alike. How far a campaign
+distinguishes two such ports is not a matter of the diagnosis alone: here the drawn law itself is fitted at its own
+port and at another one, with the search, the priors and the background of a diagnosis. The difference of their log
+evidences is all that a diagnosis could have to go on that knew the formula.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from savgs_ident.core.presentation import no_progress
+from savgs_ident.diagnosis.diagnose import baseline_problem
+from savgs_ident.diagnosis.model_selection import recalibrate
+from savgs_ident.diagnosis.result import DiagnosisSettings
+from savgs_ident.diagnosis.search import single_effects, singles_among
+from savgs_ident.effects.base import Port
+from savgs_ident.effects.effect import Effect, typical_effect
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.quarter_car.plant import QuarterCar
+from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+
+ELSEWHERE = "elsewhere"
+"""The name of the effect at the other port."""
+
+
+def log_odds_of_port(
+    measured: HarmonicResponse, rig: Rig, drawn: Effect, location: str, settings: DiagnosisSettings
+) -> float | None:
+    """Log odds [nat] of an effect at its own port against its law at another ``location``.
+
+    None where the law cannot act there, or where one of the two fits has no solution.
+    """
+    port = _port_for(drawn, location)
+    if port is None:
+        return None
+    there = typical_effect(ELSEWHERE, port, drawn.law, symptom=drawn.symptom, reference=drawn.reference)
+    evidence = _log_evidences(measured, rig, {drawn.name: drawn, ELSEWHERE: there}, settings)
+    if not {drawn.name, ELSEWHERE} <= set(evidence):
+        return None
+    return evidence[drawn.name] - evidence[ELSEWHERE]
+
+
+def _port_for(drawn: Effect, location: str) -> Port | None:
+    """The port of a location at which the law of an effect could act, too."""
+    kind = drawn.port.kind
+    suitable = (each for each in QuarterCar.ports if each.location == location and each.kind is kind)
+    return next((each for each in suitable if drawn.law.suits(each)), None)
+
+
+def _log_evidences(
+    measured: HarmonicResponse, rig: Rig, effects: Mapping[str, Effect], settings: DiagnosisSettings
+) -> dict[str, float]:
+    """The log evidence of each effect alone that could be fitted, by name."""
+    given = RigModel(rig, settings.baseline)
+    known = {name: CATALOGUE[name] for name in settings.baseline} | dict(effects)
+    bare = replace(given.build(), effects=())
+    plant, data = baseline_problem(measured, bare, given.table, known, replace(settings, without=()))
+    problem = recalibrate(plant, data, {}, no_progress)
+    first = single_effects(problem.search, problem.base, plant.candidates, no_progress)
+    both = singles_among(problem.search, first, plant.candidates, plant.candidates, no_progress)
+    return {mode.terms[0]: mode.evidence for mode in both.modes}
