@@ -7,7 +7,7 @@ of the regression, is chosen knowing all answers.
 
 Trials of the catalogue's own effects and foreign trials, whose truth follows laws that no library has, are counted
 apart. A peer says the name of an effect, or that nothing is missing; the rules that mark the diagnosis mark it
-(:mod:`savgs_ident.validation.blind_answer`):
+(:mod:`savgs_ident.validation.blind_marks`):
 
     own       the drawn effect by its name
     foreign   the effect's port, and its family at that port, among those that are right for the truth
@@ -27,7 +27,8 @@ from benchmarks.outcome import Outcome, Progress
 from benchmarks.sparse_selection import PEERS, THRESHOLDS, Peer, Said
 from benchmarks.trial_regression import VARIANTS, Trial, Variant, read_trial, trial_folders
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.validation.blind_answer import Answer, Score, failed, said_words, score_of, truth_words
+from savgs_ident.validation.blind_answer import Answer
+from savgs_ident.validation.blind_marks import Score, failed, said_words, score_of, truth_words
 from savgs_ident.validation.trials import side_by_side
 
 Marks = Mapping[str, bool]

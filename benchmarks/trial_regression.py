@@ -31,7 +31,8 @@ from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, parse_rig,
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_response
-from savgs_ident.validation.blind_answer import Answer, Score, Seal, envelope_of, opened, score_of
+from savgs_ident.validation.blind_answer import Answer, Seal, envelope_of, opened
+from savgs_ident.validation.blind_marks import Score, score_of
 from savgs_ident.validation.trials import rig_marks
 
 SAME = 1.0 - 1e-6

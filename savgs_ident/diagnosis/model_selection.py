@@ -314,19 +314,6 @@ def _worth_learning(
     return [problem.port(name) for name in dict.fromkeys(ranked)]
 
 
-def nearest_effect(
-    problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: FlexibleMember
-) -> str | None:
-    """The catalogue's effect that comes nearest to a learned law: of its family if there is one, at its location."""
-    catalogue = problem.plant.catalogue
-    scored = {each.term.name: each.evidence for each in evidence.findings.scores}
-    fitted = {mode.terms[0]: mode.evidence for mode in evidence.findings.modes if len(mode.terms) == 1}
-    known = scored | fitted
-    there = [name for name in known if problem.location(name) == member.location]
-    same = [name for name in there if catalogue[name].law.family is member.family]
-    return max(same or there, key=lambda name: known[name], default=None)
-
-
 def _with_nearest(
     problem: DiagnosisProblem, findings: Findings, localisations: Sequence[Localisation], progress: Progress
 ) -> Findings:

@@ -7,7 +7,6 @@ import numpy as np
 
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.gap import Shrink
-from savgs_ident.diagnosis.model_selection import nearest_effect
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Verdict
 from savgs_ident.diagnosis.search import hypothesis_of, left_over
 from savgs_ident.diagnosis.thresholds import DecisionConstants
@@ -66,7 +65,7 @@ def _verdict(
         )
     member = evidence.named_law
     if member is not None:
-        nearest = nearest_effect(problem, evidence, member)
+        nearest = _nearest_effect(problem, evidence, member)
         return Verdict(
             kind="effect",
             effects=() if nearest is None else (nearest,),
@@ -128,6 +127,19 @@ def _law_missing(
         else:
             sentence += "promised too little for a fit."
     return sentence + _not_apart(problem, evidence)
+
+
+def _nearest_effect(
+    problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: FlexibleMember
+) -> str | None:
+    """The catalogue's effect that comes nearest to a learned law: of its family if there is one, at its location."""
+    catalogue = problem.plant.catalogue
+    scored = {each.term.name: each.evidence for each in evidence.findings.scores}
+    fitted = {mode.terms[0]: mode.evidence for mode in evidence.findings.modes if len(mode.terms) == 1}
+    known = scored | fitted
+    there = [name for name in known if problem.location(name) == member.location]
+    same = [name for name in there if catalogue[name].law.family is member.family]
+    return max(same or there, key=lambda name: known[name], default=None)
 
 
 def _words(problem: DiagnosisProblem, effect: str) -> str:

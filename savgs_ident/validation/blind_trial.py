@@ -31,19 +31,9 @@ from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Recording
 from savgs_ident.simulate.excitation import first_sweep, measured_response
 from savgs_ident.simulate.public import DWELLS
-from savgs_ident.validation.blind_answer import (
-    Answer,
-    Envelope,
-    Score,
-    Seal,
-    envelope_of,
-    failed,
-    opened,
-    port_in_question,
-    score_of,
-    sealed,
-)
+from savgs_ident.validation.blind_answer import Answer, Envelope, Seal, envelope_of, opened, sealed
 from savgs_ident.validation.blind_draw import Shares, draw_answer
+from savgs_ident.validation.blind_marks import Score, failed, port_in_question, score_of
 from savgs_ident.validation.foreign_draw import draw_foreign, true_bench
 from savgs_ident.validation.foreign_laws import FOREIGN
 from savgs_ident.validation.other_port import log_odds_of_port

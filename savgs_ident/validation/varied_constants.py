@@ -19,7 +19,8 @@ from savgs_ident.diagnosis.narrative import write_verdict
 from savgs_ident.diagnosis.result import Verdict
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.diagnosis.verdict import indistinguishable
-from savgs_ident.validation.blind_answer import Answer, Score, port_in_question, score_of
+from savgs_ident.validation.blind_answer import Answer
+from savgs_ident.validation.blind_marks import Score, port_in_question, score_of
 from savgs_ident.validation.blind_rates import Rate, rates_of
 
 VARIED = (

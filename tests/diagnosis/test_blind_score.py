@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.validation.blind_answer import Score, failed, score_from, score_of
+from savgs_ident.validation.blind_marks import Score, failed, score_from, score_of
 from savgs_ident.validation.blind_rates import (
     NOTHING,
     OTHERS,

@@ -7,10 +7,9 @@ from typing import Any
 import pytest
 
 from savgs_ident.report.blind import blind_html, blind_record, blind_text, reliability_figure
-from savgs_ident.validation.blind_answer import (
-    Answer,
+from savgs_ident.validation.blind_answer import Answer, SmallErrors
+from savgs_ident.validation.blind_marks import (
     Score,
-    SmallErrors,
     failed,
     is_right,
     port_in_question,

@@ -1,0 +1,333 @@
+"""The marks of a blind trial: a diagnosis held against its answer. Pure functions.
+
+    score = score_of(answer, diagnosis)      # ``diagnosis`` as ``diagnosis.json`` has it
+
+An effect counts as named by its own name. Where the draw found that another effect does the same to the campaign, so
+that nothing shows which it is, naming that one counts too, if the verdict says that it cannot distinguish the two.
+The port of something unknown counts as found,
+too, where the verdict says that it cannot distinguish it from the one that it names. Marks that do not apply to a
+kind of trial are None.
+
+In a foreign trial no name can be right, for no catalogue has the law. A port is right where an engineer would rightly
+put the effect, a family where it would rightly be called that, at such a port
+(:mod:`savgs_ident.validation.foreign_laws`). "Unknown" at a right port has the port, not the family. Of an effect of
+which calibration leaves too little to matter "none" is right: it has no port then. Where the drawn law itself
+explains the recordings as well at another port (:mod:`savgs_ident.validation.other_port`), no diagnosis can
+distinguish the two: naming that one counts, too, if the verdict says that it cannot.
+
+What many trials say together is in :mod:`savgs_ident.validation.blind_rates`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+from savgs_ident.core.files import record_of
+from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.validation.blind_answer import Answer, Drawn
+from savgs_ident.validation.foreign_laws import FOREIGN
+
+FAILED = "failed"
+"""The verdict of a diagnosis that ended with an error."""
+
+_VERDICTS = ("none", "effect", "several", "unknown", FAILED)
+
+
+@dataclass(frozen=True)
+class Interval:
+    """True value of an effect's parameter, and the 95 % interval that the diagnosis gave, SI."""
+
+    true: float
+    low: float
+    high: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the truth lies inside."""
+        return self.low <= self.true <= self.high
+
+
+@dataclass(frozen=True)
+class Score:
+    """A trial's marks.
+
+    Attributes:
+        number: of the trial.
+        kind: what was drawn.
+        effects: names of the drawn effects.
+        changes: by how much each changes the response, relative, in the same order.
+        verdict: kind of the verdict: none, effect, several, unknown, or :data:`FAILED`.
+        said: names of the effects that the verdict names.
+        named_right: the drawn effect and no other is named, or one that does the same and is said to; of trials
+            with one effect.
+        named_exactly: the drawn effect and no other is named; of the same.
+        located_right: the verdict's ports are those of the drawn effects, or of what does the same and is said to;
+            of trials with any effect.
+        located_exactly: the verdict's ports are those of the drawn effects; of the same.
+        false_alarm: something is named, or said to be unknown; of trials with nothing.
+        unknown_recognised: the verdict is unknown, or a law that the catalogue does not have; of trials whose effect
+            is not in the catalogue.
+        both_named: both drawn effects and no other are named; of trials with two.
+        share_closed: share of the explainable gap that the diagnosis closed, on tests held out; None if there
+            is none or the diagnosis does not say.
+        intervals: of the effects' parameters, where the verdict names all of them and no other; in a foreign trial,
+            of those of the rig's own that mean something.
+        wall_s: how long the diagnosis took [s].
+        foreign: whether it is a foreign trial.
+        families: what the verdict says is missing, each as port/family.
+        sigmas: by how many standard deviations each effect stands out, in the order of ``effects``.
+        port_right: something is named or unknown, at ports that are right alone, or at one where the law itself does
+            the same, which the verdict says; of foreign trials with an effect.
+        port_exactly: the same, at ports that are right alone; of the same.
+        port_listed: the ports are right, or a right one is listed as indistinguishable from them; of the same.
+        family_right: a family is named, with ports that are right as above and families that are; of the same.
+        family_exactly: the same, at ports that are right alone; of the same.
+        elsewhere: log odds [nat] of the drawn law itself at its own port against it at the port that is named; None
+            where that was not looked at.
+        probability: that the verdict states; None if it states none.
+        closed_by_effect: share of the recalibrated gap that what is named closes, on tests held out; None as above.
+        version: of the code that made the diagnosis.
+        hidden: whether calibration leaves too little of a foreign effect to matter.
+    """
+
+    number: int
+    kind: Drawn
+    effects: tuple[str, ...]
+    changes: tuple[float, ...]
+    verdict: str
+    said: tuple[str, ...]
+    named_right: bool | None
+    named_exactly: bool | None
+    located_right: bool | None
+    located_exactly: bool | None
+    false_alarm: bool | None
+    unknown_recognised: bool | None
+    both_named: bool | None
+    share_closed: float | None
+    intervals: Mapping[str, Interval]
+    wall_s: float
+    foreign: bool = False
+    families: tuple[str, ...] = ()
+    sigmas: tuple[float, ...] = ()
+    port_right: bool | None = None
+    port_exactly: bool | None = None
+    port_listed: bool | None = None
+    family_right: bool | None = None
+    family_exactly: bool | None = None
+    elsewhere: float | None = None
+    probability: float | None = None
+    closed_by_effect: float | None = None
+    version: str = ""
+    hidden: bool = False
+
+    @property
+    def left_alone(self) -> bool:
+        """Whether an effect that calibration hides is not named."""
+        return self.hidden and self.verdict == "none"
+
+    def __str__(self) -> str:
+        right = "right" if is_right(self) else "wrong"
+        return f"trial {self.number}: {truth_words(self)}; verdict {said_words(self)}: {right}"
+
+
+_KIND_WORDS = {"none": "nothing", "unknown": "unknown", FAILED: "failed"}
+
+
+def truth_words(score: Score) -> str:
+    """The effects that were in the rig."""
+    names = " + ".join(score.effects)
+    foreign = f"{names} (foreign law)"
+    return {"none": "nothing", "unknown": f"{names} (not in the catalogue)", "foreign": foreign}.get(
+        score.kind, names
+    )
+
+
+def said_words(score: Score) -> str:
+    """The verdict as names of effects."""
+    said = _KIND_WORDS.get(score.verdict, " + ".join(score.said))
+    return f"{said} ({', '.join(score.families)})" if score.foreign and score.families else said
+
+
+def is_right(score: Score) -> bool:
+    """Whether the verdict is right altogether."""
+    marks = (score.named_right, score.unknown_recognised, score.both_named, score.family_right)
+    return any(marks) or score.left_alone or (score.kind == "none" and score.verdict == "none")
+
+
+def said_right(score: Score) -> bool:
+    """Whether what the verdict says is true: what its stated probability is to be compared with.
+
+    That a foreign effect is unknown, at its port, is true; that it is at a port where it would do the same is not.
+    """
+    if score.family_right:
+        return score.family_exactly is True
+    return is_right(score) or (score.verdict == "unknown" and score.port_exactly is True)
+
+
+def port_in_question(answer: Answer, diagnosis: Mapping[str, Any]) -> str | None:
+    """The one port that a verdict names, where it is wrong but a right one is listed as indistinguishable from it."""
+    verdict = diagnosis["verdict"]
+    if answer.kind != "foreign" or _port_exactly(answer, verdict) or not _port_listed(answer, verdict):
+        return None
+    return str(verdict["ports"][0]) if len(verdict["ports"]) == 1 else None
+
+
+def score_of(
+    answer: Answer, diagnosis: Mapping[str, Any], version: str = "", elsewhere: float | None = None
+) -> Score:
+    """The marks of a diagnosis, given as the object of its ``diagnosis.json``; ``version`` is that of the code.
+
+    ``elsewhere`` are the log odds of the drawn law at its own port against it at the :func:`port_in_question`.
+    """
+    verdict = diagnosis["verdict"]
+    said, true = tuple(verdict["effects"]), set(answer.effects)
+    right = set(said) == true and len(said) == len(true)
+    alike = len(said) == 1 and said[0] in answer.imitators and true <= {*verdict["confusable_with"]}
+    here = set(verdict["ports"]) == set(answer.ports) and verdict["kind"] != "none"
+    beside = verdict["kind"] == "unknown" and set(answer.ports) <= {*verdict["confusable_ports"]}
+    kind, families = answer.kind, tuple(verdict.get("families", ()))
+    cataloguing, foreign = kind not in ("none", "foreign"), answer.small_errors is not None
+    placed = kind == "foreign" and not (answer.hidden and verdict["kind"] == "none")
+    own = _intervals(answer, diagnosis) if right and verdict.get("law_known", True) else {}
+    accepted = _accepted(answer, diagnosis, elsewhere)
+    return Score(
+        number=answer.number,
+        kind=kind,
+        effects=answer.effects,
+        changes=tuple(answer.changes[name] for name in answer.effects),
+        verdict=verdict["kind"],
+        said=said,
+        named_right=right or alike if kind == "effect" else None,
+        named_exactly=right if kind == "effect" else None,
+        located_right=here or alike or beside if cataloguing else None,
+        located_exactly=here if cataloguing else None,
+        false_alarm=verdict["kind"] not in ("none", FAILED) if kind == "none" else None,
+        unknown_recognised=_no_known_law(verdict) if kind == "unknown" else None,
+        both_named=right if kind == "two" else None,
+        share_closed=diagnosis["shrink"]["share_closed"],
+        intervals=_rig_intervals(answer, diagnosis) if foreign else own,
+        wall_s=float(diagnosis["wall_s"]),
+        foreign=foreign,
+        families=families,
+        sigmas=tuple(answer.sigmas[name] for name in answer.effects if name in answer.sigmas),
+        port_right=_port_right(accepted, verdict) if placed else None,
+        port_exactly=_port_exactly(answer, verdict) if placed else None,
+        port_listed=_port_listed(answer, verdict) if placed else None,
+        family_right=_family_right(accepted, answer, verdict, families) if placed else None,
+        family_exactly=_family_right(answer.accepted, answer, verdict, families) if placed else None,
+        elsewhere=elsewhere,
+        probability=_number_or_none(verdict.get("probability")),
+        closed_by_effect=_number_or_none(diagnosis["shrink"].get("closed_by_effect")),
+        version=version,
+        hidden=answer.hidden,
+    )
+
+
+def _no_known_law(verdict: Mapping[str, Any]) -> bool:
+    """Whether something is said to be missing that follows no formula of the catalogue."""
+    learned = verdict["kind"] == "effect" and not verdict.get("law_known", True)
+    return learned or verdict["kind"] == "unknown"
+
+
+def _accepted(answer: Answer, diagnosis: Mapping[str, Any], elsewhere: float | None) -> tuple[str, ...]:
+    """The ports that are right, and the one in question where the drawn law itself does the same."""
+    other = port_in_question(answer, diagnosis)
+    if other is None or elsewhere is None or elsewhere >= DEFAULTS.indistinguishable_log_odds:
+        return answer.accepted
+    return (*answer.accepted, other)
+
+
+def _port_right(accepted: Sequence[str], verdict: Mapping[str, Any]) -> bool:
+    """Whether something is said to be missing, at accepted ports alone."""
+    ports = set(verdict["ports"])
+    return verdict["kind"] not in ("none", FAILED) and bool(ports) and ports <= {*accepted}
+
+
+def _port_exactly(answer: Answer, verdict: Mapping[str, Any]) -> bool:
+    """Whether something is said to be missing, at ports that are right alone."""
+    return _port_right(answer.accepted, verdict)
+
+
+def _port_listed(answer: Answer, verdict: Mapping[str, Any]) -> bool:
+    """Whether the ports are right, or one that is right is listed as indistinguishable from them."""
+    listed = verdict["kind"] not in ("none", FAILED) and bool(
+        {*verdict["confusable_ports"]} & {*answer.accepted}
+    )
+    return listed or _port_exactly(answer, verdict)
+
+
+def _family_right(
+    accepted: Sequence[str], answer: Answer, verdict: Mapping[str, Any], families: Sequence[str]
+) -> bool:
+    """Whether a family is named, and all that are named are right, at accepted ports."""
+    right = {f"{port}/{family}" for port in accepted for family in answer.families}
+    named = verdict["kind"] in ("effect", "several") and bool(families)
+    return named and set(families) <= right and _port_right(accepted, verdict)
+
+
+def _number_or_none(found: object) -> float | None:
+    """A finite number, or None."""
+    return float(found) if isinstance(found, int | float) and isfinite(found) else None
+
+
+MEANINGFUL: Mapping[str, tuple[str, ...]] = {
+    "mu_r": ("rail/friction",),
+    "c_sd": ("strut/damping", "strut/friction", "strut/play", "suspension/damping", "suspension/friction"),
+}
+"""Parameters of the rig whose true values mean something whatever is missing, but for what acts as they do."""
+
+
+def _rig_intervals(answer: Answer, diagnosis: Mapping[str, Any]) -> dict[str, Interval]:
+    """Intervals of the rig's own parameters in a foreign trial, where the diagnosis gives them.
+
+    Rail friction that drifts has its mean as the true value.
+    """
+    there = {f"{port}/{family}" for port in answer.ports for family in answer.families}
+    given = diagnosis.get("intervals", {})
+    return {
+        name: Interval(answer.rig[name], given[name]["lo"], given[name]["hi"])
+        for name, alike in MEANINGFUL.items()
+        if name in answer.rig and name in given and not there & {*alike}
+        if None not in (given[name]["lo"], given[name]["hi"])
+    }
+
+
+def score_from(record: Mapping[str, Any]) -> Score:
+    """The marks that ``dataclasses.asdict`` and JSON made ``record`` of; ``ValueError`` for others."""
+    score = record_of(Score, record)
+    known = {*CATALOGUE, *FOREIGN} if score.kind == "foreign" else {*CATALOGUE}
+    if score.verdict not in _VERDICTS or not ({*score.effects} <= known and {*score.said} <= {*CATALOGUE}):
+        raise ValueError(f"trial {score.number} is about something unknown")
+    if (score.kind in ("effect", "foreign") and len(score.effects) != 1) or (
+        score.verdict == "effect" and not (score.said or score.families)
+    ):
+        raise ValueError(f"trial {score.number} names no effect")
+    return score
+
+
+def failed(why: str) -> dict[str, Any]:
+    """What stands for the ``diagnosis.json`` of a diagnosis that ended with an error."""
+    verdict = {
+        "kind": FAILED,
+        "effects": [],
+        "ports": [],
+        "confusable_with": [],
+        "sentence": why,
+        "confusable_ports": [],
+    }
+    return {"verdict": verdict, "which": [], "shrink": {"share_closed": None}, "wall_s": 0.0}
+
+
+def _intervals(answer: Answer, diagnosis: Mapping[str, Any]) -> dict[str, Interval]:
+    """Intervals that the verdict's hypothesis gives for parameters that the rig truly has."""
+    said = sorted(diagnosis["verdict"]["effects"])
+    for each in diagnosis["which"]:
+        if sorted(each["effects"]) == said:
+            return {
+                name: Interval(answer.parameters[name], found["lo"], found["hi"])
+                for name, found in each["parameters"].items()
+                if name in answer.parameters and None not in (found["lo"], found["hi"])
+            }
+    return {}
