@@ -37,7 +37,7 @@ RATE_WORDS: Mapping[str, str] = {
     "named_exactly": "Effect named strictly, without indistinguishable ones",
     "located_exactly": "Located strictly, without indistinguishable ports",
     "port_right": "Foreign effect put at a right port",
-    "port_exactly": "The same strictly, without ports where the law itself would do the same",
+    "port_exactly": "Port right strictly, without ports where the law itself would do the same",
     "port_listed": "A right port named, or listed as not distinguishable",
     "family_exactly": "Family right strictly, without ports where the law itself would do the same",
     "family_right": "Foreign effect given a right family",

@@ -180,6 +180,17 @@ def test_intervals_are_those_of_parameters_that_have_a_meaning() -> None:
     assert score_of(answer("none"), verdict).intervals == {}
 
 
+def test_marks_of_versions_that_did_not_look_at_other_ports_are_strict() -> None:
+    for verdict in (said("effect", "tyre_radial/stiffness"), said("effect", "road/stiffness")):
+        score = score_of(foreign("tyre_cubic"), verdict)
+        older = asdict(score)
+        for name in ("port_exactly", "family_exactly", "elsewhere"):
+            del older[name]
+        read = score_from(json.loads(json.dumps(older)))
+        assert read == score
+        assert said_right(read) == said_right(score)
+
+
 def test_marks_are_read_as_they_are_written() -> None:
     score = score_of(foreign("rail_lugre"), said("effect", "rail/friction"), "v1")
     assert score_from(json.loads(json.dumps(asdict(score)))) == score
