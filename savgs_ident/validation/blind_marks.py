@@ -294,11 +294,13 @@ def _rig_intervals(answer: Answer, diagnosis: Mapping[str, Any]) -> dict[str, In
     }
 
 
-def score_from(record: Mapping[str, Any]) -> Score:
+def score_from(record: object) -> Score:
     """The marks that ``dataclasses.asdict`` and JSON made ``record`` of; ``ValueError`` for others."""
-    # Marks of versions that did not look at other ports are strict.
-    strict = {"port_exactly": record.get("port_right"), "family_exactly": record.get("family_right")}
-    score = record_of(Score, {**strict, **record})
+    if isinstance(record, Mapping):
+        # Marks of versions that did not look at other ports are strict.
+        strict = {"port_exactly": record.get("port_right"), "family_exactly": record.get("family_right")}
+        record = {**strict, **record}
+    score = record_of(Score, record)
     known = {*CATALOGUE, *FOREIGN} if score.kind == "foreign" else {*CATALOGUE}
     if score.verdict not in _VERDICTS or not ({*score.effects} <= known and {*score.said} <= {*CATALOGUE}):
         raise ValueError(f"trial {score.number} is about something unknown")
