@@ -43,6 +43,7 @@ def failed_checks_give(number: int) -> tuple[int, str]:
     return number, os.environ["EQX_ON_ERROR"]
 
 
+@pytest.mark.slow
 def test_a_failed_check_of_a_program_gives_nan_in_a_process_unless_the_user_says_otherwise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

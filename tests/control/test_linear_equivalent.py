@@ -386,6 +386,7 @@ _force = jax.jit(jax.grad(_energy, argnums=1))
 _stiffness = jax.jit(jax.hessian(_energy, argnums=1))
 
 
+@pytest.mark.slow
 @over("link", LINKS)
 def test_the_energy_is_least_at_rest(frictionless: QuarterCar, numbers: Values, link: float) -> None:
     at = resting(frictionless, numbers, link)

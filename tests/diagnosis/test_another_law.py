@@ -35,7 +35,7 @@ from savgs_ident.plants.quarter_car.ports import RAIL, ROAD
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
 from savgs_ident.validation.foreign_laws import FOREIGN
 from savgs_ident.validation.other_port import log_odds_of_port
 
@@ -71,6 +71,8 @@ class WavyCam(AbstractInputLaw):
         return InputSignal(1e-4 * jnp.cos(turned), -4e-4 * jnp.sin(turned) * fundamental.speed)
 
 
+COARSE = replace(SIMTR, periodic=PeriodicSettings(nodes=128, adaptations=1))
+
 STRIBECK = effect_at("exponential_stribeck", RAIL, ExponentialStribeck(), {"coefficient": "mu_r"})
 WAVY = effect_at("wavy_cam", ROAD, WavyCam(), {})
 
@@ -96,7 +98,7 @@ def _recorded(response: HarmonicResponse, rig: Rig, effect: Effect) -> HarmonicR
 
 @pytest.mark.slow
 def test_an_effect_by_another_law_is_named(measure_few: Measure, rig: Rig) -> None:
-    diagnosis = diagnose_response(_recorded(measure_few("nominal"), rig, STRIBECK), rig)
+    diagnosis = diagnose_response(_recorded(measure_few("nominal"), rig, STRIBECK), rig, COARSE)
     assert diagnosis.verdict.kind == "effect"
     assert diagnosis.verdict.effects == ("rail_stribeck",)
     assert diagnosis.verdict.ports == ("rail",)
@@ -113,7 +115,7 @@ def test_an_effect_by_another_law_is_named(measure_few: Measure, rig: Rig) -> No
 def test_a_wave_that_no_cam_of_the_catalogue_has_is_a_shape_of_the_road(
     measure_few: Measure, rig: Rig
 ) -> None:
-    diagnosis = diagnose_response(_recorded(measure_few("nominal"), rig, WAVY), rig)
+    diagnosis = diagnose_response(_recorded(measure_few("nominal"), rig, WAVY), rig, COARSE)
     assert diagnosis.verdict.kind == "effect"
     assert diagnosis.verdict.ports == ("road",)
     assert tuple(map(str, diagnosis.verdict.families)) == ("road/shape",)

@@ -31,7 +31,9 @@ def _diagnosed(fading: float) -> Diagnosis:
         return diagnose_dwells(problem, data, response, PlantModel(TwoMass(), PARAMETERS), settings, {})
 
 
-@pytest.mark.parametrize(("fading", "word"), [(0.25, "fell"), (-0.25, "rose")])
+@pytest.mark.parametrize(
+    ("fading", "word"), [(0.25, "fell"), pytest.param(-0.25, "rose", marks=pytest.mark.slow)]
+)
 def test_a_damper_that_fades_by_more_than_is_tolerated(fading: float, word: str) -> None:
     found = _diagnosed(fading)
     assert found.verdict.kind == "none"

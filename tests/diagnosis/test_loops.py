@@ -37,6 +37,7 @@ def test_the_force_of_a_mount_is_that_of_the_strut_with_its_nonlinear_damper(
     assert np.abs(linear - expected).max() > 0.1 * np.abs(expected).max(), "the damper would pass for linear"
 
 
+@pytest.mark.slow
 def test_the_force_of_the_rails_friction_is_that_of_its_bristle(
     plant_and_data: Case, start: PeriodicSolution
 ) -> None:

@@ -43,6 +43,7 @@ def fitted(plant_and_data: tuple[DwellProblem, Data], start: PeriodicSolution) -
     return search, plant, modes[0], modes[1]
 
 
+@pytest.mark.slow
 def test_the_most_significant_tests_are_proposed_with_their_dwells(fitted: Fitted) -> None:
     search, plant, one, other = fitted
     found = next_tests(search, plant, one, other)

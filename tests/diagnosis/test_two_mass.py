@@ -123,6 +123,7 @@ def _found_and_located(case: Case, location: str, alike: set[str]) -> None:
     assert len(most_probable(findings).terms) == 1
 
 
+@pytest.mark.slow
 def test_friction_is_found_and_located(rubbing: Case) -> None:
     """Where the load is constant, friction in proportion to it is the one that needs no load."""
     _found_and_located(rubbing, "guide", {"guide_coulomb", "guide_preload"})
