@@ -252,7 +252,7 @@ def reliability_figure(scores: Sequence[Score]) -> Figure:
     """Stated probabilities across, how often what was said is true up, with 95 % intervals; the diagonal is ideal."""
     reliability = reliability_of(scores)
     with styled():
-        figure = new_figure(3.8, 3.6)
+        figure = new_figure(4.4, 4.4)
         axes = figure.subplots()
         axes.plot([0.0, 1.0], [0.0, 1.0], color=INK, linestyle="--", linewidth=0.8, label="ideal")
         for each in reliability.bins:
@@ -268,12 +268,13 @@ def reliability_figure(scores: Sequence[Score]) -> Figure:
             axes.annotate(
                 str(each.rate.total),
                 (each.stated, share),
-                (-5.0, 5.0),
+                (-5.0, 0.0),
                 textcoords="offset points",
                 ha="right",
+                va="center",
             )
-        axes.set_xlim(0.0, 1.03)
-        axes.set_ylim(0.0, 1.03)
+        axes.set_xlim(0.0, 1.05)
+        axes.set_ylim(0.0, 1.05)
         axes.set_aspect("equal")
         axes.set_xlabel("stated probability [1]")
         axes.set_ylabel("share of verdicts that are true [1]")
