@@ -91,7 +91,8 @@ class LearnedForce(AbstractForceLaw):
     name: ClassVar[str] = "learned"
     family: ClassVar[Family] = Family.LEARNED
     roles: ClassVar[tuple[Role, ...]] = _roles(
-        ("middle", "stroke", "speed", "carried", "turn"), len((*OF_THE_MOTION, *OF_SLIDERS, *OF_THE_LOAD))
+        ("middle", "stroke", "speed", "carried", "turn", "give"),
+        len((*OF_THE_MOTION, *OF_SLIDERS, *OF_THE_LOAD)),
     )
     port: Port = eqx.field(static=True)
 
@@ -100,12 +101,14 @@ class LearnedForce(AbstractForceLaw):
         unit, force = port.displacement_unit, port.force_unit
         carried = Parameter("carried", 1.0, force, lower=SMALLEST, about="largest load seen")
         turn = "velocity over which a friction turns round, over the largest seen"
+        give = "how far spring-sliders give before they slide, over what their functions say"
         spans = {
             "middle": Parameter("middle", 0.0, unit, about="displacement in the middle of what was seen"),
             "stroke": Parameter("stroke", 1.0, unit, lower=SMALLEST, about="largest displacement from there"),
             "speed": Parameter("speed", 1.0, f"{unit}/s", lower=SMALLEST, about="largest velocity seen"),
             "carried": carried if port.loaded else 1.0,
             "turn": Parameter("turn", TURN, "1", lower=0.1 * TURN, upper=10.0 * TURN, about=turn),
+            "give": Parameter("give", 1.0, "1", lower=0.2, upper=5.0, about=give),
         }
         return {role.name: 0.0 for role in self.roles} | spans | _coefficients(port, force)
 
@@ -127,20 +130,20 @@ class LearnedForce(AbstractForceLaw):
         n = jnp.clip(signals.load / v["carried"], -1.0, 1.0) if self.port.loaded else jnp.zeros_like(x)
         whole = jnp.abs(v["middle"]) + v["stroke"]
         d = jnp.clip(signals.displacement / whole, -1.0, 1.0)
-        held = [-each.force for each in self._sliders(signals, state)]
+        held = [-each.force for each in self._sliders(v, signals, state)]
         seen = RelativeMotion(x, d, speed, n, v["turn"], held)
         return self.port.sense * _sum(v, values_of(functions_at(self.port), seen))
 
     def rate(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:
         """Velocities of the anchors [m/s]."""
-        return jnp.stack([each.rate for each in self._sliders(signals, state)])
+        return jnp.stack([each.rate for each in self._sliders(v, signals, state)])
 
-    def _sliders(self, signals: PortSignals, state: Float[Array, " s"]) -> list[Bristle]:
+    def _sliders(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> list[Bristle]:
         """Spring-sliders of unit friction: what they carry is a function of the motion alone."""
         one = jnp.ones_like(signals.displacement)
         limit = FrictionLimit(one, one)
         moved = signals._replace(displacement=signals.displacement - signals.rest)
-        widths = [share * self.port.displacement for share in STRETCHES]
+        widths = [share * self.port.displacement * v["give"] for share in STRETCHES]
         sticks = [Presliding(one / width, one * (SLIDER_LAG / width)) for width in widths]
         return [bristle(stick, moved, limit, state[place]) for place, stick in enumerate(sticks)]
 

@@ -50,7 +50,10 @@ SOFT_GAPS = (0.0, 0.4)
 """Where stops begin that are touched softly, as shares of the stroke [1]."""
 
 STRETCHES = (0.01, 0.03, 0.07, 0.2)
-"""How far a spring-slider gives before it slides, as shares of the port's typical displacement [1]."""
+"""How far a spring-slider gives before it slides, as shares of the port's typical displacement [1].
+
+In a learned law they are multiplied by a number that is estimated along.
+"""
 
 SMALLEST = 1e-9
 """Least stroke [m], speed [m/s] and load [N] by which is divided."""

@@ -26,11 +26,12 @@ Array = NDArray[np.float64]
 STEPS = 15
 """Most steps to a mode."""
 
-HALVINGS = 5
-"""Most halvings of a step that does not rise."""
+HALVINGS = 8
+"""Most halvings of a step that does not rise: what shapes a law may curve the density a hundred times as much as the
+slopes say."""
 
 LEVEL = 0.1
-"""Rise of the log density that a step promises below which the mode is found."""
+"""Rise of the log density below which the mode is found: that which a step promises, or which a halved step finds."""
 
 ROUGH = 2.0
 """Rise that is promised, but not found, up to which a mode is as good: friction makes the density rough."""
@@ -191,7 +192,8 @@ class _Ascent:
         for halving in range(HALVINGS):
             there = self._at(point.x + 0.5**halving * (top.x - point.x), here.warm_start)
             if there.value > point.value:
-                return there
+                found = halving and there.value < point.value + self._level
+                return there._replace(status=Status.CONVERGED) if found else there
         return point._replace(status=Status.CONVERGED if promised < ROUGH else Status.STALLED)
 
     def mode(self, point: _Point, steps: int, progress: Progress | None = None) -> LaplaceFit:

@@ -179,7 +179,7 @@ def test_what_was_put_in_is_named_and_nothing_else(
     laws: dict[str, float], effects: set[str], seed: int
 ) -> None:
     """Dry friction without presliding is a saturating friction of a velocity near zero."""
-    gap = si.diagnose(_axis(), driven_motion(recorded_axis(laws, seed)))
+    gap = si.diagnose(_axis(), driven_motion(recorded_axis(laws, seed, cycles=3)))
     assert set(gap.verdict.effects) == effects
     assert gap.identified["mass"] == pytest.approx(BASE["mass"], rel=0.005)
     assert gap.shrink.after < 1.1 * gap.shrink.floor

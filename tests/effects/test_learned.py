@@ -64,7 +64,9 @@ LAWS: dict[str, Callable[[float, float, float], float]] = {
 
 TURN = 0.02
 
-SPANS = {"middle": 0.4, "stroke": 0.03, "speed": 0.5, "carried": 8e3, "turn": TURN}
+GIVE = 1.4
+
+SPANS = {"middle": 0.4, "stroke": 0.03, "speed": 0.5, "carried": 8e3, "turn": TURN, "give": GIVE}
 
 
 def _whole(x: float) -> float:
@@ -100,7 +102,7 @@ def _force(effect: Effect, p: Values, displacement: float, velocity: float, load
 
 def _carried(effect: Effect, words: str, displacement: float, velocity: float) -> float:
     """What a spring-slider of these words carries, anchored in the nominal state."""
-    width = float(words.split()[-3]) * effect.port.displacement
+    width = GIVE * float(words.split()[-3]) * effect.port.displacement
     return float(np.clip((displacement + SLIDER_LAG * velocity) / width, -1.0, 1.0))
 
 

@@ -54,6 +54,7 @@ SPANS = {
     "learned_strut_speed": 0.3,
     "learned_strut_carried": 4e3,
     "learned_strut_turn": 0.03,
+    "learned_strut_give": 1.2,
 }
 COEFFICIENTS = {name: 3.0 * number for number, name in enumerate(coefficients_at(STRUT), 1)}
 LEARNED = diagnosis(
