@@ -192,8 +192,8 @@ class _Ascent:
         for halving in range(HALVINGS):
             there = self._at(point.x + 0.5**halving * (top.x - point.x), here.warm_start)
             if there.value > point.value:
-                found = halving and there.value < point.value + self._level
-                return there._replace(status=Status.CONVERGED) if found else there
+                little = halving > 0 and there.value < point.value + self._level
+                return there._replace(status=Status.CONVERGED) if little else there
         return point._replace(status=Status.CONVERGED if promised < ROUGH else Status.STALLED)
 
     def mode(self, point: _Point, steps: int, progress: Progress | None = None) -> LaplaceFit:
@@ -252,8 +252,8 @@ def find_map(
 ) -> LaplaceFit:
     """The mode of the baseline with ``terms`` from ``start`` (SI, centres where not given).
 
-    The parameters ``held`` (SI, by name) stay where they are said to be. The mode is found where a step promises a
-    rise of less than ``level``. ``progress`` is called with the density at every step.
+    The parameters ``held`` (SI, by name) stay where they are said to be. The mode is found where a step promises, or
+    a halved one finds, a rise of less than ``level``. ``progress`` is called with the density at every step.
     """
     ascent = _Ascent(search, terms, held or {}, level)
     return ascent.mode(ascent.start(start, warm_start), steps, progress)
