@@ -31,7 +31,7 @@ lint: $(VENV)/.installed-test
 	$(BIN)/lint-imports
 
 # The peers in the benchmarks are tested, too.
-test-all: lint $(VENV)/.installed-bench
+test-all: lint $(VENV)/.installed-test-all
 	HYPOTHESIS_PROFILE=thorough $(BIN)/python -m pytest -m "slow or hypothesis" $(PYTEST_ARGS)
 
 bench: $(VENV)/.installed-bench
@@ -64,6 +64,10 @@ $(VENV)/.installed: pyproject.toml | $(BIN)/python
 $(VENV)/.installed-test: pyproject.toml | $(BIN)/python
 	$(PIP) install --quiet --editable '.[test]'
 	@touch $@ $(VENV)/.installed
+
+$(VENV)/.installed-test-all: pyproject.toml | $(BIN)/python
+	$(PIP) install --quiet --editable '.[test-all]'
+	@touch $@ $(VENV)/.installed $(VENV)/.installed-test $(VENV)/.installed-bench $(VENV)/.installed-docs
 
 $(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
 	$(PIP) install --quiet --editable '.[docs]'

@@ -34,7 +34,7 @@ os.environ["JAX_NUMPY_DTYPE_PROMOTION"] = "strict"
 settings.register_profile(
     "fast", max_examples=12, deadline=None, database=None, print_blob=True, derandomize=True
 )
-settings.register_profile("thorough", max_examples=50, deadline=None, database=None, print_blob=True)
+settings.register_profile("thorough", max_examples=36, deadline=None, database=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fast"))
 
 # A shell that runs the tests in its background ignores Ctrl-C, and so would the programs that the tests interrupt.
@@ -64,24 +64,34 @@ APART = ("tests/notebooks/test_notebooks.py",)
 """Modules whose tests share nothing and take minutes: each test is a room of its own."""
 
 LONGEST_FIRST = (
+    *("diagnosis/test_whole_diagnoses.py", "notebooks", "diagnosis/test_another_law.py"),
+    *("inference", "control", "export", "effects", "symbolic", "simulate", "fit"),
     *(
-        "notebooks",
+        "diagnosis/test_motion_problem.py",
+        "cli/test_posterior.py",
         "test_public.py",
-        "validation",
-        "diagnosis",
-        "test_any_plant.py",
-        "docs",
-        "browser",
-        "cli",
+        "plants/test_contract.py",
     ),
-    *("export", "simulate", "control", "inference", "effects", "symbolic", "fit"),
+    *("validation", "diagnosis", "test_any_plant.py", "docs", "browser", "cli"),
 )
-"""Folders and modules with tests of a minute and more, and folders that one process takes whole, in the order in
-which `make test-all` begins with them: what is left for the end must be short, or one process works alone."""
+"""Folders and modules in the order in which the rooms of their tests are begun with: what is left for the end must be
+short, or one process works alone."""
 
 UNOPTIMISED = "--xla_backend_optimization_level=0"
-"""The compiler takes half the time with it. The fast tests compile more than they compute; `make test-all` compiles
-as in use."""
+"""The compiler takes half the time with it. The fast tests compile more than they compute; of the slow ones those of
+:data:`COMPILED_MORE_THAN_COMPUTED` do, and the others are compiled as in use."""
+
+COMPILED_MORE_THAN_COMPUTED = (
+    *("control", "effects", "export", "fit", "plants", "simulate", "symbolic"),
+    *(
+        "cli/test_closed_loop.py",
+        "cli/test_control.py",
+        "diagnosis/test_drift.py",
+        "diagnosis/test_two_mass.py",
+    ),
+    *("diagnosis/test_whole_diagnoses.py", "docs/test_contributing.py", "test_any_plant.py"),
+)
+"""Folders and modules of tests that run each of their programs a few times."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -102,16 +112,26 @@ def _only_the_fast(config: pytest.Config) -> bool:
     return bool(config.getoption("markexpr") == "not slow")
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Where slow tests run, those that take longest come first."""
-    if not _only_the_fast(config):
-        place = {REPOSITORY / "tests" / name: number for number, name in enumerate(LONGEST_FIRST)}
-        items.sort(
-            key=lambda item: min(
-                (place[each] for each in (item.path, *item.path.parents) if each in place),
-                default=len(place),
-            )
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Before the fixtures of a slow test are made; how the fast ones are compiled stands in the environment."""
+    if not _only_the_fast(item.config):
+        import jax
+
+        places = {REPOSITORY / "tests" / name for name in COMPILED_MORE_THAN_COMPUTED}
+        jax.config.update(
+            "jax_disable_most_optimizations", not places.isdisjoint((item.path, *item.path.parents))
         )
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests in the order of :data:`LONGEST_FIRST`."""
+    place = {REPOSITORY / "tests" / name: number for number, name in enumerate(LONGEST_FIRST)}
+    items.sort(
+        key=lambda item: next(
+            (place[each] for each in (item.path, *item.path.parents) if each in place), len(place)
+        )
+    )
 
 
 class _Rooms(LoadScopeScheduling):
@@ -136,7 +156,7 @@ class _Rooms(LoadScopeScheduling):
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadScopeScheduling:
     """Where tests run in several processes, spread them by room; see LONGEST_FIRST."""
-    config.option.loadscopereorder = _only_the_fast(config)
+    config.option.loadscopereorder = False
     return _Rooms(config, log)
 
 

@@ -359,6 +359,7 @@ class FreeVector(eqx.Module):
             tolerated_bijection(parameter) for parameter in self.parameters[split:]
         ]
 
+    @eqx.filter_jit
     def _values(self, u: Float[Array, " n"]) -> Float[Array, " n"]:
         # All maps of one kind in one operation: dozens of scalar ones would take a second to compile.
         values = jnp.zeros_like(u)

@@ -13,8 +13,8 @@ hypothesis under a prior whose width is the material size (:class:`~savgs_ident.
 missing is what stands out of them.
 
 Beside them stand errors of known size, which calibration may take up. What the sheet knows as a curve, as the table
-of a damper, has a tolerance at every point of it; and what is identified, a friction or a damping, may change while a
-campaign goes on and parts become warm.
+of a damper, has a tolerance at every point of it, and errs alike at points near each other; and what is identified, a
+friction or a damping, may change while a campaign goes on and parts become warm.
 """
 
 from collections.abc import Sequence
@@ -100,6 +100,23 @@ def relative_change(data: Data, channel: NDArray[np.intp], columns: Matrix) -> N
     return np.asarray(np.sqrt(np.max(squares[whole > 0.0] / whole[whole > 0.0, None], axis=0)))
 
 
+def errors_of_curve(
+    velocity: NDArray[np.float64], force: NDArray[np.float64], constants: DecisionConstants = DEFAULTS
+) -> list[NDArray[np.float64]]:
+    """What independent relative errors of one of a damper's curve do to its ``force`` (P,) along a motion.
+
+    At each point of the curve they add up to an error of variance one, which is correlated with those of its
+    neighbours to the same side by exp(-|ln(v_i / v_j)| / ln ``curve_alike``). Velocities and forces are in the units
+    of their port, which the errors keep.
+    """
+    points = _points(constants)
+    pieces = np.stack(pieces_of_curve(velocity, force, constants))
+    distance = np.subtract.outer(*[np.log(np.where(points == 0.0, 1.0, np.abs(points)))] * 2)
+    same_side = np.equal.outer(np.sign(points), np.sign(points))
+    alike = np.where(same_side, np.exp(-np.abs(distance) / np.log(constants.curve_alike)), 0.0)
+    return list(np.linalg.cholesky(alike).T @ pieces)
+
+
 def pieces_of_curve(
     velocity: NDArray[np.float64], force: NDArray[np.float64], constants: DecisionConstants = DEFAULTS
 ) -> list[NDArray[np.float64]]:
@@ -107,10 +124,15 @@ def pieces_of_curve(
 
     Between points the errors are straight. Velocities and forces are in the units of their port, which they keep.
     """
-    beside = constants.curve_points
-    points = np.array([*(-share for share in reversed(beside)), 0.0, *beside])
     relative = velocity / max(float(np.abs(velocity).max()), np.finfo(float).tiny)
+    points = _points(constants)
     return [np.interp(relative, points, unit) * force for unit in np.eye(points.size)]
+
+
+def _points(constants: DecisionConstants) -> NDArray[np.float64]:
+    """Of a damper's curve, as shares of the largest velocity, rising."""
+    beside = constants.curve_points
+    return np.array([*(-share for share in reversed(beside)), 0.0, *beside])
 
 
 def time_of(recorded: NDArray[np.float64]) -> NDArray[np.float64]:

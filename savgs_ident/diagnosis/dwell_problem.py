@@ -21,7 +21,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import joint_status
 from savgs_ident.core.values import Values
-from savgs_ident.diagnosis.background import pieces_of_curve, with_background, without_drifts
+from savgs_ident.diagnosis.background import errors_of_curve, with_background, without_drifts
 from savgs_ident.diagnosis.effect_sensitivities import impose, node_loads, rehearse, sensitivities_with_states
 from savgs_ident.diagnosis.gap import CyclePosition, MapCell, cycle_positions, gap_map
 from savgs_ident.diagnosis.localisation import InputLocation, Localisation
@@ -281,14 +281,14 @@ class DwellProblem(AbstractProblem):
         return np.array(self.recorded or range(self.shape[0]), np.float64)
 
     def _curves(self, values: Mapping[str, float], warm_start: PeriodicSolution) -> NDArray[np.float64]:
-        """What relative errors of one at points of the dampers' curves do to the rows, (m, points)."""
+        """What independent relative errors of one of the dampers' curves do to the rows, (m, points)."""
         model, p = self.complete(()), self.values(values)
         seen = self.port_signals(values, warm_start)
         fields = [
             (port.name, piece)
             for port in self.plant.ports
             if port.damped
-            for piece in pieces_of_curve(
+            for piece in errors_of_curve(
                 np.asarray(seen[port.name].velocity), np.asarray(seen[port.name].load), self.constants
             )
         ]

@@ -164,6 +164,13 @@ class DecisionConstants:
     Origin: by choice, as dense as tables are.
     """
 
+    curve_alike: float = 2.0
+    """Ratio of two velocities at which the errors of a damper's curve are correlated by 1/e.
+
+    Origin: by choice: what makes a table wrong, the oil's temperature or a friction in the dynamometer, makes a
+    stretch of it wrong, not single points.
+    """
+
     drift_tolerance: float = 0.05
     """Change of an identified parameter from the middle of a campaign to its ends, as a share of it.
 

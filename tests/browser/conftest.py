@@ -6,17 +6,18 @@ from base64 import b64decode
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
-from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
 
 from savgs_ident.core.presentation import Origin
 from savgs_ident.inference.result import Posterior
 from savgs_ident.report.posterior.page import posterior_html
 
 from ..report.posterior_synthetic import nominal_response, renamed, synthetic_posterior, unconverged
+
+if TYPE_CHECKING:
+    from selenium import webdriver
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 HOSTILE = "<script>alert(1)</script>\"'&amp;</td><img src=x onerror=alert(2)><b>$\\pi$</b> \x1b[31m\x07\ud800"
@@ -30,7 +31,7 @@ SHOWN = (
 class Browser:
     """A browser window that takes note of everything a page tries."""
 
-    driver: webdriver.Chrome
+    driver: "webdriver.Chrome"
 
     def open(self, page: Path, width: int = 1400) -> None:
         """Show a file in a window of this width [CSS pixel], as a phone would if it is narrow."""
@@ -71,6 +72,10 @@ class Browser:
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     """Headless Chromium; the test is left out where there is none."""
+    # Not among what the fast tests need.
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
     program = next(filter(None, map(shutil.which, BROWSERS)), None)
     steering = shutil.which("chromedriver")
     if program is None or steering is None:

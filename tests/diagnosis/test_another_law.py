@@ -130,7 +130,7 @@ def test_a_friction_of_the_joints_would_do_the_same_in_the_strut_and_not_at_the_
     joints = FOREIGN["joint_smooth"].effect
     response = _recorded(measure_few("nominal"), rig, joints)
     strut, rail, road = (
-        log_odds_of_port(response, rig, joints, each, SIMTR) for each in ("strut", "rail", "road")
+        log_odds_of_port(response, rig, joints, each, COARSE) for each in ("strut", "rail", "road")
     )
     assert strut is not None
     assert abs(strut) < DEFAULTS.indistinguishable_log_odds

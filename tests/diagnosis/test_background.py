@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.presentation import no_progress
-from savgs_ident.diagnosis.background import pieces_of_curve, relative_change, with_background
+from savgs_ident.diagnosis.background import (
+    errors_of_curve,
+    pieces_of_curve,
+    relative_change,
+    with_background,
+)
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence
 from savgs_ident.diagnosis.localisation import InputLocation, Law
 from savgs_ident.diagnosis.model_selection import compare_models, decide_among, recalibrate
@@ -66,6 +71,18 @@ def test_the_pieces_of_a_curve_are_the_curve() -> None:
     np.testing.assert_allclose(np.sum(pieces, axis=0), force, atol=1e-9)
     # Each stands for a part of the curve alone.
     assert max(np.count_nonzero(each) for each in pieces) < 40
+
+
+def test_errors_of_a_curve_are_of_the_tolerated_size_and_alike_where_velocities_are_near() -> None:
+    """Read at the points themselves under a force of one, their covariance is that which is said."""
+    beside = np.array(DEFAULTS.curve_points)
+    errors = np.stack(errors_of_curve(np.concatenate([-beside[::-1], beside]), np.ones(2 * beside.size)))
+    covariance = errors.T @ errors
+    np.testing.assert_allclose(np.diag(covariance), 1.0)
+    one_side = covariance[beside.size :, beside.size :]
+    ratio = np.divide.outer(beside, beside)
+    np.testing.assert_allclose(one_side, np.exp(-np.abs(np.log2(ratio))), atol=1e-12)
+    np.testing.assert_allclose(covariance[: beside.size, beside.size :], 0.0, atol=1e-12)
 
 
 def _with_damper_off(rig: Rig, share: float, seed: int) -> Rig:

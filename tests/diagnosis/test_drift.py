@@ -31,16 +31,15 @@ def _diagnosed(fading: float) -> Diagnosis:
         return diagnose_dwells(problem, data, response, PlantModel(TwoMass(), PARAMETERS), settings, {})
 
 
-@pytest.mark.parametrize(
-    ("fading", "word"), [(0.25, "fell"), pytest.param(-0.25, "rose", marks=pytest.mark.slow)]
-)
-def test_a_damper_that_fades_by_more_than_is_tolerated(fading: float, word: str) -> None:
+@pytest.mark.slow
+def test_a_damper_that_fades_by_more_than_is_tolerated() -> None:
+    fading = 0.25
     found = _diagnosed(fading)
     assert found.verdict.kind == "none"
     assert set(found.drifts) == {"c"}
     assert found.drifts["c"] == pytest.approx(-2.0 * fading, rel=0.04)
     ((said, percent),) = re.findall(r"`c` (fell|rose) by ([0-9.]+) %", found.verdict.sentence)
-    assert said == word
+    assert said == "fell"
     assert float(percent) == pytest.approx(100.0 * abs(found.drifts["c"]), rel=0.02)
     by_chance = DEFAULTS.sure_of_gap * found.shrink.scatter
     assert found.shrink.recalibrated**2 - found.shrink.floor**2 < DEFAULTS.material_share**2 + by_chance

@@ -135,6 +135,7 @@ def test_a_mount_is_found_and_located_among_all_laws() -> None:
     _found_and_located(_recalibrated(measured, CATALOGUE), "suspension", {"mount_compliance"})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "port"),
     [

@@ -1,4 +1,7 @@
-"""One whole diagnosis for each kind of verdict, on the linear two masses: seconds each, all stages of it."""
+"""One whole diagnosis for each kind of verdict, on the linear two masses: seconds each, all stages of it.
+
+Of a learned law where slow.
+"""
 
 from collections.abc import Iterator, Mapping
 from typing import ClassVar
@@ -158,6 +161,7 @@ def test_two_effects_are_named_and_would_be_by_other_constants() -> None:
     assert found.shrink.closed_by_effect > 0.98
 
 
+@pytest.mark.slow
 def test_a_law_that_the_catalogue_does_not_have_is_learned_at_its_port() -> None:
     varied, watch = _varied()
     found = _diagnosed(_recorded(FOREIGN), watch)

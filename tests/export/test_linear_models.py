@@ -41,6 +41,7 @@ def test_friction_is_what_holds_at_rest() -> None:
     assert {name for name, effect in EFFECTS.items() if is_friction(effect)} == DRY
 
 
+@pytest.mark.slow
 def test_both_are_those_of_the_control_stage(rig: Rig) -> None:
     model = ExportedModel(RigModel(rig, MODELS["simtr"]))
     p, bare = as_values(rig.parameters.as_dict()), build_model(rig, ())

@@ -15,7 +15,9 @@ from .toy import Toy
 from .toy_surrogate import Stand
 
 
-@pytest.mark.parametrize("name", SAMPLERS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(each, marks=pytest.mark.slow if each == "nuts" else ()) for each in SAMPLERS]
+)
 def test_it_goes_on_until_every_identified_parameter_is_known_well_enough(
     name: str, bent: Toy, rough: Stand
 ) -> None:

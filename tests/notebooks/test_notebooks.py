@@ -6,7 +6,6 @@ from pathlib import Path
 
 import nbformat
 import pytest
-from nbclient import NotebookClient
 
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 CHANCE = 0.15
@@ -39,6 +38,9 @@ def test_a_notebook_is_stored_with_its_results_and_without_errors(path: Path) ->
 @pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs_and_prints_what_is_stored_in_it(path: Path) -> None:
+    # Not among what the fast tests need.
+    from nbclient import NotebookClient
+
     kept = nbformat.read(path, as_version=4)
     fresh = nbformat.read(path, as_version=4)
     # JAX as users have it, without the strictness of the tests, which a kernel would inherit.
