@@ -189,7 +189,7 @@ def test_the_error_follows_the_tolerance(simtr: Bench) -> None:
 
     def error(tolerance: float) -> np.floating:
         """Of several runs: where a step ends at a reversal, another rounding halves or doubles it."""
-        close = tolerance * np.array([0.9, 0.95, 1.0, 1.05, 1.1])
+        close = tolerance * np.linspace(0.8, 1.2, 9)
         return np.median([np.max(np.abs(motion(each) - exact)) for each in close])
 
     exact = motion(1e-11)
