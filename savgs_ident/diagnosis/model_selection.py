@@ -214,7 +214,7 @@ SIZES = 100
 
 def _chance_of_little(problem: DiagnosisProblem, amplitudes: Amplitudes) -> float:
     """The probability [1] that an effect which was only scored changes the response by too little to matter."""
-    changes = (_change(problem, rows) for rows in amplitudes.draws(SIZES).T)
+    changes = _changes(problem, amplitudes.draws(SIZES))
     return float(np.mean([not each.matters(problem.constants) for each in changes]))
 
 
@@ -391,11 +391,18 @@ def change_without(problem: DiagnosisProblem, mode: LaplaceFit, gone: Sequence[s
 
 
 def _change(problem: DiagnosisProblem, rows: NDArray[np.float64]) -> Change:
-    """A change of the rows, in the channel where it is greatest."""
+    """A change of the rows (m,), in the channel where it is greatest."""
+    return _changes(problem, rows[:, None])[0]
+
+
+def _changes(problem: DiagnosisProblem, rows: NDArray[np.float64]) -> list[Change]:
+    """Changes of the rows, (m, changes), each in the channel where it is greatest."""
     channel, data = problem.plant.channel, problem.data
 
-    def share(group: NDArray[np.intp]) -> float:
-        squares, whole = np.bincount(group, rows**2), np.bincount(group, data.measured**2)
-        return float(np.sqrt(np.max(squares[whole > 0.0] / whole[whole > 0.0])))
+    def share(group: NDArray[np.intp]) -> NDArray[np.float64]:
+        of_group = np.equal.outer(np.arange(group.max() + 1), group).astype(float)
+        squares, whole = of_group @ rows**2, of_group @ data.measured**2
+        return np.asarray(np.sqrt(np.max(squares[whole > 0.0] / whole[whole > 0.0, None], axis=0)))
 
-    return Change(share(channel), share(channel * data.tests + data.test))
+    overall, in_one_test = share(channel), share(channel * data.tests + data.test)
+    return [Change(*each) for each in zip(overall.tolist(), in_one_test.tolist(), strict=True)]

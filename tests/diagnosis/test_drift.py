@@ -45,6 +45,7 @@ def test_a_damper_that_fades_by_more_than_is_tolerated() -> None:
     assert found.shrink.recalibrated**2 - found.shrink.floor**2 < DEFAULTS.material_share**2 + by_chance
 
 
+@pytest.mark.slow
 def test_a_damper_that_stays_is_not_said_to_fade() -> None:
     found = _diagnosed(0.0)
     assert found.verdict.kind == "none"

@@ -106,6 +106,7 @@ def test_no_function_decides_by_the_defaults_where_it_is_given_others(file: str)
             assert "DEFAULTS" not in read, function.name
 
 
+@pytest.mark.slow
 def test_an_effect_with_states_is_scored_at_its_typical_size_whatever_the_width_of_its_prior(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

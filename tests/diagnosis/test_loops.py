@@ -68,6 +68,7 @@ def test_the_force_of_a_mount_does_to_the_response_what_the_mount_does(
     assert np.linalg.norm(same - given) < 0.01 * np.linalg.norm(given)
 
 
+@pytest.mark.slow
 def test_a_stiffer_tyre_pushes_in_proportion_to_its_compression(
     plant_and_data: Case, start: PeriodicSolution
 ) -> None:

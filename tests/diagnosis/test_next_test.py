@@ -56,11 +56,13 @@ def test_the_most_significant_tests_are_proposed_with_their_dwells(fitted: Fitte
         assert each.expected_sigma > 0.0
 
 
+@pytest.mark.slow
 def test_no_test_distinguishes_a_hypothesis_from_itself(fitted: Fitted) -> None:
     search, plant, one, _ = fitted
     assert all(each.expected_sigma < 1e-6 for each in next_tests(search, plant, one, one))
 
 
+@pytest.mark.slow
 def test_a_link_that_swings_while_the_road_stands_still_moves_the_body_as_its_strut_pushes(
     fitted: Fitted,
 ) -> None:
@@ -79,6 +81,7 @@ def test_a_link_that_swings_while_the_road_stands_still_moves_the_body_as_its_st
     assert not predicted(plant, one, OperatingCondition("", 0.0)).solved
 
 
+@pytest.mark.slow
 def test_at_half_the_lift_the_rail_holds_the_body_in_slow_tests(fitted: Fitted) -> None:
     """Its acceleration falls by more than the lift, the more so the slower the test."""
     _, plant, one, _ = fitted

@@ -53,6 +53,7 @@ def test_both_are_those_of_the_control_stage(rig: Rig) -> None:
         assert found.state_labels == wanted.state_labels
 
 
+@pytest.mark.slow
 def test_every_signal_has_its_unit(model: ExportedModel) -> None:
     for each in (equation_8(model.model), exact(model)):
         space = each.space
@@ -68,6 +69,7 @@ def _sag(rig: Rig, compliance: float) -> float:
     return float(np.real(found[1, 0, 0] / found[0, 0, 0]))
 
 
+@pytest.mark.slow
 def test_a_mount_that_gives_way_is_in_the_exact_one(rig: Rig) -> None:
     """The strut's spring k and the mount C are in series: the stiffness falls in proportion to k C / (1 + k C)."""
     spring, some, more = rig.parameters["k_sd"].value, 5e-7, 1.5e-6

@@ -14,10 +14,11 @@ from savgs_ident.inference.samplers.chains import SamplingSettings, new_checkpoi
 from .toy import Toy
 from .toy_surrogate import Stand
 
+ONE_OF_THEM_SLOW = [pytest.param(each, marks=pytest.mark.slow if each == "nuts" else ()) for each in SAMPLERS]
+"""What runs around both is the same; NUTS takes long to compile."""
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(each, marks=pytest.mark.slow if each == "nuts" else ()) for each in SAMPLERS]
-)
+
+@pytest.mark.parametrize("name", ONE_OF_THEM_SLOW)
 def test_it_goes_on_until_every_identified_parameter_is_known_well_enough(
     name: str, bent: Toy, rough: Stand
 ) -> None:
@@ -37,7 +38,7 @@ def test_it_goes_on_until_every_identified_parameter_is_known_well_enough(
     assert f"{least_ess(mixing):.0f} of 300" in lines[-1]
 
 
-@pytest.mark.parametrize("name", SAMPLERS)
+@pytest.mark.parametrize("name", ONE_OF_THEM_SLOW)
 def test_without_time_there_are_draws_all_the_same(name: str, bent: Toy, rough: Stand) -> None:
     settings = SamplingSettings(name, time_limit_s=0.0)
     chains = _run(

@@ -61,6 +61,7 @@ def chains(bent: Toy, rough: Stand) -> Mapping[str, Chains]:
     return {name: _sampled(name, bent, rough, steps) for name, steps in STEPS.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SAMPLERS)
 def test_draws_are_those_of_the_exact_posterior(
     name: str, chains: Mapping[str, Chains], reference: Reference
@@ -71,12 +72,14 @@ def test_draws_are_those_of_the_exact_posterior(
         assert abs(value - _true(reference, key)) < SURE * error, key
 
 
+@pytest.mark.slow
 def test_both_samplers_agree(chains: Mapping[str, Chains]) -> None:
     one, other = (_estimates(chains[name].points) for name in ("emcee", "nuts"))
     for key in one:
         assert abs(one[key][0] - other[key][0]) < SURE * np.hypot(one[key][1], other[key][1]), key
 
 
+@pytest.mark.slow
 def test_the_surrogate_alone_would_be_found_out(
     rough: Stand, reference: Reference, chains: Mapping[str, Chains]
 ) -> None:
@@ -93,6 +96,7 @@ def test_the_surrogate_alone_would_be_found_out(
     assert max(off) > 1.5 * SURE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SAMPLERS)
 def test_a_chain_says_where_it_was(name: str, chains: Mapping[str, Chains], bent: Toy, rough: Stand) -> None:
     reported = chains[name]

@@ -57,6 +57,7 @@ def test_a_typical_size_is_within_bounds_and_off_the_null(effect: Effect) -> Non
         assert parameter.value != null
 
 
+@pytest.mark.slow
 @over("effect", ONE_OF_EACH)
 def test_at_its_null_it_is_nothing_and_has_a_slope(effect: Effect, numbers: dict[str, float]) -> None:
     seen = seen_by(effect, as_values(numbers), seed=4)
@@ -75,6 +76,7 @@ def test_at_its_null_it_is_nothing_and_has_a_slope(effect: Effect, numbers: dict
         assert np.any(found != 0.0)
 
 
+@pytest.mark.slow
 @over("effect", ONE_OF_EACH)
 def test_derivatives_are_those_of_differences(effect: Effect, numbers: dict[str, float]) -> None:
     seen = seen_by(effect, as_values(numbers), seed=5)
