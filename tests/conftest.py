@@ -34,7 +34,7 @@ os.environ["JAX_NUMPY_DTYPE_PROMOTION"] = "strict"
 settings.register_profile(
     "fast", max_examples=12, deadline=None, database=None, print_blob=True, derandomize=True
 )
-settings.register_profile("thorough", max_examples=36, deadline=None, database=None, print_blob=True)
+settings.register_profile("thorough", max_examples=50, deadline=None, database=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fast"))
 
 # A shell that runs the tests in its background ignores Ctrl-C, and so would the programs that the tests interrupt.

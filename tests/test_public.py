@@ -7,8 +7,8 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import is_dataclass, replace
+from collections.abc import Iterator
+from dataclasses import is_dataclass
 from functools import partial
 from pathlib import Path
 from typing import get_args, get_type_hints
@@ -181,18 +181,10 @@ def test_a_result_shows_itself_and_writes_what_the_command_writes(tmp_path: Path
     assert time.perf_counter() - began < 60.0
 
 
-def _every_third_dwell(load: Callable[[Path], si.Campaign], path: Path) -> si.Campaign:
-    campaign = load(path)
-    third = {each.name for each in campaign.of_kind("dwell")[::3]}
-    kept = [each for each in campaign.recordings if each.kind != "dwell" or each.name in third]
-    return replace(campaign, recordings=tuple(kept))
-
-
 @pytest.mark.slow
 def test_the_ten_lines_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With fewer draws than by default, on every third dwell."""
+    """With fewer draws than by default."""
     monkeypatch.setattr(si, "sample", partial(si.sample, target_ess=150.0, patience=0.0))
-    monkeypatch.setattr(si, "load_campaign", partial(_every_third_dwell, si.load_campaign))
     section = (REPOSITORY / "README.md").read_text().split("## From Python")[1]
     code = section.split("```python\n")[1].split("```")[0]
     assert set(re.findall(r"^(?:import|from) .*$", code, re.M)) == {"import savgs_ident as si"}

@@ -95,8 +95,8 @@ def drifts_of(data: Data, count: int) -> Matrix:
 
 def relative_change(data: Data, channel: NDArray[np.intp], columns: Matrix) -> NDArray[np.float64]:
     """How much each of the columns (m, q) changes the response [1], in the channel where it changes most; (q,)."""
-    whole = np.bincount(channel, data.measured**2)
-    squares = np.stack([np.bincount(channel, column**2, whole.size) for column in columns.T], axis=1)
+    of_channel = np.equal.outer(np.arange(channel.max() + 1), channel).astype(float)
+    squares, whole = of_channel @ columns**2, of_channel @ data.measured**2
     return np.asarray(np.sqrt(np.max(squares[whole > 0.0] / whole[whole > 0.0, None], axis=0)))
 
 

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
+from savgs_ident.diagnosis.background import relative_change
 from savgs_ident.diagnosis.evidence import (
     DiagnosisEvidence,
     DiagnosisProblem,
@@ -396,13 +397,8 @@ def _change(problem: DiagnosisProblem, rows: NDArray[np.float64]) -> Change:
 
 
 def _changes(problem: DiagnosisProblem, rows: NDArray[np.float64]) -> list[Change]:
-    """Changes of the rows, (m, changes), each in the channel where it is greatest."""
+    """Changes of the rows (m, changes), each in the channel where it is greatest."""
     channel, data = problem.plant.channel, problem.data
-
-    def share(group: NDArray[np.intp]) -> NDArray[np.float64]:
-        of_group = np.equal.outer(np.arange(group.max() + 1), group).astype(float)
-        squares, whole = of_group @ rows**2, of_group @ data.measured**2
-        return np.asarray(np.sqrt(np.max(squares[whole > 0.0] / whole[whole > 0.0, None], axis=0)))
-
-    overall, in_one_test = share(channel), share(channel * data.tests + data.test)
+    in_one_test = relative_change(data, channel * data.tests + data.test, rows)
+    overall = relative_change(data, channel, rows)
     return [Change(*each) for each in zip(overall.tolist(), in_one_test.tolist(), strict=True)]

@@ -159,7 +159,9 @@ def test_the_report_on_campaigns_shows_their_names(installed: Installed, short_c
 @pytest.mark.parametrize(
     ("words", "page"),
     [
+        (("linearise",), "linearise.html"),
         (("design", "--rigs", "1"), "design.html"),
+        (("simulate", "--frequency", "2"), None),
         (("export", "--to", "json", "mat", "python-control", "casadi", "c"), None),
     ],
 )

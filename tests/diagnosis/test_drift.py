@@ -32,14 +32,14 @@ def _diagnosed(fading: float) -> Diagnosis:
 
 
 @pytest.mark.slow
-def test_a_damper_that_fades_by_more_than_is_tolerated() -> None:
-    fading = 0.25
+@pytest.mark.parametrize(("fading", "word"), [(0.25, "fell"), (-0.25, "rose")])
+def test_a_damper_that_fades_by_more_than_is_tolerated(fading: float, word: str) -> None:
     found = _diagnosed(fading)
     assert found.verdict.kind == "none"
     assert set(found.drifts) == {"c"}
     assert found.drifts["c"] == pytest.approx(-2.0 * fading, rel=0.04)
     ((said, percent),) = re.findall(r"`c` (fell|rose) by ([0-9.]+) %", found.verdict.sentence)
-    assert said == "fell"
+    assert said == word
     assert float(percent) == pytest.approx(100.0 * abs(found.drifts["c"]), rel=0.02)
     by_chance = DEFAULTS.sure_of_gap * found.shrink.scatter
     assert found.shrink.recalibrated**2 - found.shrink.floor**2 < DEFAULTS.material_share**2 + by_chance

@@ -167,8 +167,13 @@ def test_where_nothing_is_missing_nothing_is_named(tmp_path: Path) -> None:
     [
         ({"coulomb": 12.0}, {"guide_saturating_friction"}, 2),
         ({"spring": 60.0}, {"screw_stiffness"}, 4),
+        (
+            {"coulomb": 8.0, "viscous_difference": 30.0},
+            {"guide_saturating_friction", "lubricant_one_sided"},
+            5,
+        ),
     ],
-    ids=["friction", "spring"],
+    ids=["friction", "spring", "friction and directed damping"],
 )
 def test_what_was_put_in_is_named_and_nothing_else(
     laws: dict[str, float], effects: set[str], seed: int
