@@ -9,6 +9,7 @@ sensor are not among the candidates.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,7 +19,6 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import Status
-from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, cycle_position
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation
 from savgs_ident.diagnosis.location_hypotheses import force_port, ports_by_location
@@ -39,11 +39,18 @@ from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.plants.base import AbstractPlant, AtPorts
 from savgs_ident.responses.driven_motion import DrivenMotion
-from savgs_ident.simulate.along_motion import Samples, force_gain, force_slopes, needed_force, ports_along
+from savgs_ident.simulate.along_motion import (
+    Needed,
+    Samples,
+    force_gain,
+    force_slopes,
+    needed_force,
+    ports_along,
+)
 from savgs_ident.simulate.program_cache import placed
 
 WIDTH = 8
-"""Slopes are computed so many at a time: a program for each number of them would have to be compiled."""
+"""Slopes are computed in multiples of so many: a program for each number of them would have to be compiled."""
 
 PRECISION = 1e-6
 """Largest Newton step that may remain in a state, in its typical size [1]."""
@@ -106,11 +113,23 @@ class MotionProblem(AbstractProblem):
         self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
     ) -> Prediction:
         """Force rows [N] with ``terms`` at ``values`` [SI], with slopes in ``names``."""
-        model, p = self.model(terms), placed(self.values(values))
-        needed = needed_force(model, p, self.samples, self.motion.step)
+        needed, slopes = self._with_slopes(self.model(terms), values, names)
         status = Status.CONVERGED if float(needed.step_left) < PRECISION else Status.STALLED
-        rows = self.motion.rows(np.asarray(needed.force))
-        return Prediction(rows, self._slopes(model, p, names), status, warm_start)
+        return Prediction(self.motion.rows(np.asarray(needed.force)), slopes, status, warm_start)
+
+    def _with_slopes(
+        self, model: AbstractPlant, values: Mapping[str, float], names: Sequence[str]
+    ) -> tuple[Needed, NDArray[np.float64]]:
+        """The force that is needed, and slopes of the rows in the named parameters [N per SI unit], (m, n)."""
+        p, step = placed(self.values(values)), self.motion.step
+        if not names:
+            needed = needed_force(model, p, self.samples, step)
+            return needed, np.zeros((self.motion.row_times.size, 0))
+        directions = {name: np.zeros(ceil(len(names) / WIDTH) * WIDTH) for name in p}
+        for place, name in enumerate(names):
+            directions[name][place] = 1.0
+        needed, slopes = force_slopes(model, p, self.samples, step, placed(directions))
+        return needed, self.motion.rows(np.asarray(slopes)[: len(names)]).T
 
     def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
@@ -127,8 +146,8 @@ class MotionProblem(AbstractProblem):
     ) -> NDArray[np.float64]:
         """The same at given shapes: slopes at the null, or the secant to the typical size of one that has states."""
         if not self.catalogue[term.name].states:
-            model, p = self.complete(terms), placed(self.values(values))
-            return self._slopes(model, p, [each.name for each in term.amplitudes])
+            names = [each.name for each in term.amplitudes]
+            return self._with_slopes(self.complete(terms), values, names)[1]
         found = []
         for each in term.amplitudes:
             typical = self.constants.typical_coordinate * each.scale
@@ -136,18 +155,6 @@ class MotionProblem(AbstractProblem):
             moved = self.predict((*terms, term.name), there, (), None).rows - base
             found.append(moved / typical)
         return np.stack(found, axis=1)
-
-    def _slopes(self, model: AbstractPlant, p: Values, names: Sequence[str]) -> NDArray[np.float64]:
-        """Slopes of the rows in the named parameters [N per SI unit], (m, n)."""
-        parts = [np.zeros((0, self.motion.position.size))]
-        for first in range(0, len(names), WIDTH):
-            some = names[first : first + WIDTH]
-            directions = {name: np.zeros(WIDTH) for name in p}
-            for place, name in enumerate(some):
-                directions[name][place] = 1.0
-            slopes = force_slopes(model, p, self.samples, self.motion.step, placed(directions))
-            parts.append(np.asarray(slopes)[: len(some)])
-        return self.motion.rows(np.concatenate(parts)).T
 
     def port_signals(self, values: Mapping[str, float], warm_start: Any) -> Mapping[str, PortSignals]:
         """What laws see at the force ports at the samples."""
@@ -219,8 +226,7 @@ class MotionProblem(AbstractProblem):
     ) -> InputLocation:
         """A location of numbers alone: slopes in them."""
         numbers = [number for port in ports for number in port.numbers]
-        model, p = self.complete(terms), placed(self.values(values))
-        columns = self._slopes(model, p, [each.name for each in numbers])
+        columns = self._with_slopes(self.complete(terms), values, [each.name for each in numbers])[1]
         columns = columns * np.array([each.change for each in numbers])
         laws = laws_of_functions(columns, (Family.NUMBER,) * len(numbers), self.constants)
         return InputLocation(name, laws, columns)

@@ -10,7 +10,7 @@ sticks) are marched along the motion from rest, by backward Euler where they sli
 elsewhere.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import equinox as eqx
@@ -44,11 +44,10 @@ class Samples(NamedTuple):
 
 
 class Course(NamedTuple):
-    """Internal states and their rates along a motion, (n, s) each, and the Newton step that was left, (n,) [1]."""
+    """Internal states and their rates along a motion, (n, s) each."""
 
     state: Float[Array, "n s"]
     rate: Float[Array, "n s"]
-    step_left: Float[Array, " n"]
 
 
 class Needed(NamedTuple):
@@ -58,56 +57,111 @@ class Needed(NamedTuple):
     step_left: Float[Array, ""]
 
 
+class NeededSlopes(NamedTuple):
+    """Force needed from the drive, and its slopes along k directions of the parameters [N per unit]."""
+
+    needed: Needed
+    slopes: Float[Array, "k n"]
+
+
 def _at(model: AbstractPlant, now: Samples) -> tuple[Motion, tuple[InputSignal], Fundamental]:
     motion = Motion(*(model.coordinate_type(each) for each in (now.q, now.qd, now.qdd)))
     return motion, (InputSignal(now.drive, now.drive_rate),), Fundamental(now.angle, now.speed)
 
 
-def _march(model: AbstractPlant, p: Values, along: Samples, step: float) -> Course:
-    """The states of the effects along a motion, from rest."""
-    size, n = len(model.states), len(model.coordinates)
+def _weights(model: AbstractPlant) -> Float[Array, " s"]:
+    """Weight of the far end of a step in each state of the effects [1]."""
+    return jnp.asarray([1.0 if each.slips else FORWARD for each in model.states])
+
+
+def _defect(
+    model: AbstractPlant, p: Values, at: Samples, step: float, now: Array, before: Array
+) -> Float[Array, " s"]:
+    """What the equations of the states leave over a step that ends at a sample [their units]."""
+    motion, signals, fundamental = _at(model, at)
+    weight = _weights(model)
+    state, rate = weight * now + (1.0 - weight) * before, (now - before) / step
+    return model.residual(p, motion, state, rate, model.drive(signals, fundamental))[len(model.coordinates) :]
+
+
+def _jacobian(function: Callable[[Array], Array], at: Float[Array, " s"]) -> Float[Array, "s s"]:
+    columns = [jax.jvp(function, (at,), (unit,))[1] for unit in jnp.unstack(jnp.eye(at.size))]
+    return jnp.stack(columns, axis=1)
+
+
+def _march(
+    model: AbstractPlant, p: Values, along: Samples, step: float
+) -> tuple[Float[Array, "n s"], Float[Array, " n"]]:
+    """The states of the effects at the samples of a motion, from rest, and the Newton step that was left [1]."""
+    size = len(model.states)
+    if size == 0:
+        return jnp.zeros((along.q.size, 0)), jnp.zeros(along.q.size)
     scale = jnp.asarray([each.scale for each in model.states])
-    weight = jnp.asarray([1.0 if each.slips else FORWARD for each in model.states])
-    known = jax.lax.stop_gradient(p)
 
-    def advance(before: Array, at: Samples) -> tuple[Array, Course]:
-        motion, signals, fundamental = _at(model, at)
-        u = model.drive(signals, fundamental)
-
-        def parts(now: Array, before: Array) -> tuple[Array, Array]:
-            return weight * now + (1.0 - weight) * before, (now - before) / step
-
-        def defect(p: Values, now: Array, before: Array) -> Array:
-            return model.residual(p, motion, *parts(now, before), u)[n:]
-
-        def jacobian(now: Array) -> Array:
-            columns = [
-                jax.jvp(lambda each: defect(known, each, held), (now,), (unit,))[1]
-                for unit in jnp.unstack(jnp.eye(size))
-            ]
-            return jnp.stack(columns, axis=1)
+    def advance(before: Array, at: Samples) -> tuple[Array, tuple[Array, Array]]:
+        def defect(now: Array) -> Array:
+            return _defect(model, p, at, step, now, before)
 
         def correction(now: Array) -> Array:
-            return solve_dense(jacobian(now), defect(known, now, held))
+            return solve_dense(_jacobian(defect, now), defect(now))
 
-        # The last step alone is differentiated: its slopes are those of the implicit function theorem.
-        held = jax.lax.stop_gradient(before)
-        near = jax.lax.fori_loop(0, NEWTON_STEPS - 1, lambda _, each: each - correction(each), held)
-        now = near - solve_dense(jacobian(near), defect(p, near, before))
-        left = jnp.max(jnp.abs(correction(jax.lax.stop_gradient(now))) / scale)
-        return now, Course(*parts(now, before), left)
+        now = jax.lax.fori_loop(0, NEWTON_STEPS, lambda _, each: each - correction(each), before)
+        return now, (now, jnp.max(jnp.abs(correction(now)) / scale))
 
-    if size == 0:
-        none = jnp.zeros((along.q.size, 0))
-        return Course(none, none, jnp.zeros(along.q.size))
     return jax.lax.scan(advance, jnp.zeros(size), along)[1]
 
 
-def _needed(
-    model: AbstractPlant, p: Values, along: Samples, step: float, imposed: Mapping[str, Array]
-) -> Needed:
-    """What the drive would have had to exert, with signals (n,) or (n, 2) ``imposed`` at ports [SI]."""
-    course = _march(model, p, along, step)
+def _before(now: Float[Array, "n ..."]) -> Float[Array, "n ..."]:
+    """The same a sample earlier; at rest before the first."""
+    return jnp.concatenate([jnp.zeros_like(now[:1]), now[:-1]])
+
+
+def _course(model: AbstractPlant, now: Float[Array, "n s"], step: float) -> Course:
+    """States at samples as the equations take them: between the ends of each step."""
+    weight, before = _weights(model), _before(now)
+    return Course(weight * now + (1.0 - weight) * before, (now - before) / step)
+
+
+def _moved(
+    model: AbstractPlant, p: Values, along: Samples, step: float, now: Float[Array, "n s"], directions: Values
+) -> Float[Array, "k n s"]:
+    """Change of the states at the samples per unit of k directions of the parameters.
+
+    By the implicit function theorem at each sample, all at once; only the sum over time is taken step by step.
+    """
+    count = next(iter(directions.values())).size
+    if now.shape[1] == 0:
+        return jnp.zeros((count, *now.shape))
+
+    def linear(at: Samples, now: Array, before: Array) -> tuple[Array, Array]:
+        ahead = _jacobian(lambda each: _defect(model, p, at, step, each, before), now)
+        behind = _jacobian(lambda each: _defect(model, p, at, step, now, each), before)
+
+        def of(p: Values) -> Array:
+            return _defect(model, p, at, step, now, before)
+
+        forced = jax.vmap(lambda direction: jax.jvp(of, (dict(p),), (direction,))[1], out_axes=1)(directions)
+        columns = jnp.concatenate([behind, forced], axis=1)
+        solved = jax.vmap(lambda column: -solve_dense(ahead, column), in_axes=1, out_axes=1)(columns)
+        return solved[:, : now.size], solved[:, now.size :]
+
+    def advance(moved: Array, by: tuple[Array, Array]) -> tuple[Array, Array]:
+        carried, forced = by
+        moved = carried @ moved + forced
+        return moved, moved
+
+    steps = jax.vmap(linear)(along, now, _before(now))
+    return jnp.moveaxis(jax.lax.scan(advance, jnp.zeros((now.shape[1], count)), steps)[1], 2, 0)
+
+
+def _force(
+    model: AbstractPlant,
+    p: Values,
+    along: Samples,
+    course: Course,
+    imposed: Mapping[str, Float[Array, "n ..."]],
+) -> Float[Array, " n"]:
+    """What the drive would have had to exert [N], with signals (n,) or (n, 2) ``imposed`` at ports [SI]."""
 
     def at(now: Samples, s: Array, sd: Array, imposed: Mapping[str, Array]) -> Array:
         motion, (recorded,), fundamental = _at(model, now)
@@ -119,38 +173,47 @@ def _needed(
         r, slope = jax.jvp(out_of_balance, (now.drive,), (jnp.ones_like(now.drive),))
         return now.drive - r / slope
 
-    force = jax.vmap(at)(along, course.state, course.rate, dict(imposed))
-    return Needed(force, jnp.max(course.step_left))
+    return jax.vmap(at)(along, *course, dict(imposed))
 
 
 @eqx.filter_jit
 def needed_force(model: AbstractPlant, p: Values, along: Samples, step: float) -> Needed:
     """What the drive would have had to exert, and whether the states were found."""
-    return _needed(model, p, along, step, nothing_imposed(model.ports, along.q))
+    now, left = _march(model, p, along, step)
+    course = _course(model, now, step)
+    force = _force(model, p, along, course, nothing_imposed(model.ports, along.q))
+    return Needed(force, jnp.max(left))
 
 
 @eqx.filter_jit
 def force_slopes(
     model: AbstractPlant, p: Values, along: Samples, step: float, directions: Mapping[str, Float[Array, " k"]]
-) -> Float[Array, "k n"]:
-    """Slopes of the force along k directions of the parameters."""
+) -> NeededSlopes:
+    """What :func:`needed_force` gives, and slopes of the force along k directions of the parameters."""
+    now, left = _march(model, p, along, step)
     blank = nothing_imposed(model.ports, along.q)
 
-    def of(p: Values) -> Array:
-        return _needed(model, p, along, step, blank).force
+    def force(p: Values, now: Array) -> Array:
+        return _force(model, p, along, _course(model, now, step), blank)
 
-    return jax.vmap(lambda direction: jax.jvp(of, (dict(p),), (direction,))[1])(dict(directions))
+    def slope(direction: Values, moved: Array) -> tuple[Array, Array]:
+        return jax.jvp(force, (dict(p), now), (direction, moved))
+
+    moved = _moved(model, p, along, step, now, dict(directions))
+    at, slopes = jax.vmap(slope, out_axes=(None, 0))(dict(directions), moved)
+    return NeededSlopes(Needed(at, jnp.max(left)), slopes)
 
 
 @eqx.filter_jit
 def force_gain(model: AbstractPlant, p: Values, along: Samples, step: float, port: str) -> Float[Array, " n"]:
     """Change of the needed force per unit of a signal imposed at a port [N per the port's unit], (n,)."""
+    course = _course(model, _march(model, p, along, step)[0], step)
     blank = nothing_imposed(model.ports, along.q)
     unit = jnp.zeros_like(blank[port])
     unit = unit.at[:, 0].set(1.0) if unit.ndim == 2 else jnp.ones_like(unit)
 
     def of(signal: Array) -> Array:
-        return _needed(model, p, along, step, blank | {port: signal}).force
+        return _force(model, p, along, course, blank | {port: signal})
 
     return jax.jvp(of, (blank[port],), (unit,))[1]
 
@@ -158,10 +221,9 @@ def force_gain(model: AbstractPlant, p: Values, along: Samples, step: float, por
 @eqx.filter_jit
 def ports_along(model: AbstractPlant, p: Values, along: Samples, step: float) -> AtPorts:
     """What laws see at the ports at every sample, (n,) each."""
-    course = _march(model, p, along, step)
 
     def at(now: Samples, s: Array, sd: Array) -> AtPorts:
         motion, signals, fundamental = _at(model, now)
         return model.at_ports(p, motion, s, sd, model.drive(signals, fundamental))
 
-    return jax.vmap(at)(along, course.state, course.rate)
+    return jax.vmap(at)(along, *_course(model, _march(model, p, along, step)[0], step))
