@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
@@ -52,7 +51,12 @@ from savgs_ident.simulate.periodic import (
     simulate_periodic,
 )
 from savgs_ident.simulate.program_cache import placed, run_cached
-from savgs_ident.simulate.sensitivity import directional
+from savgs_ident.simulate.sensitivity import (
+    Directions,
+    directional,
+    directions_of,
+    unit_tangents,
+)
 
 
 @eqx.filter_jit
@@ -65,7 +69,7 @@ def rows_of(
 
 @eqx.filter_jit
 def slopes_of(*args: Any) -> tuple[Array, ...]:
-    """Their slopes along directions (k, n) of named parameters, (k, m) [unit of the reading]."""
+    """Their slopes along k directions of the parameters, (k, m) [unit of the reading]."""
     return run_cached(_directional_rows, *args)
 
 
@@ -74,12 +78,10 @@ def _directional_rows(
     likelihood: Likelihood,
     p: Values,
     solution: PeriodicSolution,
-    directions: Array,
-    names: tuple[str, ...],
+    directions: Directions,
     orders: int,
 ) -> tuple[Array]:
-    along = directional(model, p, solution, names, orders)
-    return (jax.lax.map(lambda direction: likelihood.rows(along(direction)), directions),)
+    return (directional(model, p, solution, orders, directions, likelihood.rows),)
 
 
 WIDTH = 52
@@ -242,11 +244,9 @@ class DwellProblem(AbstractProblem):
         parts = [np.zeros((0, self.likelihood.measured.size))]
         for first in range(0, len(names), WIDTH):
             some = names[first : first + WIDTH]
-            directions = np.zeros((WIDTH, len(self.names)))
-            directions[np.arange(len(some)), [self.names.index(name) for name in some]] = 1.0
-            (slopes,) = slopes_of(
-                model, self.likelihood, p, solution, placed(jnp.asarray(directions)), self.names, self.orders
-            )
+            tangents = unit_tangents(p, some, WIDTH)
+            directions = directions_of(model, p, placed(tangents))
+            (slopes,) = slopes_of(model, self.likelihood, p, solution, directions, self.orders)
             parts.append(np.asarray(slopes)[: len(some)])
         return np.concatenate(parts).T
 

@@ -48,6 +48,7 @@ from savgs_ident.simulate.along_motion import (
     ports_along,
 )
 from savgs_ident.simulate.program_cache import placed
+from savgs_ident.simulate.sensitivity import unit_tangents
 
 WIDTH = 8
 """Slopes are computed in multiples of so many: a program for each number of them would have to be compiled."""
@@ -125,10 +126,8 @@ class MotionProblem(AbstractProblem):
         if not names:
             needed = needed_force(model, p, self.samples, step)
             return needed, np.zeros((self.motion.row_times.size, 0))
-        directions = {name: np.zeros(ceil(len(names) / WIDTH) * WIDTH) for name in p}
-        for place, name in enumerate(names):
-            directions[name][place] = 1.0
-        needed, slopes = force_slopes(model, p, self.samples, step, placed(directions))
+        directions = placed(unit_tangents(p, names, ceil(len(names) / WIDTH) * WIDTH))
+        needed, slopes = force_slopes(model, p, self.samples, step, directions)
         return needed, self.motion.rows(np.asarray(slopes)[: len(names)]).T
 
     def sensitivities(

@@ -30,7 +30,6 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jax.extend.core import jaxpr_as_fun
 from jaxtyping import Array, Float
 
 from savgs_ident.core.values import Values
@@ -196,18 +195,19 @@ def residual_at_nodes(
 def _residual_and_columns(function: Callable[..., Array], parts: tuple[Array, ...]) -> tuple[Array, Array]:
     """A residual and its derivatives in each of its scalar arguments.
 
-    One forward pass a column lets each column compute only what that unknown touches.
+    One pass a column through the linear part lets each column compute only what that unknown touches.
     """
-    closed = jaxpr_as_fun(jax.make_jaxpr(function)(*parts))
-    columns = []
-    for i, part in enumerate(parts):
+    residual, linear = jax.linearize(function, *parts)
+    still = [jnp.zeros_like(part) for part in parts]
 
-        def along(moved: Array, i: int = i) -> Array:
-            return closed(*parts[:i], moved, *parts[i + 1 :])[0]
+    def column(i: int) -> Array:
+        def along(moved: Array) -> Array:
+            change: Array = linear(*still[:i], moved, *still[i + 1 :])
+            return change
 
-        residual, column = jax.jvp(along, (part,), (jnp.ones_like(part),))
-        columns.append(column)
-    return residual, jnp.stack(columns, axis=1)
+        return jax.jvp(along, (still[i],), (jnp.ones_like(still[i]),))[1]
+
+    return residual, jnp.stack([column(i) for i in range(len(parts))], axis=1)
 
 
 def implicitness(model: AbstractPlant) -> Float[Array, "m 1"]:
@@ -217,11 +217,16 @@ def implicitness(model: AbstractPlant) -> Float[Array, "m 1"]:
 
 
 def linearise(
-    model: AbstractPlant, p: Values, at: Trajectory, u: Any, layout: Layout, steps: Float[Array, " P"]
+    model: AbstractPlant,
+    p: Values,
+    prepared: Any,
+    at: Trajectory,
+    u: Any,
+    layout: Layout,
+    steps: Float[Array, " P"],
 ) -> Linearised:
     """Linearise residual and steps about a trajectory; ``steps`` [s] from each node to the next."""
     parts = (*at.x, *at.y)
-    prepared = model.prepare(p)
     residual, jacobian = _residual_and_columns(lambda *z: residual_at_nodes(model, p, prepared, z, u), parts)
     size = at.x.shape[0]
     mass = jacobian[:, size:]

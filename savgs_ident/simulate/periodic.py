@@ -108,9 +108,9 @@ def _rates(model: AbstractPlant, at: Trajectory) -> Array:
 
 
 def _newton_step(
-    model: AbstractPlant, p: Values, at: Trajectory, u: Any, layout: Layout, steps: Array
+    model: AbstractPlant, p: Values, prepared: Any, at: Trajectory, u: Any, layout: Layout, steps: Array
 ) -> tuple[Trajectory, Linearised]:
-    lin = linearise(model, p, at, u, layout, steps)
+    lin = linearise(model, p, prepared, at, u, layout, steps)
     rate = _rates(model, at).at[len(model.coordinates) :].add(lin.imbalance)
     return solve_linearised(layout, lin, step_defects(model, at, rate, layout, steps), lin.imbalance), lin
 
@@ -118,6 +118,7 @@ def _newton_step(
 def solve_newton(
     model: AbstractPlant,
     p: Values,
+    prepared: Any,
     start: Trajectory,
     u: Any,
     layout: Layout,
@@ -135,7 +136,7 @@ def solve_newton(
     def advance(progress: _Progress) -> _Progress:
         before = progress.result
         at = before.trajectory
-        change, lin = _newton_step(model, p, at, u, layout, steps)
+        change, lin = _newton_step(model, p, prepared, at, u, layout, steps)
         length = _over_dwells(jnp.max(jnp.abs(change.x) / scale, axis=0), layout)
         damped = jnp.maximum(progress.share / 2.0, LEAST_SHARE)
         share = jnp.where(length > before.last_step, damped, jnp.minimum(1.0, 2.0 * progress.share))
@@ -212,7 +213,9 @@ def solve_on_mesh(
     """Newton's method on given nodes from a given start."""
     bounds = jnp.asarray(limit), jnp.asarray(TOLERANCE)
     p, excitation, mesh, start, bounds = placed((p, excitation, mesh, start, bounds))
-    parts = _solved(model, p, excitation, mesh, start, *bounds)
+    # Apart from the program, which would compile it again for every model.
+    prepared = model.prepare(p)
+    parts = _solved(model, p, prepared, excitation, mesh, start, *bounds)
     trajectory, linearised, last_step, iterations = jax.tree.unflatten(newton_structure(), parts)
     travel = tuple(each.travel for each in model.coordinates)
     return PeriodicSolution(excitation, mesh, trajectory, linearised, last_step, iterations, travel=travel)
@@ -226,6 +229,7 @@ def _solved(*args: Any) -> tuple[Array, ...]:
 def _solve(
     model: AbstractPlant,
     p: Values,
+    prepared: Any,
     excitation: Excitation,
     mesh: Mesh,
     start: Trajectory,
@@ -236,7 +240,8 @@ def _solve(
     layout, steps = mesh.layout, node_steps(excitation, mesh)
     scale = motion_scale(model, signals, excitation.frequency, layout)
     u = model.drive(signals, turning)
-    return tuple(jax.tree.leaves(solve_newton(model, p, start, u, layout, steps, scale, limit, enough)))
+    result = solve_newton(model, p, prepared, start, u, layout, steps, scale, limit, enough)
+    return tuple(jax.tree.leaves(result))
 
 
 def solve_near(
@@ -248,7 +253,7 @@ def solve_near(
     iterations were too few.
     """
     bounds = jnp.asarray(limit), jnp.asarray(enough)
-    parts = _solve(model, p, known.excitation, known.mesh, start, *bounds)
+    parts = _solve(model, p, model.prepare(p), known.excitation, known.mesh, start, *bounds)
     found = jax.tree.unflatten(newton_structure(), parts)
     return found.trajectory, jnp.max(found.last_step)
 

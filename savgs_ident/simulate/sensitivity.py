@@ -4,13 +4,15 @@ They change with the parameters and with signals imposed at the plant's ports. A
 its last Newton step: one more direction costs one more back substitution.
 """
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Complex, Float
+from numpy.typing import NDArray
 
 from savgs_ident.core.values import Values
 from savgs_ident.effects.composition import nothing_imposed
@@ -27,6 +29,41 @@ from savgs_ident.simulate.excitation import inputs_at, signals_at
 from savgs_ident.simulate.periodic import PeriodicSolution, harmonics_of, node_steps
 
 
+class Directions(NamedTuple):
+    """Directions of the parameters, k of them, and what they do to what a plant prepares from the parameters.
+
+    Attributes:
+        tangents: change of each parameter along every direction [its unit], (k,).
+        prepared: what :meth:`AbstractPlant.prepare` gives.
+        changes: its change along every direction, with a leading axis (k,).
+    """
+
+    tangents: dict[str, Array]
+    prepared: Any
+    changes: Any
+
+
+def directions_of(model: AbstractPlant, p: Values, tangents: Mapping[str, Float[Array, " k"]]) -> Directions:
+    """Directions that change all parameters by ``tangents`` [their units].
+
+    What is prepared has programs of its own, which serve any effects of the plant.
+    """
+
+    def prepared(tangent: dict[str, Array]) -> tuple[Any, Any]:
+        found: tuple[Any, Any] = jax.jvp(model.prepare, (dict(p),), (tangent,))
+        return found
+
+    return Directions(dict(tangents), *jax.vmap(prepared, out_axes=(None, 0))(dict(tangents)))
+
+
+def unit_tangents(p: Values, names: Sequence[str], count: int) -> dict[str, NDArray[np.float64]]:
+    """Changes by one of each named parameter in turn, (count,) for all parameters; no change where none is left."""
+    tangents = {name: np.zeros(count) for name in p}
+    for place, name in enumerate(names):
+        tangents[name][place] = 1.0
+    return tangents
+
+
 @eqx.filter_jit
 def harmonic_sensitivities(
     model: AbstractPlant, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
@@ -35,52 +72,52 @@ def harmonic_sensitivities(
 
     They are in the unit of the reading per unit of the parameter.
     """
-    return jax.lax.map(directional(model, p, solution, names, orders), jnp.eye(len(names)))
+    directions = directions_of(model, p, jax.tree.map(jnp.asarray, unit_tangents(p, names, len(names))))
+    return directional(model, p, solution, orders, directions)
 
 
 def directional(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, names: tuple[str, ...], orders: int
-) -> Callable[[Float[Array, " n"]], Complex[Array, "D C K"]]:
-    """The same along directions (n,) [units of the parameters] of the named parameters, to be mapped over."""
+    model: AbstractPlant,
+    p: Values,
+    solution: PeriodicSolution,
+    orders: int,
+    directions: Directions,
+    shown: Callable[[Array], Array] = lambda each: each,
+) -> Array:
+    """The same along k directions of the parameters, (k, ...); what is ``shown`` of each is kept."""
     at = solution.trajectory
-    moved_along = _linear_motion(model, p, solution)
+    moved_along = _linear_motion(model, p, solution, directions.prepared)
 
     def seen(q: dict[str, Array], motions: Trajectory) -> Array:
         return harmonics_of(model, q, motions, solution, orders)
 
-    def along(direction: Float[Array, " n"]) -> Complex[Array, "D C K"]:
-        tangent = _tangent(p, names, direction)
-        change: Array = jax.jvp(seen, (dict(p), at), (tangent, moved_along(tangent)))[1]
-        return change
+    def one(given: tuple[dict[str, Array], Any]) -> Array:
+        return shown(jax.jvp(seen, (dict(p), at), (given[0], moved_along(*given)))[1])
 
-    return along
+    return jax.lax.map(one, (directions.tangents, directions.changes))
 
 
 def trajectory_sensitivities(
     model: AbstractPlant, p: Values, solution: PeriodicSolution, names: tuple[str, ...]
 ) -> Trajectory:
     """Derivatives of the trajectory itself in the named parameters, each field with a leading axis (n,)."""
-    moved_along = _linear_motion(model, p, solution)
-    directions = jnp.eye(len(names))
-    return jax.lax.map(lambda direction: moved_along(_tangent(p, names, direction)), directions)
-
-
-def _tangent(p: Values, names: tuple[str, ...], direction: Array) -> dict[str, Array]:
-    return {name: jnp.zeros_like(p[name]) for name in p} | dict(zip(names, direction, strict=True))
+    directions = directions_of(model, p, jax.tree.map(jnp.asarray, unit_tangents(p, names, len(names))))
+    moved_along = _linear_motion(model, p, solution, directions.prepared)
+    return jax.lax.map(lambda given: moved_along(*given), (directions.tangents, directions.changes))
 
 
 def _linear_motion(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution
-) -> Callable[[dict[str, Array]], Trajectory]:
-    """The change of the trajectory that a change of the parameters brings about."""
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, prepared: Any
+) -> Callable[[dict[str, Array], Any], Trajectory]:
+    """The change of the trajectory by one of the parameters and of what is prepared from them."""
     at, u = solution.trajectory, inputs_at(model, solution.excitation, solution.mesh)
     parts, respond = (*at.x, *at.y), linear_response(model, p, solution)
 
-    def moved(tangent: dict[str, Array]) -> Trajectory:
-        _, change = jax.jvp(
-            lambda q: residual_at_nodes(model, q, model.prepare(q), parts, u), (dict(p),), (tangent,)
-        )
-        return respond(change)
+    def residual(q: dict[str, Array], prepared: Any) -> Array:
+        return residual_at_nodes(model, q, prepared, parts, u)
+
+    def moved(tangent: dict[str, Array], change: Any) -> Trajectory:
+        return respond(jax.jvp(residual, (dict(p), prepared), (tangent, change))[1])
 
     return moved
 
