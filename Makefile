@@ -1,8 +1,8 @@
 # Needs python3 (3.11 or newer, with venv) and make; everything else goes into .venv.
 #   make demo        the main job on the shipped recordings
 #   make test        lint, types, import contracts, tests: at most five minutes on two cores
-#   make test-all    lint and what make test leaves out: processes, browsers, notebooks, documents, FMUs, long
-#                    simulations; and the property tests once more, with more examples
+#   make test-all    what make test leaves out: processes, browsers, notebooks, documents, FMUs, long simulations;
+#                    and the property tests once more, with more examples
 #   make bench       the benchmark table
 #   make docs        the guide and the reference, in build/docs
 #   make fuzz        every loader on damaged files, counted in docs/fuzzing.md
@@ -31,7 +31,7 @@ lint: $(VENV)/.installed-test
 	$(BIN)/lint-imports
 
 # The peers in the benchmarks are tested, too.
-test-all: lint $(VENV)/.installed-test-all
+test-all: $(VENV)/.installed-test-all
 	HYPOTHESIS_PROFILE=thorough $(BIN)/python -m pytest -m "slow or hypothesis" $(PYTEST_ARGS)
 
 bench: $(VENV)/.installed-bench
