@@ -119,9 +119,11 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         import jax
 
         places = {REPOSITORY / "tests" / name for name in COMPILED_MORE_THAN_COMPUTED}
-        jax.config.update(
-            "jax_disable_most_optimizations", not places.isdisjoint((item.path, *item.path.parents))
-        )
+        unoptimised = not places.isdisjoint((item.path, *item.path.parents))
+        if unoptimised != jax.config.read("jax_disable_most_optimizations"):
+            # A program that is there already serves on, however it was compiled.
+            jax.clear_caches()
+            jax.config.update("jax_disable_most_optimizations", unoptimised)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -258,11 +258,12 @@ def _repeat(
             now = jax.lax.fori_loop(0, NEWTON_STEPS, better, before)
             return now, output(now, before, at, step)
 
-        def period(_: Array, begun: Array) -> Array:
-            return jax.lax.scan(advance, begun, signals)[0]
+        def period(begun: Array, _: None) -> tuple[Array, Array]:
+            return jax.lax.scan(advance, begun, signals)
 
-        repeated = jax.lax.fori_loop(0, PERIODS - 1, period, jnp.zeros(size))
-        return jax.lax.scan(advance, repeated, signals)[1]
+        # All periods are kept and the last is taken: apart from the others it would be compiled once more.
+        periods: Array = jax.lax.scan(period, jnp.zeros(size), length=PERIODS)[1]
+        return periods[-1]
 
     return jax.vmap(one_dwell)(signals, steps)
 
