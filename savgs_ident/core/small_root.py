@@ -58,9 +58,15 @@ class _NewtonState(NamedTuple):
     iterations: Array
 
 
-def _columns(slope: Callable[[Vector], Vector], like: Vector) -> Float[Array, "n n"]:
+def _columns(slope: Callable[[Vector], Array], like: Vector) -> Float[Array, "k n"]:
     """The matrix of a linear function, column by column: for few unknowns cheaper than all at once."""
     return jnp.stack([slope(unit) for unit in jnp.unstack(jnp.eye(like.shape[0]))], axis=1)
+
+
+def jacobian(function: Callable[[Vector], Array], at: Vector) -> tuple[Array, Float[Array, "k n"]]:
+    """The value (k,) of ``function`` and its derivatives in each of a few unknowns (n,), in its units."""
+    value, slope = jax.linearize(function, at)
+    return value, _columns(slope, at)
 
 
 def solve_dense(matrix: Float[Array, "n n"], right: Vector) -> Vector:
@@ -100,11 +106,10 @@ def find_root(
 
     def newton(function: Callable[[Vector], Vector], start: Vector) -> tuple[Vector, Float[Array, ""]]:
         def advance(now: _NewtonState) -> _NewtonState:
-            residual, slope = jax.linearize(function, now.root)
-            jacobian = _columns(slope, now.root)
-            root = now.root - solve(jacobian, residual)
-            # Where the same piece holds at the new point, the old Jacobian gives the remaining step.
-            step_left = jnp.max(jnp.abs(solve(jacobian, function(root))) / scale)
+            residual, matrix = jacobian(function, now.root)
+            root = now.root - solve(matrix, residual)
+            # Where the same piece holds at the new point, the old matrix gives the remaining step.
+            step_left = jnp.max(jnp.abs(solve(matrix, function(root))) / scale)
             return _NewtonState(root, step_left, now.iterations + 1)
 
         def unfinished(now: _NewtonState) -> Array:

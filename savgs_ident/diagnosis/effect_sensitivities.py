@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
-from savgs_ident.core.small_root import solve_dense
+from savgs_ident.core.small_root import jacobian, solve_dense
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import (
     AbstractForceLaw,
@@ -249,11 +249,8 @@ def _repeat(
     def one_dwell(signals: Any, step: Array) -> Array:
         def advance(before: Array, at: Any) -> tuple[Array, Array]:
             def better(_: Array, now: Array) -> Array:
-                columns = [
-                    jax.jvp(lambda each: defect(each, before, at, step), (now,), (unit,))[1]
-                    for unit in jnp.unstack(jnp.eye(size))
-                ]
-                return now - solve_dense(jnp.stack(columns, axis=1), defect(now, before, at, step))
+                left, matrix = jacobian(lambda each: defect(each, before, at, step), now)
+                return now - solve_dense(matrix, left)
 
             now = jax.lax.fori_loop(0, NEWTON_STEPS, better, before)
             return now, output(now, before, at, step)

@@ -23,7 +23,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from casadi import Function
@@ -32,7 +31,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.core.small_root import Root, solve_dense
+from savgs_ident.core.small_root import Root, jacobian, solve_dense
 from savgs_ident.core.values import as_values
 from savgs_ident.effects.base import AbstractInputLaw, Fundamental, InputSignal
 from savgs_ident.effects.effect import Effect
@@ -97,9 +96,8 @@ class Equations:
 
         y = jnp.zeros(x.shape[0] - len(self.model.coordinates))
         for _ in range(NEWTON_STEPS):
-            value, slope = jax.linearize(balance, y)
-            columns = [slope(unit) for unit in jnp.unstack(jnp.eye(y.shape[0]))]
-            y = y - solve_dense(jnp.stack(columns, axis=1), value)
+            value, matrix = jacobian(balance, y)
+            y = y - solve_dense(matrix, value)
         return y
 
     def rates(

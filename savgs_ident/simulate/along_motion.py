@@ -10,7 +10,7 @@ sticks) are marched along the motion from rest, by backward Euler where they sli
 elsewhere.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import equinox as eqx
@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from savgs_ident.core.small_root import solve_dense
+from savgs_ident.core.small_root import jacobian, solve_dense
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import Fundamental, InputSignal
 from savgs_ident.effects.composition import nothing_imposed
@@ -84,11 +84,6 @@ def _defect(
     return model.residual(p, motion, state, rate, model.drive(signals, fundamental))[len(model.coordinates) :]
 
 
-def _jacobian(function: Callable[[Array], Array], at: Float[Array, " s"]) -> Float[Array, "s s"]:
-    columns = [jax.jvp(function, (at,), (unit,))[1] for unit in jnp.unstack(jnp.eye(at.size))]
-    return jnp.stack(columns, axis=1)
-
-
 def _march(
     model: AbstractPlant, p: Values, along: Samples, step: float
 ) -> tuple[Float[Array, "n s"], Float[Array, " n"]]:
@@ -103,7 +98,8 @@ def _march(
             return _defect(model, p, at, step, now, before)
 
         def correction(now: Array) -> Array:
-            return solve_dense(_jacobian(defect, now), defect(now))
+            left, matrix = jacobian(defect, now)
+            return solve_dense(matrix, left)
 
         now = jax.lax.fori_loop(0, NEWTON_STEPS, lambda _, each: each - correction(each), before)
         return now, (now, jnp.max(jnp.abs(correction(now)) / scale))
@@ -134,8 +130,8 @@ def _moved(
         return jnp.zeros((count, *now.shape))
 
     def linear(at: Samples, now: Array, before: Array) -> tuple[Array, Array]:
-        ahead = _jacobian(lambda each: _defect(model, p, at, step, each, before), now)
-        behind = _jacobian(lambda each: _defect(model, p, at, step, now, each), before)
+        _, ahead = jacobian(lambda each: _defect(model, p, at, step, each, before), now)
+        _, behind = jacobian(lambda each: _defect(model, p, at, step, now, each), before)
 
         def of(p: Values) -> Array:
             return _defect(model, p, at, step, now, before)
