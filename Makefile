@@ -16,7 +16,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-.PHONY: demo test lint style types test-all bench docs fuzz clean
+.PHONY: demo test lint test-all bench docs fuzz clean
 
 demo: $(VENV)/.installed
 	$(BIN)/savgs-ident demo
@@ -24,16 +24,10 @@ demo: $(VENV)/.installed
 test: lint
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
-# Side by side: each takes one core.
 lint: $(VENV)/.installed-test
-	@$(MAKE) --no-print-directory --jobs 2 types style
-
-types: $(VENV)/.installed-test
-	$(BIN)/mypy savgs_ident
-
-style: $(VENV)/.installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/mypy --num-workers 2 savgs_ident
 	$(BIN)/lint-imports
 
 # The peers in the benchmarks are tested, too.
