@@ -245,7 +245,7 @@ class DwellProblem(AbstractProblem):
         for first in range(0, len(names), WIDTH):
             some = names[first : first + WIDTH]
             tangents = unit_tangents(p, some, WIDTH)
-            directions = directions_of(model, p, placed(tangents))
+            directions = directions_of(model, p, placed(tangents), len(some))
             (slopes,) = slopes_of(model, self.likelihood, p, solution, directions, self.orders)
             parts.append(np.asarray(slopes)[: len(some)])
         return np.concatenate(parts).T

@@ -60,7 +60,7 @@ from savgs_ident.diagnosis.verdict import (
     without_immaterial_members,
 )
 from savgs_ident.effects.base import Port
-from savgs_ident.inference.find_map import LaplaceFit, Start, find_map, refine, search_of
+from savgs_ident.inference.find_map import LaplaceFit, Start, find_map, find_map_again, refine, search_of
 from savgs_ident.inference.observations import Data
 
 
@@ -92,7 +92,7 @@ def recalibrate(
         return DiagnosisProblem(plant, data, replace(search, given=start), given.rows, fine, constants)
     progress("recalibrating with a background of small errors")
     search = search_of(plant, data, start)
-    base = replace(find_map(search, (), fine.values, fine.prediction.warm_start), precise=True)
+    base = replace(find_map_again(search, (), fine), precise=True)
     return DiagnosisProblem(plant, data, search, given.rows, base, constants)
 
 

@@ -175,6 +175,10 @@ class _Ascent:
         x = [c.at(given[c.name]) if c.name in given else 0.0 for c in self._coordinates]
         return self._at(np.clip(x, *bounds_of(self._coordinates)), warm_start)
 
+    def again(self, fit: LaplaceFit) -> _Point:
+        """The point of a fit of the same plant with the same terms, which is not solved again."""
+        return self._valued(fit.x, fit.prediction)
+
     def step(self, point: _Point) -> _Point:
         """The point one step on; the same, with the status, where there is no step that rises."""
         if not point.prediction.solved or point.status is not None:
@@ -189,10 +193,14 @@ class _Ascent:
         promised = top.value - point.value
         if promised < self._level:
             return point._replace(status=Status.CONVERGED if top.converged else Status.STALLED)
-        for halving in range(HALVINGS):
-            there = self._at(point.x + 0.5**halving * (top.x - point.x), here.warm_start)
+        there = self._at(top.x, here.warm_start)
+        if there.value > point.value:
+            return there
+        for halving in range(1, HALVINGS):
+            there = self._without_slopes(point.x + 0.5**halving * (top.x - point.x), here.warm_start)
             if there.value > point.value:
-                little = halving > 0 and there.value < point.value + self._level
+                little = there.value < point.value + self._level
+                there = self._at(there.x, there.prediction.warm_start)
                 return there._replace(status=Status.CONVERGED) if little else there
         return point._replace(status=Status.CONVERGED if promised < ROUGH else Status.STALLED)
 
@@ -211,10 +219,19 @@ class _Ascent:
         return np.array([each.name in self._held for each in self._coordinates], bool)
 
     def _at(self, x: Array, warm_start: Any) -> _Point:
-        wanted = [each.name for each in self._coordinates]
+        return self._point(x, warm_start, [each.name for each in self._coordinates])
+
+    def _without_slopes(self, x: Array, warm_start: Any) -> _Point:
+        """For its value alone: slopes take longer than the motion."""
+        return self._point(x, warm_start, [])
+
+    def _point(self, x: Array, warm_start: Any, wanted: list[str]) -> _Point:
         found = self._search.plant.predict(self._names, values_at(self._coordinates, x), wanted, warm_start)
         if found.solved and not (np.isfinite(found.rows).all() and np.isfinite(found.slopes).all()):
             found = found._replace(status=Status.NOT_FINITE)
+        return self._valued(x, found)
+
+    def _valued(self, x: Array, found: Prediction) -> _Point:
         if not found.solved:
             return _Point(x, found, -np.inf)
         scales = noise_scales(self._search.rows, self._search.missed(found))
@@ -257,6 +274,17 @@ def find_map(
     """
     ascent = _Ascent(search, terms, held or {}, level)
     return ascent.mode(ascent.start(start, warm_start), steps, progress)
+
+
+def find_map_again(
+    search: Search, terms: tuple[Term, ...], fit: LaplaceFit, steps: int = STEPS
+) -> LaplaceFit:
+    """The mode from a ``fit`` of the same plant with the same terms to other data, or to other rows of them.
+
+    What the plant does there is known.
+    """
+    ascent = _Ascent(search, terms, {}, LEVEL)
+    return ascent.mode(ascent.again(fit), steps)
 
 
 def find_map_from_both(

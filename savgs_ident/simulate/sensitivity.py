@@ -36,15 +36,19 @@ class Directions(NamedTuple):
         tangents: change of each parameter along every direction [its unit], (k,).
         prepared: what :meth:`AbstractPlant.prepare` gives.
         changes: its change along every direction, with a leading axis (k,).
+        wanted: how many of them are wanted, the first ones; what comes along the others is zero.
     """
 
     tangents: dict[str, Array]
     prepared: Any
     changes: Any
+    wanted: Array
 
 
-def directions_of(model: AbstractPlant, p: Values, tangents: Mapping[str, Float[Array, " k"]]) -> Directions:
-    """Directions that change all parameters by ``tangents`` [their units].
+def directions_of(
+    model: AbstractPlant, p: Values, tangents: Mapping[str, Float[Array, " k"]], count: int
+) -> Directions:
+    """Directions that change all parameters by ``tangents`` [their units], ``count`` of which are wanted.
 
     What is prepared has programs of its own, which serve any effects of the plant.
     """
@@ -53,7 +57,8 @@ def directions_of(model: AbstractPlant, p: Values, tangents: Mapping[str, Float[
         found: tuple[Any, Any] = jax.jvp(model.prepare, (dict(p),), (tangent,))
         return found
 
-    return Directions(dict(tangents), *jax.vmap(prepared, out_axes=(None, 0))(dict(tangents)))
+    changes = jax.vmap(prepared, out_axes=(None, 0))(dict(tangents))
+    return Directions(dict(tangents), *changes, jnp.asarray(count))
 
 
 def unit_tangents(p: Values, names: Sequence[str], count: int) -> dict[str, NDArray[np.float64]]:
@@ -72,8 +77,8 @@ def harmonic_sensitivities(
 
     They are in the unit of the reading per unit of the parameter.
     """
-    directions = directions_of(model, p, jax.tree.map(jnp.asarray, unit_tangents(p, names, len(names))))
-    return directional(model, p, solution, orders, directions)
+    tangents = jax.tree.map(jnp.asarray, unit_tangents(p, names, len(names)))
+    return directional(model, p, solution, orders, directions_of(model, p, tangents, len(names)))
 
 
 def directional(
@@ -94,16 +99,43 @@ def directional(
     def one(given: tuple[dict[str, Array], Any]) -> Array:
         return shown(jax.jvp(seen, (dict(p), at), (given[0], moved_along(*given)))[1])
 
-    return jax.lax.map(one, (directions.tangents, directions.changes))
+    return _over(one, directions)
+
+
+TOGETHER = 4
+"""Directions that are solved for in one pass: more of them leave the processor's nearest memory."""
+
+
+def _over(one: Callable[[tuple[dict[str, Array], Any]], Any], directions: Directions) -> Any:
+    """What ``one`` gives of the tangents and changes of each wanted direction, with a leading axis (k,)."""
+    given = directions.tangents, directions.changes
+    size = jax.tree.leaves(given)[0].shape[0]
+    width = max(1, min(TOGETHER, size))
+    shapes = jax.eval_shape(lambda given: jax.vmap(one)(given), given)
+
+    def some(place: Array, known: Any) -> Any:
+        first = jnp.minimum(place * width, size - width)
+        part = jax.tree.map(lambda each: jax.lax.dynamic_slice_in_dim(each, first, width), given)
+        return jax.tree.map(
+            lambda all_, new: jax.lax.dynamic_update_slice_in_dim(all_, new, first, 0),
+            known,
+            jax.vmap(one)(part),
+        )
+
+    passes = (directions.wanted + width - 1) // width
+    blank = jax.tree.map(lambda each: jnp.zeros(each.shape, each.dtype), shapes)
+    return jax.lax.fori_loop(0, passes, some, blank)
 
 
 def trajectory_sensitivities(
     model: AbstractPlant, p: Values, solution: PeriodicSolution, names: tuple[str, ...]
 ) -> Trajectory:
     """Derivatives of the trajectory itself in the named parameters, each field with a leading axis (n,)."""
-    directions = directions_of(model, p, jax.tree.map(jnp.asarray, unit_tangents(p, names, len(names))))
+    tangents = jax.tree.map(jnp.asarray, unit_tangents(p, names, len(names)))
+    directions = directions_of(model, p, tangents, len(names))
     moved_along = _linear_motion(model, p, solution, directions.prepared)
-    return jax.lax.map(lambda given: moved_along(*given), (directions.tangents, directions.changes))
+    trajectories: Trajectory = _over(lambda given: moved_along(*given), directions)
+    return trajectories
 
 
 def _linear_motion(
