@@ -50,8 +50,8 @@ from savgs_ident.simulate.along_motion import (
 from savgs_ident.simulate.program_cache import placed
 from savgs_ident.simulate.sensitivity import unit_tangents
 
-WIDTH = 8
-"""Slopes are computed in multiples of so many: a program for each number of them would have to be compiled."""
+WIDTH = 48
+"""Room for slopes in one program, or multiples of it: a program for each number of them would have to be compiled."""
 
 PRECISION = 1e-6
 """Largest Newton step that may remain in a state, in its typical size [1]."""
@@ -127,7 +127,9 @@ class MotionProblem(AbstractProblem):
             needed = needed_force(model, p, self.samples, step)
             return needed, np.zeros((self.motion.row_times.size, 0))
         directions = placed(unit_tangents(p, names, ceil(len(names) / WIDTH) * WIDTH))
-        needed, slopes = force_slopes(model, p, self.samples, step, directions)
+        needed, slopes = force_slopes(
+            model, p, self.samples, step, directions, placed(np.asarray(len(names)))
+        )
         return needed, self.motion.rows(np.asarray(slopes)[: len(names)]).T
 
     def sensitivities(

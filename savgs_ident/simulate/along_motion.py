@@ -23,6 +23,7 @@ from savgs_ident.core.values import Values
 from savgs_ident.effects.base import Fundamental, InputSignal
 from savgs_ident.effects.composition import nothing_imposed
 from savgs_ident.plants.base import AbstractPlant, AtPorts, Motion
+from savgs_ident.simulate.sensitivity import along_first
 
 FORWARD = 0.52
 """Weight of the far end of a step for states that do not slip: hardly any damping, and none that rings on."""
@@ -119,34 +120,43 @@ def _course(model: AbstractPlant, now: Float[Array, "n s"], step: float) -> Cour
 
 
 def _moved(
-    model: AbstractPlant, p: Values, along: Samples, step: float, now: Float[Array, "n s"], directions: Values
+    model: AbstractPlant,
+    p: Values,
+    along: Samples,
+    step: float,
+    now: Float[Array, "n s"],
+    directions: Values,
+    wanted: Array,
 ) -> Float[Array, "k n s"]:
-    """Change of the states at the samples per unit of k directions of the parameters.
+    """Change of the states at the samples per unit of the wanted ones of k directions of the parameters.
 
     By the implicit function theorem at each sample, all at once; only the sum over time is taken step by step.
     """
-    count = next(iter(directions.values())).size
+    count, before = next(iter(directions.values())).size, _before(now)
     if now.shape[1] == 0:
         return jnp.zeros((count, *now.shape))
 
-    def linear(at: Samples, now: Array, before: Array) -> tuple[Array, Array]:
+    def carried(at: Samples, now: Array, before: Array) -> tuple[Array, Array]:
         _, ahead = jacobian(lambda each: _defect(model, p, at, step, each, before), now)
         _, behind = jacobian(lambda each: _defect(model, p, at, step, now, each), before)
+        return ahead, jax.vmap(lambda column: -solve_dense(ahead, column), in_axes=1, out_axes=1)(behind)
 
-        def of(p: Values) -> Array:
-            return _defect(model, p, at, step, now, before)
+    def forced(direction: Values) -> Array:
+        def at_sample(at: Samples, now: Array, before: Array, ahead: Array) -> Array:
+            def of(p: Values) -> Array:
+                return _defect(model, p, at, step, now, before)
 
-        forced = jax.vmap(lambda direction: jax.jvp(of, (dict(p),), (direction,))[1], out_axes=1)(directions)
-        columns = jnp.concatenate([behind, forced], axis=1)
-        solved = jax.vmap(lambda column: -solve_dense(ahead, column), in_axes=1, out_axes=1)(columns)
-        return solved[:, : now.size], solved[:, now.size :]
+            return -solve_dense(ahead, jax.jvp(of, (dict(p),), (direction,))[1])
+
+        return jax.vmap(at_sample)(along, now, before, ahead)
 
     def advance(moved: Array, by: tuple[Array, Array]) -> tuple[Array, Array]:
         carried, forced = by
         moved = carried @ moved + forced
         return moved, moved
 
-    steps = jax.vmap(linear)(along, now, _before(now))
+    ahead, carry = jax.vmap(carried)(along, now, before)
+    steps = carry, jnp.moveaxis(along_first(forced, dict(directions), wanted), 0, 2)
     return jnp.moveaxis(jax.lax.scan(advance, jnp.zeros((now.shape[1], count)), steps)[1], 2, 0)
 
 
@@ -183,21 +193,26 @@ def needed_force(model: AbstractPlant, p: Values, along: Samples, step: float) -
 
 @eqx.filter_jit
 def force_slopes(
-    model: AbstractPlant, p: Values, along: Samples, step: float, directions: Mapping[str, Float[Array, " k"]]
+    model: AbstractPlant,
+    p: Values,
+    along: Samples,
+    step: float,
+    directions: Mapping[str, Float[Array, " k"]],
+    wanted: Array,
 ) -> NeededSlopes:
-    """What :func:`needed_force` gives, and slopes of the force along k directions of the parameters."""
+    """What :func:`needed_force` gives, and slopes of the force along the first ``wanted`` directions of k."""
     now, left = _march(model, p, along, step)
-    blank = nothing_imposed(model.ports, along.q)
+    course, blank = _course(model, now, step), nothing_imposed(model.ports, along.q)
 
     def force(p: Values, now: Array) -> Array:
         return _force(model, p, along, _course(model, now, step), blank)
 
-    def slope(direction: Values, moved: Array) -> tuple[Array, Array]:
-        return jax.jvp(force, (dict(p), now), (direction, moved))
+    def slope(given: tuple[Values, Array]) -> Array:
+        return jax.jvp(force, (dict(p), now), given)[1]
 
-    moved = _moved(model, p, along, step, now, dict(directions))
-    at, slopes = jax.vmap(slope, out_axes=(None, 0))(dict(directions), moved)
-    return NeededSlopes(Needed(at, jnp.max(left)), slopes)
+    moved = _moved(model, p, along, step, now, dict(directions), wanted)
+    slopes = along_first(slope, (dict(directions), moved), wanted)
+    return NeededSlopes(Needed(_force(model, p, along, course, blank), jnp.max(left)), slopes)
 
 
 @eqx.filter_jit

@@ -99,16 +99,15 @@ def directional(
     def one(given: tuple[dict[str, Array], Any]) -> Array:
         return shown(jax.jvp(seen, (dict(p), at), (given[0], moved_along(*given)))[1])
 
-    return _over(one, directions)
+    return along_first(one, (directions.tangents, directions.changes), directions.wanted)
 
 
 TOGETHER = 4
 """Directions that are solved for in one pass: more of them leave the processor's nearest memory."""
 
 
-def _over(one: Callable[[tuple[dict[str, Array], Any]], Any], directions: Directions) -> Any:
-    """What ``one`` gives of the tangents and changes of each wanted direction, with a leading axis (k,)."""
-    given = directions.tangents, directions.changes
+def along_first(one: Callable[[Any], Any], given: Any, wanted: Array) -> Any:
+    """What ``one`` gives of each of k things ``given``, with a leading axis (k,); zero after the first ``wanted``."""
     size = jax.tree.leaves(given)[0].shape[0]
     width = max(1, min(TOGETHER, size))
     shapes = jax.eval_shape(lambda given: jax.vmap(one)(given), given)
@@ -122,7 +121,7 @@ def _over(one: Callable[[tuple[dict[str, Array], Any]], Any], directions: Direct
             jax.vmap(one)(part),
         )
 
-    passes = (directions.wanted + width - 1) // width
+    passes = (wanted + width - 1) // width
     blank = jax.tree.map(lambda each: jnp.zeros(each.shape, each.dtype), shapes)
     return jax.lax.fori_loop(0, passes, some, blank)
 
@@ -134,7 +133,8 @@ def trajectory_sensitivities(
     tangents = jax.tree.map(jnp.asarray, unit_tangents(p, names, len(names)))
     directions = directions_of(model, p, tangents, len(names))
     moved_along = _linear_motion(model, p, solution, directions.prepared)
-    trajectories: Trajectory = _over(lambda given: moved_along(*given), directions)
+    given = directions.tangents, directions.changes
+    trajectories: Trajectory = along_first(lambda each: moved_along(*each), given, directions.wanted)
     return trajectories
 
 
