@@ -30,6 +30,9 @@ from savgs_ident.inference.prior import Scales
 
 Matrix = NDArray[np.float64]
 
+SINE = 400
+"""Instants of half a sine at which power is summed up."""
+
 
 def with_background(
     data: Data,
@@ -101,20 +104,43 @@ def relative_change(data: Data, channel: NDArray[np.intp], columns: Matrix) -> N
 
 
 def errors_of_curve(
-    velocity: NDArray[np.float64], force: NDArray[np.float64], constants: DecisionConstants = DEFAULTS
+    velocity: NDArray[np.float64],
+    force: NDArray[np.float64],
+    reference: float,
+    constants: DecisionConstants = DEFAULTS,
 ) -> list[NDArray[np.float64]]:
     """What independent relative errors of one of a damper's curve do to its ``force`` (P,) along a motion.
 
     At each point of the curve they add up to an error of variance one, which is correlated with those of its
-    neighbours to the same side by exp(-|ln(v_i / v_j)| / ln ``curve_alike``). Velocities and forces are in the units
-    of their port, which the errors keep.
+    neighbours to the same side by exp(-|ln(v_i / v_j)| / ln ``curve_alike``); less what they have in common, which is
+    the damper's coefficient itself: a sine of amplitude ``reference`` of the velocity takes as much energy with the
+    errors as without. Velocities and forces are in the units of their port, which the errors keep.
     """
     points = _points(constants)
     pieces = np.stack(pieces_of_curve(velocity, force, constants))
     distance = np.subtract.outer(*[np.log(np.where(points == 0.0, 1.0, np.abs(points)))] * 2)
     same_side = np.equal.outer(np.sign(points), np.sign(points))
     alike = np.where(same_side, np.exp(-np.abs(distance) / np.log(constants.curve_alike)), 0.0)
-    return list(np.linalg.cholesky(alike).T @ pieces)
+    errors = np.linalg.cholesky(alike)
+    return list((errors - _energy_shares(velocity, force, reference, constants) @ errors).T @ pieces)
+
+
+def _energy_shares(
+    velocity: NDArray[np.float64], force: NDArray[np.float64], reference: float, constants: DecisionConstants
+) -> NDArray[np.float64]:
+    """The share of each point of a curve in the energy of a sine of the velocity [1], (points,).
+
+    The curve is that of the ``force`` (P,) along a motion; beyond its largest velocity it stays as it is there.
+    """
+    order = np.argsort(velocity)
+    sine = reference * np.sin(np.pi * ((np.arange(SINE) + 0.5) / SINE - 0.5))
+    curve = np.interp(sine, velocity[order], force[order])
+    scaled = sine / max(float(np.abs(velocity).max()), np.finfo(float).tiny)
+    energy = np.array(
+        [np.interp(scaled, _points(constants), unit) for unit in np.eye(_points(constants).size)]
+    )
+    energy = energy @ (curve * sine)
+    return np.asarray(energy / energy.sum()) if energy.any() else energy
 
 
 def pieces_of_curve(

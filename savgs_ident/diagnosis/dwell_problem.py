@@ -287,9 +287,12 @@ class DwellProblem(AbstractProblem):
         fields = [
             (port.name, piece)
             for port in self.plant.ports
-            if port.damped
+            if port.damped_at is not None
             for piece in errors_of_curve(
-                np.asarray(seen[port.name].velocity), np.asarray(seen[port.name].load), self.constants
+                np.asarray(seen[port.name].velocity),
+                np.asarray(seen[port.name].load),
+                port.damped_at,
+                self.constants,
             )
         ]
         return impose(model, self.likelihood, self.orders, p, warm_start, fields).T

@@ -114,7 +114,8 @@ class Port:
         force: a typical size [``force_unit``].
         sense: power into the plant per force and velocity of the port, 1 or -1.
         loaded: whether the port carries a load to which a friction there is proportional.
-        damped: whether that load is the force of a damper that the plant has there.
+        damped_at: where that load is the force of a damper that the plant has there, the amplitude of a sine of the
+            velocity [``displacement_unit``/s] to whose energy its coefficient refers; None where there is no damper.
         contact: names of the stiffness and damping with which a contact sticks before it slides; only there is a
             limit of friction, and all such limits load one bristle.
         numbers: parameters that may be others than the sheet's, at a number port.
@@ -135,7 +136,7 @@ class Port:
     force: float = 30.0
     sense: float = 1.0
     loaded: bool = False
-    damped: bool = False
+    damped_at: float | None = None
     contact: tuple[str, str] | None = None
     numbers: tuple[Number, ...] = ()
     inertias: tuple[Inertia, ...] = ()

@@ -61,7 +61,7 @@ LUBRICANT = Port(
     displacement=1e-3,
     velocity=0.1,
     force=20.0,
-    damped=True,
+    damped_at=0.1,
 )
 SCREW = Port(
     "screw",

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from savgs_ident.core.presentation import no_progress
 from savgs_ident.diagnosis.background import (
@@ -74,15 +76,28 @@ def test_the_pieces_of_a_curve_are_the_curve() -> None:
 
 
 def test_errors_of_a_curve_are_of_the_tolerated_size_and_alike_where_velocities_are_near() -> None:
-    """Read at the points themselves under a force of one, their covariance is that which is said."""
+    """Read at the points themselves, the covariance of their differences is that which is said."""
     beside = np.array(DEFAULTS.curve_points)
-    errors = np.stack(errors_of_curve(np.concatenate([-beside[::-1], beside]), np.ones(2 * beside.size)))
-    covariance = errors.T @ errors
-    np.testing.assert_allclose(np.diag(covariance), 1.0)
-    one_side = covariance[beside.size :, beside.size :]
-    ratio = np.divide.outer(beside, beside)
-    np.testing.assert_allclose(one_side, np.exp(-np.abs(np.log2(ratio))), atol=1e-12)
-    np.testing.assert_allclose(covariance[: beside.size, beside.size :], 0.0, atol=1e-12)
+    velocity = np.concatenate([-beside[::-1], beside])
+    force = 500.0 * velocity
+    errors = np.stack(errors_of_curve(velocity, force, 0.5)) / force
+    side, ratio = np.sign(velocity), np.abs(np.divide.outer(velocity, velocity))
+    alike = np.where(np.equal.outer(side, side), np.exp(-np.abs(np.log2(ratio))), 0.0)
+    least = np.eye(velocity.size)[1:] - np.eye(velocity.size)[:1]
+    np.testing.assert_allclose(least @ errors.T @ errors @ least.T, least @ alike @ least.T, atol=1e-12)
+
+
+@given(reference=st.floats(0.05, 0.39), steep=st.floats(0.0, 3.0))
+def test_errors_of_a_curve_take_no_energy_from_what_its_coefficient_says(
+    reference: float, steep: float
+) -> None:
+    """Summed up along the sine itself, for a curve that is stiffer in one direction."""
+    motion = np.linspace(-0.4, 0.4, 4001)
+    force = 900.0 * motion + 300.0 * steep * np.maximum(motion, 0.0) ** 2
+    sine = reference * np.sin(np.linspace(0.0, 2.0 * np.pi, 2000, endpoint=False))
+    errors = errors_of_curve(motion, force, reference)
+    energy = np.array([np.sum(np.interp(sine, motion, each) * sine) for each in (force, *errors)])
+    assert np.abs(energy[1:] / energy[0]).max() < 2e-4
 
 
 def _with_damper_off(rig: Rig, share: float, seed: int) -> Rig:

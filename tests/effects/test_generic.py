@@ -27,7 +27,7 @@ SPINDLE = Port(
     velocity=5.0,
     force=0.2,
     loaded=True,
-    damped=True,
+    damped_at=0.1,
 )
 BELT = Port("belt", PortKind.FORCE, "belt", sense=-1.0, loaded=True)
 NUT = Port("nut", PortKind.SERIES, "spindle", displacement=1e-5, velocity=1e-3, force=100.0)
@@ -54,7 +54,9 @@ def _outcome(effect: Effect, p: dict[str, Array]) -> Array:
     match port.kind:
         case PortKind.FORCE:
             moved, fast = 3.0 * port.displacement, 0.7 * port.velocity
-            signals = PortSignals(*map(jnp.asarray, (moved, fast, -40.0 if port.damped else 40.0, 0.0)))
+            signals = PortSignals(
+                *map(jnp.asarray, (moved, fast, -40.0 if port.damped_at is not None else 40.0, 0.0))
+            )
             there = at.force(port, signals)
             other = signals._replace(displacement=-signals.displacement)
             return jnp.stack([there, at.force(port, other)])

@@ -33,7 +33,7 @@ class OneSidedDamping(AbstractForceLaw):
 
     def suits(self, port: Port) -> bool:
         """Only where the plant has a damper."""
-        return port.kind is self.kind and port.damped
+        return port.kind is self.kind and port.damped_at is not None
 
     def force(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, ""]:
         """What the pulled damper lacks [N]."""

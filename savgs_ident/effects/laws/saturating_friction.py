@@ -41,7 +41,7 @@ class SaturatingFriction(AbstractForceLaw):
 
     def suits(self, port: Port) -> bool:
         """Only where the port carries a load that is not a damper's."""
-        return port.kind is self.kind and port.loaded and not port.damped
+        return port.kind is self.kind and port.loaded and port.damped_at is None
 
     def force(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, ""]:
         """The friction [N]."""

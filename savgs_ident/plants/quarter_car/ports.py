@@ -33,6 +33,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from savgs_ident.effects.base import Family, Inertia, Number, Port, PortKind
+from savgs_ident.plants.quarter_car.forces import REFERENCE_VELOCITY
 
 RAIL = Port(
     "rail",
@@ -48,7 +49,7 @@ STRUT = Port(
     "strut",
     about="strut length; force that pushes it apart; load the damper's push",
     loaded=True,
-    damped=True,
+    damped_at=REFERENCE_VELOCITY,
 )
 SUSPENSION = Port(
     "suspension",
