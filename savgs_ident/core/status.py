@@ -14,6 +14,7 @@ class Status(Enum):
     CONVERGED = "converged"
     MAX_ITERATIONS = "stopped at the iteration limit before converging: raise the limit or start nearer"
     STALLED = "no step reduced the residual: the problem is stiff or not smooth here, refine the time grid"
+    HOPELESS = "given up: far below another hypothesis, and what its next step promised is little beside that"
     NOT_FINITE = "met a value that is not finite: a parameter has left the range where the model exists"
     NOT_IDENTIFIABLE = "the data do not identify every free parameter: see the identifiability verdict"
 

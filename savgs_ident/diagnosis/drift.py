@@ -24,7 +24,7 @@ from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem
 from savgs_ident.diagnosis.result import NONE
 from savgs_ident.diagnosis.thresholds import DecisionConstants
-from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
+from savgs_ident.inference.find_map import HOPE, LaplaceFit, Search, find_map, find_map_again, search_of
 from savgs_ident.inference.observations import Data
 
 TIMES = (-1.0, -0.5, 0.0, 0.5, 1.0)
@@ -53,9 +53,13 @@ def drifting(
     if np.abs(_drifts(problem.search, problem.base, len(plant.free)).x).max() < constants.least_drift:
         return None
     progress("looking for parameters that drift")
+    prior = log(constants.prior_none) + log(constants.prior_broken_tolerance)
     width, known = constants.broken_tolerance_width, constants.drift_convergence
     data = with_wider_drifts(problem.data, len(plant.free), width)
-    search, mode = search_of(plant, data, problem.search.given), problem.base
+    search, base = search_of(plant, data, problem.search.given), problem.base
+    mode = find_map_again(search, (), base, 1)
+    if base.value + HOPE * (mode.value - base.value) < best - prior:
+        return None
     drifts, moved = _Drifts(np.zeros(len(plant.free)), np.zeros(len(plant.free))), np.inf
     for _ in range(constants.drift_rounds):
         mode = find_map(search, (), mode.values, mode.prediction.warm_start)
@@ -67,8 +71,7 @@ def drifting(
         if curved is None:
             return None
         search = search_of(curved, data, problem.search.given)
-    weight = mode.evidence + log(constants.prior_none) + log(constants.prior_broken_tolerance)
-    if not mode.solved or moved >= known / width or weight < best:
+    if not mode.solved or moved >= known / width or mode.evidence + prior < best:
         return None
     assert isinstance(search.plant, DwellProblem)
     change = 2.0 * width * constants.drift_tolerance * drifts.x

@@ -211,6 +211,11 @@ class _Fits:
         """Whether a hypothesis leaves hardly more than the noise, and every parameter within its tolerance."""
         return self._left(mode) == 0.0 and not self.conflicts(mode)
 
+    def negligible(self, modes: Sequence[LaplaceFit]) -> float:
+        """The log evidence below which nothing is worth fitting beside ``modes``, one of which explains all."""
+        enough = [mode.evidence for mode in modes if self.explains_all(mode)]
+        return max(enough, default=-np.inf) - self.constants.refined_log_evidence
+
     def conflicts(self, mode: LaplaceFit) -> bool:
         """Whether the data speak for a tolerance that does not hold beside this hypothesis."""
         found = prior_conflict(mode, self.search.plant.nuisances, self.constants)
@@ -236,15 +241,17 @@ class _Fits:
         self.progress(f"fitting {name} from its value in {hypothesis_of(pair)}")
         return find_map(self.search, (self.terms[name],), pair.values, pair.prediction.warm_start)
 
-    def extended(self, parent: LaplaceFit, scores: Sequence[Score]) -> list[LaplaceFit]:
-        """Fits of the scored terms, each added to those of ``parent``."""
+    def extended(
+        self, parent: LaplaceFit, scores: Sequence[Score], least: float = -np.inf
+    ) -> list[LaplaceFit]:
+        """Fits of the scored terms, each added to those of ``parent``; those below ``least`` are given up."""
         inherited = tuple(self.terms[name] for name in parent.terms)
 
         def fit(score: Score) -> LaplaceFit:
             self.progress(f"fitting {hypothesis_of(parent).with_effect(score.term.name)}")
             start = parent.values | score.start
             return find_map_from_both(
-                self.search, (*inherited, score.term), start, parent.prediction.warm_start
+                self.search, (*inherited, score.term), start, parent.prediction.warm_start, least=least
             )
 
         return in_parallel(fit, scores)
@@ -280,15 +287,17 @@ def _single_effects(fits: _Fits, scores: Sequence[Score]) -> list[LaplaceFit]:
     constants, base = fits.constants, fits.base
     worth = [each for each in scores if each.evidence > base.evidence + constants.promising_log_evidence]
     first, second = constants.first_fits, constants.first_fits + constants.further_fits
-    begun = worth[:first] + fits.lookalikes(worth[first:second], worth[:1])
-    ranked = fits.refined(fits.extended(base, begun))
-    names = {each.term.name for each in begun}
+    alike = fits.lookalikes(worth[first:second], worth[:1])
+    begun = fits.extended(base, worth[:first])
+    least = fits.negligible(begun)
+    ranked = fits.refined([*begun, *fits.extended(base, alike, least)])
+    names = {each.term.name for each in (*worth[:first], *alike)}
     later = [each for each in worth if each.term.name not in names]
     if ranked and fits.explains_all(ranked[0]):
         later = fits.lookalikes(later, [each for each in scores if each.term.name == ranked[0].terms[0]])
     else:
         later = later[: constants.further_fits]
-    return fits.refined([*ranked, *fits.extended(base, later)])
+    return fits.refined([*ranked, *fits.extended(base, later, max(least, fits.negligible(ranked)))])
 
 
 def _pairs(

@@ -36,6 +36,9 @@ LEVEL = 0.1
 ROUGH = 2.0
 """Rise that is promised, but not found, up to which a mode is as good: friction makes the density rough."""
 
+HOPE = 10.0
+"""How many times what its next step promises a search may still rise [1]; with less to go for it is given up."""
+
 
 @dataclass(frozen=True)
 class LaplaceFit:
@@ -164,8 +167,15 @@ class _Point(NamedTuple):
 class _Ascent:
     """Steps to the mode of a hypothesis."""
 
-    def __init__(self, search: Search, terms: tuple[Term, ...], held: Mapping[str, float], level: float):
-        self._search, self._held, self._level = search, held, level
+    def __init__(
+        self,
+        search: Search,
+        terms: tuple[Term, ...],
+        held: Mapping[str, float],
+        level: float = LEVEL,
+        least: float = -np.inf,
+    ):
+        self._search, self._held, self._level, self._least = search, held, level, least
         self._names = tuple(term.name for term in terms)
         self._coordinates = search.plant.nuisances + tuple(c for term in terms for c in term.coordinates)
 
@@ -193,6 +203,8 @@ class _Ascent:
         promised = top.value - point.value
         if promised < self._level:
             return point._replace(status=Status.CONVERGED if top.converged else Status.STALLED)
+        if point.value + HOPE * promised < self._least:
+            return point._replace(status=Status.HOPELESS)
         there = self._at(top.x, here.warm_start)
         if there.value > point.value:
             return there
@@ -283,19 +295,25 @@ def find_map_again(
 
     What the plant does there is known.
     """
-    ascent = _Ascent(search, terms, {}, LEVEL)
+    ascent = _Ascent(search, terms, {})
     return ascent.mode(ascent.again(fit), steps)
 
 
 def find_map_from_both(
-    search: Search, terms: tuple[Term, ...], start: Mapping[str, float], warm_start: Any, steps: int = STEPS
+    search: Search,
+    terms: tuple[Term, ...],
+    start: Mapping[str, float],
+    warm_start: Any,
+    steps: int = STEPS,
+    least: float = -np.inf,
 ) -> LaplaceFit:
     """The mode of the baseline with ``terms``, from ``start`` or from the plant as it was given.
 
     What calibration makes of a plant that lacks something may be so far from it that no step leads back. The search
-    goes on from where one step leads higher. What ``start`` says of the terms holds for both.
+    goes on from where one step leads higher, and ends where it cannot come to a log density of ``least``. What
+    ``start`` says of the terms holds for both.
     """
-    ascent = _Ascent(search, terms, {}, LEVEL)
+    ascent = _Ascent(search, terms, {}, least=least)
     points = [ascent.step(ascent.start(start, warm_start))]
     if search.given is not None:
         points.append(ascent.step(ascent.start({**start, **search.given.values}, search.given.warm_start)))

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import Parameter
+from savgs_ident.core.status import Status
 from savgs_ident.inference.find_map import Start, find_map, find_map_from_both, search_of
 from savgs_ident.inference.prior import Coordinates, sheet_coordinate
 
@@ -58,3 +59,18 @@ def test_the_better_start_is_kept_where_the_given_one_is_the_worse() -> None:
     search = search_of(PLANT, draw(PLANT, TRUTH, 0.02, 2), far)
     found = find_map_from_both(search, (BEND,), {"w": 5.0}, None)
     assert found.values["w"] == pytest.approx(6.0, abs=0.1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_only_a_search_that_cannot_come_near_another_hypothesis_is_given_up(seed: int) -> None:
+    search = search_of(PLANT, draw(PLANT, TRUTH, 0.02, seed))
+    astray = find_map(search, (BEND,), FAR, None)
+    best = find_map(search, (BEND,), {"w": 5.0}, None)
+    least = best.evidence - 10.0
+    given_up = find_map_from_both(search, (BEND,), FAR, None, least=least)
+    assert given_up.status is Status.HOPELESS
+    assert given_up.solved
+    assert given_up.evidence <= astray.evidence < least
+    kept = find_map_from_both(search, (BEND,), {"w": 5.0}, None, least=least)
+    assert kept.status is best.status
+    np.testing.assert_array_equal(kept.x, best.x)
