@@ -306,6 +306,11 @@ def write_warnings(
             "The fit of the named effects on twice as many mesh nodes failed: their parameters still contain the "
             "discretisation error."
         )
+    if evidence.chosen.hypothesis in map(Hypothesis, problem.plant.known):
+        found.append(
+            f"{evidence.chosen.hypothesis} were tried together to begin with, as a model of this plant has them; the "
+            "search did not find them one after the other."
+        )
     for mode, name in (
         (problem.base, "the recalibrated baseline"),
         (named, "the model with the named effects"),

@@ -61,6 +61,10 @@ def _mode(evidence: float, *terms: str, off: float = 0.0) -> Any:
     )
 
 
+def _problem(known: tuple[tuple[str, ...], ...] = ()) -> Any:
+    return SimpleNamespace(base=_mode(0.0), constants=DEFAULTS, drifts={}, plant=SimpleNamespace(known=known))
+
+
 def _evidence(kind: Any, reason: Reason, weights: dict[str, float], **more: Any) -> DiagnosisEvidence:
     """Evidence by the weights of "none", "unknown" and single effects."""
     effects = {name: weight for name, weight in weights.items() if name not in ("none", "unknown")}
@@ -233,11 +237,21 @@ def test_what_could_not_be_evaluated_or_refitted_is_a_warning() -> None:
         lost=(LostHypothesis(Hypothesis(("gear_backlash",)), Status.MAX_ITERATIONS),),
         refit_failed=True,
     )
-    problem: Any = SimpleNamespace(base=_mode(0.0), constants=DEFAULTS, drifts={})
+    problem: Any = _problem()
     reported = " ".join(write_warnings(problem, evidence, _mode(0.0), 1.0))
     assert "The fit of gear_backlash found no periodic motion of the plant" in reported
     assert "not evaluated: stopped at the iteration limit" in reported
     assert "on twice as many mesh nodes failed" in reported
+
+
+def test_what_was_tried_together_from_the_first_is_said_so() -> None:
+    evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 5.0, "rail_viscous": 700.0})
+    both = replace(evidence.chosen, hypothesis=Hypothesis(("tyre_friction", "rail_coulomb")))
+    evidence = replace(evidence, kind="several", chosen=both)
+    given = _problem((("rail_coulomb", "tyre_friction"),))
+    said = "tyre_friction + rail_coulomb were tried together to begin with"
+    assert any(said in each for each in write_warnings(given, evidence, _mode(0.0), 1.0))
+    assert not any(said in each for each in write_warnings(_problem(), evidence, _mode(0.0), 1.0))
 
 
 @pytest.mark.parametrize(
@@ -247,7 +261,7 @@ def test_what_could_not_be_evaluated_or_refitted_is_a_warning() -> None:
 def test_what_an_effect_does_not_explain_is_a_warning(reason: Reason, reported: str) -> None:
     evidence = _evidence("rail_viscous", reason, {"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0})
     evidence = replace(evidence, kind="effect", left=0.0)
-    problem: Any = SimpleNamespace(base=_mode(0.0), constants=DEFAULTS, drifts={})
+    problem: Any = _problem()
     assert any(reported in each for each in write_warnings(problem, evidence, _mode(0.0), 1.0))
 
 
