@@ -15,6 +15,8 @@ PYTEST_ARGS ?= -n auto --dist worksteal
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
+# pip compiles what it installs on one core; packages bring files of other Pythons along, which do not compile.
+COMPILE := $(BIN)/python -m compileall -q -j 0 $(VENV)/lib >/dev/null || true
 
 .PHONY: demo test lint test-all bench docs fuzz clean
 
@@ -58,21 +60,26 @@ $(BIN)/python:
 
 # Installed as a link to this folder: a change of the code needs no new installation, one of pyproject.toml does.
 $(VENV)/.installed: pyproject.toml | $(BIN)/python
-	$(PIP) install --quiet --editable .
+	$(PIP) install --quiet --no-compile --editable .
+	@$(COMPILE)
 	@touch $@
 
 $(VENV)/.installed-test: pyproject.toml | $(BIN)/python
-	$(PIP) install --quiet --editable '.[test]'
+	$(PIP) install --quiet --no-compile --editable '.[test]'
+	@$(COMPILE)
 	@touch $@ $(VENV)/.installed
 
 $(VENV)/.installed-test-all: pyproject.toml | $(BIN)/python
-	$(PIP) install --quiet --editable '.[test-all]'
+	$(PIP) install --quiet --no-compile --editable '.[test-all]'
+	@$(COMPILE)
 	@touch $@ $(VENV)/.installed $(VENV)/.installed-test $(VENV)/.installed-bench $(VENV)/.installed-docs
 
 $(VENV)/.installed-docs: pyproject.toml | $(BIN)/python
-	$(PIP) install --quiet --editable '.[docs]'
+	$(PIP) install --quiet --no-compile --editable '.[docs]'
+	@$(COMPILE)
 	@touch $@ $(VENV)/.installed
 
 $(VENV)/.installed-bench: pyproject.toml | $(BIN)/python
-	$(PIP) install --quiet --editable '.[bench]'
+	$(PIP) install --quiet --no-compile --editable '.[bench]'
+	@$(COMPILE)
 	@touch $@ $(VENV)/.installed
