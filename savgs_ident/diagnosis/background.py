@@ -136,11 +136,12 @@ def _energy_shares(
     sine = reference * np.sin(np.pi * ((np.arange(SINE) + 0.5) / SINE - 0.5))
     curve = np.interp(sine, velocity[order], force[order])
     scaled = sine / max(float(np.abs(velocity).max()), np.finfo(float).tiny)
+    points = _points(constants)
     energy = np.array(
-        [np.interp(scaled, _points(constants), unit) for unit in np.eye(_points(constants).size)]
+        [np.sum(np.interp(scaled, points, unit) * curve * sine) for unit in np.eye(points.size)]
     )
-    energy = energy @ (curve * sine)
-    return np.asarray(energy / energy.sum()) if energy.any() else energy
+    whole = float(energy.sum())
+    return energy / whole if whole else energy
 
 
 def pieces_of_curve(

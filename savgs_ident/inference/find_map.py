@@ -211,8 +211,9 @@ class _Ascent:
         for halving in range(1, HALVINGS):
             there = self._without_slopes(point.x + 0.5**halving * (top.x - point.x), here.warm_start)
             if there.value > point.value:
-                little = there.value < point.value + self._level
                 there = self._at(there.x, there.prediction.warm_start)
+            if there.value > point.value:
+                little = there.value < point.value + self._level
                 return there._replace(status=Status.CONVERGED) if little else there
         return point._replace(status=Status.CONVERGED if promised < ROUGH else Status.STALLED)
 

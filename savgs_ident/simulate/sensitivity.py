@@ -107,7 +107,10 @@ TOGETHER = 4
 
 
 def along_first(one: Callable[[Any], Any], given: Any, wanted: Array) -> Any:
-    """What ``one`` gives of each of k things ``given``, with a leading axis (k,); zero after the first ``wanted``."""
+    """What ``one`` gives of each of k things ``given``, with a leading axis (k,).
+
+    All but the first ``wanted`` may be left zero.
+    """
     size = jax.tree.leaves(given)[0].shape[0]
     width = max(1, min(TOGETHER, size))
     shapes = jax.eval_shape(lambda given: jax.vmap(one)(given), given)
