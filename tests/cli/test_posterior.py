@@ -236,7 +236,7 @@ def _draws(folder: Path) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.slow
-def test_both_samplers_find_the_same_posterior_of_eight_dwells_of_the_shipped_campaign(
+def test_both_samplers_find_the_same_posterior_of_four_dwells_of_the_shipped_campaign(
     cache: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -247,8 +247,8 @@ def test_both_samplers_find_the_same_posterior_of_eight_dwells_of_the_shipped_ca
     Of a difference of means its standard deviation is 0.035 of one of the posterior, of a ratio of widths 0.025.
     """
     monkeypatch.setenv("SAVGS_IDENT_CACHE", str(cache))
-    table, campaign = pd.read_csv(default_campaign_path()), str(tmp_path / "eight.csv")
-    kept = ["standstill", *(f"dwell_{frequency:.2f}Hz" for frequency in FEW)]
+    table, campaign = pd.read_csv(default_campaign_path()), str(tmp_path / "four.csv")
+    kept = ["standstill", *(f"dwell_{frequency:.2f}Hz" for frequency in FEW[::2])]
     table[table["test"].isin(kept)].to_csv(campaign, index=False)
     fitted = as_users_have_it(["fit", campaign, "--quiet", "--out", str(tmp_path)])
     assert fitted.exit_code == 0, fitted.stderr
