@@ -2,8 +2,9 @@
 
     score = score_of(answer, diagnosis)      # ``diagnosis`` as ``diagnosis.json`` has it
 
-An effect counts as named by its own name. Where the draw found that another effect does the same to the campaign, so
-that nothing shows which it is, naming that one counts too, if the verdict says that it cannot distinguish the two.
+An effect counts as named by its own name, and as a formula of the catalogue. Where the draw found that another effect
+does the same to the campaign, so that nothing shows which it is, naming that one counts too, if the verdict says that
+it cannot distinguish the two.
 The port of something unknown counts as found,
 too, where the verdict says that it cannot distinguish it from the one that it names. Marks that do not apply to a
 kind of trial are None.
@@ -90,6 +91,7 @@ class Score:
         closed_by_effect: share of the recalibrated gap that what is named closes, on tests held out; None as above.
         version: of the code that made the diagnosis.
         hidden: whether calibration leaves too little of a foreign effect to matter.
+        law_known: whether what is named is a formula of the catalogue; if not, ``said`` is the nearest one.
     """
 
     number: int
@@ -121,6 +123,7 @@ class Score:
     closed_by_effect: float | None = None
     version: str = ""
     hidden: bool = False
+    law_known: bool = True
 
     @property
     def left_alone(self) -> bool:
@@ -145,9 +148,14 @@ def truth_words(score: Score) -> str:
 
 
 def said_words(score: Score) -> str:
-    """The verdict as names of effects."""
-    said = _KIND_WORDS.get(score.verdict, " + ".join(score.said))
-    return f"{said} ({', '.join(score.families)})" if score.foreign and score.families else said
+    """The verdict as names of effects, and the families where no formula of the catalogue is said to be right."""
+    names = " + ".join(score.said)
+    learned = score.verdict == "effect" and not score.law_known
+    if learned:
+        said = f"another law, nearest to {names}" if names else "another law"
+    else:
+        said = _KIND_WORDS.get(score.verdict, names)
+    return f"{said} ({', '.join(score.families)})" if (score.foreign or learned) and score.families else said
 
 
 def is_right(score: Score) -> bool:
@@ -159,10 +167,13 @@ def is_right(score: Score) -> bool:
 def said_right(score: Score) -> bool:
     """Whether what the verdict says is true: what its stated probability is to be compared with.
 
-    That a foreign effect is unknown, at its port, is true; that it is at a port where it would do the same is not.
+    That a foreign effect is unknown, at its port, is true; that it is at a port where it would do the same is not. A
+    law of something that was removed from the catalogue is true at its port alone.
     """
     if score.family_right:
         return score.family_exactly is True
+    if score.kind == "unknown" and score.verdict == "effect":
+        return score.unknown_recognised is True and score.located_exactly is True
     return is_right(score) or (score.verdict == "unknown" and score.port_exactly is True)
 
 
@@ -183,14 +194,15 @@ def score_of(
     """
     verdict = diagnosis["verdict"]
     said, true = tuple(verdict["effects"]), set(answer.effects)
-    right = set(said) == true and len(said) == len(true)
-    alike = len(said) == 1 and said[0] in answer.imitators and true <= {*verdict["confusable_with"]}
+    known = bool(verdict.get("law_known", True))
+    right = known and set(said) == true and len(said) == len(true)
+    alike = known and len(said) == 1 and said[0] in answer.imitators and true <= {*verdict["confusable_with"]}
     here = set(verdict["ports"]) == set(answer.ports) and verdict["kind"] != "none"
     beside = verdict["kind"] == "unknown" and set(answer.ports) <= {*verdict["confusable_ports"]}
     kind, families = answer.kind, tuple(verdict.get("families", ()))
     cataloguing, foreign = kind not in ("none", "foreign"), answer.small_errors is not None
     placed = kind == "foreign" and not (answer.hidden and verdict["kind"] == "none")
-    own = _intervals(answer, diagnosis) if right and verdict.get("law_known", True) else {}
+    own = _intervals(answer, diagnosis) if right else {}
     accepted = _accepted(answer, diagnosis, elsewhere)
     return Score(
         number=answer.number,
@@ -222,6 +234,7 @@ def score_of(
         closed_by_effect=_number_or_none(diagnosis["shrink"].get("closed_by_effect")),
         version=version,
         hidden=answer.hidden,
+        law_known=known,
     )
 
 

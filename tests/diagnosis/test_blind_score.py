@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.validation.blind_marks import Score, failed, score_from, score_of
+from savgs_ident.validation.blind_marks import Score, failed, said_right, score_from, score_of
 from savgs_ident.validation.blind_rates import (
     NOTHING,
     OTHERS,
@@ -102,6 +102,26 @@ def test_an_effect_that_the_catalogue_lacks() -> None:
     assert (there.located_exactly, elsewhere.located_exactly) == (True, False)
     named = score_of(GONE, diagnosis("effect", "accel_gain"))
     assert (named.unknown_recognised, named.located_right) == (False, True)
+
+
+def test_a_law_that_is_said_to_be_none_of_the_catalogue() -> None:
+    """The formula that comes nearest is not named, though its name stands in the verdict."""
+
+    def learned(effect: str) -> dict[str, object]:
+        found = diagnosis("effect", effect)
+        found["verdict"] |= {"law_known": False, "families": ["sensor.sprung_accel/dynamics"]}
+        return found
+
+    known = score_of(LAG, learned("accel_lag"))
+    assert (known.named_right, known.located_right, known.intervals) == (False, True, {})
+    gone = score_of(GONE, learned("accel_tilt"))
+    assert (gone.unknown_recognised, said_right(gone)) == (True, True)
+    assert str(gone) == (
+        "trial 1: accel_lag (not in the catalogue); verdict another law, nearest to accel_tilt "
+        "(sensor.sprung_accel/dynamics): right"
+    )
+    elsewhere = score_of(GONE, learned("rail_viscous"))
+    assert (elsewhere.unknown_recognised, said_right(elsewhere)) == (True, False)
 
 
 @pytest.mark.parametrize("truth", [LAG, PAIR, GONE, NONE])

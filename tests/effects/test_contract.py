@@ -51,6 +51,15 @@ def test_a_law_says_what_it_is(law: AbstractLaw) -> None:
     assert {role for role, _ in law.tried} <= set(names)
 
 
+def test_something_that_swings_is_looked_for_at_frequencies_no_further_apart_than_it_is_wide() -> None:
+    """Of those of a rig's body; the half-power bandwidth of a resonance is twice its damping ratio."""
+    effect = CATALOGUE["body_oscillator"]
+    width = 2.0 * ParameterTable(effect.parameters)["body_oscillator_damping_ratio"].value
+    frequency = np.array([each["body_oscillator_frequency"] for each in effect.tried])
+    assert np.max(np.diff(frequency) / frequency[:-1]) <= width
+    assert frequency[0] < 1.0 < 30.0 < frequency[-1]
+
+
 @over("effect", effects_of())
 def test_an_effect_says_how_it_shows_and_where_it_is_from(effect: Effect) -> None:
     assert len(effect.symptom.split()) > 3

@@ -28,8 +28,9 @@ class AttachedOscillator(AbstractForceLaw):
     words: ClassVar[str] = "something that hangs there and swings"
     family: ClassVar[Family] = Family.OSCILLATOR
     roles: ClassVar[tuple[Role, ...]] = (Role("mass", 0.0), Role("frequency"), Role("damping_ratio"))
+    # A half-power bandwidth apart: one between two that are further apart would promise nothing.
     tried: ClassVar[tuple[tuple[str, float], ...]] = tuple(
-        ("frequency", frequency) for frequency in np.geomspace(1.0, 40.0, 16).tolist()
+        ("frequency", frequency) for frequency in np.geomspace(0.8, 40.0, 43).tolist()
     )
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
