@@ -12,9 +12,11 @@ kind of trial are None.
 In a foreign trial no name can be right, for no catalogue has the law. A port is right where an engineer would rightly
 put the effect, a family where it would rightly be called that, at such a port
 (:mod:`savgs_ident.validation.foreign_laws`). "Unknown" at a right port has the port, not the family. Of an effect of
-which calibration leaves too little to matter "none" is right: it has no port then. Where the drawn law itself
-explains the recordings as well at another port (:mod:`savgs_ident.validation.other_port`), no diagnosis can
-distinguish the two: naming that one counts, too, if the verdict says that it cannot.
+which calibration leaves too little to matter "none" is right: it has no port then. So it is where the draw says so,
+to first order and with an exact damper's table, or where the recalibrated model misses tests that were held out by
+less than matters beyond their noise. Where the drawn law itself explains the recordings as well at another port
+(:mod:`savgs_ident.validation.other_port`), no diagnosis can distinguish the two: naming that one counts, too, if the
+verdict says that it cannot.
 
 What many trials say together is in :mod:`savgs_ident.validation.blind_rates`.
 """
@@ -90,7 +92,7 @@ class Score:
         probability: that the verdict states; None if it states none.
         closed_by_effect: share of the recalibrated gap that what is named closes, on tests held out; None as above.
         version: of the code that made the diagnosis.
-        hidden: whether calibration leaves too little of a foreign effect to matter.
+        hidden: whether calibration leaves too little of a foreign effect to matter, in the draw or in held-out tests.
         law_known: whether what is named is a formula of the catalogue; if not, ``said`` is the nearest one.
     """
 
@@ -201,7 +203,8 @@ def score_of(
     beside = verdict["kind"] == "unknown" and set(answer.ports) <= {*verdict["confusable_ports"]}
     kind, families = answer.kind, tuple(verdict.get("families", ()))
     cataloguing, foreign = kind not in ("none", "foreign"), answer.small_errors is not None
-    placed = kind == "foreign" and not (answer.hidden and verdict["kind"] == "none")
+    hidden = kind == "foreign" and (answer.hidden or _calibrated(diagnosis["shrink"]))
+    placed = kind == "foreign" and not (hidden and verdict["kind"] == "none")
     own = _intervals(answer, diagnosis) if right else {}
     accepted = _accepted(answer, diagnosis, elsewhere)
     return Score(
@@ -233,9 +236,15 @@ def score_of(
         probability=_number_or_none(verdict.get("probability")),
         closed_by_effect=_number_or_none(diagnosis["shrink"].get("closed_by_effect")),
         version=version,
-        hidden=answer.hidden,
+        hidden=hidden,
         law_known=known,
     )
+
+
+def _calibrated(shrink: Mapping[str, Any]) -> bool:
+    """Whether the recalibrated model misses held-out tests by less than matters beyond the noise."""
+    gap, noise = (_number_or_none(shrink.get(name)) for name in ("recalibrated", "floor"))
+    return gap is not None and noise is not None and gap**2 - noise**2 < DEFAULTS.material_share**2
 
 
 def _no_known_law(verdict: Mapping[str, Any]) -> bool:

@@ -49,14 +49,22 @@ def foreign(name: str, number: int = 1) -> Answer:
 
 
 def said(
-    kind: str, *families: str, closed: float | None = 0.95, p: float = 0.9, **more: Any
+    kind: str,
+    *families: str,
+    closed: float | None = 0.95,
+    p: float = 0.9,
+    gap: float = 0.01,
+    **more: Any,
 ) -> dict[str, Any]:
-    """A diagnosis that names families, each as port/family; ``ports`` are theirs where not given."""
+    """A diagnosis that names families, each as port/family; ``ports`` are theirs where not given.
+
+    The recalibrated ``gap`` is that in held-out tests, where the noise has 0.2 %.
+    """
     nearest = {"effect": ["rail_viscous"], "several": ["rail_viscous", "accel_lag"]}.get(kind, [])
     ports = more.pop("ports", list(dict.fromkeys(each.partition("/")[0] for each in families)))
     found = diagnosis(kind, *nearest, ports=ports, **more)
     found["verdict"] |= {"families": list(families), "probability": p}
-    found["shrink"] |= {"closed_by_effect": closed}
+    found["shrink"] |= {"closed_by_effect": closed, "recalibrated": gap, "floor": 0.002}
     return found
 
 
@@ -125,18 +133,22 @@ def test_no_port_is_in_question_where_it_is_right_or_the_right_one_is_not_listed
     assert score_of(truth, verdict, elsewhere=0.7) == replace(score_of(truth, verdict), elsewhere=0.7)
 
 
-def test_what_calibration_hides_may_be_left_alone_and_not_be_put_elsewhere() -> None:
-    hidden = replace(foreign("strut_digressive"), hidden=True)
-    alone = score_of(hidden, said("none", closed=None))
+@pytest.mark.parametrize(("in_the_draw", "gap"), [(True, 0.01), (False, 0.0032)])
+def test_what_calibration_hides_may_be_left_alone_and_not_be_put_elsewhere(
+    in_the_draw: bool, gap: float
+) -> None:
+    """By the draw, or because 0.25 % of the response is left beyond the noise."""
+    hidden = replace(foreign("strut_digressive"), hidden=in_the_draw)
+    alone = score_of(hidden, said("none", closed=None, gap=gap))
     assert (alone.port_right, alone.family_right, is_right(alone), said_right(alone)) == (
         None,
         None,
         True,
         True,
     )
-    wrong = score_of(hidden, said("effect", "suspension/friction"))
+    wrong = score_of(hidden, said("effect", "suspension/friction", gap=gap))
     assert (wrong.port_right, wrong.family_right, is_right(wrong)) == (False, False, False)
-    right = score_of(hidden, said("effect", "strut/damping", closed=0.4))
+    right = score_of(hidden, said("effect", "strut/damping", closed=0.4, gap=gap))
     assert (right.port_right, right.family_right) == (True, True)
     rates = rates_of([alone, wrong, right])
     assert (rates["hidden_left_alone"].count, rates["hidden_left_alone"].total) == (1, 3)
@@ -144,6 +156,12 @@ def test_what_calibration_hides_may_be_left_alone_and_not_be_put_elsewhere() -> 
     assert rates["closed_by_effect_90"].total == 2
     assert median_closed([alone, right]) == 0.4
     assert not is_right(score_of(foreign("strut_digressive"), said("none")))
+
+
+def test_what_shows_in_held_out_tests_is_not_hidden() -> None:
+    """0.4 % of the response is left beyond the noise, more than the 0.3 % that matter."""
+    score = score_of(foreign("strut_digressive"), said("none", closed=None, gap=0.0045))
+    assert (score.hidden, score.port_right, is_right(score)) == (False, False, False)
 
 
 def test_what_swings_on_the_body_may_be_put_at_the_masses() -> None:
