@@ -69,18 +69,15 @@ APART = ("tests/notebooks/test_notebooks.py",)
 """Modules whose tests share nothing and take minutes: each test is a room of its own."""
 
 LONGEST_FIRST = (
-    *("diagnosis/test_whole_diagnoses.py", "notebooks", "diagnosis/test_another_law.py"),
-    *("inference", "control", "export", "effects", "symbolic", "simulate", "fit"),
-    *(
-        "diagnosis/test_motion_problem.py",
-        "cli/test_posterior.py",
-        "test_public.py",
-        "plants/test_contract.py",
-    ),
+    *("diagnosis/test_whole_diagnoses.py", "notebooks"),
+    *("control", "export", "effects", "symbolic", "simulate", "fit", "plants/test_contract.py"),
+    *("diagnosis/test_another_law.py", "inference", "diagnosis/test_motion_problem.py"),
+    *("cli/test_posterior.py", "test_public.py"),
     *("validation", "diagnosis", "test_any_plant.py", "docs", "browser", "cli"),
 )
 """Folders and modules in the order in which the rooms of their tests are begun with: what is left for the end must be
-short, or one process works alone."""
+short, or one process works alone. Of one folder, those of :data:`COMPILED_MORE_THAN_COMPUTED` come first: where the
+way of compiling changes, all programs are lost."""
 
 UNOPTIMISED = "--xla_backend_optimization_level=0"
 """The compiler takes half the time with it. The fast tests compile more than they compute; of the slow ones those of
@@ -122,14 +119,18 @@ def _only_the_fast(config: pytest.Config) -> bool:
     return bool(config.getoption("markexpr") == "not slow")
 
 
+def _compiled_more_than_computed(item: pytest.Item) -> bool:
+    places = {REPOSITORY / "tests" / name for name in COMPILED_MORE_THAN_COMPUTED}
+    return not places.isdisjoint((item.path, *item.path.parents))
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Before the fixtures of a slow test are made; how the fast ones are compiled stands in the environment."""
     if not _only_the_fast(item.config):
         import jax
 
-        places = {REPOSITORY / "tests" / name for name in COMPILED_MORE_THAN_COMPUTED}
-        unoptimised = not places.isdisjoint((item.path, *item.path.parents))
+        unoptimised = _compiled_more_than_computed(item)
         if unoptimised != jax.config.read("jax_disable_most_optimizations"):
             # A program that is there already serves on, however it was compiled.
             jax.clear_caches()
@@ -139,11 +140,13 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests in the order of :data:`LONGEST_FIRST`."""
     place = {REPOSITORY / "tests" / name: number for number, name in enumerate(LONGEST_FIRST)}
-    items.sort(
-        key=lambda item: next(
-            (place[each] for each in (item.path, *item.path.parents) if each in place), len(place)
-        )
-    )
+
+    def turn(item: pytest.Item) -> tuple[int, bool]:
+        folders = (item.path, *item.path.parents)
+        first = next((place[each] for each in folders if each in place), len(place))
+        return first, not _compiled_more_than_computed(item)
+
+    items.sort(key=turn)
 
 
 class _Rooms(LoadScopeScheduling):
