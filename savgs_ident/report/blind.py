@@ -41,7 +41,7 @@ RATE_WORDS: Mapping[str, str] = {
     "port_listed": "A right port named, or listed as not distinguishable",
     "family_exactly": "Family right strictly, without ports where the law itself would do the same",
     "family_right": "Foreign effect given a right family",
-    "hidden_left_alone": "Nothing named where calibration leaves too little of the effect to matter",
+    "hidden_left_alone": "Nothing else named where calibration leaves too little of an effect to be seen",
     "closed_by_effect_90": "Nine tenths of the recalibrated gap closed",
 }
 """What each rate counts."""

@@ -26,6 +26,11 @@ Drawn = Literal["none", "effect", "two", "unknown", "foreign"]
 law no catalogue has."""
 
 
+STANDS_OUT = 8.0
+"""Standard deviations, expected, by which an effect must stand out of what calibration and tolerances do to be seen:
+with that it does so by five however noise and tolerances fall."""
+
+
 @dataclass(frozen=True)
 class SmallErrors:
     """What no real rig is without, and no diagnosis is to take for an effect.
@@ -55,8 +60,7 @@ class Answer:
         changes: by how much each alone changes the clean response, relative; by effect.
         sigmas: by how many standard deviations each stands out of what noise, calibration and tolerances can do,
             the other one projected out; by effect.
-        imitators: of a single effect, others of the catalogue that do the same to this campaign, to first order
-            within the noise.
+        imitators: others of the catalogue that do the same to this campaign as one of the effects, within the noise.
         parameters: true values of the effects' parameters, SI.
         rig: true values of the rig's own parameters that are not those of the sheet, SI.
         without: effects that are removed from the catalogue for this trial.
@@ -80,6 +84,13 @@ class Answer:
     families: tuple[str, ...] = ()
     small_errors: SmallErrors | None = None
     hidden: bool = False
+
+    @property
+    def out_of_sight(self) -> frozenset[str]:
+        """The effects of which calibration and tolerances leave too little to be seen."""
+        if self.kind == "foreign":
+            return frozenset(self.effects if self.hidden else ())
+        return frozenset(name for name, sigma in self.sigmas.items() if sigma < STANDS_OUT)
 
 
 _FOREIGN_ONLY = ("accepted", "families", "small_errors", "hidden")

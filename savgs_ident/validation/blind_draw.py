@@ -2,10 +2,9 @@
 
 Its parameters are off the sheet by their tolerances, those that are to be identified by a tenth. Then comes nothing,
 an effect, two at once, or one that is removed from the catalogue. An effect is made so large that the response
-changes by 3 to 25 % (:class:`Present`), and must stand out of what calibration and tolerances can do
-(:class:`Drawing`, by :mod:`savgs_ident.validation.lookalikes`). What does not is drawn again. An effect that is
-removed must stand out of what is left in the catalogue, too, and each of two out of all others: nobody could name
-them else.
+changes by 3 to 25 % (:class:`Present`). How far it stands out of what calibration and tolerances can do, and which
+others of the catalogue do the same (:class:`Drawing`, by :mod:`savgs_ident.validation.lookalikes`), is noted for the
+marks; nothing is drawn again because it is hard to see or easily imitated.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +18,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.diagnosis.problem import term_of
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.simulate.periodic import PeriodicSolution
-from savgs_ident.validation.blind_answer import Answer, Drawn
+from savgs_ident.validation.blind_answer import STANDS_OUT, Answer, Drawn
 from savgs_ident.validation.effect_size import draw_form, find_size
 from savgs_ident.validation.lookalikes import (
     Hiding,
@@ -35,10 +34,6 @@ from savgs_ident.validation.virtual_rig import Bench, change_of, draw_rig
 
 SMALLEST, LARGEST = 0.03, 0.25
 """Change of the response by a drawn effect, relative; drawn evenly in its logarithm."""
-
-STANDS_OUT = 8.0
-"""Standard deviations, expected, by which an effect must stand out of what calibration and tolerances do: with
-that it does so by five however noise and tolerances fall."""
 
 TOLD_APART = 5.0
 """Standard deviations from which on two effects can be distinguished."""
@@ -197,11 +192,8 @@ class Drawing:
             for name, value in zip(self.hiding.names, x.tolist(), strict=False)
         }
 
-    def imitators(self, present: Present, limit: float = TOLD_APART) -> tuple[str, ...]:
-        """Effects that, of some size and shape, do the same.
-
-        Beside them it stands out by less than ``limit`` standard deviations.
-        """
+    def imitators(self, present: Present) -> tuple[str, ...]:
+        """Effects that, of some size and shape, do the same: beside them it cannot be told apart."""
         change = rows_of(present.response) - rows_of(self.response)
         found = []
         for name, parameters in similar(self.hiding, change, self.sensitivities, present.name).items():
@@ -210,7 +202,7 @@ class Drawing:
                 each.name: float(np.clip(parameters[each.name], each.lower, each.upper))
                 for each in effect.parameters
             }
-            if self.sigma(present.response, Present(name, within, 0.0, self.response)) < limit:
+            if self.sigma(present.response, Present(name, within, 0.0, self.response)) < TOLD_APART:
                 found.append(name)
         return tuple(found)
 
@@ -235,7 +227,7 @@ INDISTINGUISHABLE = (frozenset({"accel_gain", "accel_tilt"}),)
 """Effects that do exactly the same: if one is removed from the catalogue, so are the others."""
 
 ATTEMPTS = 60
-"""So often it is drawn again."""
+"""So often it is drawn again where no size of an effect gives the change that was drawn, or a dwell has no motion."""
 
 
 @dataclass(frozen=True)
@@ -266,7 +258,7 @@ class Shares:
 def draw_answer(bench: Bench, shares: Shares, number: int, random: np.random.Generator) -> Answer:
     """The truth of a trial; the same for the same state of ``random``.
 
-    Raises :class:`InputError` if nothing that can be assessed was drawn in :data:`ATTEMPTS` attempts.
+    Raises :class:`InputError` if no effect that was drawn in :data:`ATTEMPTS` attempts gives the change drawn.
     """
     kind = shares.draw(random)
     drawing = drawing_of(bench, draw_rig(bench, random))
@@ -277,14 +269,14 @@ def draw_answer(bench: Bench, shares: Shares, number: int, random: np.random.Gen
         if answer is not None:
             return answer
     raise InputError(
-        f"nothing of kind '{kind}' that can be assessed was drawn",
+        f"nothing of kind '{kind}' reaches the change that was drawn",
         source=f"trial {number}",
         remedy="name another --seed",
     )
 
 
 def _draw(kind: Drawn, drawing: Drawing, number: int, random: np.random.Generator) -> Answer | None:
-    """An answer of a kind; None if what was drawn cannot be assessed."""
+    """An answer of a kind; None if no size of what was drawn gives its change, or a dwell has no motion."""
     names = [name for name in CATALOGUE if name not in drawing.bench.baseline]
     many = {"none": 0, "effect": 1, "two": 2, "unknown": 1}[kind]
     chosen = [str(name) for name in random.choice(names, many, replace=False)]
@@ -295,15 +287,11 @@ def _draw(kind: Drawn, drawing: Drawing, number: int, random: np.random.Generato
             return None
         present.append(found)
     sigmas = _sigmas(drawing, present)
-    if any(sigma < STANDS_OUT for sigma in sigmas):
+    if sigmas is None:
         return None
     alike = {each for pair in INDISTINGUISHABLE for each in pair if kind == "unknown" and chosen[0] in pair}
     without = tuple(sorted({*chosen, *alike})) if kind == "unknown" else ()
-    # What is unknown must stand out of the catalogue as an effect must of what calibration does.
-    limit = STANDS_OUT if kind == "unknown" else TOLD_APART
-    imitators = {each.name: drawing.imitators(each, limit) for each in present}
-    if kind != "effect" and any(set(each) - set(without) for each in imitators.values()):
-        return None
+    imitators = {other for each in present for other in drawing.imitators(each)}
     return Answer(
         number=number,
         kind=kind,
@@ -311,20 +299,20 @@ def _draw(kind: Drawn, drawing: Drawing, number: int, random: np.random.Generato
         ports=tuple(CATALOGUE[name].port.location for name in chosen),
         changes={each.name: each.change for each in present},
         sigmas=dict(zip(chosen, sigmas, strict=True)),
-        imitators=imitators[chosen[0]] if kind == "effect" else (),
+        imitators=tuple(sorted(imitators - {*chosen, *without})),
         parameters={name: value for each in present for name, value in each.parameters.items()},
         rig=drawing.rig,
         without=without,
     )
 
 
-def _sigmas(drawing: Drawing, present: Sequence[Present]) -> list[float]:
-    """How far each effect stands out, beside the other one if there are two; 0 where there is no motion."""
+def _sigmas(drawing: Drawing, present: Sequence[Present]) -> list[float] | None:
+    """How far each effect stands out, beside the other one if there are two; None where there is no motion."""
     if len(present) < 2:
         return [drawing.sigma(each.response) for each in present]
     one, other = present
     given = {**drawing.rig, **one.parameters, **other.parameters}
     together = drawing.solve((one.name, other.name), given)
     if together is None:
-        return [0.0, 0.0]
+        return None
     return [drawing.sigma(together, other), drawing.sigma(together, one)]

@@ -4,25 +4,26 @@
 
 An effect counts as named by its own name, and as a formula of the catalogue. Where the draw found that another effect
 does the same to the campaign, so that nothing shows which it is, naming that one counts too, if the verdict says that
-it cannot distinguish the two.
+it cannot distinguish the two; instead of an effect that was removed it may be named without.
 The port of something unknown counts as found,
 too, where the verdict says that it cannot distinguish it from the one that it names. Marks that do not apply to a
 kind of trial are None.
 
 In a foreign trial no name can be right, for no catalogue has the law. A port is right where an engineer would rightly
 put the effect, a family where it would rightly be called that, at such a port
-(:mod:`savgs_ident.validation.foreign_laws`). "Unknown" at a right port has the port, not the family. Of an effect of
-which calibration leaves too little to matter "none" is right: it has no port then. So it is where the draw says so,
-to first order and with an exact damper's table, or where the recalibrated model misses tests that were held out by
-less than matters beyond their noise. Where the drawn law itself explains the recordings as well at another port
-(:mod:`savgs_ident.validation.other_port`), no diagnosis can distinguish the two: naming that one counts, too, if the
-verdict says that it cannot.
+(:mod:`savgs_ident.validation.foreign_laws`). "Unknown" at a right port has the port, not the family. Where the drawn
+law itself explains the recordings as well at another port (:mod:`savgs_ident.validation.other_port`), no diagnosis
+can distinguish the two: naming that one counts, too, if the verdict says that it cannot.
+
+Of an effect of which calibration leaves too little to be seen or to matter it is right to say nothing: it has no name
+and no port then. So it is where the draw found it, with an exact damper's table, or where the recalibrated model
+misses tests that were held out by less than matters beyond their noise.
 
 What many trials say together is in :mod:`savgs_ident.validation.blind_rates`.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
 
@@ -92,8 +93,10 @@ class Score:
         probability: that the verdict states; None if it states none.
         closed_by_effect: share of the recalibrated gap that what is named closes, on tests held out; None as above.
         version: of the code that made the diagnosis.
-        hidden: whether calibration leaves too little of a foreign effect to matter, in the draw or in held-out tests.
+        hidden: whether calibration leaves too little of a foreign effect, or of every effect that is not named, in
+            the draw or in held-out tests.
         law_known: whether what is named is a formula of the catalogue; if not, ``said`` is the nearest one.
+        imitated: whether, instead of an effect that was removed, one is named that does the same.
     """
 
     number: int
@@ -126,11 +129,13 @@ class Score:
     version: str = ""
     hidden: bool = False
     law_known: bool = True
+    imitated: bool = False
 
     @property
     def left_alone(self) -> bool:
-        """Whether an effect that calibration hides is not named."""
-        return self.hidden and self.verdict == "none"
+        """Whether an effect that calibration hides is not named, and no other instead of it."""
+        one_of_two = self.kind == "two" and self.verdict == "effect" and {*self.said} < {*self.effects}
+        return self.hidden and (self.verdict == "none" or (one_of_two and self.law_known))
 
     def __str__(self) -> str:
         right = "right" if is_right(self) else "wrong"
@@ -163,7 +168,9 @@ def said_words(score: Score) -> str:
 def is_right(score: Score) -> bool:
     """Whether the verdict is right altogether."""
     marks = (score.named_right, score.unknown_recognised, score.both_named, score.family_right)
-    return any(marks) or score.left_alone or (score.kind == "none" and score.verdict == "none")
+    return (
+        any(marks) or score.left_alone or score.imitated or (score.kind == "none" and score.verdict == "none")
+    )
 
 
 def said_right(score: Score) -> bool:
@@ -194,20 +201,17 @@ def score_of(
 
     ``elsewhere`` are the log odds of the drawn law at its own port against it at the :func:`port_in_question`.
     """
-    verdict = diagnosis["verdict"]
-    said, true = tuple(verdict["effects"]), set(answer.effects)
+    verdict, kind = diagnosis["verdict"], answer.kind
+    said, true = tuple(verdict["effects"]), {*answer.effects}
     known = bool(verdict.get("law_known", True))
-    right = known and set(said) == true and len(said) == len(true)
-    alike = known and len(said) == 1 and said[0] in answer.imitators and true <= {*verdict["confusable_with"]}
-    here = set(verdict["ports"]) == set(answer.ports) and verdict["kind"] != "none"
-    beside = verdict["kind"] == "unknown" and set(answer.ports) <= {*verdict["confusable_ports"]}
-    kind, families = answer.kind, tuple(verdict.get("families", ()))
-    cataloguing, foreign = kind not in ("none", "foreign"), answer.small_errors is not None
-    hidden = kind == "foreign" and (answer.hidden or _calibrated(diagnosis["shrink"]))
-    placed = kind == "foreign" and not (hidden and verdict["kind"] == "none")
-    own = _intervals(answer, diagnosis) if right else {}
+    right = known and {*said} == true and len(said) == len(true)
+    alike = known and _as_well(answer, verdict)
+    here = {*verdict["ports"]} == {*answer.ports} and verdict["kind"] != "none"
+    beside = verdict["kind"] == "unknown" and {*answer.ports} <= {*verdict["confusable_ports"]}
+    families, foreign = tuple(verdict.get("families", ())), answer.small_errors is not None
     accepted = _accepted(answer, diagnosis, elsewhere)
-    return Score(
+    own = _intervals(answer, diagnosis) if right else {}
+    score = Score(
         number=answer.number,
         kind=kind,
         effects=answer.effects,
@@ -216,29 +220,61 @@ def score_of(
         said=said,
         named_right=right or alike if kind == "effect" else None,
         named_exactly=right if kind == "effect" else None,
-        located_right=here or alike or beside if cataloguing else None,
-        located_exactly=here if cataloguing else None,
+        located_right=here or alike or beside if kind in _CATALOGUED else None,
+        located_exactly=here if kind in _CATALOGUED else None,
         false_alarm=verdict["kind"] not in ("none", FAILED) if kind == "none" else None,
         unknown_recognised=_no_known_law(verdict) if kind == "unknown" else None,
-        both_named=right if kind == "two" else None,
+        both_named=right or alike if kind == "two" else None,
         share_closed=diagnosis["shrink"]["share_closed"],
         intervals=_rig_intervals(answer, diagnosis) if foreign else own,
         wall_s=float(diagnosis["wall_s"]),
         foreign=foreign,
         families=families,
         sigmas=tuple(answer.sigmas[name] for name in answer.effects if name in answer.sigmas),
-        port_right=_port_right(accepted, verdict) if placed else None,
-        port_exactly=_port_exactly(answer, verdict) if placed else None,
-        port_listed=_port_listed(answer, verdict) if placed else None,
-        family_right=_family_right(accepted, answer, verdict, families) if placed else None,
-        family_exactly=_family_right(answer.accepted, answer, verdict, families) if placed else None,
+        port_right=_port_right(accepted, verdict) if kind == "foreign" else None,
+        port_exactly=_port_exactly(answer, verdict) if kind == "foreign" else None,
+        port_listed=_port_listed(answer, verdict) if kind == "foreign" else None,
+        family_right=_family_right(accepted, answer, verdict, families) if kind == "foreign" else None,
+        family_exactly=_family_right(answer.accepted, answer, verdict, families)
+        if kind == "foreign"
+        else None,
         elsewhere=elsewhere,
         probability=_number_or_none(verdict.get("probability")),
         closed_by_effect=_number_or_none(diagnosis["shrink"].get("closed_by_effect")),
         version=version,
-        hidden=hidden,
+        hidden=_hidden(answer, diagnosis),
         law_known=known,
+        imitated=kind == "unknown" and known and len(said) == 1 and said[0] in answer.imitators,
     )
+    unmarked: dict[str, Any] = dict.fromkeys(_OF_WHAT_IS_THERE)
+    return replace(score, **unmarked) if score.left_alone or score.imitated else score
+
+
+_CATALOGUED = ("effect", "two", "unknown")
+"""Kinds of trials whose effects are of the catalogue."""
+
+_OF_WHAT_IS_THERE = (
+    *("named_right", "named_exactly", "located_right", "located_exactly", "unknown_recognised", "both_named"),
+    *("port_right", "port_exactly", "port_listed", "family_right", "family_exactly"),
+)
+"""Marks that nobody could earn where what is there cannot be seen, or told from what is named."""
+
+
+def _as_well(answer: Answer, verdict: Mapping[str, Any]) -> bool:
+    """Whether in place of one drawn effect another is named that does the same, which the verdict says."""
+    said, true = {*verdict["effects"]}, {*answer.effects}
+    instead, left_out = said - true, true - said
+    one_for_one = len(said) == len(true) and len(instead) == 1
+    return one_for_one and instead <= {*answer.imitators} and left_out <= {*verdict["confusable_with"]}
+
+
+def _hidden(answer: Answer, diagnosis: Mapping[str, Any]) -> bool:
+    """Whether calibration hides every drawn effect that is not named; of a foreign one, none has its name."""
+    all_of_it = answer.kind != "none" and _calibrated(diagnosis["shrink"])
+    unseen = {*answer.effects} if all_of_it else answer.out_of_sight
+    said = set() if answer.kind == "foreign" else {*diagnosis["verdict"]["effects"]}
+    missed = {*answer.effects} - said
+    return bool(missed) and missed <= unseen
 
 
 def _calibrated(shrink: Mapping[str, Any]) -> bool:

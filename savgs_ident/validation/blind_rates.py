@@ -117,6 +117,7 @@ def _own_rates(scores: Sequence[Score]) -> dict[str, Rate]:
         "share_closed_90": _rate([share is not None and share >= 0.9 for share in closed]),
         "named_exactly": _rate([score.named_exactly for score in scores]),
         "located_exactly": _rate([score.located_exactly for score in scores]),
+        "hidden_left_alone": _rate([score.left_alone for score in scores if score.hidden]),
     }
 
 

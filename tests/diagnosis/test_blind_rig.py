@@ -16,7 +16,6 @@ from savgs_ident.validation.blind_answer import Answer
 from savgs_ident.validation.blind_draw import (
     LARGEST,
     SMALLEST,
-    STANDS_OUT,
     Drawing,
     Present,
     Shares,
@@ -154,7 +153,8 @@ def test_draws_are_what_was_asked_for_and_can_be_repeated(bench: Bench, shares: 
     assert len(first.effects) == count
     assert set(first.parameters) == {p.name for name in first.effects for p in CATALOGUE[name].parameters}
     assert first.ports == tuple(CATALOGUE[name].port.location for name in first.effects)
-    assert all(sigma >= STANDS_OUT for sigma in first.sigmas.values())
+    assert {*first.sigmas} == {*first.effects}
+    assert not {*first.imitators} & {*first.effects, *first.without}
     assert set(first.effects) <= set(CATALOGUE) - set(MODELS["simtr"])
     assert set(first.effects) <= set(first.without) if shares.unknown else first.without == ()
 

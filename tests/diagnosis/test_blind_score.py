@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.validation.blind_marks import Score, failed, said_right, score_from, score_of
+from savgs_ident.validation.blind_marks import Score, failed, is_right, said_right, score_from, score_of
 from savgs_ident.validation.blind_rates import (
     NOTHING,
     OTHERS,
@@ -104,6 +104,57 @@ def test_an_effect_that_the_catalogue_lacks() -> None:
     assert (named.unknown_recognised, named.located_right) == (False, True)
 
 
+def test_of_two_effects_the_one_that_calibration_hides_may_be_left_out() -> None:
+    """Its four standard deviations are seen by nobody; the other's twenty are."""
+    dim = replace(PAIR, sigmas={"accel_lag": 20.0, "rail_viscous": 4.0})
+    seen = score_of(dim, diagnosis("effect", "accel_lag"))
+    assert (seen.left_alone, seen.both_named, seen.located_right, is_right(seen)) == (True, None, None, True)
+    both = score_of(dim, diagnosis("several", "accel_lag", "rail_viscous"))
+    assert (both.left_alone, both.both_named, is_right(both)) == (False, True, True)
+    other = score_of(dim, diagnosis("effect", "accel_gain"))
+    assert (other.left_alone, other.both_named, is_right(other)) == (False, False, False)
+    nothing = score_of(dim, diagnosis("none"))
+    assert (nothing.left_alone, nothing.both_named, is_right(nothing)) == (False, False, False)
+    assert rates_of([seen, both, other])["hidden_left_alone"] == Rate(1, 1)
+
+
+def test_an_effect_of_which_held_out_tests_show_too_little_may_be_left_alone() -> None:
+    alone = diagnosis("none")
+    alone["shrink"] |= {"recalibrated": 0.0032, "floor": 0.002}
+    score = score_of(LAG, alone)
+    assert (score.left_alone, score.named_right, score.located_right, is_right(score)) == (
+        True,
+        None,
+        None,
+        True,
+    )
+    alone["shrink"] |= {"recalibrated": 0.0045}
+    shown = score_of(LAG, alone)
+    assert (shown.left_alone, shown.named_right, shown.located_right, is_right(shown)) == (
+        *(False, False, False),
+        False,
+    )
+
+
+def test_where_another_effect_does_the_same_as_one_that_was_removed_it_may_be_named() -> None:
+    gone = replace(GONE, imitators=("deflection_delay",))
+    named = score_of(gone, diagnosis("effect", "deflection_delay"))
+    assert (named.imitated, named.unknown_recognised, named.located_right, is_right(named)) == (
+        *(True, None, None),
+        True,
+    )
+    other = score_of(gone, diagnosis("effect", "rail_viscous"))
+    assert (other.imitated, other.unknown_recognised, is_right(other)) == (False, False, False)
+
+
+def test_in_place_of_one_of_two_effects_another_may_be_named_that_does_the_same() -> None:
+    pair = replace(PAIR, imitators=("rail_preload",))
+    told = score_of(pair, diagnosis("several", "accel_lag", "rail_preload", like=["rail_viscous"]))
+    assert (told.both_named, told.located_right) == (True, True)
+    untold = score_of(pair, diagnosis("several", "accel_lag", "rail_preload"))
+    assert untold.both_named is False
+
+
 def test_a_law_that_is_said_to_be_none_of_the_catalogue() -> None:
     """The formula that comes nearest is not named, though its name stands in the verdict."""
 
@@ -176,6 +227,7 @@ def test_rates_count_only_the_trials_that_they_are_about() -> None:
         "share_closed_90": (1, 2),
         "named_exactly": (1, 3),
         "located_exactly": (5, 7),
+        "hidden_left_alone": (0, 0),
     }
 
 
