@@ -4,7 +4,8 @@
     print(study)                            # the rates with their intervals, and where it was wrong
 
 Trials run side by side, each is kept as soon as it is there (:mod:`savgs_ident.validation.trials`); one trial from
-the draw to its marks is :mod:`savgs_ident.validation.blind_trial`.
+the draw to its marks is :mod:`savgs_ident.validation.blind_trial`. A run that goes on marks the diagnoses that are
+there by the rules of its own version.
 """
 
 import secrets
@@ -32,6 +33,7 @@ from savgs_ident.validation.blind_trial import (
     diagnose_folder,
     draw_and_record,
     kept_trials,
+    marked_anew,
     run_trial,
 )
 from savgs_ident.validation.trials import append_trial, begin_trials, known_trials, marks_in, side_by_side
@@ -147,7 +149,7 @@ def run_blind(
     use_persistent_cache()
     kept = out / FILE
     plan = plan_of(request, sheet, kept)
-    done = known_trials(kept, plan.marks(), score_from)
+    done = marked_anew(out, known_trials(kept, plan.marks(), score_from))
     if request.again or not done:
         done = []
         begin_trials(kept, plan.marks())

@@ -201,6 +201,15 @@ def kept_trials(out: Path, scores: Sequence[Score]) -> Iterator[tuple[Score, Ans
             yield score, _read(answer, envelope_of).answer, _read(said, dict)
 
 
+def marked_anew(out: Path, scores: Sequence[Score]) -> list[Score]:
+    """The marks of trials by the rules of today; those that were kept, where a trial's files are gone."""
+    anew = {
+        score.number: score_of(answer, said, score.version, score.elsewhere)
+        for score, answer, said in kept_trials(out, scores)
+    }
+    return [anew.get(score.number, score) for score in scores]
+
+
 def _diagnosed(diagnose: Diagnose, folder: Path, rig: Rig, without: tuple[str, ...]) -> Mapping[str, Any]:
     try:
         return diagnose(folder, rig, without)

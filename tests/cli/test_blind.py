@@ -57,6 +57,19 @@ def test_trials_that_are_there_are_neither_drawn_nor_diagnosed(tmp_path: Path) -
     assert _record(tmp_path) == before
 
 
+def test_a_run_that_goes_on_marks_what_is_there_by_its_own_rules(tmp_path: Path) -> None:
+    """Rules of an earlier version gave nothing for what was named; where its files are gone, its marks stay."""
+    concluded(request(), draw, always_right, SILENT, tmp_path)
+    before, kept = _record(tmp_path), tmp_path / "trials.jsonl"
+    assert '"named_right": true' in kept.read_text()
+    kept.write_text(kept.read_text().replace('"named_right": true', '"named_right": false'))
+    assert concluded(request(), _never, _never, SILENT, tmp_path) == OK
+    assert _record(tmp_path) == before
+    for file in tmp_path.glob("trial_*/diagnosis.json"):
+        file.unlink()
+    assert concluded(request(), _never, _never, SILENT, tmp_path) == NOT_TRUSTED
+
+
 def test_again_diagnoses_the_same_recordings(tmp_path: Path) -> None:
     concluded(request(), draw, always_right, SILENT, tmp_path)
     code = concluded(request(again=True), _never, always_none, SILENT, tmp_path)
