@@ -69,7 +69,8 @@ class Rate:
         share = self.count / n
         middle = (share + Z**2 / (2 * n)) / (1.0 + Z**2 / n)
         half = Z * sqrt(share * (1.0 - share) / n + Z**2 / (4 * n**2)) / (1.0 + Z**2 / n)
-        return max(middle - half, 0.0), min(middle + half, 1.0)
+        # It contains the share, but for rounding.
+        return min(max(middle - half, 0.0), share), max(min(middle + half, 1.0), share)
 
 
 def rates_of(scores: Sequence[Score]) -> dict[str, Rate]:

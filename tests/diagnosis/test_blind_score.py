@@ -252,6 +252,14 @@ def test_intervals_of_rates_are_those_of_wilson(total: int, data: st.DataObject)
     assert rate.high == pytest.approx(expected.high, abs=1e-6)
 
 
+def test_an_interval_contains_its_rate_to_the_last_digit() -> None:
+    """Of 14 of 14 the formula gives 1 less one rounding, and a bar of negative length could not be drawn."""
+    for total in range(1, 200):
+        for count in {0, 1, total - 1, total}:
+            rate = Rate(count, total)
+            assert rate.low <= count / total <= rate.high
+
+
 def test_what_is_confused_with_what() -> None:
     confusion = confusion_of(_scores(), tuple(CATALOGUE))
     assert confusion.truths == (NOTHING, "cam_scale", "accel_lag", TWO, UNKNOWN)
