@@ -61,7 +61,7 @@ def _verdict(
             ports,
             families=families,
             law_known=False,
-            probability=sum(_probability(evidence, each) for each in (UNKNOWN, *evidence.insufficient)),
+            probability=_probability(evidence, UNKNOWN, *evidence.insufficient),
         )
     member = evidence.named_law
     if member is not None:
@@ -89,18 +89,21 @@ def _verdict(
     )
 
 
-def _probability(evidence: DiagnosisEvidence, hypothesis: Hypothesis) -> float:
-    """The probability [1] of a hypothesis among all."""
-    shares = probabilities(evidence.weighed)
-    both = zip(evidence.weighed, shares, strict=True)
-    return float(next(share for each, share in both if each.hypothesis == hypothesis))
+def _probability(evidence: DiagnosisEvidence, *hypotheses: Hypothesis) -> float:
+    """The probability [1] of hypotheses among all."""
+    return _sum_of_shares(evidence, dict.fromkeys(hypotheses, 1.0))
 
 
 def _probability_of_nothing(evidence: DiagnosisEvidence) -> float:
     """The probability [1] that nothing is missing, or too little to matter."""
-    little = {NONE: 1.0, **evidence.immaterial}
+    return _sum_of_shares(evidence, {NONE: 1.0, **evidence.immaterial})
+
+
+def _sum_of_shares(evidence: DiagnosisEvidence, parts: Mapping[Hypothesis, float]) -> float:
+    """The probabilities of hypotheses, so much of each as ``parts`` say, together [1]."""
     both = zip(evidence.weighed, probabilities(evidence.weighed), strict=True)
-    return float(sum(share * little.get(each.hypothesis, 0.0) for each, share in both))
+    # Rounded, a sum of all may be more than one.
+    return min(float(sum(share * parts.get(each.hypothesis, 0.0) for each, share in both)), 1.0)
 
 
 def _law_missing(

@@ -200,7 +200,8 @@ def probabilities(weighed: Sequence[WeighedHypothesis]) -> NDArray[np.float64]:
         drawn = weights + sd * np.random.default_rng(0).standard_normal((DRAWS, sd.size))
     shares = np.exp(drawn - drawn.max(axis=-1, keepdims=True))
     each = shares / shares.sum(axis=-1, keepdims=True)
-    return np.asarray(each.reshape(-1, weights.size).mean(axis=0))
+    # A mean of ones may be one and a rounding.
+    return np.asarray(np.minimum(each.reshape(-1, weights.size).mean(axis=0), 1.0))
 
 
 def uncertain_odds(odds: float, sd: float) -> float:

@@ -198,8 +198,9 @@ class Reliability:
 
 def reliability_of(scores: Sequence[Score]) -> Reliability:
     """The table of the trials that state a probability and did not fail."""
+    # Diagnoses of earlier versions may state one and a rounding.
     stated = [
-        (score.probability, said_right(score))
+        (min(score.probability, EDGES[-1]), said_right(score))
         for score in scores
         if score.probability is not None and score.verdict != FAILED
     ]

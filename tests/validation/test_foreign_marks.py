@@ -294,3 +294,10 @@ def test_what_people_read_has_the_same_numbers() -> None:
     assert axes.get_xlabel() == "stated probability [1]"
     assert {text.get_text() for text in axes.texts} == {"1", "2"}
     assert blind_text(scores())
+
+
+def test_a_certainty_that_rounding_made_more_than_one_is_counted() -> None:
+    wrong = score_of(foreign("tyre_cubic"), said("unknown", ports=["road"], p=1.0000000000000016))
+    found = reliability_of([wrong])
+    assert [each.rate.total for each in found.bins] == [0, 0, 0, 0, 1]
+    assert found.error == 1.0
