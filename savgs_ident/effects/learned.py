@@ -160,7 +160,7 @@ class LearnedCompliance(AbstractSeriesLaw):
         """Nothing learned yet."""
         spans = {
             "carried": Parameter("carried", 1.0, port.force_unit, lower=SMALLEST, about="largest load seen"),
-            "lag": Parameter("lag", 3e-4, "s", lower=1e-5, upper=0.1, about="time in which it gives way"),
+            "lag": Parameter("lag", 3e-3, "s", lower=1e-5, upper=0.1, about="time in which it gives way"),
         }
         return spans | _coefficients(port, port.displacement_unit)
 
