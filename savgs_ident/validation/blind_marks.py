@@ -177,7 +177,8 @@ def said_right(score: Score) -> bool:
     """Whether what the verdict says is true: what its stated probability is to be compared with.
 
     That a foreign effect is unknown, at its port, is true; that it is at a port where it would do the same is not. A
-    law of something that was removed from the catalogue is true at its port alone.
+    law of something that was removed from the catalogue is true at its port alone; an effect that does the same as
+    what was removed is not.
     """
     if score.family_right:
         return score.family_exactly is True

@@ -202,11 +202,11 @@ def kept_trials(out: Path, scores: Sequence[Score]) -> Iterator[tuple[Score, Ans
 
 
 def marked_anew(out: Path, scores: Sequence[Score]) -> list[Score]:
-    """The marks of trials by the rules of today; those that were kept, where a trial's files are gone."""
-    anew = {
-        score.number: score_of(answer, said, score.version, score.elsewhere)
-        for score, answer, said in kept_trials(out, scores)
-    }
+    """The marks of trials by the rules of today; those that were kept, where a trial's files are gone or damaged."""
+    anew = {}
+    for score, answer, said in kept_trials(out, scores):
+        with suppress(KeyError, TypeError, AttributeError):
+            anew[score.number] = score_of(answer, said, score.version, score.elsewhere)
     return [anew.get(score.number, score) for score in scores]
 
 
