@@ -7,13 +7,14 @@ catalogue's formulas, solved, simulated and exported.
 
 Which family the law is of follows from the fit: its functions of all other families are taken away, to first order
 about the fit, and one by one those of the family that are not needed; what remains is weighed. The likely families
-are fitted again by themselves; where the functions of one are more probable than all, the law is made of them.
+are fitted again by themselves; where the functions of one are more probable than all, the law is made of them. A play
+is fitted as one that is blocked at its ends, too: until then it may give way as slowly as a film of oil does.
 
 How large coefficients may be is unknown before the data: their prior is one of several widths, first the one that is
 the most probable to first order about the baseline, for each family then the one that is so about the fit.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import log
 from typing import NamedTuple
@@ -22,7 +23,9 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.parameter import ParameterTable, merge_parameters
+from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out
 from savgs_ident.diagnosis.localisation import widths_of
 from savgs_ident.diagnosis.problem import AbstractProblem, term_of
@@ -31,6 +34,7 @@ from savgs_ident.effects.base import Family, Port, PortKind
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned import learned_effect
 from savgs_ident.effects.learned_functions import (
+    blocking_at,
     coefficients_at,
     coefficients_of,
     functions_at,
@@ -40,7 +44,7 @@ from savgs_ident.effects.learned_functions import (
 from savgs_ident.inference.find_map import LaplaceFit, Search, Start, find_map, find_map_from_both, search_of
 from savgs_ident.inference.laplace import linearised_optimum, log_evidence
 from savgs_ident.inference.observations import Data, Term
-from savgs_ident.inference.prior import Linear, bounds_of
+from savgs_ident.inference.prior import Linear, Logarithmic, bounds_of
 
 
 @dataclass(frozen=True)
@@ -109,15 +113,101 @@ def learn(
     problem: AbstractProblem,
     data: Data,
     base: LaplaceFit,
-    port: Port,
+    ports: Sequence[Port],
     constants: DecisionConstants = DEFAULTS,
     given: Start | None = None,
-) -> LearnedLaw | None:
-    """The law at a port; ``base`` is the recalibrated baseline. None where nothing can be learned.
+    progress: Progress = no_progress,
+) -> tuple[LearnedLaw, ...]:
+    """The laws at ports, in their order; ``base`` is the recalibrated baseline.
 
-    It is looked for from there and from the plant as ``given``. Nothing can be learned at a port without learned law,
-    where the plant with one has no solution, or where the law is impossible.
+    They are looked for from there and from the plant as ``given``. There is none at a port without learned law, where
+    the plant with one has no solution, or where the law is impossible. Families are told apart where a law with the
+    functions of one could be as probable as the best of all ports.
     """
+
+    def begin(port: Port) -> _Begun | None:
+        progress(f"learning a law at {port.location} ({port.name})")
+        return _begin(problem, data, base, port, constants, given)
+
+    begun = [each for each in in_parallel(begin, ports) if each is not None]
+    weights = [each.best.weight for each in begun if each.law(each.best, {}) is not None]
+    least = max(weights, default=-np.inf) - constants.alarm_log_odds
+
+    def finish(each: _Begun) -> LearnedLaw | None:
+        progress(f"telling families apart at {each.port.location} ({each.port.name})")
+        return each.law(*_most_probable(each, base, least, constants))
+
+    return tuple(law for law in in_parallel(finish, begun) if law is not None)
+
+
+class _FittedFunctions(NamedTuple):
+    """Functions fitted on the nonlinear plant: all of a port, or some of one family alone.
+
+    Attributes:
+        term: their coefficients as a search takes them.
+        mode: the best point.
+        log_prior: log prior probability that these of the family are needed; 0 for all functions.
+        only: the family; None for all functions.
+    """
+
+    term: Term
+    mode: LaplaceFit
+    log_prior: float = 0.0
+    only: Family | None = None
+
+    @property
+    def weight(self) -> float:
+        """Their log evidence, with the prior probability of the functions."""
+        return self.mode.evidence + self.log_prior
+
+    @property
+    def attainable(self) -> float:
+        """The log evidence that some of them cannot exceed: the likelihood of all at its best, if that was found."""
+        x = self.mode.x
+        return self.mode.value + 0.5 * float(x @ x) if self.mode.status.ok else np.inf
+
+
+class _Begun(NamedTuple):
+    """All functions of a port fitted, and those of a play that is blocked, if any; see :class:`LearnedLaw`."""
+
+    port: Port
+    problem: AbstractProblem
+    search: Search
+    spans: Mapping[str, float]
+    every: _FittedFunctions
+    blocked: _FittedFunctions | None
+
+    @property
+    def best(self) -> _FittedFunctions:
+        """The more probable ones."""
+        return max((each for each in (self.every, self.blocked) if each), key=lambda each: each.weight)
+
+    def law(self, fitted: _FittedFunctions, families: Mapping[Family, float]) -> LearnedLaw | None:
+        """The law of some functions; None where it is impossible."""
+        law = LearnedLaw(
+            name=fitted.term.name,
+            port=self.port,
+            term=fitted.term,
+            problem=self.problem,
+            search=self.search,
+            mode=fitted.mode,
+            spans=self.spans,
+            families=families,
+            log_prior=fitted.log_prior,
+            only=fitted.only,
+        )
+        return None if _is_impossible(law) else law
+
+
+def _begin(
+    problem: AbstractProblem,
+    data: Data,
+    base: LaplaceFit,
+    port: Port,
+    constants: DecisionConstants,
+    given: Start | None,
+) -> _Begun | None:
+    """The fit of all functions of a port; None where there is none."""
     spans = problem.learned_spans(port, base.values, base.prediction.warm_start)
     if spans is None:
         return None
@@ -141,20 +231,8 @@ def learn(
     mode = find_map_from_both(search, (term,), base.values, there_now.warm_start, constants.learned_steps)
     if not mode.solved:
         return None
-    best, families = _most_probable(search, term, mode, port, base, constants)
-    law = LearnedLaw(
-        name=effect.name,
-        port=port,
-        term=best.term,
-        problem=mine,
-        search=search,
-        mode=best.mode,
-        spans=spans,
-        families=families,
-        log_prior=best.log_prior,
-        only=best.only,
-    )
-    return None if _is_impossible(law) else law
+    blocked = _blocked_play(search, effect, blank, port, base, constants)
+    return _Begun(port, mine, search, spans, _FittedFunctions(term, mode), blocked)
 
 
 def _is_impossible(law: LearnedLaw) -> bool:
@@ -214,55 +292,58 @@ def _some_of(term: Term, found: _FamilyAlone) -> Term:
     return replace(term, amplitudes=tuple(replace(each, scale=found.width * each.scale) for each in kept))
 
 
-class _FittedFunctions(NamedTuple):
-    """Functions fitted on the nonlinear plant: all of a port, or some of one family alone.
-
-    Attributes:
-        term: their coefficients as a search takes them.
-        mode: the best point.
-        log_prior: log prior probability that these of the family are needed; 0 for all functions.
-        only: the family; None for all functions.
-    """
-
-    term: Term
-    mode: LaplaceFit
-    log_prior: float = 0.0
-    only: Family | None = None
-
-    @property
-    def weight(self) -> float:
-        """Their log evidence, with the prior probability of the functions."""
-        return self.mode.evidence + self.log_prior
-
-
 def _most_probable(
-    search: Search,
-    term: Term,
-    mode: LaplaceFit,
-    port: Port,
-    base: LaplaceFit,
-    constants: DecisionConstants,
+    begun: _Begun, base: LaplaceFit, least: float, constants: DecisionConstants
 ) -> tuple[_FittedFunctions, Mapping[Family, float]]:
     """The most probable functions of a law, and what the law's ``families`` are.
 
-    All functions of the port, which are fitted with ``term`` and ``mode``, or those of a family that is likely.
+    All functions of the port, or a play that is blocked, or those of a family that is likely, where this can come to
+    a log evidence of ``least``.
     """
-    found = _families(search, mode, port, constants)
-    weights = {family: each.weight for family, each in found.items()}
-    best, least = _FittedFunctions(term, mode), base.evidence + constants.alarm_log_odds
-    # To first order about all functions together the families are not known well enough to take the first.
-    likely = sorted(found, key=lambda family: -found[family].weight)[: constants.likely_families]
-    for family in likely:
-        each = found[family]
-        if family is not likely[0] and each.weight <= least:
-            continue
-        some, near = _some_of(term, each), best.mode.prediction.warm_start
-        alone = find_map(search, (some,), each.start, near, constants.learned_steps)
-        if alone.solved:
-            fitted = _FittedFunctions(some, alone, each.log_prior, family)
-            weights[family] = fitted.weight
-            best = fitted if fitted.weight > best.weight else best
-    return best, weights if best.only else _spared(search, mode, port)
+    every, best, weights = begun.every, begun.best, dict[Family, float]()
+    if every.attainable > least:
+        search, mode, worth = begun.search, every.mode, base.evidence + constants.alarm_log_odds
+        found = _families(search, mode, begun.port, constants)
+        weights = {family: each.weight for family, each in found.items()}
+        # To first order about all functions together the families are not known well enough to take the first.
+        likely = sorted(found, key=lambda family: -found[family].weight)[: constants.likely_families]
+        for family in likely:
+            each = found[family]
+            if family is not likely[0] and each.weight <= worth:
+                continue
+            some, near = _some_of(every.term, each), best.mode.prediction.warm_start
+            alone = find_map(search, (some,), each.start, near, constants.learned_steps)
+            if alone.solved:
+                fitted = _FittedFunctions(some, alone, each.log_prior, family)
+                weights[family] = fitted.weight
+                best = fitted if fitted.weight > best.weight else best
+    if best.only is None:
+        return best, _spared(begun.search, every.mode, begun.port)
+    return best, weights | {best.only: best.weight}
+
+
+def _blocked_play(
+    search: Search, effect: Effect, blank: Term, port: Port, base: LaplaceFit, constants: DecisionConstants
+) -> _FittedFunctions | None:
+    """The functions of a play that is blocked at its ends, fitted from the baseline.
+
+    ``blank`` is the port's learned law without coefficients. None where there is no play, or none with a solution.
+    """
+    blocking = blocking_at(port)
+    if blocking is None:
+        return None
+    lags = tuple(replace(each, centre=constants.lag_of_play) for each in blank.shapes)
+    blocked = Logarithmic(blocking, "1", constants.blocking_of_play, constants.shape_width, 0.0, np.inf)
+    names, shapes = coefficients_of(port, Family.PLAY), (*lags, blocked)
+    start = {**base.values, **{each.name: each.centre for each in shapes}}
+    there_now = search.plant.predict((effect.name,), start, names, base.prediction.warm_start)
+    if not there_now.solved:
+        return None
+    columns = dict(zip(names, there_now.slopes.T, strict=True))
+    term = _with_amplitudes(replace(blank, shapes=shapes), effect, search, base, columns, constants)
+    mode = find_map(search, (term,), start, there_now.warm_start, constants.learned_steps)
+    log_prior = len(term.amplitudes) * log(constants.function_prior)
+    return _FittedFunctions(term, mode, log_prior, Family.PLAY) if mode.solved else None
 
 
 def _families(

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.executor import in_parallel, side_by_side
+from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.presentation import Progress
 from savgs_ident.diagnosis.background import relative_change
 from savgs_ident.diagnosis.evidence import (
@@ -261,13 +261,8 @@ def _learned_laws(
     explained = left_over(problem.search, base, best, constants) <= constants.explained_share
     if explained and weight >= linear + log_prior(UNKNOWN, count, constants):
         return ()
-
-    def fitted(port: Port) -> LearnedLaw | None:
-        progress(f"learning a law at {port.location} ({port.name})")
-        return learn(problem.plant, problem.data, base, port, constants, problem.search.given)
-
     ports = _worth_learning(problem, findings, localisations)
-    return tuple(each for each in in_parallel(fitted, ports) if each is not None and each.mode.solved)
+    return learn(problem.plant, problem.data, base, ports, constants, problem.search.given, progress)
 
 
 def _flexible_members(

@@ -433,6 +433,18 @@ class DecisionConstants:
     Halved or doubled: log odds between ports that do nearly the same move by up to 0.7 nat.
     """
 
+    lag_of_play: float = 0.05
+    """Time constant [s] from which that of a play between films of oil is looked for.
+
+    Origin: by choice: a film that gives way within a period of the dwells. A shorter one is found from there as well.
+    """
+
+    blocking_of_play: float = 5.0
+    """Typical displacement of a port over that at which a play is blocked, from which that is looked for [1].
+
+    Origin: by choice: a play is smaller than what gives way elsewhere.
+    """
+
     likely_families: int = 2
     """Families of a learned law that are fitted by themselves on the nonlinear plant. Origin: computing time."""
 

@@ -4,7 +4,7 @@ A learned law is a sum of known functions of what its port sees, with coefficien
 
     port     law                a sum of functions of
     force    LearnedForce       displacement, velocity and load, and of spring-sliders that follow the displacement
-    series   LearnedCompliance  the load: by how much something gives way
+    series   LearnedCompliance  the load: by how much something gives way, until it is blocked
     input    LearnedInput       the angle of the test: what comes on top of the recorded value
     sensor   LearnedTransfer    the frequency: what comes on top of a transfer function of one
 
@@ -66,6 +66,9 @@ from savgs_ident.effects.learned_functions import (
 
 SLIDER_LAG = 3e-4
 """Damping over stiffness of a spring-slider [s]."""
+
+BLOCKED_AS = 8
+"""Exponent with which a play is blocked at its ends [1]."""
 
 
 def _coefficients(port: Port, unit: str) -> dict[str, Parameter | float]:
@@ -149,11 +152,20 @@ class LearnedForce(AbstractForceLaw):
 
 
 class LearnedCompliance(AbstractSeriesLaw):
-    """What gives way under a load by a learned law: x + T xd = sum over k of c_k f_k(n, N)."""
+    """What gives way under a load by a learned law, until it is blocked.
+
+        T xd + x (1 + (b x / x_t)^8) = sum over k of c_k f_k(n, N)
+
+    with the deflection x, the typical one x_t of the port, the time T [s] in which it gives way, and b [1], x_t over
+    the deflection at which it is blocked; nothing blocks it with b = 0.
+    """
 
     name: ClassVar[str] = "learned_compliance"
     family: ClassVar[Family] = Family.LEARNED
-    roles: ClassVar[tuple[Role, ...]] = _roles(("carried", "lag"), len(OF_WHAT_GIVES))
+    roles: ClassVar[tuple[Role, ...]] = (
+        *_roles(("carried", "lag"), len(OF_WHAT_GIVES)),
+        Role("blocking", 0.0),
+    )
     port: Port = eqx.field(static=True)
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
@@ -162,7 +174,9 @@ class LearnedCompliance(AbstractSeriesLaw):
             "carried": Parameter("carried", 1.0, port.force_unit, lower=SMALLEST, about="largest load seen"),
             "lag": Parameter("lag", 3e-3, "s", lower=1e-5, upper=0.1, about="time in which it gives way"),
         }
-        return spans | _coefficients(port, port.displacement_unit)
+        about = "typical displacement over that at which it is blocked"
+        blocking = Parameter("blocking", 0.0, "1", lower=0.0, upper=1e3, about=about)
+        return spans | _coefficients(port, port.displacement_unit) | {"blocking": blocking}
 
     def states(self, port: Port) -> tuple[InternalState, ...]:
         """The deflection."""
@@ -178,7 +192,8 @@ class LearnedCompliance(AbstractSeriesLaw):
         """The deflection out of balance [the port's unit]."""
         n = jnp.clip(load.beyond_rest / v["carried"], -1.0, 1.0)
         whole, rest = load.total / v["carried"], load.rest / v["carried"]
-        return jnp.sqrt(v["lag"] ** 2 + SETTLING**2) * rate + state - _sum(v, what_gives(n, whole, rest))
+        held = state * (1.0 + (v["blocking"] * state / self.port.displacement) ** BLOCKED_AS)
+        return jnp.sqrt(v["lag"] ** 2 + SETTLING**2) * rate + held - _sum(v, what_gives(n, whole, rest))
 
 
 class LearnedInput(AbstractInputLaw):

@@ -276,6 +276,11 @@ def coefficients_of(port: Port, family: Family) -> tuple[str, ...]:
     return tuple(name for name, function in both if function.family in mine)
 
 
+def blocking_at(port: Port) -> str | None:
+    """Name of the number by which a play is blocked at its ends; None where nothing gives way by a learned law."""
+    return f"learned_{port.name}_blocking" if port.kind is PortKind.SERIES and not port.resonant else None
+
+
 def interactions_at(port: Port) -> tuple[str, ...]:
     """Names of the coefficients of products of displacement and velocity at a port."""
     both = zip(coefficients_at(port), functions_at(port), strict=True)

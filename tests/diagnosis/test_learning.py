@@ -35,8 +35,7 @@ def case(measure: Measure, rig: Rig) -> tuple[DwellProblem, Data, LaplaceFit]:
 @pytest.fixture(scope="module")
 def law(case: tuple[DwellProblem, Data, LaplaceFit]) -> LearnedLaw:
     """The force at the rail."""
-    found = learn(*case, RAIL)
-    assert found is not None
+    (found,) = learn(*case, [RAIL])
     return found
 
 

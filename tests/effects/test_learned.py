@@ -9,12 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from jaxtyping import Array
+from scipy.optimize import brentq
 
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import Family, Fundamental, InputSignal, Load, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned import SLIDER_LAG, LearnedForce
-from savgs_ident.effects.learned_functions import coefficients_at, coefficients_of, frictions_at, functions_at
+from savgs_ident.effects.learned_functions import (
+    blocking_at,
+    coefficients_at,
+    coefficients_of,
+    frictions_at,
+    functions_at,
+)
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, EFFECTS, LEARNED
 from savgs_ident.plants.quarter_car.ports import PORTS
 from savgs_ident.plants.quarter_car.rig_toml import KNOWN_UNITS
@@ -126,7 +133,8 @@ def test_every_function_is_of_a_family(effect: Effect) -> None:
     assert set(of_families) == set(coefficients_at(port))
     gains = set(coefficients_of(port, Family.GAIN))
     assert gains <= set(coefficients_of(port, Family.DYNAMICS))
-    assert set(effect.null) == set(coefficients_at(port))
+    blocking = {blocking_at(port)} - {None}
+    assert set(effect.null) == {*coefficients_at(port), *blocking}
 
 
 @each_force
@@ -146,6 +154,25 @@ def test_what_gives_way_returns_to_rest_and_follows_the_load() -> None:
     at_rest = Load(load.rest, load.rest)
     every = as_values(dict.fromkeys(effect.null, 1e-3) | spans)
     assert float(effect.balance(every, at_rest, zero, zero)[0]) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_what_gives_way_is_blocked_in_the_end() -> None:
+    """Below the deflection at which it is blocked it follows the load, above it hardly does."""
+    effect = LEARNED["learned_damper"]
+    gap = 0.2 * effect.port.displacement
+    spans = {"learned_damper_carried": 1e3, "learned_damper_lag": 1e-3, "learned_damper_blocking": 5.0}
+    p = as_values(dict(effect.null) | {"learned_damper_1": 10.0 * gap} | spans)
+
+    def deflection(load: float) -> float:
+        def missing(x: float) -> float:
+            pushed = Load(jnp.asarray(load), jnp.zeros(()))
+            return float(effect.balance(p, pushed, jnp.asarray([x]), jnp.zeros(1))[0])
+
+        return float(brentq(missing, -10.0 * gap, 10.0 * gap, xtol=1e-12))
+
+    assert deflection(30.0) == pytest.approx(0.3 * gap, rel=1e-3)
+    assert gap < deflection(1000.0) < 1.35 * gap
+    assert deflection(-1000.0) == pytest.approx(-deflection(1000.0), rel=1e-9)
 
 
 def test_a_learned_input_moves_as_its_rate_says() -> None:
