@@ -127,7 +127,7 @@ def learn(
 
     def begin(port: Port) -> _Begun | None:
         progress(f"learning a law at {port.location} ({port.name})")
-        return _begin(problem, data, base, port, constants, given)
+        return _begin_learning(problem, data, base, port, constants, given)
 
     begun = [each for each in in_parallel(begin, ports) if each is not None]
     weights = [each.best.weight for each in begun if each.law(each.best, {}) is not None]
@@ -199,7 +199,7 @@ class _Begun(NamedTuple):
         return None if _is_impossible(law) else law
 
 
-def _begin(
+def _begin_learning(
     problem: AbstractProblem,
     data: Data,
     base: LaplaceFit,

@@ -23,6 +23,7 @@ from savgs_ident.effects.base import Family
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.laplace import linearised_optimum, log_evidence
 from savgs_ident.inference.likelihood import NoiseScales
+from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import bounds_of
 
 Matrix = NDArray[np.float64]
@@ -101,7 +102,8 @@ def localise(
 ) -> list[Localisation]:
     """What an input at every location explains beyond a fit, the largest share first."""
     folds = _folds_of(search, mode, constants.location_folds)
-    found = [_localisation(search, mode, each, folds, constants) for each in locations]
+    fit = _linearised(search, mode)
+    found = [_localisation(search, fit, each, folds, constants) for each in locations]
     return sorted(found, key=lambda each: -each.share)
 
 
@@ -117,8 +119,9 @@ def widths_of(
 
     ``columns`` (m, q) are the change of the rows per unit of each.
     """
-    rms = _rms(search, mode, columns)
-    return np.asarray(_best_width(search, mode, columns / rms, constants).width / rms)
+    across = search.turned(columns)
+    rms = _rms(mode, across)
+    return np.asarray(_best_width(_linearised(search, mode), across / rms, constants).width / rms)
 
 
 def _log_mean_exp(evidences: Sequence[float]) -> float:
@@ -154,19 +157,42 @@ def _folds_of(search: Search, mode: LaplaceFit, count: int) -> list[_Fold]:
     return found
 
 
+class _Linearised(NamedTuple):
+    """A fit as laws are tried beside it.
+
+    Attributes:
+        mode: the fit.
+        rows: the independent rows.
+        missed: how far it misses them.
+        slopes: theirs in its coordinates.
+    """
+
+    mode: LaplaceFit
+    rows: Data
+    missed: NDArray[np.float64]
+    slopes: Matrix
+
+
+def _linearised(search: Search, mode: LaplaceFit) -> _Linearised:
+    return _Linearised(mode, search.rows, search.missed(mode.prediction), search.turned(mode.slopes))
+
+
 def _localisation(
     search: Search,
-    mode: LaplaceFit,
+    fit: _Linearised,
     location: InputLocation,
     folds: Sequence[_Fold],
     constants: DecisionConstants,
 ) -> Localisation:
+    mode = fit.mode
     weight = 1.0 / np.sqrt(search.data.marginal(mode.noise_scales.noise, mode.noise_scales.discrepancy))
-    laws = [each.columns / _rms(search, mode, each.columns) for each in location.laws]
-    fitted = [_best_width(search, mode, each, constants) for each in laws]
+    turned = [search.turned(each.columns) for each in location.laws]
+    rms = [_rms(mode, each) for each in turned]
+    fitted = [_best_width(fit, each / size, constants) for each, size in zip(turned, rms, strict=True)]
     priors = np.array([each.prior for each in location.laws])
     weights = np.array([each.evidence for each in fitted]) + np.log(priors / priors.sum())
-    law, best = laws[int(np.argmax(weights))], fitted[int(np.argmax(weights))]
+    first = int(np.argmax(weights))
+    law, best = location.laws[first].columns / rms[first], fitted[first]
     evidence = float(np.logaddexp.reduce(weights))
     free_share, free_input = _free_input(search, mode, location.free, weight, constants.free_input_width)
     without = _left_out(search, mode, law[:, :0], folds, mode.noise_scales)
@@ -186,9 +212,9 @@ def _localisation(
     )
 
 
-def _rms(search: Search, mode: LaplaceFit, columns: Matrix) -> NDArray[np.float64]:
-    """Root mean squares (q,) of columns (m, q) as independent rows, in their sd; 1 for what does nothing."""
-    squares = search.turned(columns) ** 2 / mode.noise_scales.spread[:, None]
+def _rms(mode: LaplaceFit, turned: Matrix) -> NDArray[np.float64]:
+    """Root mean squares (q,) of columns (m, q) of independent rows, in their sd; 1 for what does nothing."""
+    squares = turned**2 / mode.noise_scales.spread[:, None]
     size = np.sqrt(np.mean(squares, axis=0))
     return np.where(size > 0.0, size, 1.0)
 
@@ -207,17 +233,18 @@ class _Width(NamedTuple):
     noise_scales: NoiseScales
 
 
-def _best_width(search: Search, mode: LaplaceFit, law: Matrix, constants: DecisionConstants) -> _Width:
-    """The best of all widths of the prior."""
-    missed, inside, across = search.missed(mode.prediction), search.turned(mode.slopes), search.turned(law)
+def _best_width(fit: _Linearised, law: Matrix, constants: DecisionConstants) -> _Width:
+    """The best of all widths of the prior; ``law`` (m, q) is what coefficients change in the independent rows."""
+    mode = fit.mode
     lower, upper = bounds_of(mode.coordinates)
     wide = np.full(law.shape[1], np.inf)
     bounds = np.concatenate([lower, -wide]), np.concatenate([upper, wide])
     start = np.concatenate([mode.x, np.zeros(law.shape[1])])
     found, tops = [], []
     for width in constants.law_widths:
-        slopes = np.concatenate([inside, width * across], axis=1)
-        tops.append(linearised_optimum(search.rows, missed, slopes, start, bounds))
+        slopes = np.concatenate([fit.slopes, width * law], axis=1)
+        top = linearised_optimum(fit.rows, fit.missed, slopes, start, bounds, scales=mode.noise_scales)
+        tops.append(top)
         found.append(log_evidence(tops[-1].value, tops[-1].precision, mode.coordinates))
     best = int(np.argmax(found))
     return _Width(constants.law_widths[best], _log_mean_exp(found), tops[best].noise_scales)

@@ -119,7 +119,8 @@ def _score(
         moved = search.turned(column * scales)
         slopes = np.concatenate([inside, moved], axis=1)
         x = np.concatenate([mode.x, np.zeros(count)])
-        top = linearised_optimum(search.rows, residual, slopes, x, (bounds[0], bounds[1]))
+        within = (bounds[0], bounds[1])
+        top = linearised_optimum(search.rows, residual, slopes, x, within, scales=mode.noise_scales)
         evidence = log_evidence(top.value, top.precision, mode.coordinates + term.amplitudes)
         if best is None or evidence > best.evidence:
             found = dict(zip((c.name for c in term.amplitudes), top.x[-count:], strict=True))

@@ -25,7 +25,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.inference.likelihood import NoiseScales, noise_scales
+from savgs_ident.inference.likelihood import (
+    NoiseScales,
+    noise_scales,
+    noise_scales_near,
+    with_more_discrepancy,
+)
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import Coordinates
 
@@ -118,22 +123,26 @@ def linearised_optimum(
     x: Array,
     bounds: tuple[Array, Array],
     level: float = 1e-3,
+    scales: NoiseScales | None = None,
 ) -> LinearisedOptimum:
     """The best point for residuals (measured - predicted, m) with slopes (m, n) of the prediction at ``x`` (n,).
 
     ``data`` are independent rows, in their units; coordinates are in standard deviations. The point for given
     weights and the scales for a given point in turn, until the density rises by less than ``level``: it rises at
-    every turn.
+    every turn. They begin with ``scales``, if these are known for the residuals.
     """
-    scales = noise_scales(data, residual)
+    scales = scales or noise_scales(data, residual)
     value, point, converged = -np.inf, x, False
     for _ in range(_LINEAR_ROUNDS):
         point, inside = _within(residual, slopes, x, scales.spread, bounds)
-        scales = noise_scales(data, residual - slopes @ (point - x), scales.discrepancy)
-        before, value = value, scales.value - 0.5 * float(point @ point)
+        left, before = residual - slopes @ (point - x), value
+        scales = noise_scales_near(data, left, scales)
+        value = scales.value - 0.5 * float(point @ point)
         if abs(value - before) < level:
-            converged = scales.converged and inside
-            break
+            scales, known = with_more_discrepancy(data, left, scales), scales
+            if scales.value < known.value + level:
+                converged = scales.converged and inside
+                break
     return LinearisedOptimum(point, scales, value, precision_of(slopes, scales.spread), converged)
 
 

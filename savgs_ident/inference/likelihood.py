@@ -20,7 +20,7 @@ coordinates of a point that a sampler moves, in :func:`noise_scales` at their be
 that misses is thereby weighed by what it can explain.
 """
 
-from math import exp, isfinite, sqrt
+from math import exp, isfinite, log, sqrt
 from typing import NamedTuple
 
 import equinox as eqx
@@ -161,15 +161,22 @@ class NoiseScales(NamedTuple):
     converged: bool
 
 
-def noise_scales(data: Data, residual: NDArray[np.float64], start: float = 1e-2) -> NoiseScales:
-    """The best noise scale and discrepancy for residuals (m,) of independent rows.
+def noise_scales(data: Data, residual: NDArray[np.float64]) -> NoiseScales:
+    """The best noise scale and discrepancy for residuals (m,) of independent rows."""
+    return with_more_discrepancy(data, residual, _maximum_from(data, residual, 1.0, 1e-2))
 
-    The discrepancy is looked for from ``start`` on.
+
+def noise_scales_near(data: Data, residual: NDArray[np.float64], near: NoiseScales) -> NoiseScales:
+    """The maximum that is reached from the scales of similar residuals, which need not be the best."""
+    return _maximum_from(data, residual, near.noise, near.discrepancy)
+
+
+def with_more_discrepancy(data: Data, residual: NDArray[np.float64], found: NoiseScales) -> NoiseScales:
+    """What was found, or the maximum with more discrepancy where that is better.
 
     There may be two maxima, of which one has little discrepancy: where the residuals have room for more than was
     found, it is looked for from there too.
     """
-    found = _maximum_from(data, residual, start)
     excess, discrepancy_scale = (
         float(np.sum(residual**2 - data.variance)),
         float(np.sum(data.discrepancy_scale**2)),
@@ -177,21 +184,21 @@ def noise_scales(data: Data, residual: NDArray[np.float64], start: float = 1e-2)
     if excess > 2.0 * max(found.discrepancy, 1e-4) ** 2 * discrepancy_scale > 0.0:
         return max(
             found,
-            _maximum_from(data, residual, float(np.sqrt(excess / discrepancy_scale))),
+            _maximum_from(data, residual, 1.0, float(np.sqrt(excess / discrepancy_scale))),
             key=lambda each: each.value,
         )
     return found
 
 
-def _maximum_from(data: Data, residual: NDArray[np.float64], start: float) -> NoiseScales:
-    """The maximum that is reached from a discrepancy.
+def _maximum_from(data: Data, residual: NDArray[np.float64], noise: float, discrepancy: float) -> NoiseScales:
+    """The maximum that is reached from a noise scale and a discrepancy.
 
     Steps in the logarithm of the noise scale and the square of the discrepancy: the better of Newton's, which is
     short where residuals far exceed the noise, and Fisher's, which is long there, halved until the density rises.
     Without that, Fisher's scoring swings to and fro where the noise is understated.
     """
     rows = _Rows(residual**2, data.variance, data.discrepancy_scale**2, data.scales)
-    point = (0.0, start**2 if rows.discrepancy_scale.any() else 0.0)
+    point = (log(noise), discrepancy**2 if rows.discrepancy_scale.any() else 0.0)
     value, converged = _density(rows, point), False
     for _ in range(_ROUNDS):
         steps, promised = _steps(rows, point)
@@ -200,7 +207,9 @@ def _maximum_from(data: Data, residual: NDArray[np.float64], start: float) -> No
             break
         for halving in range(_HALVINGS):
             share = 0.5**halving
-            tried = [(point[0] + share * log, max(point[1] + share * square, 0.0)) for log, square in steps]
+            tried = [
+                (point[0] + share * along, max(point[1] + share * square, 0.0)) for along, square in steps
+            ]
             found, there = max((_density(rows, each), each) for each in tried)
             if found > value:
                 break
@@ -251,15 +260,15 @@ def _steps(rows: _Rows, point: _Point) -> tuple[list[_Point], float]:
         )
         determinant = own * other - both**2
         if held and own > 0.0:
-            log, square = gradient[0] / own, 0.0
+            along, square = gradient[0] / own, 0.0
         elif own > 0.0 and determinant > 1e-12 * own * abs(other):
-            log = (other * gradient[0] - both * gradient[1]) / determinant
+            along = (other * gradient[0] - both * gradient[1]) / determinant
             square = (own * gradient[1] - both * gradient[0]) / determinant
         else:
             continue
-        promised = max(promised, 0.5 * (gradient[0] * log + gradient[1] * square))
-        short = min(1.0, _LONGEST / max(abs(log), _LONGEST))
-        found.append((short * log, short * square))
+        promised = max(promised, 0.5 * (gradient[0] * along + gradient[1] * square))
+        short = min(1.0, _LONGEST / max(abs(along), _LONGEST))
+        found.append((short * along, short * square))
     return found, promised
 
 
