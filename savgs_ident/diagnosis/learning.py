@@ -14,7 +14,7 @@ How large coefficients may be is unknown before the data: their prior is one of 
 the most probable to first order about the baseline, for each family then the one that is so about the fit.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import log
 from typing import NamedTuple
@@ -26,7 +26,9 @@ from numpy.typing import NDArray
 from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.core.presentation import Progress, no_progress
+from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out
+from savgs_ident.diagnosis.law_families import FamilyAlone, families_alone, families_spared
 from savgs_ident.diagnosis.localisation import widths_of
 from savgs_ident.diagnosis.problem import AbstractProblem, term_of
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
@@ -37,14 +39,11 @@ from savgs_ident.effects.learned_functions import (
     blocking_at,
     coefficients_at,
     coefficients_of,
-    functions_at,
-    interactions_at,
     what_gives,
 )
 from savgs_ident.inference.find_map import LaplaceFit, Search, Start, find_map, find_map_from_both, search_of
-from savgs_ident.inference.laplace import linearised_optimum, log_evidence
 from savgs_ident.inference.observations import Data, Term
-from savgs_ident.inference.prior import Linear, Logarithmic, bounds_of
+from savgs_ident.inference.prior import Linear, Logarithmic
 
 
 @dataclass(frozen=True)
@@ -117,25 +116,27 @@ def learn(
     constants: DecisionConstants = DEFAULTS,
     given: Start | None = None,
     progress: Progress = no_progress,
+    least: float = -np.inf,
 ) -> tuple[LearnedLaw, ...]:
     """The laws at ports, in their order; ``base`` is the recalibrated baseline.
 
     They are looked for from there and from the plant as ``given``. There is none at a port without learned law, where
     the plant with one has no solution, or where the law is impossible. Families are told apart where a law with the
-    functions of one could be as probable as the best of all ports.
+    functions of one could be as probable as the best of all ports. What cannot come to a log evidence of ``least`` is
+    given up.
     """
 
     def begin(port: Port) -> _Begun | None:
         progress(f"learning a law at {port.location} ({port.name})")
-        return _begin_learning(problem, data, base, port, constants, given)
+        return _begin_learning(problem, data, base, port, constants, given, least)
 
     begun = [each for each in in_parallel(begin, ports) if each is not None]
     weights = [each.best.weight for each in begun if each.law(each.best, {}) is not None]
-    least = max(weights, default=-np.inf) - constants.alarm_log_odds
+    near = max(weights, default=-np.inf) - constants.alarm_log_odds
 
     def finish(each: _Begun) -> LearnedLaw | None:
         progress(f"telling families apart at {each.port.location} ({each.port.name})")
-        return each.law(*_most_probable(each, base, least, constants))
+        return each.law(*_most_probable(each, base, near, constants))
 
     return tuple(law for law in in_parallel(finish, begun) if law is not None)
 
@@ -163,6 +164,8 @@ class _FittedFunctions(NamedTuple):
     @property
     def attainable(self) -> float:
         """The log evidence that some of them cannot exceed: the likelihood of all at its best, if that was found."""
+        if self.mode.status is Status.HOPELESS:
+            return -np.inf
         x = self.mode.x
         return self.mode.value + 0.5 * float(x @ x) if self.mode.status.ok else np.inf
 
@@ -206,6 +209,7 @@ def _begin_learning(
     port: Port,
     constants: DecisionConstants,
     given: Start | None,
+    least: float,
 ) -> _Begun | None:
     """The fit of all functions of a port; None where there is none."""
     spans = problem.learned_spans(port, base.values, base.prediction.warm_start)
@@ -228,7 +232,8 @@ def _begin_learning(
     blank = Term(effect.name, port.location, (), shapes)
     columns = dict(zip(names, there_now.slopes.T, strict=True))
     term = _with_amplitudes(blank, effect, search, base, columns, constants)
-    mode = find_map_from_both(search, (term,), base.values, there_now.warm_start, constants.learned_steps)
+    steps, near = constants.learned_steps, there_now.warm_start
+    mode = find_map_from_both(search, (term,), base.values, near, steps, least)
     if not mode.solved:
         return None
     blocked = _blocked_play(search, effect, blank, port, base, constants)
@@ -268,25 +273,7 @@ def _with_amplitudes(
     return replace(term, amplitudes=amplitudes)
 
 
-class _FamilyAlone(NamedTuple):
-    """Functions of one family without those of the others, and without those that are not needed.
-
-    Attributes:
-        functions: names of their coefficients.
-        width: of their prior, over that of all functions.
-        weight: log evidence, with the log prior probability that these functions of the family are needed.
-        log_prior: that.
-        start: the best point [SI], by name.
-    """
-
-    functions: tuple[str, ...]
-    width: float
-    weight: float
-    log_prior: float
-    start: Mapping[str, float]
-
-
-def _some_of(term: Term, found: _FamilyAlone) -> Term:
+def _some_of(term: Term, found: FamilyAlone) -> Term:
     """The term of all functions with those of a family alone."""
     kept = [each for each in term.amplitudes if each.name in found.functions]
     return replace(term, amplitudes=tuple(replace(each, scale=found.width * each.scale) for each in kept))
@@ -303,7 +290,7 @@ def _most_probable(
     every, best, weights = begun.every, begun.best, dict[Family, float]()
     if every.attainable > least:
         search, mode, worth = begun.search, every.mode, base.evidence + constants.alarm_log_odds
-        found = _families(search, mode, begun.port, constants)
+        found = families_alone(search, mode, begun.port, constants)
         weights = {family: each.weight for family, each in found.items()}
         # To first order about all functions together the families are not known well enough to take the first.
         likely = sorted(found, key=lambda family: -found[family].weight)[: constants.likely_families]
@@ -318,7 +305,7 @@ def _most_probable(
                 weights[family] = fitted.weight
                 best = fitted if fitted.weight > best.weight else best
     if best.only is None:
-        return best, _spared(begun.search, every.mode, begun.port)
+        return best, families_spared(begun.search, every.mode, begun.port)
     return best, weights | {best.only: best.weight}
 
 
@@ -344,79 +331,3 @@ def _blocked_play(
     mode = find_map(search, (term,), start, there_now.warm_start, constants.learned_steps)
     log_prior = len(term.amplitudes) * log(constants.function_prior)
     return _FittedFunctions(term, mode, log_prior, Family.PLAY) if mode.solved else None
-
-
-def _families(
-    search: Search, mode: LaplaceFit, port: Port, constants: DecisionConstants
-) -> dict[Family, _FamilyAlone]:
-    """Each family's functions without those of the others, to first order about the fit."""
-    seen = {each.name for each in mode.coordinates}
-    found = {}
-    for family in dict.fromkeys(each.family for each in functions_at(port)):
-        mine = tuple(name for name in coefficients_of(port, family) if name in seen)
-        if mine:
-            found[family] = _needed(search, mode, port, mine, constants)
-    return found
-
-
-def _spared(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, float]:
-    """Minus the log evidence of the law without the functions of each family."""
-    gone = {each.family: coefficients_of(port, each.family) for each in functions_at(port)}
-    return {family: -_alone(search, mode, names, (), 1.0, 0.0).weight for family, names in gone.items()}
-
-
-def _needed(
-    search: Search, mode: LaplaceFit, port: Port, family: tuple[str, ...], constants: DecisionConstants
-) -> _FamilyAlone:
-    """Those of a family's functions without which the law is less probable; one at least."""
-    of_all, interactions = set(coefficients_at(port)), interactions_at(port)
-    priors = {
-        name: constants.interaction_prior if name in interactions else constants.function_prior
-        for name in family
-    }
-
-    def alone(functions: tuple[str, ...], width: float) -> _FamilyAlone:
-        log_prior = sum(log(each if name in functions else 1.0 - each) for name, each in priors.items())
-        return _alone(search, mode, of_all.difference(functions), functions, width, log_prior)
-
-    def at_its_width(functions: tuple[str, ...]) -> _FamilyAlone:
-        tried = (alone(functions, width) for width in constants.family_widths)
-        return max(tried, key=lambda each: each.weight)
-
-    # Of functions that do nearly the same, one alone is needed: the best may lie beyond worse ones.
-    found = [at_its_width(family)]
-    while len(found[-1].functions) > 1:
-        left = found[-1].functions
-        fewer = [alone(tuple(each for each in left if each != gone), found[-1].width) for gone in left]
-        found.append(max(fewer, key=lambda each: each.weight))
-    return at_its_width(max(found, key=lambda each: each.weight).functions)
-
-
-def _alone(
-    search: Search,
-    mode: LaplaceFit,
-    gone: Collection[str],
-    functions: tuple[str, ...],
-    width: float,
-    log_prior: float,
-) -> _FamilyAlone:
-    """The fit with the coordinates that are ``gone`` at zero, to first order.
-
-    The coefficients of the ``functions`` have a prior that is ``width`` times as wide as in the fit.
-    """
-    kept = np.array([each.name not in gone for each in mode.coordinates])
-    missed, slopes = search.missed(mode.prediction), search.turned(mode.slopes)
-    coordinates = tuple(
-        replace(each, scale=width * each.scale)
-        if each.name in functions and isinstance(each, Linear)
-        else each
-        for each, keep in zip(mode.coordinates, kept, strict=True)
-        if keep
-    )
-    wider = np.array([width if each.name in functions else 1.0 for each in coordinates])
-    without = missed + slopes[:, ~kept] @ mode.x[~kept]
-    here = mode.x[kept] / wider
-    top = linearised_optimum(search.rows, without, slopes[:, kept] * wider, here, bounds_of(coordinates))
-    start = {each.name: each.value(float(x)) for each, x in zip(coordinates, top.x, strict=True)}
-    evidence = log_evidence(top.value, top.precision, coordinates)
-    return _FamilyAlone(functions, width, evidence + log_prior, log_prior, start)

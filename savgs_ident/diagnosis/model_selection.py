@@ -262,7 +262,8 @@ def _learned_laws(
     if explained and weight >= linear + log_prior(UNKNOWN, count, constants):
         return ()
     ports = _worth_learning(problem, findings, localisations)
-    return learn(problem.plant, problem.data, base, ports, constants, problem.search.given, progress)
+    least, given = best.evidence - constants.refined_log_evidence, problem.search.given
+    return learn(problem.plant, problem.data, base, ports, constants, given, progress, least)
 
 
 def _flexible_members(
