@@ -17,7 +17,7 @@ the most probable to first order about the baseline, for each family then the on
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import log
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -236,7 +236,7 @@ def _begin_learning(
     mode = find_map_from_both(search, (term,), base.values, near, steps, least)
     if not mode.solved:
         return None
-    blocked = _blocked_play(search, effect, blank, port, base, constants)
+    blocked = _blocked_play(search, effect, blank, port, base, near, constants)
     return _Begun(port, mine, search, spans, _FittedFunctions(term, mode), blocked)
 
 
@@ -310,11 +310,18 @@ def _most_probable(
 
 
 def _blocked_play(
-    search: Search, effect: Effect, blank: Term, port: Port, base: LaplaceFit, constants: DecisionConstants
+    search: Search,
+    effect: Effect,
+    blank: Term,
+    port: Port,
+    base: LaplaceFit,
+    near: Any,
+    constants: DecisionConstants,
 ) -> _FittedFunctions | None:
     """The functions of a play that is blocked at its ends, fitted from the baseline.
 
-    ``blank`` is the port's learned law without coefficients. None where there is no play, or none with a solution.
+    ``blank`` is the port's learned law without coefficients, and the plant is solved from ``near``, where nothing
+    gives way. None where there is no play, or none with a solution.
     """
     blocking = blocking_at(port)
     if blocking is None:
@@ -323,7 +330,7 @@ def _blocked_play(
     blocked = Logarithmic(blocking, "1", constants.blocking_of_play, constants.shape_width, 0.0, np.inf)
     names, shapes = coefficients_of(port, Family.PLAY), (*lags, blocked)
     start = {**base.values, **{each.name: each.centre for each in shapes}}
-    there_now = search.plant.predict((effect.name,), start, names, base.prediction.warm_start)
+    there_now = search.plant.predict((effect.name,), start, names, near)
     if not there_now.solved:
         return None
     columns = dict(zip(names, there_now.slopes.T, strict=True))

@@ -15,6 +15,7 @@ import pytest
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values, as_values
+from savgs_ident.diagnosis.learning import learn
 from savgs_ident.diagnosis.public import SIMTR, diagnose_response
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.effects.base import (
@@ -29,9 +30,10 @@ from savgs_ident.effects.base import (
     Role,
 )
 from savgs_ident.effects.effect import Effect, effect_at
-from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_parameters
+from savgs_ident.inference.find_map import find_map, search_of
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model, model_parameters
 from savgs_ident.plants.quarter_car.plant import CHANNELS, QuarterCar
-from savgs_ident.plants.quarter_car.ports import RAIL, ROAD
+from savgs_ident.plants.quarter_car.ports import DAMPER, RAIL, ROAD
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
@@ -39,7 +41,7 @@ from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_
 from savgs_ident.validation.foreign_laws import FOREIGN
 from savgs_ident.validation.other_port import log_odds_of_port
 
-from .conftest import Measure
+from .conftest import Measure, rig_problem
 
 
 class ExponentialStribeck(AbstractFrictionLimitLaw):
@@ -77,13 +79,17 @@ STRIBECK = effect_at("exponential_stribeck", RAIL, ExponentialStribeck(), {"coef
 WAVY = effect_at("wavy_cam", ROAD, WavyCam(), {})
 
 
-def _recorded(response: HarmonicResponse, rig: Rig, effect: Effect) -> HarmonicResponse:
-    """A response of the rig with one more effect of typical size: periodic, with the noise of ``response``."""
+def _recorded(response: HarmonicResponse, rig: Rig, effect: Effect, **values: float) -> HarmonicResponse:
+    """A response of the rig with one more effect: periodic, with the noise of ``response``.
+
+    The effect is of typical size where no ``values`` [SI] are given.
+    """
     baseline = MODELS["simtr"]
     model = build_model(rig, baseline) + effect
-    typical = {each.name: each.value for each in effect.parameters}
+    typical = {each.name: each.value for each in effect.parameters} | values
     p = as_values(typical | model_parameters(rig, baseline).as_dict())
-    solution = simulate_periodic(model, p, measured_excitation(QuarterCar, response, rig.parameters))
+    excitation = measured_excitation(QuarterCar, response, rig.parameters)
+    solution = simulate_periodic(model, p, excitation, PeriodicSettings(iterations=300))
     assert all(status.ok for status in solution.status())
     clean = np.asarray(harmonics(model, p, solution, response.orders))
     shown = response.harmonics.copy()
@@ -137,3 +143,21 @@ def test_a_friction_of_the_joints_would_do_the_same_in_the_strut_and_not_at_the_
     assert rail is not None
     assert rail > 50.0
     assert road is None
+
+
+@pytest.mark.slow
+def test_a_play_with_a_film_is_learned_as_one_that_is_blocked_at_its_ends(
+    measure_few: Measure, rig: Rig
+) -> None:
+    """The film gives way as a damper does, which no law of the load alone can do."""
+    play, catalogue = 3e-4, {name: CATALOGUE[name] for name in MODELS["simtr"]}
+    there = FOREIGN["damper_end_play"].effect
+    response = _recorded(measure_few("nominal"), rig, there, damper_end_play_play=play)
+    plant, data = rig_problem(response, rig, catalogue, COARSE.periodic)
+    base = find_map(search_of(plant, data), (), {}, plant.start({}))
+    (law,) = learn(plant, data, base, [DAMPER])
+    assert law.mode.status.ok
+    assert law.family is Family.PLAY
+    assert law.mode.evidence > base.evidence + 100.0
+    blocked_at = DAMPER.displacement / law.values["learned_damper_blocking"]
+    assert blocked_at == pytest.approx(play / 2.0, rel=0.2)
