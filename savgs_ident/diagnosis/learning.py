@@ -237,7 +237,10 @@ def _begin_learning(
     if not mode.solved:
         return None
     blocked = _blocked_play(search, effect, blank, port, base, near, constants)
-    return _Begun(port, mine, search, spans, _FittedFunctions(term, mode), blocked)
+    begun = _Begun(port, mine, search, spans, _FittedFunctions(term, mode), blocked)
+    # A play that is impossible leaves the port its other laws.
+    impossible = blocked is not None and begun.law(blocked, {}) is None
+    return begun._replace(blocked=None) if impossible else begun
 
 
 def _is_impossible(law: LearnedLaw) -> bool:
