@@ -436,7 +436,8 @@ class DecisionConstants:
     lag_of_play: float = 0.05
     """Time constant [s] from which that of a play between films of oil is looked for.
 
-    Origin: by choice: a film that gives way within a period of the dwells. A shorter one is found from there as well.
+    Origin: by choice: a film that gives way within a period of the dwells. What halving or doubling it does is not
+    measured.
     """
 
     blocking_of_play: float = 5.0
