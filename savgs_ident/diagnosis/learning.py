@@ -163,7 +163,7 @@ class _FittedFunctions(NamedTuple):
 
     @property
     def attainable(self) -> float:
-        """The log evidence that some of them can hardly exceed: the likelihood at the best of all, if it was found."""
+        """The log evidence that some of them can hardly exceed: the likelihood at the best of all, if found."""
         if self.mode.status is Status.HOPELESS:
             return -np.inf
         x = self.mode.x
