@@ -205,37 +205,54 @@ class DwellProblem(AbstractProblem):
     ) -> list[NDArray[np.float64]]:
         """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""
         model = self.complete(terms)
+        found = {term.name: np.zeros((0, 0, 0)) for term in candidates}
+        without = [term for term in candidates if not self.catalogue[term.name].states]
+        found |= self._without_states(model, values, warm_start, without)
+        with_states = [term for term in candidates if self.catalogue[term.name].states]
+        found |= self._with_states(model, values, warm_start, with_states)
+        return list(found.values())
+
+    def _without_states(
+        self,
+        model: AbstractPlant,
+        values: Mapping[str, float],
+        warm_start: PeriodicSolution,
+        candidates: Sequence[Term],
+    ) -> dict[str, NDArray[np.float64]]:
+        """The same of candidates that are in ``model`` at their nulls, by name."""
         found: dict[str, list[NDArray[np.float64]]] = {term.name: [] for term in candidates}
         for one in range(max((len(term.tried) for term in candidates), default=0)):
             some = [term for term in candidates if len(term.tried) > one]
             shapes = {name: value for term in some for name, value in term.tried[one].items()}
-            p = placed(self.values(dict(values) | shapes))
-            for term, columns in self._sensitivities(model, p, warm_start, some).items():
-                found[term].append(columns)
-        return [np.stack(found[term.name]) for term in candidates]
+            names = [each.name for term in some for each in term.amplitudes]
+            slopes = self.slopes(model, placed(self.values(dict(values) | shapes)), warm_start, names)
+            for term in some:
+                found[term.name].append(slopes[:, [names.index(each.name) for each in term.amplitudes]])
+        return {name: np.stack(each) for name, each in found.items()}
 
-    def _sensitivities(
-        self, model: AbstractPlant, p: Values, warm_start: PeriodicSolution, candidates: Sequence[Term]
+    def _with_states(
+        self,
+        model: AbstractPlant,
+        values: Mapping[str, float],
+        warm_start: PeriodicSolution,
+        candidates: Sequence[Term],
     ) -> dict[str, NDArray[np.float64]]:
-        """The same for the shapes in ``p``, by name, (m, amplitudes)."""
-        without = [term for term in candidates if not self.catalogue[term.name].states]
-        names = [each.name for term in without for each in term.amplitudes]
-        slopes = self.slopes(model, p, warm_start, names)
-        found = {
-            term.name: slopes[:, [names.index(each.name) for each in term.amplitudes]] for term in without
-        }
-        with_states = [term for term in candidates if self.catalogue[term.name].states]
+        """The same of candidates with states, by name: secants to their typical sizes."""
         size = self.constants.typical_coordinate
-        typical = [
-            {each.name: each.centre + size * each.scale for each in term.amplitudes} for term in with_states
-        ]
-        effects = [self.catalogue[term.name] for term in with_states]
-        moved = sensitivities_with_states(
-            model, self.likelihood, self.orders, p, warm_start, effects, typical
+        effects, typical = [], []
+        for term in candidates:
+            there = {each.name: each.centre + size * each.scale for each in term.amplitudes}
+            effects += [self.catalogue[term.name]] * len(term.tried)
+            typical += [there | shapes for shapes in term.tried]
+        p = self.values(values)
+        moved = iter(
+            sensitivities_with_states(model, self.likelihood, self.orders, p, warm_start, effects, typical)
         )
-        for term, rows in zip(with_states, moved, strict=True):
-            found[term.name] = rows[:, None] / (size * term.amplitudes[0].scale)
-        return found
+        return {
+            term.name: np.stack([next(moved)[:, None] for _ in term.tried])
+            / (size * term.amplitudes[0].scale)
+            for term in candidates
+        }
 
     def slopes(
         self, model: AbstractPlant, p: Values, solution: PeriodicSolution, names: Sequence[str]

@@ -33,7 +33,7 @@ from savgs_ident.plants.base import AbstractPlant, AtPorts
 from savgs_ident.simulate.along_motion import FORWARD, NEWTON_STEPS
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.program_cache import placed, run_cached
-from savgs_ident.simulate.sensitivity import answers, ports_at_nodes
+from savgs_ident.simulate.sensitivity import along_first, answers, ports_at_nodes
 
 SAMPLES = 384
 """Instants of a period along which states are marched."""
@@ -42,7 +42,7 @@ PERIODS = 16
 """Periods after which they repeat: what rang at the start has died away even in a slow, slightly damped frame."""
 
 BATCH = 32
-"""Signals that are imposed at a time."""
+"""Signals that a program has room for: one for each number would have to be compiled."""
 
 
 def sensitivities_with_states(
@@ -61,8 +61,8 @@ def sensitivities_with_states(
     signals, steps = _evenly(model, p, solution)
     fields = []
     for effect, given in zip(effects, typical, strict=True):
-        there = as_values({name: float(value) for name, value in p.items()} | dict(given))
-        along = np.asarray(_marched(effect, placed(there), signals, steps))
+        there = placed(dict(p) | as_values(given))
+        along = np.asarray(_marched(effect, there, signals, steps))
         fields.append((effect.port.name, _at_nodes(along, solution)))
     return impose(model, likelihood, orders, p, solution, fields)
 
@@ -123,7 +123,8 @@ def impose(
         for place, (port, values) in enumerate(some):
             stacked[port][place] = values
         imposed = placed({name: jnp.asarray(part) for name, part in stacked.items()})
-        (rows,) = _answered(model, likelihood, placed(dict(p)), solution, imposed, orders)
+        wanted = placed(jnp.asarray(len(some)))
+        (rows,) = _answered(model, likelihood, placed(dict(p)), solution, imposed, wanted, orders)
         found.append(np.asarray(rows)[: len(some)])
     return np.concatenate([np.zeros((0, likelihood.measured.size)), *found])
 
@@ -139,10 +140,11 @@ def _answer_rows(
     p: Values,
     solution: PeriodicSolution,
     imposed: dict[str, Array],
+    wanted: Array,
     orders: int,
 ) -> tuple[Array]:
     along = answers(model, p, solution, orders)
-    return (jax.lax.map(lambda one: likelihood.rows(along(one)), imposed),)
+    return (along_first(lambda one: likelihood.rows(along(one)), imposed, wanted),)
 
 
 def _evenly(
