@@ -47,6 +47,7 @@ from savgs_ident.effects.base import (
 )
 from savgs_ident.effects.effect import Effect, typical_effect
 from savgs_ident.effects.learned_functions import (
+    OF_CONTACTS,
     OF_SLIDERS,
     OF_THE_ANGLE,
     OF_THE_FREQUENCY,
@@ -95,7 +96,7 @@ class LearnedForce(AbstractForceLaw):
     family: ClassVar[Family] = Family.LEARNED
     roles: ClassVar[tuple[Role, ...]] = _roles(
         ("middle", "stroke", "speed", "carried", "turn", "give"),
-        len((*OF_THE_MOTION, *OF_SLIDERS, *OF_THE_LOAD)),
+        len((*OF_THE_MOTION, *OF_SLIDERS, *OF_THE_LOAD, *OF_CONTACTS)),
     )
     port: Port = eqx.field(static=True)
 

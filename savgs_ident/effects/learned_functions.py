@@ -134,6 +134,11 @@ def _soft_stop(gap: float, sign: str, side: float) -> Function:
     return Function(f"max({sign}x - {gap:g}, 0)^2", Family.STOP, lambda m: m.beyond(gap, side) ** 2)
 
 
+def _damped_stop(gap: float, sign: str, side: float) -> Function:
+    words = f"max({sign}x - {gap:g}, 0) v"
+    return Function(words, Family.STOP, lambda m: m.beyond(gap, side) * m.v, interaction=True)
+
+
 def _slider(place: int) -> Function:
     words = f"a spring-slider that gives by {STRETCHES[place]:g} typical displacements"
     return Function(words, Family.FRICTION, lambda m: m.held[place])
@@ -192,6 +197,9 @@ OF_THE_LOAD = (
     *map(_loaded_falling, FALLING),
 )
 """Functions of a :class:`RelativeMotion` at a port with a load."""
+
+OF_CONTACTS = tuple(_damped_stop(gap, *side) for gap in SOFT_GAPS for side in _SIDES)
+"""Functions of a :class:`RelativeMotion`: contacts that take energy as they are pressed in."""
 
 OF_WHAT_GIVES = (
     Function("n", Family.COMPLIANCE, lambda load: load.n),
@@ -258,7 +266,7 @@ def filters(omega: Float[Array, "*f"]) -> list[Complex[Array, "*f"]]:
 def functions_at(port: Port) -> tuple[Function, ...]:
     """The functions of the learned law at a port; none where nothing is learned."""
     if port.kind is PortKind.FORCE:
-        return (*OF_THE_MOTION, *OF_SLIDERS, *(OF_THE_LOAD if port.loaded else ()))
+        return (*OF_THE_MOTION, *OF_SLIDERS, *(OF_THE_LOAD if port.loaded else ()), *OF_CONTACTS)
     if port.kind is PortKind.SERIES:
         return () if port.resonant else OF_WHAT_GIVES
     return {PortKind.INPUT: OF_THE_ANGLE, PortKind.SENSOR: OF_THE_FREQUENCY}.get(port.kind, ())
