@@ -9,15 +9,18 @@ import pytest
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.values import as_values
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
+from savgs_ident.diagnosis.learning import learn
 from savgs_ident.diagnosis.localisation import localise
 from savgs_ident.diagnosis.location_hypotheses import input_locations
 from savgs_ident.diagnosis.verdict import most_probable
-from savgs_ident.effects.effect import Effect, generic_effects
+from savgs_ident.effects.base import Family
+from savgs_ident.effects.effect import Effect, generic_effects, typical_effect
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
 from savgs_ident.plants.base import Excitation
-from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
+from savgs_ident.plants.two_mass import PARAMETERS, SUSPENSION, TwoMass
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
+from savgs_ident.validation.foreign_forces import Clearance
 
 from ..relaxed import as_users_have_it
 from .simple_laws import assert_a_law_of_one_function
@@ -59,9 +62,9 @@ def _relaxed() -> Iterator[None]:
         yield
 
 
-def _recorded(effect: str, numbers: Mapping[str, float]) -> HarmonicResponse:
+def _recorded(there: Effect, numbers: Mapping[str, float]) -> HarmonicResponse:
     """Dwells of the plant with an effect, and noise of a thousandth of the first harmonic."""
-    rng, there = np.random.default_rng(3), CATALOGUE[effect]
+    rng = np.random.default_rng(3)
     model = TwoMass() + there
     own = ParameterTable(there.parameters).with_values(numbers)
     road = np.zeros((FREQUENCY.size, 2), complex)
@@ -107,7 +110,7 @@ def _recalibrated(measured: HarmonicResponse, catalogue: Mapping[str, Effect]) -
 @pytest.fixture(scope="module")
 def rubbing() -> Case:
     """The plant without friction on recordings of one whose guide rubs."""
-    return _recalibrated(_recorded("guide_coulomb", {"guide_coulomb_coefficient": 0.02}), FEWER)
+    return _recalibrated(_recorded(CATALOGUE["guide_coulomb"], {"guide_coulomb_coefficient": 0.02}), FEWER)
 
 
 def _found_and_located(case: Case, location: str, alike: set[str]) -> None:
@@ -131,8 +134,20 @@ def test_friction_is_found_and_located(rubbing: Case) -> None:
 
 @pytest.mark.slow
 def test_a_mount_is_found_and_located_among_all_laws() -> None:
-    measured = _recorded("mount_compliance", {"mount_compliance_compliance": 1e-6})
+    measured = _recorded(CATALOGUE["mount_compliance"], {"mount_compliance_compliance": 1e-6})
     _found_and_located(_recalibrated(measured, CATALOGUE), "suspension", {"mount_compliance"})
+
+
+@pytest.mark.slow
+def test_a_clearance_whose_contact_takes_energy_is_learned_as_a_stop() -> None:
+    """Its force is that of a spring and of a damper, both beyond the clearance alone."""
+    clearance = typical_effect("clearance", SUSPENSION, Clearance(), {"gap": 2e-3, "dissipation": 2.0})
+    stiffness = 0.1 * TRUTH["k"]
+    problem, search, base = _recalibrated(_recorded(clearance, {"clearance_stiffness": stiffness}), {})
+    (law,) = learn(problem, search.data, base, [SUSPENSION])
+    assert law.mode.status.ok
+    assert law.only is Family.STOP
+    assert law.mode.evidence > base.evidence + 50.0
 
 
 @pytest.mark.slow
