@@ -370,8 +370,8 @@ def score_from(record: object) -> Score:
     return score
 
 
-def failed(why: str) -> dict[str, Any]:
-    """What stands for the ``diagnosis.json`` of a diagnosis that ended with an error."""
+def failed(why: str, trace: str = "") -> dict[str, Any]:
+    """What stands for the ``diagnosis.json`` of a diagnosis that ended with an error; ``trace`` says where it did."""
     verdict = {
         "kind": FAILED,
         "effects": [],
@@ -380,7 +380,8 @@ def failed(why: str) -> dict[str, Any]:
         "sentence": why,
         "confusable_ports": [],
     }
-    return {"verdict": verdict, "which": [], "shrink": {"share_closed": None}, "wall_s": 0.0}
+    shrink = {"share_closed": None}
+    return {"verdict": verdict, "which": [], "shrink": shrink, "wall_s": 0.0, "traceback": trace.splitlines()}
 
 
 def _intervals(answer: Answer, diagnosis: Mapping[str, Any]) -> dict[str, Interval]:

@@ -11,6 +11,7 @@ The seal is written last: a folder with a seal is whole, and its recordings serv
 
 import json
 import shutil
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -218,7 +219,7 @@ def _diagnosed(diagnose: Diagnose, folder: Path, rig: Rig, without: tuple[str, .
         raise
     except Exception as error:
         # A diagnosis that breaks is one that is not right; the other trials go on.
-        return failed(f"{type(error).__name__}: {error}")
+        return failed(f"{type(error).__name__}: {error}", traceback.format_exc())
 
 
 def draw_and_record(plan: Plan, bench: Bench, number: int) -> Drawn:

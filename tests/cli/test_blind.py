@@ -163,6 +163,7 @@ def test_a_diagnosis_that_ends_with_an_error_counts_as_wrong(error: Exception, t
     reported = json.loads((tmp_path / "trial_0001" / "diagnosis.json").read_text())
     assert reported["verdict"]["sentence"].startswith(f"{type(error).__name__}: ")
     assert "no good" in reported["verdict"]["sentence"]
+    assert any("in broken" in line for line in reported["traceback"])
 
 
 def test_a_disk_that_is_full_is_no_mark_of_a_diagnosis(tmp_path: Path) -> None:
