@@ -41,7 +41,15 @@ from savgs_ident.effects.learned_functions import (
     coefficients_of,
     what_gives,
 )
-from savgs_ident.inference.find_map import LaplaceFit, Search, Start, find_map, find_map_from_both, search_of
+from savgs_ident.inference.find_map import (
+    LaplaceFit,
+    Search,
+    Start,
+    find_map,
+    find_map_again,
+    find_map_from_both,
+    search_of,
+)
 from savgs_ident.inference.observations import Data, Term
 from savgs_ident.inference.prior import Linear, Logarithmic
 
@@ -131,14 +139,39 @@ def learn(
         return _begin_learning(problem, data, base, port, constants, given, least)
 
     begun = [each for each in in_parallel(begin, ports) if each is not None]
-    weights = [each.best.weight for each in begun if each.law(each.best, {}) is not None]
-    near = max(weights, default=-np.inf) - constants.alarm_log_odds
+    fitted = _to_the_end(begun, constants, progress, least)
+    near = _as_probable_as(fitted, constants)
 
     def finish(each: _Begun) -> LearnedLaw | None:
         progress(f"telling families apart at {each.port.location} ({each.port.name})")
         return each.law(*_most_probable(each, base, near, constants))
 
-    return tuple(law for law in in_parallel(finish, begun) if law is not None)
+    return tuple(law for law in in_parallel(finish, fitted) if law is not None)
+
+
+def _to_the_end(
+    begun: Sequence["_Begun"], constants: DecisionConstants, progress: Progress, least: float
+) -> list["_Begun"]:
+    """What was begun, gone on with in the same order: the most probable first, until it is a possible law.
+
+    What cannot come near to that is given up.
+    """
+    found: dict[str, _Begun] = {}
+    left = sorted(begun, key=lambda each: -each.best.weight)
+    while left and not any(each.is_possible for each in found.values()):
+        first = left.pop(0)
+        progress(f"fitting a law at {first.port.location} ({first.port.name})")
+        found[first.port.name] = first.gone_on(least, constants)
+    near = max(least, _as_probable_as(tuple(found.values()), constants))
+    for each in in_parallel(lambda each: each.gone_on(near, constants), left):
+        found[each.port.name] = each
+    return [found[each.port.name] for each in begun]
+
+
+def _as_probable_as(fitted: Sequence["_Begun"], constants: DecisionConstants) -> float:
+    """The log evidence from which on a law is about as probable as the best possible one of ``fitted``."""
+    weights = [each.best.weight for each in fitted if each.is_possible]
+    return max(weights, default=-np.inf) - constants.alarm_log_odds
 
 
 class _FittedFunctions(NamedTuple):
@@ -169,6 +202,14 @@ class _FittedFunctions(NamedTuple):
         x = self.mode.x
         return self.mode.value + 0.5 * float(x @ x) if self.mode.status.ok else np.inf
 
+    def gone_on(self, search: Search, least: float, constants: DecisionConstants) -> "_FittedFunctions":
+        """The fit to its end, or until it cannot come to a log evidence of ``least``."""
+        if self.mode.status is not Status.MAX_ITERATIONS:
+            return self
+        steps = constants.learned_steps - constants.first_learned_steps
+        mode = find_map_again(search, (self.term,), self.mode, steps, least - self.log_prior)
+        return self._replace(mode=mode) if mode.solved else self
+
 
 class _Begun(NamedTuple):
     """All functions of a port fitted, and those of a play that is blocked, if any; see :class:`LearnedLaw`."""
@@ -184,6 +225,21 @@ class _Begun(NamedTuple):
     def best(self) -> _FittedFunctions:
         """The more probable ones."""
         return max((each for each in (self.every, self.blocked) if each), key=lambda each: each.weight)
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether the more probable ones are a possible law."""
+        return self.law(self.best, {}) is not None
+
+    def gone_on(self, least: float, constants: DecisionConstants) -> "_Begun":
+        """Both fits to their ends, or until they cannot come to a log evidence of ``least``.
+
+        A play that is impossible leaves the port its other laws.
+        """
+        both = [each for each in (self.every, self.blocked) if each]
+        every, *blocked = in_parallel(lambda each: each.gone_on(self.search, least, constants), both)
+        possible = [each for each in blocked if self.law(each, {}) is not None]
+        return self._replace(every=every, blocked=possible[0] if possible else None)
 
     def law(self, fitted: _FittedFunctions, families: Mapping[Family, float]) -> LearnedLaw | None:
         """The law of some functions; None where it is impossible."""
@@ -211,7 +267,7 @@ def _begin_learning(
     given: Start | None,
     least: float,
 ) -> _Begun | None:
-    """The fit of all functions of a port; None where there is none."""
+    """The first steps of the fit of all functions of a port; None where there is none."""
     spans = problem.learned_spans(port, base.values, base.prediction.warm_start)
     if spans is None:
         return None
@@ -232,15 +288,12 @@ def _begin_learning(
     blank = Term(effect.name, port.location, (), shapes)
     columns = dict(zip(names, there_now.slopes.T, strict=True))
     term = _with_amplitudes(blank, effect, search, base, columns, constants)
-    steps, near = constants.learned_steps, there_now.warm_start
+    steps, near = constants.first_learned_steps, there_now.warm_start
     mode = find_map_from_both(search, (term,), base.values, near, steps, least)
     if not mode.solved:
         return None
     blocked = _blocked_play(search, effect, blank, port, base, near, constants)
-    begun = _Begun(port, mine, search, spans, _FittedFunctions(term, mode), blocked)
-    # A play that is impossible leaves the port its other laws.
-    impossible = blocked is not None and begun.law(blocked, {}) is None
-    return begun._replace(blocked=None) if impossible else begun
+    return _Begun(port, mine, search, spans, _FittedFunctions(term, mode), blocked)
 
 
 def _is_impossible(law: LearnedLaw) -> bool:
@@ -321,7 +374,7 @@ def _blocked_play(
     near: Any,
     constants: DecisionConstants,
 ) -> _FittedFunctions | None:
-    """The functions of a play that is blocked at its ends, fitted from the baseline.
+    """The functions of a play that is blocked at its ends, after the first steps from the baseline.
 
     ``blank`` is the port's learned law without coefficients, and the plant is solved from ``near``, where nothing
     gives way. None where there is no play, or none with a solution.
@@ -338,6 +391,6 @@ def _blocked_play(
         return None
     columns = dict(zip(names, there_now.slopes.T, strict=True))
     term = _with_amplitudes(replace(blank, shapes=shapes), effect, search, base, columns, constants)
-    mode = find_map(search, (term,), start, there_now.warm_start, constants.learned_steps)
+    mode = find_map(search, (term,), start, there_now.warm_start, constants.first_learned_steps)
     log_prior = len(term.amplitudes) * log(constants.function_prior)
     return _FittedFunctions(term, mode, log_prior, Family.PLAY) if mode.solved else None

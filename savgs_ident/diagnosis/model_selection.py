@@ -59,7 +59,7 @@ from savgs_ident.diagnosis.verdict import (
     weigh,
     without_immaterial_members,
 )
-from savgs_ident.effects.base import Port
+from savgs_ident.effects.base import Port, PortKind
 from savgs_ident.inference.find_map import LaplaceFit, Start, find_map, find_map_again, refine, search_of
 from savgs_ident.inference.observations import Data
 
@@ -293,7 +293,8 @@ def _worth_learning(
 ) -> list[Port]:
     """The ports whose learned laws are worth a fit: those that explain most to first order, if that is anything.
 
-    And the ports of the best single effects: to first order about the baseline a strong effect may explain little.
+    And the ports of the best single effects, and what is in series with the nearest ports: to first order about the
+    baseline a strong effect may explain little, and a play with a film in it hardly anything.
     """
     constants = problem.constants
     least = problem.base.evidence + constants.alarm_log_odds
@@ -304,6 +305,12 @@ def _worth_learning(
         if name and weight > least
     }
     ranked = sorted(ports, key=lambda name: -ports[name])[: constants.learned_fits]
+    nearest = {problem.port(name).location for name in ranked[: constants.nearest_ports]}
+    ranked += [
+        each.name
+        for each in problem.plant.plant.ports
+        if each.kind is PortKind.SERIES and each.location in nearest
+    ]
     singles = [mode for mode in findings.modes if len(mode.terms) == 1]
     ranked += [
         problem.plant.catalogue[mode.terms[0]].port.name for mode in singles[: constants.nearest_ports]

@@ -418,6 +418,12 @@ class DecisionConstants:
     learned_steps: int = 20
     """Most steps of the fit of a learned law. Origin: computing time."""
 
+    first_learned_steps: int = 4
+    """Steps after which the fits of learned laws are compared, and the most probable is gone on with first.
+
+    Origin: computing time. By then a play with a film is ahead of laws that imitate it.
+    """
+
     function_prior: float = 0.2
     """Prior probability that a learned law of a family needs one of its functions, each independent of the others.
 

@@ -290,13 +290,17 @@ def find_map(
 
 
 def find_map_again(
-    search: Search, terms: tuple[Term, ...], fit: LaplaceFit, steps: int = STEPS
+    search: Search,
+    terms: tuple[Term, ...],
+    fit: LaplaceFit,
+    steps: int = STEPS,
+    least: float = -np.inf,
 ) -> LaplaceFit:
-    """The mode from a ``fit`` of the same plant with the same terms to other data, or to other rows of them.
+    """The mode from a ``fit`` of the same plant with the same terms: to other data, to other rows, or not at its end.
 
-    What the plant does there is known.
+    What the plant does there is known. The search ends where it cannot come to a log density of ``least``.
     """
-    ascent = _Ascent(search, terms, {})
+    ascent = _Ascent(search, terms, {}, least=least)
     return ascent.mode(ascent.again(fit), steps)
 
 
