@@ -12,12 +12,13 @@ from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
 from savgs_ident.diagnosis.learning import learn
 from savgs_ident.diagnosis.localisation import localise
 from savgs_ident.diagnosis.location_hypotheses import input_locations
+from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.diagnosis.verdict import most_probable
 from savgs_ident.effects.base import Family
 from savgs_ident.effects.effect import Effect, generic_effects, typical_effect
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
 from savgs_ident.plants.base import Excitation
-from savgs_ident.plants.two_mass import PARAMETERS, SUSPENSION, TwoMass
+from savgs_ident.plants.two_mass import GUIDE, PARAMETERS, SUSPENSION, TwoMass
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
 from savgs_ident.validation.foreign_forces import Clearance
@@ -144,10 +145,12 @@ def test_a_clearance_whose_contact_takes_energy_is_learned_as_a_stop() -> None:
     clearance = typical_effect("clearance", SUSPENSION, Clearance(), {"gap": 2e-3, "dissipation": 2.0})
     stiffness = 0.1 * TRUTH["k"]
     problem, search, base = _recalibrated(_recorded(clearance, {"clearance_stiffness": stiffness}), {})
-    (law,) = learn(problem, search.data, base, [SUSPENSION])
+    guide, law = learn(problem, search.data, base, [GUIDE, SUSPENSION])
+    assert (guide.port, law.port) == (GUIDE, SUSPENSION)
     assert law.mode.status.ok
     assert law.only is Family.STOP
     assert law.mode.evidence > base.evidence + 50.0
+    assert guide.mode.evidence < law.mode.evidence - DEFAULTS.alarm_log_odds
 
 
 @pytest.mark.slow
