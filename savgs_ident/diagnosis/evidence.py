@@ -261,3 +261,16 @@ class DiagnosisEvidence:
             and uncertain_odds(most[0] - each[0], hypot(most[1], each[1]))
             < constants.indistinguishable_log_odds
         )
+
+    def ports_alike(self, port: str, constants: DecisionConstants = DEFAULTS) -> tuple[str, ...]:
+        """Other ports at which a law does to first order as much as one at ``port``, the likest first.
+
+        A formula at the port may be far more probable than the catalogue's formulas there: what it does may be that
+        of another law all the same. None where a law at the port explains little to first order.
+        """
+        here = next((each for each in self.localisations if each.name == port), None)
+        if here is None or here.share < constants.alike_share:
+            return ()
+        apart = [(abs(each.evidence - here.evidence), each.name) for each in self.localisations]
+        near = constants.indistinguishable_log_odds
+        return tuple(name for off, name in sorted(apart) if name != port and off < near)

@@ -84,9 +84,20 @@ def _verdict(
         ports=problem.locations(hypothesis),
         confusable_with=tuple(alternatives),
         sentence=_effects_missing(problem, evidence, alternatives, gap),
+        confusable_ports=_other_ports(problem, evidence, alternatives),
         families=problem.families(hypothesis),
         probability=_probability(evidence, hypothesis),
     )
+
+
+def _other_ports(
+    problem: DiagnosisProblem, evidence: DiagnosisEvidence, alternatives: Sequence[str]
+) -> tuple[str, ...]:
+    """Where the alternatives to the effects that are named act, and a law that would do as much as a single one."""
+    here = problem.locations(evidence.chosen.hypothesis)
+    alike = evidence.ports_alike(here[0], problem.constants) if len(here) == 1 else ()
+    there = (*(problem.location(name) for name in alternatives), *alike)
+    return tuple(each for each in dict.fromkeys(there) if each not in here)
 
 
 def _probability(evidence: DiagnosisEvidence, *hypotheses: Hypothesis) -> float:
@@ -267,6 +278,11 @@ def _effects_missing(
     if alternatives:
         others = " or ".join(f"`{name}`" for name in alternatives)
         sentence += f" This campaign cannot distinguish {'it' if one else 'one of them'} from {others}."
+    listed = {problem.location(name) for name in alternatives}
+    ports = [each for each in _other_ports(problem, evidence, alternatives) if each not in listed]
+    if ports:
+        others = " or the ".join(problem.location_text(each) for each in ports)
+        sentence += f" By a law of another form the {others} could do as much."
     return sentence
 
 

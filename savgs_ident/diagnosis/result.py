@@ -94,7 +94,8 @@ class Verdict:
         ports: where they act; for an unknown one, the port that explains it best.
         confusable_with: effects that this campaign cannot distinguish from those named.
         sentence: the verdict in one sentence.
-        confusable_ports: of something unknown, ports that this campaign cannot distinguish from the one named.
+        confusable_ports: ports that this campaign cannot distinguish from the one named: where the effects of
+            ``confusable_with`` act, and where a law of another form would do as much.
         families: the kinds of what is missing, each with its port.
         law_known: whether what is named acts by the law of the catalogue; otherwise that is the nearest.
         probability: of what is said, all hypotheses summing to 1.

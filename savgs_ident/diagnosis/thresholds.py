@@ -115,6 +115,12 @@ class DecisionConstants:
     Origin: by choice; exp(5) is about 150 to 1.
     """
 
+    alike_share: float = 0.5
+    """Share of the gap that a law at a port explains to first order, from which on its likeness to others is known.
+
+    Origin: by choice, most of it.
+    """
+
     # Thresholds on the change of the response
 
     material_share: float = 0.003

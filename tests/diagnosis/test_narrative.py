@@ -135,6 +135,23 @@ def test_ports_that_do_the_same_are_listed_where_a_prior_decides_between_them() 
     assert named.indistinguishable_ports() == ("suspension",)
 
 
+def test_a_port_at_which_another_law_would_do_as_much_is_listed_beside_a_formula() -> None:
+    evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 500.0, "rail_viscous": 700.0})
+    alike: Any = SimpleNamespace(name="strut", share=0.9, evidence=RAIL.evidence + 3.0)
+    other: Any = SimpleNamespace(name="suspension", share=0.9, evidence=RAIL.evidence + 30.0)
+    evidence = replace(evidence, kind="effect", localisations=(alike, other, RAIL))
+    verdict = write_verdict(PROBLEM, evidence, (), GAP)
+    assert (verdict.effects, verdict.confusable_ports) == (("rail_viscous",), ("strut",))
+    assert verdict.sentence.endswith("By a law of another form the strut could do as much.")
+    # What a law explains little of says nothing of other ports.
+    little: Any = SimpleNamespace(name="rail", share=0.1, evidence=RAIL.evidence)
+    hidden = replace(evidence, localisations=(alike, other, little))
+    assert write_verdict(PROBLEM, hidden, (), GAP).confusable_ports == ()
+    # An effect that cannot be told from the named one has its port listed, too.
+    beside = write_verdict(PROBLEM, hidden, ("accel_lag",), GAP)
+    assert beside.confusable_ports == ("sensor.sprung_accel",)
+
+
 def test_nothing_that_counts_is_missing_where_what_is_more_probable_does_too_little() -> None:
     evidence = _evidence("none", "law", {"none": 0.0, "unknown": -5.0, "rail_viscous": 6.0, "accel_lag": 1.0})
     plain = write_verdict(PROBLEM, evidence, (), GAP)
