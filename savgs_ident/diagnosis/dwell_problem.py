@@ -205,12 +205,11 @@ class DwellProblem(AbstractProblem):
     ) -> list[NDArray[np.float64]]:
         """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""
         model = self.complete(terms)
-        found = {term.name: np.zeros((0, 0, 0)) for term in candidates}
         without = [term for term in candidates if not self.catalogue[term.name].states]
-        found |= self._without_states(model, values, warm_start, without)
         with_states = [term for term in candidates if self.catalogue[term.name].states]
+        found = self._without_states(model, values, warm_start, without)
         found |= self._with_states(model, values, warm_start, with_states)
-        return list(found.values())
+        return [found[term.name] for term in candidates]
 
     def _without_states(
         self,
