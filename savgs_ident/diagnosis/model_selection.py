@@ -180,7 +180,9 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
         immaterial=_immaterial(problem, findings, members),
         insufficient=_insufficient(problem, findings, members),
     )
-    if not members or not _is_named(problem, found, members[0]):
+    if not members or not (
+        _is_named(problem, found, members[0]) or is_better_form(problem, found, members[0])
+    ):
         return found
     chosen = next(each for each in weighed if each.mode is members[0].law.mode)
     return replace(found, kind="effect", chosen=chosen, named_law=members[0])
@@ -239,6 +241,18 @@ def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: Fl
         return False
     change = _change(problem, member.law.mode.prediction.rows - problem.base.prediction.rows)
     return member.left <= constants.unexplained_share_flexible and change.matters(constants)
+
+
+def is_better_form(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: FlexibleMember) -> bool:
+    """Whether a formula would be named and a learned law of its family at its port is certainly more probable.
+
+    The formula is the nearest then: its own probability would be next to nothing.
+    """
+    chosen, constants = evidence.chosen, problem.constants
+    if evidence.kind != "effect" or problem.families(chosen.hypothesis) != (member.hypothesis.flexible,):
+        return False
+    much = member.weight > chosen.weight + constants.indistinguishable_log_odds
+    return much and member.left <= evidence.left
 
 
 def _learned_laws(

@@ -15,6 +15,7 @@ from savgs_ident.diagnosis import narrative
 from savgs_ident.diagnosis.conclusion import decide_by_held_out
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.gap import Shrink
+from savgs_ident.diagnosis.model_selection import is_better_form
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, PortFamily
 from savgs_ident.diagnosis.score_test import PriorConflict
@@ -133,6 +134,21 @@ def test_ports_that_do_the_same_are_listed_where_a_prior_decides_between_them() 
     evidence = _evidence("unknown", "law", {"none": 0.0, "unknown": 100.0}, flexible=laws)
     named = replace(evidence, kind="effect", named_law=laws[0])
     assert named.indistinguishable_ports() == ("suspension",)
+
+
+def test_a_formula_is_not_named_where_a_law_of_its_family_at_its_port_is_certainly_more_probable() -> None:
+    evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 5.0, "rail_viscous": 700.0})
+    evidence = replace(evidence, kind="effect")
+
+    def member(weight: float, family: Family, left: float = 0.05) -> FlexibleMember:
+        law: Any = SimpleNamespace(mode=_mode(weight), port=SimpleNamespace(location="rail"), family=family)
+        return FlexibleMember(law, weight, left)
+
+    assert is_better_form(PROBLEM, evidence, member(730.0, Family.DAMPING))
+    assert not is_better_form(PROBLEM, evidence, member(730.0, Family.FRICTION))
+    assert not is_better_form(PROBLEM, evidence, member(703.0, Family.DAMPING))
+    assert not is_better_form(PROBLEM, evidence, member(730.0, Family.DAMPING, left=0.2))
+    assert not is_better_form(PROBLEM, replace(evidence, kind="none"), member(730.0, Family.DAMPING))
 
 
 def test_a_port_at_which_another_law_would_do_as_much_is_listed_beside_a_formula() -> None:
