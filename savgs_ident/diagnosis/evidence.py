@@ -263,7 +263,7 @@ class DiagnosisEvidence:
         )
 
     def ports_alike(self, port: str, constants: DecisionConstants = DEFAULTS) -> tuple[str, ...]:
-        """Other ports at which a law does to first order as much as one at ``port``, the likest first.
+        """Other ports at which a law is to first order about as probable as one at ``port``, or more, the best first.
 
         A formula at the port may be far more probable than the catalogue's formulas there: what it does may be that
         of another law all the same. None where a law at the port explains little to first order.
@@ -271,6 +271,6 @@ class DiagnosisEvidence:
         here = next((each for each in self.localisations if each.name == port), None)
         if here is None or here.share < constants.alike_share:
             return ()
-        apart = [(abs(each.evidence - here.evidence), each.name) for each in self.localisations]
-        near = constants.indistinguishable_log_odds
-        return tuple(name for off, name in sorted(apart) if name != port and off < near)
+        least = here.evidence - constants.indistinguishable_log_odds
+        ranked = sorted(self.localisations, key=lambda each: -each.evidence)
+        return tuple(each.name for each in ranked if each.name != port and each.evidence > least)

@@ -153,8 +153,8 @@ def test_a_formula_is_not_named_where_a_law_of_its_family_at_its_port_is_certain
 
 def test_a_port_at_which_another_law_would_do_as_much_is_listed_beside_a_formula() -> None:
     evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 500.0, "rail_viscous": 700.0})
-    alike: Any = SimpleNamespace(name="strut", share=0.9, evidence=RAIL.evidence + 3.0)
-    other: Any = SimpleNamespace(name="suspension", share=0.9, evidence=RAIL.evidence + 30.0)
+    alike: Any = SimpleNamespace(name="strut", share=0.9, evidence=RAIL.evidence - 3.0)
+    other: Any = SimpleNamespace(name="suspension", share=0.9, evidence=RAIL.evidence - 30.0)
     evidence = replace(evidence, kind="effect", localisations=(alike, other, RAIL))
     verdict = write_verdict(PROBLEM, evidence, (), GAP)
     assert (verdict.effects, verdict.confusable_ports) == (("rail_viscous",), ("strut",))
