@@ -49,6 +49,13 @@ GAPS = (0.3, 0.55)
 SOFT_GAPS = (0.0, 0.4)
 """Where stops begin that are touched softly, as shares of the stroke [1]."""
 
+DAMPED_GAP = 0.2
+"""Where contacts begin that take energy, as a share of the stroke [1].
+
+From the middle on they would be half a damping that grows with the displacement: with them the law of a published axis
+misses held-out tests by 3.8 % in place of 2.4 %.
+"""
+
 STRETCHES = (0.01, 0.03, 0.07, 0.2)
 """How far a spring-slider gives before it slides, as shares of the port's typical displacement [1].
 
@@ -198,7 +205,7 @@ OF_THE_LOAD = (
 )
 """Functions of a :class:`RelativeMotion` at a port with a load."""
 
-OF_CONTACTS = tuple(_damped_stop(gap, *side) for gap in SOFT_GAPS for side in _SIDES)
+OF_CONTACTS = tuple(_damped_stop(DAMPED_GAP, *side) for side in _SIDES)
 """Functions of a :class:`RelativeMotion`: contacts that take energy as they are pressed in."""
 
 OF_WHAT_GIVES = (

@@ -66,10 +66,8 @@ LAWS: dict[str, Callable[[float, float, float], float]] = {
     "n tanh(v/0.01) exp(-|v|/0.2)": lambda x, v, n: n * np.tanh(v / 0.01) * np.exp(-abs(v) / 0.2),
     "n v": lambda x, v, n: n * v,
     "n": lambda x, v, n: n,
-    "max(x - 0, 0) v": lambda x, v, n: max(x, 0.0) * v,
-    "max(-x - 0, 0) v": lambda x, v, n: max(-x, 0.0) * v,
-    "max(x - 0.4, 0) v": lambda x, v, n: max(x - 0.4, 0.0) * v,
-    "max(-x - 0.4, 0) v": lambda x, v, n: max(-x - 0.4, 0.0) * v,
+    "max(x - 0.2, 0) v": lambda x, v, n: max(x - 0.2, 0.0) * v,
+    "max(-x - 0.2, 0) v": lambda x, v, n: max(-x - 0.2, 0.0) * v,
 }
 """What the words for the functions say."""
 
