@@ -52,8 +52,8 @@ SOFT_GAPS = (0.0, 0.4)
 DAMPED_GAP = 0.2
 """Where contacts begin that take energy, as a share of the stroke [1].
 
-From the middle on they would be half a damping that grows with the displacement: with them the law of a published axis
-misses held-out tests by 3.8 % in place of 2.4 %.
+From the middle on they would be half a damping that grows with the displacement: with them the law of a published
+axis misses held-out tests by 3.8 % in place of 2.4 %.
 """
 
 STRETCHES = (0.01, 0.03, 0.07, 0.2)
