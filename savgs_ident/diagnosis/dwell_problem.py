@@ -21,7 +21,7 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import joint_status
 from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.background import errors_of_curve, with_background, without_drifts
-from savgs_ident.diagnosis.effect_sensitivities import impose, node_loads, rehearse, sensitivities_with_states
+from savgs_ident.diagnosis.effect_sensitivities import impose, node_loads, rehearse, secants_of_terms
 from savgs_ident.diagnosis.gap import CyclePosition, MapCell, cycle_positions, gap_map
 from savgs_ident.diagnosis.localisation import InputLocation, Localisation
 from savgs_ident.diagnosis.location_hypotheses import input_locations
@@ -208,7 +208,11 @@ class DwellProblem(AbstractProblem):
         without = [term for term in candidates if not self.catalogue[term.name].states]
         with_states = [term for term in candidates if self.catalogue[term.name].states]
         found = self._without_states(model, values, warm_start, without)
-        found |= self._with_states(model, values, warm_start, with_states)
+        p, size = self.values(values), self.constants.typical_coordinate
+        effects = [self.catalogue[term.name] for term in with_states]
+        found |= secants_of_terms(
+            model, self.likelihood, self.orders, p, warm_start, effects, with_states, size
+        )
         return [found[term.name] for term in candidates]
 
     def _without_states(
@@ -228,30 +232,6 @@ class DwellProblem(AbstractProblem):
             for term in some:
                 found[term.name].append(slopes[:, [names.index(each.name) for each in term.amplitudes]])
         return {name: np.stack(each) for name, each in found.items()}
-
-    def _with_states(
-        self,
-        model: AbstractPlant,
-        values: Mapping[str, float],
-        warm_start: PeriodicSolution,
-        candidates: Sequence[Term],
-    ) -> dict[str, NDArray[np.float64]]:
-        """The same of candidates with states, by name: secants to their typical sizes."""
-        size = self.constants.typical_coordinate
-        effects, typical = [], []
-        for term in candidates:
-            there = {each.name: each.centre + size * each.scale for each in term.amplitudes}
-            effects += [self.catalogue[term.name]] * len(term.tried)
-            typical += [there | shapes for shapes in term.tried]
-        p = self.values(values)
-        moved = iter(
-            sensitivities_with_states(model, self.likelihood, self.orders, p, warm_start, effects, typical)
-        )
-        return {
-            term.name: np.stack([next(moved)[:, None] for _ in term.tried])
-            / (size * term.amplitudes[0].scale)
-            for term in candidates
-        }
 
     def slopes(
         self, model: AbstractPlant, p: Values, solution: PeriodicSolution, names: Sequence[str]

@@ -29,6 +29,7 @@ from savgs_ident.effects.base import (
 from savgs_ident.effects.composition import contact_bristle, nothing_imposed
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.likelihood import Likelihood
+from savgs_ident.inference.observations import Term
 from savgs_ident.plants.base import AbstractPlant, AtPorts
 from savgs_ident.simulate.along_motion import FORWARD, NEWTON_STEPS
 from savgs_ident.simulate.periodic import PeriodicSolution
@@ -65,6 +66,32 @@ def sensitivities_with_states(
         along = np.asarray(_marched(effect, there, signals, steps))
         fields.append((effect.port.name, _at_nodes(along, solution)))
     return impose(model, likelihood, orders, p, solution, fields)
+
+
+def secants_of_terms(
+    model: AbstractPlant,
+    likelihood: Likelihood,
+    orders: int,
+    p: Values,
+    solution: PeriodicSolution,
+    effects: Sequence[Effect],
+    terms: Sequence[Term],
+    size: float,
+) -> dict[str, NDArray[np.float64]]:
+    """Change of the rows per unit of the amplitude of every term whose effect has states, by name, (tries, m, 1).
+
+    They are secants to the typical sizes, ``size`` scales from the centres.
+    """
+    every, typical = [], []
+    for term, effect in zip(terms, effects, strict=True):
+        there = {each.name: each.centre + size * each.scale for each in term.amplitudes}
+        every += [effect] * len(term.tried)
+        typical += [there | shapes for shapes in term.tried]
+    moved = iter(sensitivities_with_states(model, likelihood, orders, p, solution, every, typical))
+    return {
+        term.name: np.stack([next(moved)[:, None] for _ in term.tried]) / (size * term.amplitudes[0].scale)
+        for term in terms
+    }
 
 
 def rehearse(p: Values, effects: Sequence[Effect], tests: int) -> None:

@@ -274,3 +274,15 @@ class DiagnosisEvidence:
         least = here.evidence - constants.indistinguishable_log_odds
         ranked = sorted(self.localisations, key=lambda each: -each.evidence)
         return tuple(each.name for each in ranked if each.name != port and each.evidence > least)
+
+
+def is_better_form(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: FlexibleMember) -> bool:
+    """Whether a formula would be named and a learned law of its family at its port is certainly more probable.
+
+    The formula is the nearest then: its own probability would be next to nothing.
+    """
+    chosen, constants = evidence.chosen, problem.constants
+    if evidence.kind != "effect" or problem.families(chosen.hypothesis) != (member.hypothesis.flexible,):
+        return False
+    much = member.weight > chosen.weight + constants.indistinguishable_log_odds
+    return much and member.left <= evidence.left

@@ -31,6 +31,7 @@ from savgs_ident.diagnosis.evidence import (
     DiagnosisProblem,
     FittedHypotheses,
     FlexibleMember,
+    is_better_form,
 )
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
@@ -241,18 +242,6 @@ def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: Fl
         return False
     change = _change(problem, member.law.mode.prediction.rows - problem.base.prediction.rows)
     return member.left <= constants.unexplained_share_flexible and change.matters(constants)
-
-
-def is_better_form(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: FlexibleMember) -> bool:
-    """Whether a formula would be named and a learned law of its family at its port is certainly more probable.
-
-    The formula is the nearest then: its own probability would be next to nothing.
-    """
-    chosen, constants = evidence.chosen, problem.constants
-    if evidence.kind != "effect" or problem.families(chosen.hypothesis) != (member.hypothesis.flexible,):
-        return False
-    much = member.weight > chosen.weight + constants.indistinguishable_log_odds
-    return much and member.left <= evidence.left
 
 
 def _learned_laws(

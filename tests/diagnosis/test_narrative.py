@@ -13,9 +13,13 @@ from hypothesis import strategies as st
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis import narrative
 from savgs_ident.diagnosis.conclusion import decide_by_held_out
-from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
+from savgs_ident.diagnosis.evidence import (
+    DiagnosisEvidence,
+    DiagnosisProblem,
+    FlexibleMember,
+    is_better_form,
+)
 from savgs_ident.diagnosis.gap import Shrink
-from savgs_ident.diagnosis.model_selection import is_better_form
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, PortFamily
 from savgs_ident.diagnosis.score_test import PriorConflict
