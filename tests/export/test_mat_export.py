@@ -21,6 +21,8 @@ from savgs_ident.export.mat_export import write_mat
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 
+pytestmark = pytest.mark.slow
+
 FIELD = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 
 
@@ -84,7 +86,6 @@ def test_frequency_responses_are_those_of_the_state_spaces_in_the_file(found: di
         assert responses[name] == pytest.approx(wanted, rel=1e-9)
 
 
-@pytest.mark.slow
 def test_the_motion_on_the_cam_is_that_of_the_nonlinear_rig(
     found: dict[str, Any], model: ExportedModel
 ) -> None:
@@ -119,7 +120,6 @@ def test_a_parameter_that_matlab_cannot_name_is_refused(rig: Rig, tmp_path: Path
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
 def test_long_names_are_kept(rig: Rig, tmp_path: Path) -> None:
     name = "a" * 63
     long = ParameterTable((*rig.parameters.entries, Parameter(name, 2.0, "m")))
@@ -127,7 +127,6 @@ def test_long_names_are_kept(rig: Rig, tmp_path: Path) -> None:
     assert loadmat(path, simplify_cells=True)["parameters"][name]["value"] == 2.0
 
 
-@pytest.mark.slow
 def test_a_drawing_has_nothing_of_a_fit(rig: Rig, tmp_path: Path) -> None:
     (path,) = write_mat(ExportedModel(RigModel(rig, ())), tmp_path)
     found = loadmat(path, simplify_cells=True)

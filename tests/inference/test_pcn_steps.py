@@ -24,6 +24,7 @@ def pairs(skew: SkewHill) -> tuple[np.ndarray, np.ndarray]:
     return start, pcn_steps(skew, 5, start)[0]
 
 
+@pytest.mark.slow
 def test_long_chains_have_mean_and_covariance_of_a_normal_density() -> None:
     hill = a_normal_hill(3)
     end, _, _ = pcn_steps(hill, 4, np.zeros((CHAINS, 3)), rounds=4)
