@@ -6,7 +6,6 @@ import json
 import re
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from dataclasses import is_dataclass
 from functools import partial
@@ -163,7 +162,6 @@ def test_effects_are_added_by_name() -> None:
 
 
 def test_a_result_shows_itself_and_writes_what_the_command_writes(tmp_path: Path) -> None:
-    began = time.perf_counter()
     summary = si.inspect(si.load_campaign(si.default_campaign_path()), orders=3)
     assert str(summary).startswith(f"{si.default_campaign_path()}: ")
     assert summary._repr_html_().startswith("<pre")
@@ -178,7 +176,6 @@ def test_a_result_shows_itself_and_writes_what_the_command_writes(tmp_path: Path
         summary.figure("bode")
     with pytest.raises(si.InputError, match="a CampaignSummary has no frequency response"):
         si.plot_bode(summary)
-    assert time.perf_counter() - began < 60.0
 
 
 @pytest.mark.slow

@@ -45,6 +45,7 @@ from savgs_ident.simulate.along_motion import (
     force_gain,
     force_slopes,
     needed_force,
+    needed_forces,
     ports_along,
 )
 from savgs_ident.simulate.program_cache import placed
@@ -135,27 +136,39 @@ class MotionProblem(AbstractProblem):
     def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
-        """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""
+        """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes).
+
+        Slopes at the null, or secants to the typical size of one that has states.
+        """
         base = self.predict(terms, values, (), warm_start).rows
         return [
-            np.stack([self._sensitivities(terms, dict(values) | shapes, base, term) for shapes in term.tried])
+            self._secants(terms, values, base, term)
+            if self.catalogue[term.name].states
+            else self._slopes_at_null(terms, values, term)
             for term in candidates
         ]
 
-    def _sensitivities(
+    def _slopes_at_null(
+        self, terms: tuple[str, ...], values: Mapping[str, float], term: Term
+    ) -> NDArray[np.float64]:
+        names, everything = [each.name for each in term.amplitudes], self.complete(terms)
+        tries = [dict(values) | shapes for shapes in term.tried]
+        return np.stack([self._with_slopes(everything, each, names)[1] for each in tries])
+
+    def _secants(
         self, terms: tuple[str, ...], values: Mapping[str, float], base: NDArray[np.float64], term: Term
     ) -> NDArray[np.float64]:
-        """The same at given shapes: slopes at the null, or the secant to the typical size of one that has states."""
-        if not self.catalogue[term.name].states:
-            names = [each.name for each in term.amplitudes]
-            return self._with_slopes(self.complete(terms), values, names)[1]
-        found = []
-        for each in term.amplitudes:
-            typical = self.constants.typical_coordinate * each.scale
-            there = dict(values) | {each.name: each.centre + typical}
-            moved = self.predict((*terms, term.name), there, (), None).rows - base
-            found.append(moved / typical)
-        return np.stack(found, axis=1)
+        typical = np.array([self.constants.typical_coordinate * each.scale for each in term.amplitudes])
+        points = [
+            self.table.as_dict() | dict(values) | shapes | {each.name: each.centre + float(size)}
+            for shapes in term.tried
+            for each, size in zip(term.amplitudes, typical, strict=True)
+        ]
+        together = {name: np.array([each[name] for each in points]) for name in points[0]}
+        model = self.model((*terms, term.name))
+        forces = needed_forces(model, placed(together), self.samples, self.motion.step).force
+        moved = (self.motion.rows(np.asarray(forces)) - base).reshape(-1, typical.size, base.size)
+        return np.moveaxis(moved / typical[:, None], 1, 2)
 
     def port_signals(self, values: Mapping[str, float], warm_start: Any) -> Mapping[str, PortSignals]:
         """What laws see at the force ports at the samples."""

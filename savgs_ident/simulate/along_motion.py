@@ -192,6 +192,14 @@ def needed_force(model: AbstractPlant, p: Values, along: Samples, step: float) -
 
 
 @eqx.filter_jit
+def needed_forces(
+    model: AbstractPlant, several: Mapping[str, Float[Array, " k"]], along: Samples, step: float
+) -> Needed:
+    """What :func:`needed_force` gives at several values of the parameters, (k, n) and (k,)."""
+    return jax.vmap(lambda p: needed_force(model, p, along, step))(dict(several))
+
+
+@eqx.filter_jit
 def force_slopes(
     model: AbstractPlant,
     p: Values,

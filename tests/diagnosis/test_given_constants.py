@@ -5,18 +5,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import savgs_ident as si
 from savgs_ident import diagnosis
 from savgs_ident.diagnosis import diagnose as dwells
+from savgs_ident.diagnosis import motion_problem as problems
 from savgs_ident.diagnosis import public
-from savgs_ident.diagnosis.motion_problem import MotionProblem, motion_problem
+from savgs_ident.diagnosis.motion_problem import motion_problem
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.inference.observations import Prediction
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.driven_motion import driven_motion
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.along_motion import Needed, needed_forces
 
 from ..in_one_test import over
 from .recorded_axis import recorded_axis
@@ -110,20 +112,22 @@ def test_no_function_decides_by_the_defaults_where_it_is_given_others(file: str)
 def test_an_effect_with_states_is_scored_at_its_typical_size_whatever_the_width_of_its_prior(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    model, predict = si.PlantModel(si.Axis(), si.Axis.parameters), MotionProblem.predict
-    motion, sizes = driven_motion(recorded_axis({}, 0, cycles=3)), []
+    model, together = si.PlantModel(si.Axis(), si.Axis.parameters), needed_forces
+    motion, seen = driven_motion(recorded_axis({}, 0, cycles=3)), []
 
-    def watched(self: MotionProblem, terms: Any, values: Any, names: Any, warm_start: Any) -> Prediction:
-        if terms:
-            (amplitude,) = next(each.amplitudes for each in self.candidates if each.name == terms[0])
-            sizes.append(values[amplitude.name])
-        return predict(self, terms, values, names, warm_start)
+    def watched(model: Any, several: Any, along: Any, step: float) -> Needed:
+        seen.append(several)
+        return together(model, several, along, step)
 
-    monkeypatch.setattr(MotionProblem, "predict", watched)
+    monkeypatch.setattr(problems, "needed_forces", watched)
     for constants in (DEFAULTS, OTHERS):
         problem, _ = motion_problem(
             motion, si.Axis(), model.table, model.catalogue, free=model.free(), constants=constants
         )
         term = next(each for each in problem.candidates if problem.catalogue[each.name].states)
         problem.sensitivities((), {}, None, (term,))
-    assert sizes == pytest.approx([sizes[0]] * len(sizes))
+    (amplitude,) = term.amplitudes
+    one, other = (np.asarray(each[amplitude.name]) for each in seen)
+    assert one.size == len(term.tried)
+    np.testing.assert_allclose(one, one[0])
+    np.testing.assert_allclose(one, other)
