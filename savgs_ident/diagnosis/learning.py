@@ -21,7 +21,6 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
 from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.parameter import ParameterTable, merge_parameters
@@ -29,7 +28,7 @@ from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out
 from savgs_ident.diagnosis.law_families import FamilyAlone, families_alone, families_spared
-from savgs_ident.diagnosis.localisation import widths_of
+from savgs_ident.diagnosis.learning_start import best_gap, with_amplitudes
 from savgs_ident.diagnosis.problem import AbstractProblem, term_of
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Family, Port, PortKind
@@ -51,7 +50,7 @@ from savgs_ident.inference.find_map import (
     search_of,
 )
 from savgs_ident.inference.observations import Data, Term
-from savgs_ident.inference.prior import Linear, Logarithmic
+from savgs_ident.inference.prior import Logarithmic
 
 
 @dataclass(frozen=True)
@@ -281,15 +280,16 @@ def _begin_learning(
     ).uncorrected()
     search, names = search_of(mine, data, given), coefficients_at(port)
     start = base.prediction.warm_start
-    there_now = mine.predict((effect.name,), base.values, names, start)
+    values = {**base.values, **best_gap(mine, search, base, port, constants)}
+    there_now = mine.predict((effect.name,), values, names, start)
     if not there_now.solved:
         return None
     shapes = tuple(each for each in term_of(effect, constants).shapes if each.name not in spans)
     blank = Term(effect.name, port.location, (), shapes)
     columns = dict(zip(names, there_now.slopes.T, strict=True))
-    term = _with_amplitudes(blank, effect, search, base, columns, constants)
+    term = with_amplitudes(blank, effect, search, base, columns, constants)
     steps, near = constants.first_learned_steps, there_now.warm_start
-    mode = find_map_from_both(search, (term,), base.values, near, steps, least)
+    mode = find_map_from_both(search, (term,), values, near, steps, least)
     if not mode.solved:
         return None
     blocked = _blocked_play(search, effect, blank, port, base, near, constants)
@@ -304,29 +304,6 @@ def _is_impossible(law: LearnedLaw) -> bool:
     n = np.linspace(-1.0, 1.0, 201)
     columns = np.stack(what_gives(jnp.asarray(n), jnp.asarray(n), jnp.zeros(n.size)))
     return float([law.values[name] for name in law.units] @ columns @ n) < 0.0
-
-
-def _with_amplitudes(
-    term: Term,
-    effect: Effect,
-    search: Search,
-    base: LaplaceFit,
-    columns: Mapping[str, NDArray[np.float64]],
-    constants: DecisionConstants,
-) -> Term:
-    """The term with coefficients whose prior is as wide as to first order about the baseline explains most.
-
-    ``columns`` are the change of the rows (m,) per unit of each, by name; what the data hardly see is left out.
-    """
-    size = {name: float(np.linalg.norm(column)) for name, column in columns.items()}
-    least = constants.least_function_share * max(size.values())
-    seen = [name for name in columns if size[name] > least]
-    widths = widths_of(search, base, np.stack([columns[name] for name in seen], axis=1), constants)
-    units = {each.name: each.unit for each in effect.parameters}
-    amplitudes = tuple(
-        Linear(name, units[name], 0.0, float(width)) for name, width in zip(seen, widths, strict=True)
-    )
-    return replace(term, amplitudes=amplitudes)
 
 
 def _some_of(term: Term, found: FamilyAlone) -> Term:
@@ -390,7 +367,7 @@ def _blocked_play(
     if not there_now.solved:
         return None
     columns = dict(zip(names, there_now.slopes.T, strict=True))
-    term = _with_amplitudes(replace(blank, shapes=shapes), effect, search, base, columns, constants)
+    term = with_amplitudes(replace(blank, shapes=shapes), effect, search, base, columns, constants)
     mode = find_map(search, (term,), start, there_now.warm_start, constants.first_learned_steps)
     log_prior = len(term.amplitudes) * log(constants.function_prior)
     return _FittedFunctions(term, mode, log_prior, Family.PLAY) if mode.solved else None

@@ -124,6 +124,14 @@ def widths_of(
     return np.asarray(_best_width(_linearised(search, mode), across / rms, constants).width / rms)
 
 
+def evidence_of_law(
+    search: Search, mode: LaplaceFit, columns: Matrix, constants: DecisionConstants = DEFAULTS
+) -> float:
+    """Log evidence with a law whose coefficients change the rows by ``columns``, (m, q), to first order."""
+    across = search.turned(columns)
+    return _best_width(_linearised(search, mode), across / _rms(mode, across), constants).evidence
+
+
 def _log_mean_exp(evidences: Sequence[float]) -> float:
     best = max(evidences)
     return best + log(sum(exp(each - best) for each in evidences) / len(evidences))

@@ -20,12 +20,10 @@ from dataclasses import replace
 from math import log, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.presentation import Progress
-from savgs_ident.diagnosis.background import relative_change
 from savgs_ident.diagnosis.evidence import (
     DiagnosisEvidence,
     DiagnosisProblem,
@@ -35,9 +33,10 @@ from savgs_ident.diagnosis.evidence import (
 )
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
+from savgs_ident.diagnosis.materiality import change_of, change_without, immaterial, material
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
-from savgs_ident.diagnosis.score_test import Amplitudes, prior_conflict
+from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.search import (
     Findings,
     hypothesis_of,
@@ -49,7 +48,6 @@ from savgs_ident.diagnosis.search import (
 )
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
-    Change,
     WeighedHypothesis,
     broken_tolerance,
     decide,
@@ -58,7 +56,6 @@ from savgs_ident.diagnosis.verdict import (
     most_probable,
     unknown_evidence,
     weigh,
-    without_immaterial_members,
 )
 from savgs_ident.effects.base import Port, PortKind
 from savgs_ident.inference.find_map import LaplaceFit, Start, find_map, find_map_again, refine, search_of
@@ -118,8 +115,9 @@ def compare_models(problem: DiagnosisProblem, progress: Progress) -> FittedHypot
     findings = with_pairs(search, findings, plant.candidates, progress, constants, least)
     if not law_explains:
         findings = _with_nearest(problem, findings, localisations, progress)
-        findings, beside = _law_beside_best(problem, _material(problem, findings), progress)
+        findings, beside = _law_beside_best(problem, material(problem, findings), progress)
     best = most_probable(findings, constants)
+    laws = laws or _laws_instead_of_two(problem, findings, best, progress)
     return FittedHypotheses(
         findings, tuple(localisations), laws, beside, best, change_without(problem, best, best.terms)
     )
@@ -162,7 +160,7 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
     alone = -np.inf
     if others:
         first = max(others, key=lambda each: each.evidence)
-        alone = anywhere(others) if _change(problem, first.moved).matters(constants) else -np.inf
+        alone = anywhere(others) if change_of(problem, first.moved).matters(constants) else -np.inf
     unknown = unknown_evidence(findings, alone, fitted.beside, broken.weight, constants)
     weighed = weigh(findings, unknown, constants)
     kind, chosen = decide(weighed, change, left, constants)
@@ -178,7 +176,7 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
         kind=kind,
         chosen=chosen,
         left=left,
-        immaterial=_immaterial(problem, findings, members),
+        immaterial=immaterial(problem, findings, members),
         insufficient=_insufficient(problem, findings, members),
     )
     if not members or not (
@@ -187,39 +185,6 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
         return found
     chosen = next(each for each in weighed if each.mode is members[0].law.mode)
     return replace(found, kind="effect", chosen=chosen, named_law=members[0])
-
-
-def _immaterial(
-    problem: DiagnosisProblem, findings: Findings, members: Sequence[FlexibleMember]
-) -> Mapping[Hypothesis, float]:
-    """By hypothesis, the probability that it changes the response by too little to matter, if it is right.
-
-    Of what was fitted, at its best; of what was only scored, over all sizes that the data leave, so that an effect
-    which these tests do not see counts in full.
-    """
-    constants, base = problem.constants, problem.base
-    fits = [(hypothesis_of(mode), mode) for mode in findings.modes]
-    fits += [(each.hypothesis, each.law.mode) for each in members]
-
-    def matters(mode: LaplaceFit) -> bool:
-        return _change(problem, mode.prediction.rows - base.prediction.rows).matters(constants)
-
-    found = {
-        Hypothesis((score.term.name,)): _chance_of_little(problem, score.amplitudes)
-        for score in findings.scores
-        if score.amplitudes is not None
-    }
-    return found | {each: float(not matters(mode)) for each, mode in fits}
-
-
-SIZES = 100
-"""Draws of an effect's size over which it is averaged whether it matters."""
-
-
-def _chance_of_little(problem: DiagnosisProblem, amplitudes: Amplitudes) -> float:
-    """The probability [1] that an effect which was only scored changes the response by too little to matter."""
-    changes = _changes(problem, amplitudes.draws(SIZES))
-    return float(np.mean([not each.matters(problem.constants) for each in changes]))
 
 
 def _insufficient(
@@ -240,7 +205,7 @@ def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: Fl
     fitted = [each.weight for each in evidence.weighed if each.mode is not None and each.hypothesis.effects]
     if member.weight < max([none.weight + constants.alarm_log_odds, evidence.unknown.weight, *fitted]):
         return False
-    change = _change(problem, member.law.mode.prediction.rows - problem.base.prediction.rows)
+    change = change_of(problem, member.law.mode.prediction.rows - problem.base.prediction.rows)
     return member.left <= constants.unexplained_share_flexible and change.matters(constants)
 
 
@@ -267,6 +232,29 @@ def _learned_laws(
     ports = _worth_learning(problem, findings, localisations)
     least, given = best.evidence - constants.refined_log_evidence, problem.search.given
     return learn(problem.plant, problem.data, base, ports, constants, given, progress, least)
+
+
+def _laws_instead_of_two(
+    problem: DiagnosisProblem, findings: Findings, best: LaplaceFit, progress: Progress
+) -> tuple[LearnedLaw, ...]:
+    """Learned laws at the ports of effects that explain all alone, where two effects are more probable still.
+
+    The second may stand for what the first one's formula has wrong.
+    """
+    if len(best.terms) < 2:
+        return ()
+    constants, search = problem.constants, problem.search
+    alone = [
+        mode
+        for mode in findings.modes
+        if len(mode.terms) == 1
+        and mode.terms[0] in best.terms
+        and left_over(search, problem.base, mode, constants) <= constants.explained_share
+    ]
+    ports = dict.fromkeys(problem.plant.catalogue[mode.terms[0]].port.name for mode in alone)
+    least = best.evidence - constants.refined_log_evidence
+    wanted = [problem.port(name) for name in ports]
+    return learn(problem.plant, problem.data, problem.base, wanted, constants, search.given, progress, least)
 
 
 def _flexible_members(
@@ -359,10 +347,10 @@ def _law_beside_best(
         ports = {each.name for each in localisations[: constants.nearest_ports]}
         others = [term for term in candidates if problem.location(term.name) in ports]
         more = pairs_with(search, findings, best, others, candidates, progress, constants)
-        findings = _material(problem, more)
+        findings = material(problem, more)
         if hypothesis_of(most_probable(findings, constants)) != hypothesis_of(best):
             return _law_beside_best(problem, findings, progress)
-    change = _change(problem, localisations[0].moved)
+    change = change_of(problem, localisations[0].moved)
     return findings, anywhere(localisations) if change.matters(constants) else -np.inf
 
 
@@ -370,41 +358,3 @@ def _localised(problem: DiagnosisProblem, mode: LaplaceFit) -> list[Localisation
     """What a law at each location would explain beyond a hypothesis."""
     locations = problem.plant.locations(mode.terms, mode.values, mode.prediction.warm_start)
     return localise(problem.search, mode, locations, problem.constants)
-
-
-def _material(problem: DiagnosisProblem, findings: Findings) -> Findings:
-    """The findings less those that need an effect which does too little to matter."""
-    return without_immaterial_members(
-        findings, lambda mode, gone: change_without(problem, mode, gone), problem.constants
-    )
-
-
-def change_without(problem: DiagnosisProblem, mode: LaplaceFit, gone: Sequence[str]) -> Change:
-    """What some terms of a hypothesis do to the response, all other parameters as they are.
-
-    In the channel where they do most; infinite where the plant has no solution without them.
-    """
-    if not gone:
-        return Change(0.0, 0.0)
-    plant = problem.plant
-    left = tuple(name for name in mode.terms if name not in gone)
-    wanted = [each.name for each in plant.nuisances]
-    taken = {each.name for name in gone for each in plant.catalogue[name].parameters}
-    values = {name: value for name, value in mode.values.items() if name not in taken or name in wanted}
-    without = plant.predict(left, values, wanted, problem.base.prediction.warm_start)
-    if not without.solved:
-        return Change(np.inf, np.inf)
-    return _change(problem, mode.prediction.rows - without.rows)
-
-
-def _change(problem: DiagnosisProblem, rows: NDArray[np.float64]) -> Change:
-    """A change of the rows (m,), in the channel where it is greatest."""
-    return _changes(problem, rows[:, None])[0]
-
-
-def _changes(problem: DiagnosisProblem, rows: NDArray[np.float64]) -> list[Change]:
-    """Changes of the rows (m, changes), each in the channel where it is greatest."""
-    channel, data = problem.plant.channel, problem.data
-    in_one_test = relative_change(data, channel * data.tests + data.test, rows)
-    overall = relative_change(data, channel, rows)
-    return [Change(*each) for each in zip(overall.tolist(), in_one_test.tolist(), strict=True)]

@@ -421,6 +421,12 @@ class DecisionConstants:
     Origin: computing time. Fewer may miss the port of something strong, which explains little to first order.
     """
 
+    learned_gaps: tuple[float, ...] = (0.05, 0.1, 0.2, 0.4)
+    """Where contacts may begin before a search for a learned law, over the stroke [1].
+
+    Origin: by choice, a factor of two apart. It decides where a search begins, and nothing else.
+    """
+
     learned_steps: int = 20
     """Most steps of the fit of a learned law. Origin: computing time."""
 

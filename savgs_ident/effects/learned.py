@@ -47,6 +47,7 @@ from savgs_ident.effects.base import (
 )
 from savgs_ident.effects.effect import Effect, typical_effect
 from savgs_ident.effects.learned_functions import (
+    GAP,
     OF_CONTACTS,
     OF_SLIDERS,
     OF_THE_ANGLE,
@@ -95,7 +96,7 @@ class LearnedForce(AbstractForceLaw):
     name: ClassVar[str] = "learned"
     family: ClassVar[Family] = Family.LEARNED
     roles: ClassVar[tuple[Role, ...]] = _roles(
-        ("middle", "stroke", "speed", "carried", "turn", "give"),
+        ("middle", "stroke", "speed", "carried", "turn", "give", "gap"),
         len((*OF_THE_MOTION, *OF_SLIDERS, *OF_THE_LOAD, *OF_CONTACTS)),
     )
     port: Port = eqx.field(static=True)
@@ -106,6 +107,7 @@ class LearnedForce(AbstractForceLaw):
         carried = Parameter("carried", 1.0, force, lower=SMALLEST, about="largest load seen")
         turn = "velocity over which a friction turns round, over the largest seen"
         give = "how far spring-sliders give before they slide, over what their functions say"
+        gap = "displacement at which contacts begin, over the stroke"
         spans = {
             "middle": Parameter("middle", 0.0, unit, about="displacement in the middle of what was seen"),
             "stroke": Parameter("stroke", 1.0, unit, lower=SMALLEST, about="largest displacement from there"),
@@ -113,6 +115,7 @@ class LearnedForce(AbstractForceLaw):
             "carried": carried if port.loaded else 1.0,
             "turn": Parameter("turn", TURN, "1", lower=0.1 * TURN, upper=10.0 * TURN, about=turn),
             "give": Parameter("give", 1.0, "1", lower=0.2, upper=5.0, about=give),
+            "gap": Parameter("gap", GAP, "1", lower=0.02, upper=0.9, about=gap),
         }
         return {role.name: 0.0 for role in self.roles} | spans | _coefficients(port, force)
 
@@ -135,7 +138,7 @@ class LearnedForce(AbstractForceLaw):
         whole = jnp.abs(v["middle"]) + v["stroke"]
         d = jnp.clip(signals.displacement / whole, -1.0, 1.0)
         held = [-each.force for each in self._sliders(v, signals, state)]
-        seen = RelativeMotion(x, d, speed, n, v["turn"], held)
+        seen = RelativeMotion(x, d, speed, n, v["turn"], v["gap"], held)
         return self.port.sense * _sum(v, values_of(functions_at(self.port), seen))
 
     def rate(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:

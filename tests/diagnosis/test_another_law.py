@@ -33,7 +33,7 @@ from savgs_ident.effects.effect import Effect, effect_at
 from savgs_ident.inference.find_map import find_map, search_of
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model, model_parameters
 from savgs_ident.plants.quarter_car.plant import CHANNELS, QuarterCar
-from savgs_ident.plants.quarter_car.ports import DAMPER, RAIL, ROAD
+from savgs_ident.plants.quarter_car.ports import DAMPER, RAIL, ROAD, SUSPENSION
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
@@ -130,6 +130,19 @@ def test_a_wave_that_no_cam_of_the_catalogue_has_is_a_shape_of_the_road(
 
 
 @pytest.mark.slow
+def test_a_sensor_by_another_law_is_not_a_lag_beside_something_else(measure_few: Measure, rig: Rig) -> None:
+    """The lag leaves next to nothing, and a second effect would take that up."""
+    there = FOREIGN["accel_second_order"].effect
+    values = {"accel_second_order_time": 2.1e-3, "accel_second_order_damping_ratio": 1.4}
+    diagnosis = diagnose_response(_recorded(measure_few("nominal"), rig, there, **values), rig, COARSE)
+    assert diagnosis.verdict.kind == "effect"
+    assert diagnosis.verdict.effects == ("accel_lag",)
+    assert tuple(map(str, diagnosis.verdict.families)) == ("sensor.sprung_accel/dynamics",)
+    assert not diagnosis.verdict.law_known
+    assert diagnosis.shrink.closed_by_effect > 0.9
+
+
+@pytest.mark.slow
 def test_a_friction_of_the_joints_would_do_the_same_in_the_strut_and_not_at_the_rail(
     measure_few: Measure, rig: Rig
 ) -> None:
@@ -161,3 +174,19 @@ def test_a_play_with_a_film_is_learned_as_one_that_is_blocked_at_its_ends(
     assert law.mode.evidence > base.evidence + 100.0
     blocked_at = DAMPER.displacement / law.values["learned_damper_blocking"]
     assert blocked_at == pytest.approx(play / 2.0, rel=0.2)
+
+
+@pytest.mark.slow
+def test_a_clearance_is_learned_as_a_stop_with_its_gap(measure_few: Measure, rig: Rig) -> None:
+    """Its contact begins where no function of a fixed place does."""
+    gap, catalogue = 3.1e-3, {name: CATALOGUE[name] for name in MODELS["simtr"]}
+    there = FOREIGN["joint_clearance"].effect
+    response = _recorded(measure_few("nominal"), rig, there, joint_clearance_gap=gap)
+    plant, data = rig_problem(response, rig, catalogue, COARSE.periodic)
+    base = find_map(search_of(plant, data), (), {}, plant.start({}))
+    (law,) = learn(plant, data, base, [SUSPENSION])
+    assert law.mode.status.ok
+    assert law.only is Family.STOP
+    assert law.mode.evidence > base.evidence + 100.0
+    stroke = law.values["learned_suspension_stroke"]
+    assert law.values["learned_suspension_gap"] * stroke == pytest.approx(gap, rel=0.2)

@@ -66,8 +66,10 @@ LAWS: dict[str, Callable[[float, float, float], float]] = {
     "n tanh(v/0.01) exp(-|v|/0.2)": lambda x, v, n: n * np.tanh(v / 0.01) * np.exp(-abs(v) / 0.2),
     "n v": lambda x, v, n: n * v,
     "n": lambda x, v, n: n,
-    "max(x - 0.2, 0) v": lambda x, v, n: max(x - 0.2, 0.0) * v,
-    "max(-x - 0.2, 0) v": lambda x, v, n: max(-x - 0.2, 0.0) * v,
+    "max(x - g, 0) v": lambda x, v, n: max(x - GAP, 0.0) * v,
+    "max(-x - g, 0) v": lambda x, v, n: max(-x - GAP, 0.0) * v,
+    "max(x - g, 0)": lambda x, v, n: max(x - GAP, 0.0),
+    "max(-x - g, 0)": lambda x, v, n: max(-x - GAP, 0.0),
 }
 """What the words for the functions say."""
 
@@ -75,7 +77,17 @@ TURN = 0.02
 
 GIVE = 1.4
 
-SPANS = {"middle": 0.4, "stroke": 0.03, "speed": 0.5, "carried": 8e3, "turn": TURN, "give": GIVE}
+GAP = 0.25
+
+SPANS = {
+    "middle": 0.4,
+    "stroke": 0.03,
+    "speed": 0.5,
+    "carried": 8e3,
+    "turn": TURN,
+    "give": GIVE,
+    "gap": GAP,
+}
 
 
 def _whole(x: float) -> float:
