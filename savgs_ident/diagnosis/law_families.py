@@ -52,8 +52,20 @@ def families_alone(
     for family in dict.fromkeys(each.family for each in functions_at(port)):
         mine = tuple(name for name in coefficients_of(port, family) if name in seen)
         if mine:
-            found[family] = _needed(search, mode, port, mine, constants)
+            found[family] = _needed(search, mode, port, mine, mine, constants)
     return found
+
+
+def still_needed(
+    search: Search,
+    mode: LaplaceFit,
+    port: Port,
+    family: tuple[str, ...],
+    constants: DecisionConstants,
+) -> FamilyAlone:
+    """Those of its functions that a fit of a ``family`` alone needs, to first order about that fit."""
+    fitted = {each.name for each in mode.coordinates}
+    return _needed(search, mode, port, family, tuple(name for name in family if name in fitted), constants)
 
 
 def families_spared(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, float]:
@@ -62,18 +74,31 @@ def families_spared(search: Search, mode: LaplaceFit, port: Port) -> dict[Family
     return {family: -_alone(search, mode, names, (), 1.0, 0.0).weight for family, names in gone.items()}
 
 
-def _needed(
-    search: Search, mode: LaplaceFit, port: Port, family: tuple[str, ...], constants: DecisionConstants
-) -> FamilyAlone:
-    """Those of a family's functions without which the law is less probable; one at least."""
-    of_all, interactions = set(coefficients_at(port)), interactions_at(port)
+def log_prior_of(
+    functions: Collection[str], family: tuple[str, ...], port: Port, constants: DecisionConstants
+) -> float:
+    """Log prior probability that of a ``family`` at a port these ``functions`` are needed and no others."""
+    interactions = interactions_at(port)
     priors = {
         name: constants.interaction_prior if name in interactions else constants.function_prior
         for name in family
     }
+    return sum(log(each if name in functions else 1.0 - each) for name, each in priors.items())
+
+
+def _needed(
+    search: Search,
+    mode: LaplaceFit,
+    port: Port,
+    family: tuple[str, ...],
+    first: tuple[str, ...],
+    constants: DecisionConstants,
+) -> FamilyAlone:
+    """Those of a family's functions, among the ``first``, without which the law is less probable; one at least."""
+    of_all = set(coefficients_at(port))
 
     def alone(functions: tuple[str, ...], width: float) -> FamilyAlone:
-        log_prior = sum(log(each if name in functions else 1.0 - each) for name, each in priors.items())
+        log_prior = log_prior_of(functions, family, port, constants)
         return _alone(search, mode, of_all.difference(functions), functions, width, log_prior)
 
     def at_its_width(functions: tuple[str, ...]) -> FamilyAlone:
@@ -81,7 +106,7 @@ def _needed(
         return max(tried, key=lambda each: each.weight)
 
     # Of functions that do nearly the same, one alone is needed: the best may lie beyond worse ones.
-    found = [at_its_width(family)]
+    found = [at_its_width(first)]
     while len(found[-1].functions) > 1:
         left = found[-1].functions
         fewer = [alone(tuple(each for each in left if each != gone), found[-1].width) for gone in left]

@@ -27,8 +27,14 @@ from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out
-from savgs_ident.diagnosis.law_families import FamilyAlone, families_alone, families_spared
-from savgs_ident.diagnosis.learning_start import best_gap, with_amplitudes
+from savgs_ident.diagnosis.law_families import (
+    FamilyAlone,
+    families_alone,
+    families_spared,
+    log_prior_of,
+    still_needed,
+)
+from savgs_ident.diagnosis.learning_start import best_places, with_amplitudes
 from savgs_ident.diagnosis.problem import AbstractProblem, term_of
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Family, Port, PortKind
@@ -38,6 +44,7 @@ from savgs_ident.effects.learned_functions import (
     blocking_at,
     coefficients_at,
     coefficients_of,
+    placed_at,
     what_gives,
 )
 from savgs_ident.inference.find_map import (
@@ -217,6 +224,7 @@ class _Begun(NamedTuple):
     problem: AbstractProblem
     search: Search
     spans: Mapping[str, float]
+    places: Mapping[str, float]
     every: _FittedFunctions
     blocked: _FittedFunctions | None
 
@@ -280,7 +288,8 @@ def _begin_learning(
     ).uncorrected()
     search, names = search_of(mine, data, given), coefficients_at(port)
     start = base.prediction.warm_start
-    values = {**base.values, **best_gap(mine, search, base, port, constants)}
+    places = best_places(mine, search, base, port, constants)
+    values = {**base.values, **places}
     there_now = mine.predict((effect.name,), values, names, start)
     if not there_now.solved:
         return None
@@ -293,7 +302,7 @@ def _begin_learning(
     if not mode.solved:
         return None
     blocked = _blocked_play(search, effect, blank, port, base, near, constants)
-    return _Begun(port, mine, search, spans, _FittedFunctions(term, mode), blocked)
+    return _Begun(port, mine, search, spans, places, _FittedFunctions(term, mode), blocked)
 
 
 def _is_impossible(law: LearnedLaw) -> bool:
@@ -322,8 +331,8 @@ def _most_probable(
     """
     every, best, weights = begun.every, begun.best, dict[Family, float]()
     if every.attainable > least:
-        search, mode, worth = begun.search, every.mode, base.evidence + constants.alarm_log_odds
-        found = families_alone(search, mode, begun.port, constants)
+        found = families_alone(begun.search, every.mode, begun.port, constants)
+        worth = base.evidence + constants.alarm_log_odds
         weights = {family: each.weight for family, each in found.items()}
         # To first order about all functions together the families are not known well enough to take the first.
         likely = sorted(found, key=lambda family: -found[family].weight)[: constants.likely_families]
@@ -331,15 +340,63 @@ def _most_probable(
             each = found[family]
             if family is not likely[0] and each.weight <= worth:
                 continue
-            some, near = _some_of(every.term, each), best.mode.prediction.warm_start
-            alone = find_map(search, (some,), each.start, near, constants.learned_steps)
-            if alone.solved:
-                fitted = _FittedFunctions(some, alone, each.log_prior, family)
-                weights[family] = fitted.weight
-                best = fitted if fitted.weight > best.weight else best
+            near = best.mode.prediction.warm_start
+            for start in (each, *_placed_alone(begun, family, base, constants)):
+                fitted = _family_fitted(begun, family, start, near, constants)
+                if fitted is not None:
+                    weights[family] = (
+                        max(weights[family], fitted.weight) if start is not each else fitted.weight
+                    )
+                    best = fitted if fitted.weight > best.weight else best
     if best.only is None:
         return best, families_spared(begun.search, every.mode, begun.port)
     return best, weights | {best.only: best.weight}
+
+
+def _placed_alone(
+    begun: _Begun, family: Family, base: LaplaceFit, constants: DecisionConstants
+) -> list[FamilyAlone]:
+    """Those functions of a family alone that begin or end where is estimated, from the baseline."""
+    mine = _seen_of(begun, family)
+    groups = (tuple(set(mine) & set(each)) for each in placed_at(begun.port).values())
+    return [
+        FamilyAlone(
+            group,
+            1.0,
+            -np.inf,
+            log_prior_of(group, mine, begun.port, constants),
+            {**base.values, **begun.places},
+        )
+        for group in groups
+        if group
+    ]
+
+
+def _seen_of(begun: _Begun, family: Family) -> tuple[str, ...]:
+    """The functions of a family that the data see."""
+    seen = {each.name for each in begun.every.term.amplitudes}
+    return tuple(name for name in coefficients_of(begun.port, family) if name in seen)
+
+
+def _family_fitted(
+    begun: _Begun, family: Family, found: FamilyAlone, near: Any, constants: DecisionConstants
+) -> _FittedFunctions | None:
+    """The functions of a family by themselves at their best; None where that has no solution.
+
+    What is needed to first order about all functions together may be more than what is needed about their own fit.
+    """
+    search, term, best = begun.search, begun.every.term, None
+    mine = _seen_of(begun, family)
+    while True:
+        term = _some_of(term, found)
+        mode = find_map(search, (term,), found.start, near, constants.learned_steps)
+        fitted = _FittedFunctions(term, mode, found.log_prior, family)
+        if not mode.solved or (best is not None and fitted.weight <= best.weight):
+            return best
+        best, near = fitted, mode.prediction.warm_start
+        found = still_needed(search, mode, begun.port, mine, constants)
+        if len(found.functions) == len(term.amplitudes):
+            return best
 
 
 def _blocked_play(

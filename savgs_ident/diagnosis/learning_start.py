@@ -1,9 +1,9 @@
-"""Where the search for a learned law begins: where its contacts do, and how large its coefficients may be.
+"""Where the search for a learned law begins: what lies where in it, and how large its coefficients may be.
 
 Both are told by what explains most to first order about the recalibrated baseline.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,29 +14,43 @@ from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.effects.base import Port
 from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.learned_functions import contacts_at, gap_at
+from savgs_ident.effects.learned_functions import placed_at
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import Linear
 
 
-def best_gap(
+def best_places(
     problem: AbstractProblem, search: Search, base: LaplaceFit, port: Port, constants: DecisionConstants
 ) -> dict[str, float]:
-    """Where contacts alone explain most if they begin there, to first order about the baseline, by name.
+    """Where contacts begin and a friction has fallen, by name, if these alone explain most, to first order.
 
-    A search among all functions hardly moves it: the others take up what a contact elsewhere leaves.
+    A search among all functions hardly moves them: the others take up what one elsewhere leaves.
     """
-    name, contacts = gap_at(port), contacts_at(port)
-    if name is None:
-        return {}
-    tried: dict[float, float] = {}
-    for gap in constants.learned_gaps:
-        values = {**base.values, name: gap}
-        there = problem.predict((f"learned_{port.name}",), values, contacts, base.prediction.warm_start)
-        if there.solved and np.any(there.slopes):
-            tried[gap] = evidence_of_law(search, base, there.slopes, constants)
-    return {name: max(tried, key=lambda each: tried[each])} if tried else {}
+    return {
+        name: max(
+            constants.learned_places,
+            key=lambda place: _explained(problem, search, base, port, {name: place}, functions, constants),
+        )
+        for name, functions in placed_at(port).items()
+    }
+
+
+def _explained(
+    problem: AbstractProblem,
+    search: Search,
+    base: LaplaceFit,
+    port: Port,
+    place: Mapping[str, float],
+    functions: Sequence[str],
+    constants: DecisionConstants,
+) -> float:
+    """Log evidence to first order of some functions at a place alone; minus infinity where they do nothing."""
+    effect, start = f"learned_{port.name}", base.prediction.warm_start
+    there = problem.predict((effect,), {**base.values, **place}, functions, start)
+    if not there.solved or not np.any(there.slopes):
+        return -np.inf
+    return evidence_of_law(search, base, there.slopes, constants)
 
 
 def with_amplitudes(

@@ -421,8 +421,8 @@ class DecisionConstants:
     Origin: computing time. Fewer may miss the port of something strong, which explains little to first order.
     """
 
-    learned_gaps: tuple[float, ...] = (0.05, 0.1, 0.2, 0.4)
-    """Where contacts may begin before a search for a learned law, over the stroke [1].
+    learned_places: tuple[float, ...] = (0.05, 0.1, 0.2, 0.4)
+    """Gaps of contacts and velocities over which a friction falls, over the range, before a law is searched for [1].
 
     Origin: by choice, a factor of two apart. It decides where a search begins, and nothing else.
     """

@@ -47,7 +47,10 @@ from savgs_ident.effects.base import (
 )
 from savgs_ident.effects.effect import Effect, typical_effect
 from savgs_ident.effects.learned_functions import (
+    FALL,
     GAP,
+    OF_A_FALL,
+    OF_A_LOADED_FALL,
     OF_CONTACTS,
     OF_SLIDERS,
     OF_THE_ANGLE,
@@ -96,8 +99,8 @@ class LearnedForce(AbstractForceLaw):
     name: ClassVar[str] = "learned"
     family: ClassVar[Family] = Family.LEARNED
     roles: ClassVar[tuple[Role, ...]] = _roles(
-        ("middle", "stroke", "speed", "carried", "turn", "give", "gap"),
-        len((*OF_THE_MOTION, *OF_SLIDERS, *OF_THE_LOAD, *OF_CONTACTS)),
+        ("middle", "stroke", "speed", "carried", "turn", "give", "gap", "fall"),
+        len((*OF_THE_MOTION, *OF_SLIDERS, *OF_THE_LOAD, *OF_CONTACTS, OF_A_FALL, OF_A_LOADED_FALL)),
     )
     port: Port = eqx.field(static=True)
 
@@ -108,14 +111,16 @@ class LearnedForce(AbstractForceLaw):
         turn = "velocity over which a friction turns round, over the largest seen"
         give = "how far spring-sliders give before they slide, over what their functions say"
         gap = "displacement at which contacts begin, over the stroke"
+        fall = "velocity over which a friction falls, over the largest seen"
         spans = {
             "middle": Parameter("middle", 0.0, unit, about="displacement in the middle of what was seen"),
             "stroke": Parameter("stroke", 1.0, unit, lower=SMALLEST, about="largest displacement from there"),
             "speed": Parameter("speed", 1.0, f"{unit}/s", lower=SMALLEST, about="largest velocity seen"),
             "carried": carried if port.loaded else 1.0,
             "turn": Parameter("turn", TURN, "1", lower=0.1 * TURN, upper=10.0 * TURN, about=turn),
-            "give": Parameter("give", 1.0, "1", lower=0.2, upper=5.0, about=give),
+            "give": Parameter("give", 1.0, "1", lower=0.05, upper=5.0, about=give),
             "gap": Parameter("gap", GAP, "1", lower=0.02, upper=0.9, about=gap),
+            "fall": Parameter("fall", FALL, "1", lower=0.02, upper=1.0, about=fall),
         }
         return {role.name: 0.0 for role in self.roles} | spans | _coefficients(port, force)
 
@@ -138,7 +143,7 @@ class LearnedForce(AbstractForceLaw):
         whole = jnp.abs(v["middle"]) + v["stroke"]
         d = jnp.clip(signals.displacement / whole, -1.0, 1.0)
         held = [-each.force for each in self._sliders(v, signals, state)]
-        seen = RelativeMotion(x, d, speed, n, v["turn"], v["gap"], held)
+        seen = RelativeMotion(x, d, speed, n, v["turn"], v["gap"], v["fall"], held)
         return self.port.sense * _sum(v, values_of(functions_at(self.port), seen))
 
     def rate(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:

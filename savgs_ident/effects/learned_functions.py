@@ -43,6 +43,9 @@ TURN = 0.03
 FALLING = (0.05, 0.2)
 """Velocities over which a friction falls, as shares of the largest [1]."""
 
+FALL = 0.1
+"""The same where it is estimated along: what it begins with [1]."""
+
 GAPS = (0.3, 0.55)
 """Where stops begin, as shares of the stroke [1]."""
 
@@ -73,6 +76,7 @@ class RelativeMotion:
         n: load/carried.
         turn: the width w of a reversal.
         gap: the displacement g at which a contact begins.
+        fall: the velocity f over which a friction falls.
         held: what the spring-sliders carry, one for each of :data:`STRETCHES`, or for the first of them.
     """
 
@@ -82,6 +86,7 @@ class RelativeMotion:
     n: Float[Array, "*n"]
     turn: Float[Array, ""] | float = TURN
     gap: Float[Array, ""] | float = GAP
+    fall: Float[Array, ""] | float = FALL
     held: Sequence[Float[Array, "*n"]] = ()
 
     @cached_property
@@ -93,6 +98,11 @@ class RelativeMotion:
     def turned(self) -> Float[Array, "*n"]:
         """A friction that turns round over the width that is estimated along."""
         return jnp.tanh(self.v / self.turn)
+
+    @cached_property
+    def fallen(self) -> Float[Array, "*n"]:
+        """A friction that sticks, and falls over the velocity that is estimated along."""
+        return self.held[0] * jnp.exp(-jnp.abs(self.v) / self.fall)
 
     def beyond(self, gap: Float[Array, ""] | float, side: float) -> Float[Array, "*n"]:
         """How far a stop at a gap is compressed, at the upper ``side`` 1 or the lower one -1."""
@@ -213,6 +223,14 @@ OF_CONTACTS = (
 )
 """Functions of a :class:`RelativeMotion`: contacts, and what they take of the energy as they are pressed in."""
 
+_FALLING_SLIDER = f"exp(-|v|/f) of a spring-slider that gives by {STRETCHES[0]:g} typical displacements"
+
+OF_A_FALL = Function(_FALLING_SLIDER, Family.FRICTION, lambda m: m.fallen)
+"""A friction of a :class:`RelativeMotion` that sticks and then falls with the velocity."""
+
+OF_A_LOADED_FALL = Function(f"n {_FALLING_SLIDER}", Family.FRICTION, lambda m: m.n * m.fallen)
+"""The same in proportion to a load."""
+
 OF_WHAT_GIVES = (
     Function("n", Family.COMPLIANCE, lambda load: load.n),
     Function("n|n|", Family.COMPLIANCE, lambda load: load.n * jnp.abs(load.n)),
@@ -278,7 +296,8 @@ def filters(omega: Float[Array, "*f"]) -> list[Complex[Array, "*f"]]:
 def functions_at(port: Port) -> tuple[Function, ...]:
     """The functions of the learned law at a port; none where nothing is learned."""
     if port.kind is PortKind.FORCE:
-        return (*OF_THE_MOTION, *OF_SLIDERS, *(OF_THE_LOAD if port.loaded else ()), *OF_CONTACTS)
+        loads, falls = (OF_THE_LOAD, (OF_A_FALL, OF_A_LOADED_FALL)) if port.loaded else ((), (OF_A_FALL,))
+        return (*OF_THE_MOTION, *OF_SLIDERS, *loads, *OF_CONTACTS, *falls)
     if port.kind is PortKind.SERIES:
         return () if port.resonant else OF_WHAT_GIVES
     return {PortKind.INPUT: OF_THE_ANGLE, PortKind.SENSOR: OF_THE_FREQUENCY}.get(port.kind, ())
@@ -301,15 +320,16 @@ def blocking_at(port: Port) -> str | None:
     return f"learned_{port.name}_blocking" if port.kind is PortKind.SERIES and not port.resonant else None
 
 
-def gap_at(port: Port) -> str | None:
-    """Name of the number that says where contacts begin; None where there are none."""
-    return f"learned_{port.name}_gap" if port.kind is PortKind.FORCE else None
-
-
-def contacts_at(port: Port) -> tuple[str, ...]:
-    """Names of the coefficients of contacts at a port that begin where is estimated."""
-    both = zip(coefficients_at(port), functions_at(port), strict=True)
-    return tuple(name for name, function in both if function in OF_CONTACTS)
+def placed_at(port: Port) -> dict[str, tuple[str, ...]]:
+    """Numbers that say where functions at a port begin or end, by name, and the coefficients of these functions."""
+    if port.kind is not PortKind.FORCE:
+        return {}
+    both = tuple(zip(coefficients_at(port), functions_at(port), strict=True))
+    groups = {"gap": OF_CONTACTS, "fall": (OF_A_FALL, OF_A_LOADED_FALL)}
+    return {
+        f"learned_{port.name}_{number}": tuple(name for name, function in both if function in group)
+        for number, group in groups.items()
+    }
 
 
 def interactions_at(port: Port) -> tuple[str, ...]:

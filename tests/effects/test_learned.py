@@ -73,11 +73,20 @@ LAWS: dict[str, Callable[[float, float, float], float]] = {
 }
 """What the words for the functions say."""
 
+FACTORS: dict[str, Callable[[float, float], float]] = {
+    "": lambda v, n: 1.0,
+    "exp(-|v|/f) of ": lambda v, n: np.exp(-abs(v) / FALL),
+    "n exp(-|v|/f) of ": lambda v, n: n * np.exp(-abs(v) / FALL),
+}
+"""What the words say that stand before those for a spring-slider."""
+
 TURN = 0.02
 
 GIVE = 1.4
 
 GAP = 0.25
+
+FALL = 0.15
 
 SPANS = {
     "middle": 0.4,
@@ -87,6 +96,7 @@ SPANS = {
     "turn": TURN,
     "give": GIVE,
     "gap": GAP,
+    "fall": FALL,
 }
 
 
@@ -125,6 +135,15 @@ def _carried(effect: Effect, words: str, displacement: float, velocity: float) -
     """What a spring-slider of these words carries, anchored in the nominal state."""
     width = GIVE * float(words.split()[-3]) * effect.port.displacement
     return float(np.clip((displacement + SLIDER_LAG * velocity) / width, -1.0, 1.0))
+
+
+def _said(effect: Effect, words: str, x: float, v: float, n: float) -> float:
+    """The function of these words at a state relative to :data:`SPANS`."""
+    factor, slider, _ = words.partition("a spring-slider")
+    if not slider:
+        return LAWS[words](x, v, n)
+    at = SPANS["middle"] + SPANS["stroke"] * x, SPANS["speed"] * v
+    return FACTORS[factor](v, n) * _carried(effect, words, *at)
 
 
 def test_there_is_one_for_every_port_that_can_have_one_and_none_is_looked_for() -> None:
@@ -221,13 +240,13 @@ def test_each_of_its_numbers_weighs_the_function_that_its_words_say(effect: Effe
     loaded = {"rail", "strut", "tyre_lateral"}
     known = [words for words in LAWS if words[0] != "n" or effect.port.name in loaded]
     sliders = [words for words in _words(effect).values() if "slider" in words]
-    assert len(sliders) == 4
+    assert len(sliders) == 4 + (2 if effect.port.name in loaded else 1)
     assert sorted(_words(effect).values()) == sorted([*known, *sliders])
     x, v, n = 0.7, -0.013, 0.6
     at = (SPANS["middle"] + SPANS["stroke"] * x, SPANS["speed"] * v, SPANS["carried"] * n)
     for name, words in _words(effect).items():
         alone = {f"{own}{span}": value for span, value in SPANS.items()} | dict(effect.null) | {name: 1.0}
-        expected = _carried(effect, words, *at[:2]) if "slider" in words else LAWS[words](x, v, n)
+        expected = _said(effect, words, x, v, n)
         assert _force(effect, as_values(alone), *at) == pytest.approx(expected, rel=1e-9), words
 
 
@@ -239,7 +258,7 @@ def test_its_frictions_are_those_that_do_not_grow_once_it_moves(effect: Effect) 
 
     found = [name for name, words in _words(effect).items() if "slider" in words or rubs(words)]
     assert list(frictions_at(effect.port)) == found
-    assert len(found) in (12, 15)
+    assert len(found) in (13, 17)
 
 
 @each_force
@@ -251,10 +270,7 @@ def test_within_what_was_seen_it_is_the_sum_and_beyond_it_is_held(
 ) -> None:
     given_, p = _given(effect, 7.0), as_values(_given(effect, 7.0))
     at = (SPANS["middle"] + SPANS["stroke"] * x, SPANS["speed"] * v, SPANS["carried"] * n)
-    expected = sum(
-        given_[name] * (_carried(effect, words, *at[:2]) if "slider" in words else LAWS[words](x, v, n))
-        for name, words in _words(effect).items()
-    )
+    expected = sum(given_[name] * _said(effect, words, x, v, n) for name, words in _words(effect).items())
     assert _force(effect, p, *at) == pytest.approx(expected, rel=1e-7, abs=1e-7)
     edge = _force(effect, p, SPANS["middle"] + SPANS["stroke"], SPANS["speed"], SPANS["carried"])
     outside = (SPANS["middle"] + SPANS["stroke"] * beyond, SPANS["speed"] * beyond, SPANS["carried"] * beyond)

@@ -55,6 +55,8 @@ SPANS = {
     "learned_strut_carried": 4e3,
     "learned_strut_turn": 0.03,
     "learned_strut_give": 1.2,
+    "learned_strut_gap": 0.2,
+    "learned_strut_fall": 0.1,
 }
 COEFFICIENTS = {name: 3.0 * number for number, name in enumerate(coefficients_at(STRUT), 1)}
 LEARNED = diagnosis(
