@@ -1,8 +1,9 @@
-"""Which families a learned law is of, to first order about its fit.
+"""Which families a learned law is of: to first order about its fit, and the likely ones fitted by themselves.
 
 The functions of all families but one are taken away from the fit of all functions of a port
-(:mod:`savgs_ident.diagnosis.learning`), and one by one those of the family that are not needed; and the functions of
-each family are taken away from all, which says how well it can be spared.
+(:mod:`savgs_ident.diagnosis.learning`), and one by one those of the family that are not needed; what is left is
+fitted on the nonlinear plant, and what that fit does not need is taken away again. The functions of each family are
+taken away from all, too, which says how well it can be spared.
 """
 
 from collections.abc import Collection, Mapping
@@ -12,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.effects.base import Family, Port
 from savgs_ident.effects.learned_functions import (
@@ -19,10 +21,49 @@ from savgs_ident.effects.learned_functions import (
     coefficients_of,
     functions_at,
     interactions_at,
+    placed_at,
 )
-from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, find_map_again
 from savgs_ident.inference.laplace import linearised_optimum, log_evidence
+from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import Linear, bounds_of
+
+
+class FittedFunctions(NamedTuple):
+    """Functions fitted on the nonlinear plant: all of a port, or some of one family alone.
+
+    Attributes:
+        term: their coefficients as a search takes them.
+        mode: the best point.
+        log_prior: log prior probability that these of the family are needed; 0 for all functions.
+        only: the family; None for all functions.
+    """
+
+    term: Term
+    mode: LaplaceFit
+    log_prior: float = 0.0
+    only: Family | None = None
+
+    @property
+    def weight(self) -> float:
+        """Their log evidence, with the prior probability of the functions."""
+        return self.mode.evidence + self.log_prior
+
+    @property
+    def attainable(self) -> float:
+        """The log evidence that some of them can hardly exceed: the likelihood at the best of all, if found."""
+        if self.mode.status is Status.HOPELESS:
+            return -np.inf
+        x = self.mode.x
+        return self.mode.value + 0.5 * float(x @ x) if self.mode.status.ok else np.inf
+
+    def gone_on(self, search: Search, least: float, constants: DecisionConstants) -> "FittedFunctions":
+        """The fit to its end, or until it cannot come to a log evidence of ``least``."""
+        if self.mode.status is not Status.MAX_ITERATIONS:
+            return self
+        steps = constants.learned_steps - constants.first_learned_steps
+        mode = find_map_again(search, (self.term,), self.mode, steps, least - self.log_prior)
+        return self._replace(mode=mode) if mode.solved else self
 
 
 class FamilyAlone(NamedTuple):
@@ -56,16 +97,84 @@ def families_alone(
     return found
 
 
-def still_needed(
+def families_fitted(
     search: Search,
-    mode: LaplaceFit,
+    every: FittedFunctions,
     port: Port,
-    family: tuple[str, ...],
+    start: Mapping[str, float],
+    worth: float,
     constants: DecisionConstants,
-) -> FamilyAlone:
-    """Those of its functions that a fit of a ``family`` alone needs, to first order about that fit."""
-    fitted = {each.name for each in mode.coordinates}
-    return _needed(search, mode, port, family, tuple(name for name in family if name in fitted), constants)
+) -> tuple[dict[Family, float], list[FittedFunctions]]:
+    """The log weight of each family alone, and the likely ones fitted by themselves.
+
+    Those functions whose places are estimated are looked for alone from ``start`` [SI], too. ``worth`` is the log
+    evidence from which on more than one family is fitted: to first order about all functions together the families
+    are not known well enough to take the first.
+    """
+    found = families_alone(search, every.mode, port, constants)
+    weights, fits = {family: each.weight for family, each in found.items()}, list[FittedFunctions]()
+    likely = sorted(found, key=lambda family: -weights[family])[: constants.likely_families]
+    for family in likely:
+        if family is not likely[0] and found[family].weight <= worth:
+            continue
+        starts = (found[family], *_placed_alone(every.term, port, family, start, constants))
+        fitted = [_fitted(search, every, port, family, each, constants) for each in starts]
+        solved = [each for each in fitted if each is not None]
+        fits += solved
+        weights[family] = max((each.weight for each in solved), default=weights[family])
+    return weights, fits
+
+
+def _seen_of(term: Term, port: Port, family: Family) -> tuple[str, ...]:
+    """The functions of a family that the data see."""
+    seen = {each.name for each in term.amplitudes}
+    return tuple(name for name in coefficients_of(port, family) if name in seen)
+
+
+def _placed_alone(
+    term: Term, port: Port, family: Family, start: Mapping[str, float], constants: DecisionConstants
+) -> list[FamilyAlone]:
+    """Those functions of a family alone whose places are estimated."""
+    mine = _seen_of(term, port, family)
+    groups = (tuple(name for name in each if name in mine) for each in placed_at(port).values())
+    return [
+        FamilyAlone(group, 1.0, -np.inf, _log_prior(group, mine, port, constants), start)
+        for group in groups
+        if group
+    ]
+
+
+def _fitted(
+    search: Search,
+    every: FittedFunctions,
+    port: Port,
+    family: Family,
+    found: FamilyAlone,
+    constants: DecisionConstants,
+) -> FittedFunctions | None:
+    """The functions of a family by themselves at their best; None where that has no solution.
+
+    What is needed to first order about all functions together may be more than what is needed about their own fit.
+    """
+    term, mine, best = every.term, _seen_of(every.term, port, family), None
+    near = every.mode.prediction.warm_start
+    while True:
+        term = _some_of(term, found)
+        mode = find_map(search, (term,), found.start, near, constants.learned_steps)
+        fitted = FittedFunctions(term, mode, found.log_prior, family)
+        if not mode.solved or (best is not None and fitted.weight <= best.weight):
+            return best
+        best, near = fitted, mode.prediction.warm_start
+        left = tuple(each.name for each in term.amplitudes)
+        found = _needed(search, mode, port, mine, left, constants)
+        if len(found.functions) == len(left):
+            return best
+
+
+def _some_of(term: Term, found: FamilyAlone) -> Term:
+    """The term of all functions with those of a family alone."""
+    kept = [each for each in term.amplitudes if each.name in found.functions]
+    return replace(term, amplitudes=tuple(replace(each, scale=found.width * each.scale) for each in kept))
 
 
 def families_spared(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, float]:
@@ -74,7 +183,7 @@ def families_spared(search: Search, mode: LaplaceFit, port: Port) -> dict[Family
     return {family: -_alone(search, mode, names, (), 1.0, 0.0).weight for family, names in gone.items()}
 
 
-def log_prior_of(
+def _log_prior(
     functions: Collection[str], family: tuple[str, ...], port: Port, constants: DecisionConstants
 ) -> float:
     """Log prior probability that of a ``family`` at a port these ``functions`` are needed and no others."""
@@ -98,7 +207,7 @@ def _needed(
     of_all = set(coefficients_at(port))
 
     def alone(functions: tuple[str, ...], width: float) -> FamilyAlone:
-        log_prior = log_prior_of(functions, family, port, constants)
+        log_prior = _log_prior(functions, family, port, constants)
         return _alone(search, mode, of_all.difference(functions), functions, width, log_prior)
 
     def at_its_width(functions: tuple[str, ...]) -> FamilyAlone:

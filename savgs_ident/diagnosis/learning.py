@@ -25,15 +25,8 @@ import numpy as np
 from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.core.presentation import Progress, no_progress
-from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out
-from savgs_ident.diagnosis.law_families import (
-    FamilyAlone,
-    families_alone,
-    families_spared,
-    log_prior_of,
-    still_needed,
-)
+from savgs_ident.diagnosis.law_families import FittedFunctions, families_fitted, families_spared
 from savgs_ident.diagnosis.learning_start import best_places, with_amplitudes
 from savgs_ident.diagnosis.problem import AbstractProblem, term_of
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
@@ -44,7 +37,6 @@ from savgs_ident.effects.learned_functions import (
     blocking_at,
     coefficients_at,
     coefficients_of,
-    placed_at,
     what_gives,
 )
 from savgs_ident.inference.find_map import (
@@ -52,7 +44,6 @@ from savgs_ident.inference.find_map import (
     Search,
     Start,
     find_map,
-    find_map_again,
     find_map_from_both,
     search_of,
 )
@@ -180,43 +171,6 @@ def _as_probable_as(fitted: Sequence["_Begun"], constants: DecisionConstants) ->
     return max(weights, default=-np.inf) - constants.alarm_log_odds
 
 
-class _FittedFunctions(NamedTuple):
-    """Functions fitted on the nonlinear plant: all of a port, or some of one family alone.
-
-    Attributes:
-        term: their coefficients as a search takes them.
-        mode: the best point.
-        log_prior: log prior probability that these of the family are needed; 0 for all functions.
-        only: the family; None for all functions.
-    """
-
-    term: Term
-    mode: LaplaceFit
-    log_prior: float = 0.0
-    only: Family | None = None
-
-    @property
-    def weight(self) -> float:
-        """Their log evidence, with the prior probability of the functions."""
-        return self.mode.evidence + self.log_prior
-
-    @property
-    def attainable(self) -> float:
-        """The log evidence that some of them can hardly exceed: the likelihood at the best of all, if found."""
-        if self.mode.status is Status.HOPELESS:
-            return -np.inf
-        x = self.mode.x
-        return self.mode.value + 0.5 * float(x @ x) if self.mode.status.ok else np.inf
-
-    def gone_on(self, search: Search, least: float, constants: DecisionConstants) -> "_FittedFunctions":
-        """The fit to its end, or until it cannot come to a log evidence of ``least``."""
-        if self.mode.status is not Status.MAX_ITERATIONS:
-            return self
-        steps = constants.learned_steps - constants.first_learned_steps
-        mode = find_map_again(search, (self.term,), self.mode, steps, least - self.log_prior)
-        return self._replace(mode=mode) if mode.solved else self
-
-
 class _Begun(NamedTuple):
     """All functions of a port fitted, and those of a play that is blocked, if any; see :class:`LearnedLaw`."""
 
@@ -225,11 +179,11 @@ class _Begun(NamedTuple):
     search: Search
     spans: Mapping[str, float]
     places: Mapping[str, float]
-    every: _FittedFunctions
-    blocked: _FittedFunctions | None
+    every: FittedFunctions
+    blocked: FittedFunctions | None
 
     @property
-    def best(self) -> _FittedFunctions:
+    def best(self) -> FittedFunctions:
         """The more probable ones."""
         return max((each for each in (self.every, self.blocked) if each), key=lambda each: each.weight)
 
@@ -248,7 +202,7 @@ class _Begun(NamedTuple):
         possible = [each for each in blocked if self.law(each, {}) is not None]
         return self._replace(every=every, blocked=possible[0] if possible else None)
 
-    def law(self, fitted: _FittedFunctions, families: Mapping[Family, float]) -> LearnedLaw | None:
+    def law(self, fitted: FittedFunctions, families: Mapping[Family, float]) -> LearnedLaw | None:
         """The law of some functions; None where it is impossible."""
         law = LearnedLaw(
             name=fitted.term.name,
@@ -302,7 +256,7 @@ def _begin_learning(
     if not mode.solved:
         return None
     blocked = _blocked_play(search, effect, blank, port, base, near, constants)
-    return _Begun(port, mine, search, spans, places, _FittedFunctions(term, mode), blocked)
+    return _Begun(port, mine, search, spans, places, FittedFunctions(term, mode), blocked)
 
 
 def _is_impossible(law: LearnedLaw) -> bool:
@@ -315,88 +269,22 @@ def _is_impossible(law: LearnedLaw) -> bool:
     return float([law.values[name] for name in law.units] @ columns @ n) < 0.0
 
 
-def _some_of(term: Term, found: FamilyAlone) -> Term:
-    """The term of all functions with those of a family alone."""
-    kept = [each for each in term.amplitudes if each.name in found.functions]
-    return replace(term, amplitudes=tuple(replace(each, scale=found.width * each.scale) for each in kept))
-
-
 def _most_probable(
     begun: _Begun, base: LaplaceFit, least: float, constants: DecisionConstants
-) -> tuple[_FittedFunctions, Mapping[Family, float]]:
+) -> tuple[FittedFunctions, Mapping[Family, float]]:
     """The most probable functions of a law, and what the law's ``families`` are.
 
     All functions of the port, or a play that is blocked, or those of a family that is likely, where this can come to
     a log evidence of ``least``.
     """
-    every, best, weights = begun.every, begun.best, dict[Family, float]()
-    if every.attainable > least:
-        found = families_alone(begun.search, every.mode, begun.port, constants)
-        worth = base.evidence + constants.alarm_log_odds
-        weights = {family: each.weight for family, each in found.items()}
-        # To first order about all functions together the families are not known well enough to take the first.
-        likely = sorted(found, key=lambda family: -found[family].weight)[: constants.likely_families]
-        for family in likely:
-            each = found[family]
-            if family is not likely[0] and each.weight <= worth:
-                continue
-            near = best.mode.prediction.warm_start
-            for start in (each, *_placed_alone(begun, family, base, constants)):
-                fitted = _family_fitted(begun, family, start, near, constants)
-                if fitted is not None:
-                    weights[family] = (
-                        max(weights[family], fitted.weight) if start is not each else fitted.weight
-                    )
-                    best = fitted if fitted.weight > best.weight else best
+    best, weights = begun.best, dict[Family, float]()
+    if begun.every.attainable > least:
+        worth, start = base.evidence + constants.alarm_log_odds, {**base.values, **begun.places}
+        weights, fitted = families_fitted(begun.search, begun.every, begun.port, start, worth, constants)
+        best = max((best, *fitted), key=lambda each: each.weight)
     if best.only is None:
-        return best, families_spared(begun.search, every.mode, begun.port)
+        return best, families_spared(begun.search, begun.every.mode, begun.port)
     return best, weights | {best.only: best.weight}
-
-
-def _placed_alone(
-    begun: _Begun, family: Family, base: LaplaceFit, constants: DecisionConstants
-) -> list[FamilyAlone]:
-    """Those functions of a family alone that begin or end where is estimated, from the baseline."""
-    mine = _seen_of(begun, family)
-    groups = (tuple(set(mine) & set(each)) for each in placed_at(begun.port).values())
-    return [
-        FamilyAlone(
-            group,
-            1.0,
-            -np.inf,
-            log_prior_of(group, mine, begun.port, constants),
-            {**base.values, **begun.places},
-        )
-        for group in groups
-        if group
-    ]
-
-
-def _seen_of(begun: _Begun, family: Family) -> tuple[str, ...]:
-    """The functions of a family that the data see."""
-    seen = {each.name for each in begun.every.term.amplitudes}
-    return tuple(name for name in coefficients_of(begun.port, family) if name in seen)
-
-
-def _family_fitted(
-    begun: _Begun, family: Family, found: FamilyAlone, near: Any, constants: DecisionConstants
-) -> _FittedFunctions | None:
-    """The functions of a family by themselves at their best; None where that has no solution.
-
-    What is needed to first order about all functions together may be more than what is needed about their own fit.
-    """
-    search, term, best = begun.search, begun.every.term, None
-    mine = _seen_of(begun, family)
-    while True:
-        term = _some_of(term, found)
-        mode = find_map(search, (term,), found.start, near, constants.learned_steps)
-        fitted = _FittedFunctions(term, mode, found.log_prior, family)
-        if not mode.solved or (best is not None and fitted.weight <= best.weight):
-            return best
-        best, near = fitted, mode.prediction.warm_start
-        found = still_needed(search, mode, begun.port, mine, constants)
-        if len(found.functions) == len(term.amplitudes):
-            return best
 
 
 def _blocked_play(
@@ -407,7 +295,7 @@ def _blocked_play(
     base: LaplaceFit,
     near: Any,
     constants: DecisionConstants,
-) -> _FittedFunctions | None:
+) -> FittedFunctions | None:
     """The functions of a play that is blocked at its ends, after the first steps from the baseline.
 
     ``blank`` is the port's learned law without coefficients, and the plant is solved from ``near``, where nothing
@@ -427,4 +315,4 @@ def _blocked_play(
     term = with_amplitudes(replace(blank, shapes=shapes), effect, search, base, columns, constants)
     mode = find_map(search, (term,), start, there_now.warm_start, constants.first_learned_steps)
     log_prior = len(term.amplitudes) * log(constants.function_prior)
-    return _FittedFunctions(term, mode, log_prior, Family.PLAY) if mode.solved else None
+    return FittedFunctions(term, mode, log_prior, Family.PLAY) if mode.solved else None
