@@ -30,13 +30,13 @@ def best_places(
     return {
         name: max(
             constants.learned_places,
-            key=lambda place: _explained(problem, search, base, port, {name: place}, functions, constants),
+            key=lambda place: _evidence_at(problem, search, base, port, {name: place}, functions, constants),
         )
         for name, functions in placed_at(port).items()
     }
 
 
-def _explained(
+def _evidence_at(
     problem: AbstractProblem,
     search: Search,
     base: LaplaceFit,
