@@ -117,9 +117,11 @@ def families_fitted(
     for family in likely:
         if family is not likely[0] and found[family].weight <= worth:
             continue
-        starts = (found[family], *_placed_alone(every.term, port, family, start, constants))
-        fitted = [_fitted(search, every, port, family, each, constants) for each in starts]
-        solved = [each for each in fitted if each is not None]
+        solved = list[FittedFunctions]()
+        for each in (found[family], *_placed_alone(every.term, port, family, start, constants)):
+            least = max(fit.weight for fit in (every, *fits, *solved)) - constants.alarm_log_odds
+            fitted = _fitted(search, every, port, family, each, least, constants)
+            solved += [] if fitted is None else [fitted]
         fits += solved
         weights[family] = max((each.weight for each in solved), default=weights[family])
     return weights, fits
@@ -150,19 +152,27 @@ def _fitted(
     port: Port,
     family: Family,
     found: FamilyAlone,
+    least: float,
     constants: DecisionConstants,
 ) -> FittedFunctions | None:
     """The functions of a family by themselves at their best; None where that has no solution.
 
     What is needed to first order about all functions together may be more than what is needed about their own fit.
+    What cannot come to a log weight of ``least`` is given up.
     """
     term, mine, best = every.term, _seen_of(every.term, port, family), None
     near = every.mode.prediction.warm_start
     while True:
         term = _some_of(term, found)
-        mode = find_map(search, (term,), found.start, near, constants.learned_steps)
+        first = find_map(search, (term,), found.start, near, 1)
+        steps, bound = constants.learned_steps - 1, least - found.log_prior
+        mode = find_map_again(search, (term,), first, steps, bound) if first.solved else first
         fitted = FittedFunctions(term, mode, found.log_prior, family)
-        if not mode.solved or (best is not None and fitted.weight <= best.weight):
+        if (
+            mode.status is Status.HOPELESS
+            or not mode.solved
+            or (best is not None and fitted.weight <= best.weight)
+        ):
             return best
         best, near = fitted, mode.prediction.warm_start
         left = tuple(each.name for each in term.amplitudes)

@@ -41,7 +41,7 @@ RATE_WORDS: Mapping[str, str] = {
     "port_listed": "A right port named, or listed as not distinguishable",
     "family_exactly": "Family right strictly, without ports where the law itself would do the same",
     "family_right": "Foreign effect given a right family",
-    "hidden_left_alone": "Nothing else named where calibration leaves too little of an effect to be seen",
+    "hidden_left_alone": "Nothing named where calibration leaves too little of an effect to be seen",
     "closed_by_effect_90": "Nine tenths of the recalibrated gap closed",
 }
 """What each rate counts."""
@@ -255,33 +255,33 @@ def reliability_figure(scores: Sequence[Score]) -> Figure:
         figure = new_figure(4.4, 4.4)
         axes = figure.subplots()
         axes.plot([0.0, 1.0], [0.0, 1.0], color=INK, linestyle="--", linewidth=0.8, label="ideal")
-        for each in reliability.bins:
-            if each.stated is None or each.rate.rate is None:
+        for place, each in enumerate(reliability.bins):
+            low, share, high = each.rate.low, each.rate.rate, each.rate.high
+            if each.stated is None or share is None:
                 continue
-            share, ends = (
-                each.rate.rate,
-                [[each.rate.rate - each.rate.low], [each.rate.high - each.rate.rate]],
-            )
+            ends = [[share - low], [high - share]]
             axes.errorbar(
                 each.stated, share, yerr=ends, color=BLUE, marker="o", capsize=2.5, linestyle="none"
             )
+            # Neighbours are near each other where probabilities are high: above and below in turn.
+            end, offset, side = (low, -3.0, "top") if place % 2 else (high, 3.0, "bottom")
             axes.annotate(
                 str(each.rate.total),
-                (each.stated, share),
-                (-5.0, 0.0),
+                (each.stated, end),
+                (0.0, offset),
                 textcoords="offset points",
-                ha="right",
-                va="center",
+                ha="center",
+                va=side,
             )
-        axes.set_xlim(0.0, 1.05)
-        axes.set_ylim(0.0, 1.05)
+        axes.set_xlim(-0.05, 1.05)
+        axes.set_ylim(0.0, 1.1)
         axes.set_aspect("equal")
         axes.set_xlabel("stated probability [1]")
         axes.set_ylabel("share of verdicts that are true [1]")
         error = "" if reliability.error is None else f", calibration error {decimal(reliability.error, 3)}"
         stated = sum(each.rate.total for each in reliability.bins)
         axes.set_title(f"{stated} verdicts{error}", loc="left")
-        axes.legend(loc="upper left")
+        axes.legend(loc="lower right")
     return figure
 
 
