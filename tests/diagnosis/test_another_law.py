@@ -15,7 +15,7 @@ import pytest
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.diagnosis.learning import learn
+from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.public import SIMTR, diagnose_response
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.effects.base import (
@@ -102,6 +102,15 @@ def _recorded(response: HarmonicResponse, rig: Rig, effect: Effect, **values: fl
     return replace(response, harmonics=shown)
 
 
+def _learned(response: HarmonicResponse, rig: Rig, port: Port) -> tuple[LearnedLaw, float]:
+    """The law that is learned at a port beside the baseline, and the log evidence that it gains [nat]."""
+    catalogue = {name: CATALOGUE[name] for name in MODELS["simtr"]}
+    plant, data = rig_problem(response, rig, catalogue, COARSE.periodic)
+    base = find_map(search_of(plant, data), (), {}, plant.start({}))
+    (law,) = learn(plant, data, base, [port])
+    return law, law.mode.evidence - base.evidence
+
+
 @pytest.mark.slow
 def test_an_effect_by_another_law_is_named(measure_few: Measure, rig: Rig) -> None:
     diagnosis = diagnose_response(_recorded(measure_few("nominal"), rig, STRIBECK), rig, COARSE)
@@ -163,15 +172,13 @@ def test_a_play_with_a_film_is_learned_as_one_that_is_blocked_at_its_ends(
     measure_few: Measure, rig: Rig
 ) -> None:
     """The film gives way as a damper does, which no law of the load alone can do."""
-    play, catalogue = 3e-4, {name: CATALOGUE[name] for name in MODELS["simtr"]}
-    there = FOREIGN["damper_end_play"].effect
-    response = _recorded(measure_few("nominal"), rig, there, damper_end_play_play=play)
-    plant, data = rig_problem(response, rig, catalogue, COARSE.periodic)
-    base = find_map(search_of(plant, data), (), {}, plant.start({}))
-    (law,) = learn(plant, data, base, [DAMPER])
+    play, there = 3e-4, FOREIGN["damper_end_play"].effect
+    law, gain = _learned(
+        _recorded(measure_few("nominal"), rig, there, damper_end_play_play=play), rig, DAMPER
+    )
     assert law.mode.status.ok
     assert law.family is Family.PLAY
-    assert law.mode.evidence > base.evidence + 100.0
+    assert gain > 100.0
     blocked_at = DAMPER.displacement / law.values["learned_damper_blocking"]
     assert blocked_at == pytest.approx(play / 2.0, rel=0.2)
 
@@ -179,14 +186,12 @@ def test_a_play_with_a_film_is_learned_as_one_that_is_blocked_at_its_ends(
 @pytest.mark.slow
 def test_a_clearance_is_learned_as_a_stop_with_its_gap(measure_few: Measure, rig: Rig) -> None:
     """Its contact begins where no function of a fixed place does."""
-    gap, catalogue = 3.1e-3, {name: CATALOGUE[name] for name in MODELS["simtr"]}
-    there = FOREIGN["joint_clearance"].effect
-    response = _recorded(measure_few("nominal"), rig, there, joint_clearance_gap=gap)
-    plant, data = rig_problem(response, rig, catalogue, COARSE.periodic)
-    base = find_map(search_of(plant, data), (), {}, plant.start({}))
-    (law,) = learn(plant, data, base, [SUSPENSION])
+    gap, there = 3.1e-3, FOREIGN["joint_clearance"].effect
+    law, gain = _learned(
+        _recorded(measure_few("nominal"), rig, there, joint_clearance_gap=gap), rig, SUSPENSION
+    )
     assert law.mode.status.ok
     assert law.only is Family.STOP
-    assert law.mode.evidence > base.evidence + 100.0
+    assert gain > 100.0
     stroke = law.values["learned_suspension_stroke"]
     assert law.values["learned_suspension_gap"] * stroke == pytest.approx(gap, rel=0.2)
