@@ -241,10 +241,12 @@ def _begin_learning(
         catalogue={**there, effect.name: effect},
     ).uncorrected()
     search, names = search_of(mine, data, given), coefficients_at(port)
-    start = base.prediction.warm_start
-    places = best_places(mine, search, base, port, constants)
+    at_rest = mine.predict((effect.name,), base.values, (), base.prediction.warm_start)
+    if not at_rest.solved:
+        return None
+    places = best_places(mine, search, base, port, at_rest.warm_start, constants)
     values = {**base.values, **places}
-    there_now = mine.predict((effect.name,), values, names, start)
+    there_now = mine.predict((effect.name,), values, names, at_rest.warm_start)
     if not there_now.solved:
         return None
     shapes = tuple(each for each in term_of(effect, constants).shapes if each.name not in spans)

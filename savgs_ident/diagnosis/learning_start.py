@@ -5,6 +5,7 @@ Both are told by what explains most to first order about the recalibrated baseli
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,16 +22,24 @@ from savgs_ident.inference.prior import Linear
 
 
 def best_places(
-    problem: AbstractProblem, search: Search, base: LaplaceFit, port: Port, constants: DecisionConstants
+    problem: AbstractProblem,
+    search: Search,
+    base: LaplaceFit,
+    port: Port,
+    near: Any,
+    constants: DecisionConstants,
 ) -> dict[str, float]:
     """Where contacts begin and a friction has fallen, by name, if these alone explain most, to first order.
 
-    A search among all functions hardly moves them: the others take up what one elsewhere leaves.
+    A search among all functions hardly moves them: the others take up what one elsewhere leaves. The plant is solved
+    from ``near``, where the law does nothing yet.
     """
     return {
         name: max(
             constants.learned_places,
-            key=lambda place: _evidence_at(problem, search, base, port, {name: place}, functions, constants),
+            key=lambda place: _evidence_at(
+                problem, search, base, port, near, {name: place}, functions, constants
+            ),
         )
         for name, functions in placed_at(port).items()
     }
@@ -41,13 +50,13 @@ def _evidence_at(
     search: Search,
     base: LaplaceFit,
     port: Port,
+    near: Any,
     place: Mapping[str, float],
     functions: Sequence[str],
     constants: DecisionConstants,
 ) -> float:
     """Log evidence to first order of some functions at a place alone; minus infinity where they do nothing."""
-    effect, start = f"learned_{port.name}", base.prediction.warm_start
-    there = problem.predict((effect,), {**base.values, **place}, functions, start)
+    there = problem.predict((f"learned_{port.name}",), {**base.values, **place}, functions, near)
     if not there.solved or not np.any(there.slopes):
         return -np.inf
     return evidence_of_law(search, base, there.slopes, constants)
