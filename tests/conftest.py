@@ -11,6 +11,7 @@ import shutil
 import signal
 import tempfile
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -119,9 +120,10 @@ def _only_the_fast(config: pytest.Config) -> bool:
     return bool(config.getoption("markexpr") == "not slow")
 
 
-def _compiled_more_than_computed(item: pytest.Item) -> bool:
+@cache
+def _compiled_more_than_computed(path: Path) -> bool:
     places = {REPOSITORY / "tests" / name for name in COMPILED_MORE_THAN_COMPUTED}
-    return not places.isdisjoint((item.path, *item.path.parents))
+    return not places.isdisjoint((path, *path.parents))
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -130,7 +132,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     if not _only_the_fast(item.config):
         import jax
 
-        unoptimised = _compiled_more_than_computed(item)
+        unoptimised = _compiled_more_than_computed(item.path)
         if unoptimised != jax.config.read("jax_disable_most_optimizations"):
             # A program that is there already serves on, however it was compiled.
             jax.clear_caches()
@@ -141,12 +143,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests in the order of :data:`LONGEST_FIRST`."""
     place = {REPOSITORY / "tests" / name: number for number, name in enumerate(LONGEST_FIRST)}
 
-    def turn(item: pytest.Item) -> tuple[int, bool]:
-        folders = (item.path, *item.path.parents)
+    @cache
+    def turn(path: Path) -> tuple[int, bool]:
+        folders = (path, *path.parents)
         first = next((place[each] for each in folders if each in place), len(place))
-        return first, not _compiled_more_than_computed(item)
+        return first, not _compiled_more_than_computed(path)
 
-    items.sort(key=turn)
+    items.sort(key=lambda item: turn(item.path))
 
 
 class _Rooms(LoadScopeScheduling):
