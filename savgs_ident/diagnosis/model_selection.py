@@ -17,7 +17,7 @@ is named beside it.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import log, sqrt
+from math import hypot, log, sqrt
 
 import numpy as np
 
@@ -44,6 +44,7 @@ from savgs_ident.diagnosis.search import (
     pairs_with,
     single_effects,
     singles_among,
+    to_be_gained,
     with_pairs,
 )
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
@@ -268,11 +269,12 @@ def _flexible_members(
     def member(law: LearnedLaw) -> FlexibleMember:
         known = (law.port.location, law.family) in listed
         relative = law.log_prior + (0.0 if known else log(constants.unlisted_family_prior))
+        basis = constants.rest_uncertainty * to_be_gained(law.search, law.mode)
         return FlexibleMember(
             law,
             law.mode.evidence + prior + relative,
             left_over(law.search, problem.base, law.mode, constants),
-            constants.width_uncertainty * sqrt(law.identified),
+            hypot(constants.coefficient_uncertainty * sqrt(law.identified), basis),
             relative,
         )
 

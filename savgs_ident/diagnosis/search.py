@@ -84,6 +84,11 @@ def left_over(
     return left / whole if whole > 0.0 else np.inf
 
 
+def to_be_gained(search: Search, mode: LaplaceFit) -> float:
+    """By how much the log density of one that leaves nothing but the noise would be greater [nat], if at all."""
+    return max(-0.5 * search.rows.measured.size - mode.noise_scales.value, 0.0)
+
+
 def single_effects(
     search: Search,
     base: LaplaceFit,

@@ -140,6 +140,22 @@ def test_ports_that_do_the_same_are_listed_where_a_prior_decides_between_them() 
     assert named.indistinguishable_ports() == ("suspension",)
 
 
+def test_ports_are_listed_where_what_laws_lack_may_decide_between_them() -> None:
+    """Twelve nat apart, both of which miss by more."""
+
+    def law(port: Port, evidence: float, sd: float) -> FlexibleMember:
+        found: Any = SimpleNamespace(mode=SimpleNamespace(evidence=evidence), port=port)
+        return FlexibleMember(found, evidence, 0.0, sd)
+
+    def listed(sd: float) -> tuple[str, ...]:
+        laws = (law(STRUT, 990.0, sd), law(SUSPENSION, 978.0, sd))
+        evidence = _evidence("unknown", "law", {"none": 0.0, "unknown": 100.0}, flexible=laws)
+        return replace(evidence, kind="effect", named_law=laws[0]).indistinguishable_ports()
+
+    assert listed(1.0) == ()
+    assert listed(7.0) == ("suspension",)
+
+
 def test_a_formula_is_not_named_where_a_law_of_its_family_at_its_port_is_certainly_more_probable() -> None:
     evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 5.0, "rail_viscous": 700.0})
     evidence = replace(evidence, kind="effect")

@@ -14,7 +14,7 @@ from savgs_ident.diagnosis.held_out import HeldOut, hold_out, predict_left_out, 
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation, anywhere, localise
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import cosine, score_terms
-from savgs_ident.diagnosis.search import Findings, excess, left_over, pairs_with
+from savgs_ident.diagnosis.search import Findings, excess, left_over, pairs_with, to_be_gained
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
 from savgs_ident.inference.likelihood import noise_scales
@@ -270,6 +270,17 @@ def test_excess_is_what_the_noise_does_not_explain() -> None:
     base = find_map(search, (), {}, None)
     assert excess(search, base) == pytest.approx((0.05 / NOISE) ** 2, rel=0.3)
     assert noise_scales(data, search.residual(base.prediction)).discrepancy == pytest.approx(0.05, rel=0.25)
+
+
+def test_what_a_fit_leaves_to_be_gained_is_what_the_right_one_gains() -> None:
+    search, findings = _found({"c": 0.3}, 5)
+    right = next(each for each in findings.modes if each.terms == ("bend",))
+    # By chance the density of the truth is that of half as many squares as there are rows.
+    chance = 3.0 * np.sqrt(0.5 * search.data.measured.size)
+    assert to_be_gained(search, right) < chance
+    gained = right.noise_scales.value - findings.base.noise_scales.value
+    assert gained > 10.0 * chance
+    assert to_be_gained(search, findings.base) == pytest.approx(gained, abs=chance)
 
 
 def test_a_law_anywhere_is_as_probable_as_its_places_are_on_average() -> None:
