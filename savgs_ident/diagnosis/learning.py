@@ -94,7 +94,9 @@ class LearnedLaw:
     @property
     def values(self) -> dict[str, float]:
         """All its numbers, and those of the plant that were fitted beside it, SI."""
-        return dict.fromkeys(self.units, 0.0) | self.mode.values | dict(self.spans)
+        return (
+            {each.name: each.value for each in self.effect.parameters} | self.mode.values | dict(self.spans)
+        )
 
     @property
     def identified(self) -> float:

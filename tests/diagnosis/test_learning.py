@@ -1,5 +1,8 @@
 """A force learned where the catalogue has no name: on recordings of a rail whose friction falls with velocity."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -7,11 +10,13 @@ from savgs_ident.core.values import as_values
 from savgs_ident.diagnosis.dwell_problem import ITERATIONS, DwellProblem, rows_of
 from savgs_ident.diagnosis.held_out import hold_out
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
-from savgs_ident.effects.base import Family
+from savgs_ident.effects.base import Family, Port
+from savgs_ident.effects.learned import learned_effect
+from savgs_ident.effects.learned_functions import coefficients_at
 from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
-from savgs_ident.plants.quarter_car.ports import RAIL
+from savgs_ident.plants.quarter_car.ports import DAMPER, RAIL
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.periodic import PeriodicSettings, resolve
 
@@ -70,3 +75,16 @@ def test_it_knows_the_range_of_the_motion(law: LearnedLaw) -> None:
     assert set(law.spans) == {f"learned_rail_{name}" for name in ("middle", "stroke", "speed", "carried")}
     assert 0.005 < law.spans["learned_rail_stroke"] < 0.05
     assert 0.05 < law.spans["learned_rail_speed"] < 1.0
+
+
+@pytest.mark.parametrize("port", [RAIL, DAMPER], ids=lambda port: port.name)
+def test_its_values_are_all_that_it_needs_whichever_of_them_were_fitted(port: Port) -> None:
+    effect = learned_effect(port)
+    coefficient = coefficients_at(port)[0]
+    problem: Any = SimpleNamespace(catalogue={effect.name: effect})
+    mode: Any = SimpleNamespace(values={coefficient: 2e-4, "mu_r": 0.03})
+    unused: Any = None
+    law = LearnedLaw(effect.name, port, unused, problem, unused, mode, {}, {}, 0.0, None)
+    assert set(law.values) == {"mu_r", *(each.name for each in effect.parameters)}
+    assert law.values[coefficient] == 2e-4
+    assert all(law.values[name] == 0.0 for name in set(effect.null) - {coefficient})
