@@ -5,6 +5,7 @@ from math import nan
 
 import numpy as np
 
+from savgs_ident.diagnosis.findings import Findings, excess, left_over
 from savgs_ident.diagnosis.held_out import HeldOut
 from savgs_ident.diagnosis.result import (
     NONE,
@@ -16,7 +17,6 @@ from savgs_ident.diagnosis.result import (
     PortFamily,
 )
 from savgs_ident.diagnosis.score_test import Score, cosine
-from savgs_ident.diagnosis.search import Findings, excess, left_over
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import WeighedHypothesis, probabilities
 from savgs_ident.inference.find_map import LaplaceFit, Search

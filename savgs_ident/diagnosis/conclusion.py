@@ -14,12 +14,12 @@ from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
 from savgs_ident.diagnosis.candidates import confusable_of
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
+from savgs_ident.diagnosis.findings import hypothesis_of
 from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint, Rows, Shrink, shrinks
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out, select_in_folds
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, NextTest
-from savgs_ident.diagnosis.search import hypothesis_of
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import UnknownEvidence, WeighedHypothesis
 from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of

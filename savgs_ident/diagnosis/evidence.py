@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.diagnosis.findings import Findings
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import NONE, Hypothesis, Kind, PortFamily
-from savgs_ident.diagnosis.search import Findings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
     BrokenTolerance,

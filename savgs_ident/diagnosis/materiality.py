@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.background import relative_change
 from savgs_ident.diagnosis.evidence import DiagnosisProblem, FlexibleMember
+from savgs_ident.diagnosis.findings import Findings, hypothesis_of
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import Amplitudes
-from savgs_ident.diagnosis.search import Findings, hypothesis_of
 from savgs_ident.diagnosis.verdict import Change, without_immaterial_members
 from savgs_ident.inference.find_map import LaplaceFit
 

@@ -31,22 +31,14 @@ from savgs_ident.diagnosis.evidence import (
     FlexibleMember,
     is_better_form,
 )
+from savgs_ident.diagnosis.findings import Findings, hypothesis_of, left_over, to_be_gained
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.materiality import change_of, change_without, immaterial, material
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
 from savgs_ident.diagnosis.score_test import prior_conflict
-from savgs_ident.diagnosis.search import (
-    Findings,
-    hypothesis_of,
-    left_over,
-    pairs_with,
-    single_effects,
-    singles_among,
-    to_be_gained,
-    with_pairs,
-)
+from savgs_ident.diagnosis.search import pairs_with, single_effects, singles_among, with_pairs
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
     WeighedHypothesis,
@@ -164,7 +156,8 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
         alone = anywhere(others) if change_of(problem, first.moved).matters(constants) else -np.inf
     unknown = unknown_evidence(findings, alone, fitted.beside, broken.weight, constants)
     weighed = weigh(findings, unknown, constants)
-    kind, chosen = decide(weighed, change, left, constants)
+    tolerance_alone = unknown.reason == "tolerance" and not broken.beside.effects
+    kind, chosen = decide(weighed, change, left, constants, tolerance_alone)
     more = [WeighedHypothesis(each.hypothesis, each.weight, each.law.mode, each.sd) for each in members]
     weighed = tuple(sorted((*weighed, *more), key=lambda each: -each.weight))
     found = DiagnosisEvidence(

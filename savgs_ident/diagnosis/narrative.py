@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
+from savgs_ident.diagnosis.findings import hypothesis_of, left_over
 from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Verdict
-from savgs_ident.diagnosis.search import hypothesis_of, left_over
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.diagnosis.verdict import alarm_odds, most_probable, probabilities
 from savgs_ident.effects.base import Family
@@ -44,6 +44,8 @@ def _verdict(
         sentence = _nothing_missing(problem, evidence, gap)
         return Verdict("none", (), (), (), sentence, probability=_probability_of_nothing(evidence))
     if evidence.kind == "unknown":
+        if _is_sheet_wrong(evidence):
+            return _sheet_wrong(problem, evidence, gap)
         ports = evidence.indistinguishable_ports(problem.constants)
         sentence = _something_unknown(problem, evidence, gap)
         offered = evidence.offered
@@ -240,16 +242,43 @@ def _something_unknown(problem: DiagnosisProblem, evidence: DiagnosisEvidence, g
     return sentence + _nearest(problem, evidence) + _not_apart(problem, evidence)
 
 
+def _is_sheet_wrong(evidence: DiagnosisEvidence) -> bool:
+    """Whether a tolerance that does not hold is more probable than anything else."""
+    return evidence.unknown.reason == "tolerance" and evidence.weighed[0].hypothesis.unknown
+
+
+def _sheet_wrong(problem: DiagnosisProblem, evidence: DiagnosisEvidence, gap: Shrink) -> Verdict:
+    """The verdict where a number of the sheet does not hold: which one, and what would explain nearly as much."""
+    conflict, effects = evidence.broken.conflict, evidence.broken.beside.effects
+    start = f"With {' and '.join(f'`{name}`' for name in effects)} the" if effects else "The"
+    sentence = (
+        "A number of the data sheet does not hold, and no effect of the catalogue is as good an explanation. "
+        f"{start} model would need `{conflict.parameter}` {abs(conflict.tolerances):.1f} tolerances "
+        f"{'above' if conflict.tolerances > 0.0 else 'below'} its data sheet, which acts at the "
+        f"{problem.location_text(evidence.port)}. Recalibrated it misses by {_percent(gap.recalibrated)} of the "
+        f"response in held-out tests ({_percent(gap.before)} as given); the noise is {_percent(gap.floor)}."
+    )
+    least = evidence.unknown.weight - problem.constants.indistinguishable_log_odds
+    fitted = [each for each in evidence.weighed if each.mode is not None and each.hypothesis.effects]
+    near = [each.hypothesis for each in fitted if each.weight > least]
+    others = [each for each in near if each != evidence.broken.beside]
+    if others:
+        sentence += f" About as probable: {' or '.join(f'`{each}`' for each in others)}."
+    ports = dict.fromkeys(place for each in others for place in problem.locations(each))
+    return Verdict(
+        "unknown",
+        (),
+        (evidence.port,),
+        tuple(dict.fromkeys(name for each in others for name in each.effects)),
+        sentence,
+        tuple(each for each in ports if each != evidence.port),
+        law_known=False,
+        probability=_probability(evidence, UNKNOWN, *evidence.insufficient),
+    )
+
+
 def _nearest(problem: DiagnosisProblem, evidence: DiagnosisEvidence) -> str:
-    """The nearest effects of the catalogue, or the tolerance that something unknown would need."""
-    if evidence.unknown.reason == "tolerance" and evidence.weighed[0].hypothesis.unknown:
-        conflict, effects = evidence.broken.conflict, evidence.broken.beside.effects
-        start = f"With {' and '.join(f'`{name}`' for name in effects)} the" if effects else "The"
-        return (
-            f" {start} model would need `{conflict.parameter}` {abs(conflict.tolerances):.1f} tolerances "
-            f"{'above' if conflict.tolerances > 0.0 else 'below'} its data sheet, which acts at the "
-            f"{problem.location_text(evidence.port)}."
-        )
+    """The nearest effects of the catalogue."""
     effects = hypothesis_of(most_probable(evidence.findings, problem.constants)).effects
     if not effects:
         return ""

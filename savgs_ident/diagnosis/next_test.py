@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.executor import in_parallel
+from savgs_ident.diagnosis.findings import hypothesis_of
 from savgs_ident.diagnosis.result import NextTest
-from savgs_ident.diagnosis.search import hypothesis_of
 from savgs_ident.effects.base import AbstractInputLaw
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Prediction

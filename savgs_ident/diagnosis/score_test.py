@@ -13,6 +13,7 @@ data alone estimate x / (1 - v) with variance v / (1 - v), from which both evide
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations, pairwise
 from math import exp, inf, log, sqrt
 from typing import NamedTuple
 
@@ -22,9 +23,9 @@ from numpy.typing import NDArray
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.find_map import LaplaceFit, Search
-from savgs_ident.inference.laplace import linearised_optimum, log_evidence, precision_of
+from savgs_ident.inference.laplace import LinearisedOptimum, linearised_optimum, log_evidence, precision_of
 from savgs_ident.inference.observations import Term
-from savgs_ident.inference.prior import Coordinates, Sheet, bounds_of
+from savgs_ident.inference.prior import Coordinates, EffectCoordinates, Sheet, bounds_of
 
 
 class Amplitudes(NamedTuple):
@@ -107,20 +108,14 @@ def _score(
 ) -> Score:
     residual, inside = search.missed(mode.prediction), search.turned(mode.slopes)
     count = len(term.amplitudes)
-    bounds = tuple(
-        np.concatenate(pair)
-        for pair in zip(bounds_of(mode.coordinates), bounds_of(term.amplitudes), strict=True)
-    )
+    lower, upper = bounds_of(term.amplitudes)
     scales = np.array([each.scale for each in term.amplitudes])
     best: Score | None = None
     for shapes, column in zip(term.tried, sensitivities, strict=True):
         if not np.isfinite(column).all():
             continue
         moved = search.turned(column * scales)
-        slopes = np.concatenate([inside, moved], axis=1)
-        x = np.concatenate([mode.x, np.zeros(count)])
-        within = (bounds[0], bounds[1])
-        top = linearised_optimum(search.rows, residual, slopes, x, within, scales=mode.noise_scales)
+        top = _optimum(search, mode, residual, inside, moved, term.amplitudes)
         evidence = log_evidence(top.value, top.precision, mode.coordinates + term.amplitudes)
         if best is None or evidence > best.evidence:
             found = dict(zip((c.name for c in term.amplitudes), top.x[-count:], strict=True))
@@ -131,12 +126,86 @@ def _score(
             known = Amplitudes(
                 top.x[-count:],
                 np.asarray(np.linalg.inv(top.precision)[-count:, -count:], np.float64),
-                bounds[0][-count:],
-                bounds[1][-count:],
+                lower,
+                upper,
                 column * scales,
             )
             best = Score(term, sigma, evidence, start, smallest, direction, amplitudes=known)
     return best or Score(term, 0.0, -np.inf, {}, np.inf, np.zeros(residual.size), Status.NOT_FINITE)
+
+
+class PairScore(NamedTuple):
+    """Two candidates together: log evidence of the linearised hypothesis, and parameters at its best point, SI."""
+
+    terms: tuple[Term, Term]
+    evidence: float
+    start: dict[str, float]
+
+
+def best_pairs(search: Search, mode: LaplaceFit, scores: Sequence[Score], most: int) -> list[PairScore]:
+    """The most promising pairs of scored candidates about a fit, at most so many, best first.
+
+    Each candidate is taken where it scores best by itself. All pairs are ranked at the weights of the fit; the noise
+    scale and the discrepancy are estimated anew for the first ones alone.
+    """
+    known = [each for each in scores if each.amplitudes is not None]
+    residual, inside = search.missed(mode.prediction), search.turned(mode.slopes)
+    moved = [search.turned(each.amplitudes.columns) for each in known if each.amplitudes is not None]
+
+    def scored(one: int, other: int) -> PairScore:
+        terms = known[one].term, known[other].term
+        added = terms[0].amplitudes + terms[1].amplitudes
+        both = np.concatenate([moved[one], moved[other]], axis=1)
+        top = _optimum(search, mode, residual, inside, both, added)
+        last = top.x[-len(added) :]
+        found = {each.name: each.value(float(at)) for each, at in zip(added, last, strict=True)}
+        evidence = log_evidence(top.value, top.precision, mode.coordinates + added)
+        return PairScore(terms, evidence, known[one].start | known[other].start | found)
+
+    first = _ranked_pairs(mode, residual, inside, moved)[:most]
+    return sorted((scored(*pair) for pair in first), key=lambda each: -each.evidence)
+
+
+def _ranked_pairs(
+    mode: LaplaceFit,
+    residual: NDArray[np.float64],
+    inside: NDArray[np.float64],
+    moved: Sequence[NDArray[np.float64]],
+) -> list[tuple[int, int]]:
+    """Pairs of candidates by their places in ``moved``, the rows of each (m, k), those that explain most first."""
+    weight = 1.0 / np.sqrt(mode.noise_scales.spread)
+    residual, slopes = residual * weight, inside * weight[:, None]
+    ends = np.cumsum([0, *(each.shape[1] for each in moved)]).tolist()
+    parts = [list(range(low, high)) for low, high in pairwise(ends)]
+    columns = np.concatenate([np.zeros((residual.size, 0)), *moved], axis=1) * weight[:, None]
+    cross = columns.T @ slopes
+    held = np.linalg.solve(mode.precision, cross.T)
+    gradient = columns.T @ residual - held.T @ (slopes.T @ residual - mode.x)
+    information = columns.T @ columns - cross @ held + np.eye(ends[-1])
+
+    def promise(pair: tuple[int, int]) -> float:
+        both = parts[pair[0]] + parts[pair[1]]
+        block = information[np.ix_(both, both)]
+        rise = gradient[both] @ np.linalg.solve(block, gradient[both])
+        return 0.5 * float(rise - np.linalg.slogdet(block)[1])
+
+    return sorted(combinations(range(len(moved)), 2), key=promise, reverse=True)
+
+
+def _optimum(
+    search: Search,
+    mode: LaplaceFit,
+    residual: NDArray[np.float64],
+    inside: NDArray[np.float64],
+    moved: NDArray[np.float64],
+    added: EffectCoordinates,
+) -> LinearisedOptimum:
+    """The best point of a fit with ``added`` amplitudes that move its rows by ``moved``, to first order."""
+    lower, upper = (
+        np.concatenate(pair) for pair in zip(bounds_of(mode.coordinates), bounds_of(added), strict=True)
+    )
+    slopes, x = np.concatenate([inside, moved], axis=1), np.concatenate([mode.x, np.zeros(len(added))])
+    return linearised_optimum(search.rows, residual, slopes, x, (lower, upper), scales=mode.noise_scales)
 
 
 def cosine(one: Score, other: Score) -> float:

@@ -6,87 +6,43 @@ them leaves more than the noise, or pulls a parameter away from its tolerance, p
 1. the best single effects, each with the effects that score best beside it;
 2. members of the best pairs that are no single effect of step 1, with other effects: the second member may be a
    stand-in;
-3. the best pair with either member exchanged for its lookalikes.
+3. pairs that to first order about the baseline promise more than the best of these: of two effects that together
+   are like a third one neither need be near to the best single effect;
+4. the best pair with either member exchanged for its lookalikes.
 
 Every hypothesis that is fitted in full comes out with its evidence; one whose fit found no solution of the plant is
-named in :attr:`Findings.lost`.
+named in :attr:`~savgs_ident.diagnosis.findings.Findings.lost`.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
-from savgs_ident.core.status import Status
+from savgs_ident.diagnosis.findings import Findings, LostHypothesis, hypothesis_of, left_over
 from savgs_ident.diagnosis.result import Hypothesis
-from savgs_ident.diagnosis.score_test import Score, cosine, prior_conflict, score_terms, scores_of
+from savgs_ident.diagnosis.score_test import (
+    PairScore,
+    Score,
+    best_pairs,
+    cosine,
+    prior_conflict,
+    score_terms,
+    scores_of,
+)
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, find_map_from_both, refine
+from savgs_ident.inference.find_map import (
+    LaplaceFit,
+    Search,
+    densest,
+    find_map,
+    find_map_from_both,
+    refine,
+)
 from savgs_ident.inference.observations import Term
-
-
-class LostHypothesis(NamedTuple):
-    """A hypothesis that was not evaluated, and how the solution of the plant ended."""
-
-    hypothesis: Hypothesis
-    status: Status
-
-
-@dataclass(frozen=True)
-class Findings:
-    """All hypotheses that were tried.
-
-    Attributes:
-        base: the baseline, recalibrated.
-        scores: scores of all effects at the baseline, best first.
-        modes: hypotheses that were fitted in full, the best first; the baseline is not among them.
-        lost: hypotheses whose fit found no solution of the plant, and how that ended.
-        sensitivities: by effect, what it does to the rows about the baseline [units of the rows], (tries, m, k).
-    """
-
-    base: LaplaceFit
-    scores: tuple[Score, ...]
-    modes: tuple[LaplaceFit, ...]
-    lost: tuple[LostHypothesis, ...] = ()
-    sensitivities: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-
-
-def hypothesis_of(mode: LaplaceFit) -> Hypothesis:
-    """What a fit assumes to be missing."""
-    return Hypothesis(mode.terms)
-
-
-def excess(search: Search, mode: LaplaceFit) -> float:
-    """The misfit [1]: mean square of the residuals in their variances, less one, and not below zero.
-
-    The variance is that of the noise, and of errors that rows share at the size that these are expected at.
-    """
-    rows = search.rows
-    expected = rows.scales.discrepancy if search.data.shared is not None else 0.0
-    variance = rows.marginal(1.0, expected)
-    return max(float(np.mean(search.missed(mode.prediction) ** 2 / variance)) - 1.0, 0.0)
-
-
-def left_over(
-    search: Search, base: LaplaceFit, mode: LaplaceFit, constants: DecisionConstants = DEFAULTS
-) -> float:
-    """Share of the baseline's misfit that a hypothesis leaves; 0 where that is hardly more than the noise.
-
-    Infinite where the baseline left nothing.
-    """
-    left, whole = excess(search, mode), excess(search, base)
-    if left <= constants.negligible_misfit:
-        return 0.0
-    return left / whole if whole > 0.0 else np.inf
-
-
-def to_be_gained(search: Search, mode: LaplaceFit) -> float:
-    """By how much the log density of one that leaves nothing but the noise would be greater [nat], if at all."""
-    return max(-0.5 * search.rows.measured.size - mode.noise_scales.value, 0.0)
 
 
 def single_effects(
@@ -246,6 +202,15 @@ class _Fits:
         self.progress(f"fitting {name} from its value in {hypothesis_of(pair)}")
         return find_map(self.search, (self.terms[name],), pair.values, pair.prediction.warm_start)
 
+    def from_typical_size(self, term: Term) -> LaplaceFit:
+        """The fit of a term from its typical size, where of all that is tried it comes nearest to the data."""
+        self.progress(f"fitting {term.name} from its typical size")
+        typical = {each.name: each.value(self.constants.typical_coordinate) for each in term.amplitudes}
+        starts = [self.base.values | typical | shapes for shapes in term.tried]
+        warm_start = self.base.prediction.warm_start
+        start = densest(self.search, (term,), starts, warm_start)
+        return find_map_from_both(self.search, (term,), start, warm_start)
+
     def extended(
         self, parent: LaplaceFit, scores: Sequence[Score], least: float = -np.inf
     ) -> list[LaplaceFit]:
@@ -260,6 +225,16 @@ class _Fits:
             )
 
         return in_parallel(fit, scores)
+
+    def together(self, pairs: Sequence[PairScore]) -> list[LaplaceFit]:
+        """Fits of scored pairs from where they promise most."""
+
+        def fit(pair: PairScore) -> LaplaceFit:
+            self.progress(f"fitting {Hypothesis(tuple(term.name for term in pair.terms))}")
+            start, warm_start = self.base.values | pair.start, self.base.prediction.warm_start
+            return find_map_from_both(self.search, pair.terms, start, warm_start)
+
+        return in_parallel(fit, pairs)
 
     def exchanged(self, pair: LaplaceFit, kept: str, score: Score) -> LaplaceFit:
         """The fit of a pair with the member that is not ``kept`` exchanged for the scored term."""
@@ -298,11 +273,21 @@ def _single_effects(fits: _Fits, scores: Sequence[Score]) -> list[LaplaceFit]:
     ranked = fits.refined([*begun, *fits.extended(base, alike, least)])
     names = {each.term.name for each in (*worth[:first], *alike)}
     later = [each for each in worth if each.term.name not in names]
+    swinging: list[LaplaceFit] = []
     if ranked and fits.explains_all(ranked[0]):
         later = fits.lookalikes(later, [each for each in scores if each.term.name == ranked[0].terms[0]])
     else:
         later = later[: constants.further_fits]
-    return fits.refined([*ranked, *fits.extended(base, later, max(least, fits.negligible(ranked)))])
+        # A strong resonance is far from what it does to first order, wherever it is.
+        swinging = in_parallel(fits.from_typical_size, [term for term in fits.terms.values() if term.tries])
+    more = fits.extended(base, later, max(least, fits.negligible(ranked)))
+    return fits.refined(_best_of_each([*ranked, *more, *swinging]))
+
+
+def _best_of_each(modes: Sequence[LaplaceFit]) -> list[LaplaceFit]:
+    """Of fits of the same hypothesis the best."""
+    ranked = sorted(modes, key=lambda mode: mode.evidence)
+    return list({hypothesis_of(mode): mode for mode in ranked}.values())
 
 
 def _pairs(
@@ -328,6 +313,7 @@ def _pairs(
             pairs = _with_other_second_effects(fits, pairs, {hypothesis_of(mode) for mode in parents}, least)
     else:
         pairs = fits.refined(_with_small_second_effects(fits, best, sensitivities))
+    pairs = fits.refined([*pairs, *_best_to_first_order(fits, pairs or [best], scores, least)])
     if pairs and pairs[0].evidence > best.evidence:
         pairs = _with_lookalikes(fits, pairs, scores)
     return pairs
@@ -367,6 +353,20 @@ def _with_other_second_effects(
         if parent.solved:
             pairs = [*pairs, *_with_second_effects(fits, parent, pairs, least)]
     return fits.refined(pairs)
+
+
+def _best_to_first_order(
+    fits: _Fits, found: Sequence[LaplaceFit], scores: Sequence[Score], least: float
+) -> list[LaplaceFit]:
+    """Pairs that are not ``found`` yet and promise more about the baseline than the best of these has."""
+    tried = {hypothesis_of(mode) for mode in found}
+    least = max(found[0].evidence, least)
+    worth = [
+        pair
+        for pair in best_pairs(fits.search, fits.base, scores, fits.constants.first_order_pairs)
+        if pair.evidence > least and Hypothesis(tuple(term.name for term in pair.terms)) not in tried
+    ]
+    return fits.together(worth[: fits.constants.pairs_per_parent])
 
 
 def _with_lookalikes(fits: _Fits, pairs: list[LaplaceFit], scores: Sequence[Score]) -> list[LaplaceFit]:

@@ -408,6 +408,9 @@ class DecisionConstants:
     pairs_per_parent: int = 3
     """Pairs fitted with an effect that leaves something. Origin: computing time."""
 
+    first_order_pairs: int = 12
+    """Pairs whose evidence to first order about the baseline is evaluated. Origin: computing time."""
+
     parents: int = 2
     """Best single effects, or best pairs, of whose members pairs are made. Origin: computing time."""
 

@@ -20,9 +20,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.diagnosis.findings import Findings, hypothesis_of
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Kind
 from savgs_ident.diagnosis.score_test import PriorConflict
-from savgs_ident.diagnosis.search import Findings, hypothesis_of
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.find_map import LaplaceFit
 
@@ -227,11 +227,14 @@ def decide(
     change: Change,
     left: float,
     constants: DecisionConstants = DEFAULTS,
+    tolerance_alone: bool = False,
 ) -> tuple[Kind, WeighedHypothesis]:
     """What may be said, and the hypothesis that it rests on.
 
     ``change`` is what the best fitted hypothesis does to the response; ``left`` the share of the baseline's misfit
-    that it leaves. What leaves next to nothing is named though something unknown may explain the rest as well.
+    that it leaves. What leaves next to nothing is named though something unknown may explain the rest as well; but
+    not where ``tolerance_alone`` speaks for something unknown, one that does not hold in the baseline as it is:
+    then it is known what is off, and that it is more probable.
     """
     none, unknown = (
         next(each for each in weighed if each.hypothesis == hypothesis) for hypothesis in (NONE, UNKNOWN)
@@ -241,7 +244,8 @@ def decide(
     if alarm_odds(weighed) < constants.alarm_log_odds:
         return "none", none
     explains = best.weight >= none.weight + constants.alarm_log_odds and left <= constants.explained_share
-    if unknown.weight > best.weight and not (explains and change.matters(constants)):
+    named = explains and change.matters(constants) and not tolerance_alone
+    if unknown.weight > best.weight and not named:
         return "unknown", unknown
     if not change.matters(constants):
         return "none", none

@@ -6,7 +6,7 @@ hypothesis that misses weighs its rows by what it can explain from the first ste
 rises. At the end stands the evidence by Laplace's method.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -181,13 +181,15 @@ class _Ascent:
 
     def start(self, values: Mapping[str, float], warm_start: Any) -> _Point:
         """The point at ``values`` [SI], at the centre of what is not given, within the bounds."""
-        given = {**values, **self._held}
-        x = [c.at(given[c.name]) if c.name in given else 0.0 for c in self._coordinates]
-        return self._at(np.clip(x, *bounds_of(self._coordinates)), warm_start)
+        return self._at(self._coordinates_at(values), warm_start)
 
     def again(self, fit: LaplaceFit) -> _Point:
         """The point of a fit of the same plant with the same terms, which is not solved again."""
         return self._valued(fit.x, fit.prediction)
+
+    def density(self, values: Mapping[str, float], warm_start: Any) -> float:
+        """Log density of rows and prior at ``values`` [SI], within the bounds; minus infinity without a solution."""
+        return self._without_slopes(self._coordinates_at(values), warm_start).value
 
     def step(self, point: _Point) -> _Point:
         """The point one step on; the same, with the status, where there is no step that rises."""
@@ -226,6 +228,11 @@ class _Ascent:
                 progress(f"looking for the mode, step {count}: log density {point.value:.2f}")
             point = self.step(point)
         return self._fit(point)
+
+    def _coordinates_at(self, values: Mapping[str, float]) -> Array:
+        given = {**values, **self._held}
+        x = [c.at(given[c.name]) if c.name in given else 0.0 for c in self._coordinates]
+        return np.clip(x, *bounds_of(self._coordinates))
 
     @property
     def _fixed(self) -> NDArray[np.bool_]:
@@ -323,6 +330,20 @@ def find_map_from_both(
     if search.given is not None:
         points.append(ascent.step(ascent.start({**start, **search.given.values}, search.given.warm_start)))
     return ascent.mode(max(points, key=lambda each: each.value), steps - 1)
+
+
+def densest(
+    search: Search,
+    terms: tuple[Term, ...],
+    starts: Sequence[Mapping[str, float]],
+    warm_start: Any,
+) -> Mapping[str, float]:
+    """The one of some points (SI) of the baseline with ``terms`` at which the log density is greatest.
+
+    A mode of its own may stand at each, as about every natural frequency of what swings.
+    """
+    ascent = _Ascent(search, terms, {})
+    return max(starts, key=lambda each: ascent.density(each, warm_start))
 
 
 def refine(search: Search, mode: LaplaceFit, terms: tuple[Term, ...]) -> LaplaceFit:

@@ -2,12 +2,13 @@
 
     score = score_of(answer, diagnosis)      # ``diagnosis`` as ``diagnosis.json`` has it
 
-An effect counts as named by its own name, and as a formula of the catalogue. Where the draw found that another effect
-does the same to the campaign, so that nothing shows which it is, naming that one counts too, if the verdict says that
-it cannot distinguish the two; instead of an effect that was removed it may be named without.
-The port of something unknown counts as found,
-too, where the verdict says that it cannot distinguish it from the one that it names. Marks that do not apply to a
-kind of trial are None.
+An effect counts as named by its own name, and as a formula of the catalogue. Where another effect does the same to
+the campaign, so that nothing shows which it is, naming that one counts too, if the verdict says that it cannot
+distinguish the two: where the draw found so, or where the drawn effects are about as probable by the same recordings
+(log odds below 5 nat). Instead of an effect that was removed one that does the same may be named without.
+The port of something unknown counts as found, too, where the verdict says that it cannot distinguish it from the one
+that it names; that of an effect in whose place a law was learned, where the effect itself explains the recordings as
+well there. Marks that do not apply to a kind of trial are None.
 
 In a foreign trial no name can be right, for no catalogue has the law. A port is right where an engineer would rightly
 put the effect, a family where it would rightly be called that, at such a port
@@ -24,7 +25,7 @@ What many trials say together is in :mod:`savgs_ident.validation.blind_rates`.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import exp, isfinite
 from typing import Any
 
 from savgs_ident.core.files import record_of
@@ -188,9 +189,16 @@ def said_right(score: Score) -> bool:
 
 
 def port_in_question(answer: Answer, diagnosis: Mapping[str, Any]) -> str | None:
-    """The one port that a verdict names, where it is wrong but a right one is listed as indistinguishable from it."""
+    """The one port that a verdict names, where it is wrong but a right one is listed as indistinguishable from it.
+
+    Of foreign effects, and of those that were removed from the catalogue where a law is learned in their place.
+    """
     verdict = diagnosis["verdict"]
-    if answer.kind != "foreign" or _port_exactly(answer, verdict) or not _port_listed(answer, verdict):
+    learned = verdict["kind"] == "effect" and _no_known_law(verdict)
+    right = answer.accepted if answer.kind == "foreign" else answer.ports
+    if not (answer.kind == "foreign" or (answer.kind == "unknown" and learned)):
+        return None
+    if _ports_among(right, verdict) or not _listed_among(right, verdict):
         return None
     return str(verdict["ports"][0]) if len(verdict["ports"]) == 1 else None
 
@@ -206,9 +214,10 @@ def score_of(
     said, true = tuple(verdict["effects"]), {*answer.effects}
     known = bool(verdict.get("law_known", True))
     right = known and {*said} == true and len(said) == len(true)
-    alike = known and _as_well(answer, verdict)
+    alike = known and _as_well(answer, diagnosis)
     here = {*verdict["ports"]} == {*answer.ports} and verdict["kind"] != "none"
     beside = verdict["kind"] == "unknown" and {*answer.ports} <= {*verdict["confusable_ports"]}
+    beside = beside or (kind == "unknown" and _does_the_same(elsewhere))
     families, foreign = tuple(verdict.get("families", ())), answer.small_errors is not None
     accepted = _accepted(answer, diagnosis, elsewhere)
     own = _intervals(answer, diagnosis) if right else {}
@@ -232,9 +241,9 @@ def score_of(
         foreign=foreign,
         families=families,
         sigmas=tuple(answer.sigmas[name] for name in answer.effects if name in answer.sigmas),
-        port_right=_port_right(accepted, verdict) if kind == "foreign" else None,
-        port_exactly=_port_exactly(answer, verdict) if kind == "foreign" else None,
-        port_listed=_port_listed(answer, verdict) if kind == "foreign" else None,
+        port_right=_ports_among(accepted, verdict) if kind == "foreign" else None,
+        port_exactly=_ports_among(answer.accepted, verdict) if kind == "foreign" else None,
+        port_listed=_listed_among(answer.accepted, verdict) if kind == "foreign" else None,
         family_right=_family_right(accepted, answer, verdict, families) if kind == "foreign" else None,
         family_exactly=_family_right(answer.accepted, answer, verdict, families)
         if kind == "foreign"
@@ -261,12 +270,23 @@ _OF_WHAT_IS_THERE = (
 """Marks that nobody could earn where what is there cannot be seen, or told from what is named."""
 
 
-def _as_well(answer: Answer, verdict: Mapping[str, Any]) -> bool:
+def _as_well(answer: Answer, diagnosis: Mapping[str, Any]) -> bool:
     """Whether in place of one drawn effect another is named that does the same, which the verdict says."""
+    verdict = diagnosis["verdict"]
     said, true = {*verdict["effects"]}, {*answer.effects}
     instead, left_out = said - true, true - said
     one_for_one = len(said) == len(true) and len(instead) == 1
-    return one_for_one and instead <= {*answer.imitators} and left_out <= {*verdict["confusable_with"]}
+    listed = one_for_one and left_out <= {*verdict["confusable_with"]}
+    return listed and (instead <= {*answer.imitators} or _about_as_probable(true, said, diagnosis))
+
+
+def _about_as_probable(true: set[str], said: set[str], diagnosis: Mapping[str, Any]) -> bool:
+    """Whether the recordings do not tell the drawn effects from those that are named."""
+    stated = {
+        frozenset(each["effects"]): _number_or_none(each.get("probability")) for each in diagnosis["which"]
+    }
+    there, named = (stated.get(frozenset(each)) or 0.0 for each in (true, said))
+    return there > named * exp(-DEFAULTS.indistinguishable_log_odds)
 
 
 def _hidden(answer: Answer, diagnosis: Mapping[str, Any]) -> bool:
@@ -293,28 +313,24 @@ def _no_known_law(verdict: Mapping[str, Any]) -> bool:
 def _accepted(answer: Answer, diagnosis: Mapping[str, Any], elsewhere: float | None) -> tuple[str, ...]:
     """The ports that are right, and the one in question where the drawn law itself does the same."""
     other = port_in_question(answer, diagnosis)
-    if other is None or elsewhere is None or elsewhere >= DEFAULTS.indistinguishable_log_odds:
-        return answer.accepted
-    return (*answer.accepted, other)
+    return (*answer.accepted, other) if other is not None and _does_the_same(elsewhere) else answer.accepted
 
 
-def _port_right(accepted: Sequence[str], verdict: Mapping[str, Any]) -> bool:
-    """Whether something is said to be missing, at accepted ports alone."""
-    ports = set(verdict["ports"])
-    return verdict["kind"] not in ("none", FAILED) and bool(ports) and ports <= {*accepted}
+def _does_the_same(elsewhere: float | None) -> bool:
+    """Whether the drawn law does the same at the other port, by its log odds [nat]."""
+    return elsewhere is not None and elsewhere < DEFAULTS.indistinguishable_log_odds
 
 
-def _port_exactly(answer: Answer, verdict: Mapping[str, Any]) -> bool:
+def _ports_among(right: Sequence[str], verdict: Mapping[str, Any]) -> bool:
     """Whether something is said to be missing, at ports that are right alone."""
-    return _port_right(answer.accepted, verdict)
+    ports = set(verdict["ports"])
+    return verdict["kind"] not in ("none", FAILED) and bool(ports) and ports <= {*right}
 
 
-def _port_listed(answer: Answer, verdict: Mapping[str, Any]) -> bool:
+def _listed_among(right: Sequence[str], verdict: Mapping[str, Any]) -> bool:
     """Whether the ports are right, or one that is right is listed as indistinguishable from them."""
-    listed = verdict["kind"] not in ("none", FAILED) and bool(
-        {*verdict["confusable_ports"]} & {*answer.accepted}
-    )
-    return listed or _port_exactly(answer, verdict)
+    listed = verdict["kind"] not in ("none", FAILED) and bool({*verdict["confusable_ports"]} & {*right})
+    return listed or _ports_among(right, verdict)
 
 
 def _family_right(
@@ -323,7 +339,7 @@ def _family_right(
     """Whether a family is named, and all that are named are right, at accepted ports."""
     right = {f"{port}/{family}" for port in accepted for family in answer.families}
     named = verdict["kind"] in ("effect", "several") and bool(families)
-    return named and set(families) <= right and _port_right(accepted, verdict)
+    return named and set(families) <= right and _ports_among(accepted, verdict)
 
 
 def _number_or_none(found: object) -> float | None:

@@ -25,6 +25,7 @@ from savgs_ident.core.errors import InputError, blamed_on
 from savgs_ident.core.files import is_begun, prepare_folder, record_of, write_json
 from savgs_ident.diagnosis.diagnose import Watch, nobody
 from savgs_ident.diagnosis.public import SIMTR, diagnose_response
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, parse_rig
@@ -165,9 +166,11 @@ def _elsewhere(answer: Answer, found: Mapping[str, Any], campaign: Path, rig: Ri
     other = port_in_question(answer, found)
     if other is None:
         return None
+    name = answer.effects[0]
+    drawn = FOREIGN[name].effect if answer.kind == "foreign" else CATALOGUE[name]
     measured = measured_response(load_campaign(campaign), QuarterCar, SIMTR.orders)
     try:
-        return log_odds_of_port(measured, rig, FOREIGN[answer.effects[0]].effect, other, SIMTR)
+        return log_odds_of_port(measured, rig, drawn, other, SIMTR)
     except InputError:
         # A baseline without a solution says nothing of the ports: the trial has its strict marks.
         return None

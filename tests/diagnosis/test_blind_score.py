@@ -9,7 +9,15 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.validation.blind_marks import Score, failed, is_right, said_right, score_from, score_of
+from savgs_ident.validation.blind_marks import (
+    Score,
+    failed,
+    is_right,
+    port_in_question,
+    said_right,
+    score_from,
+    score_of,
+)
 from savgs_ident.validation.blind_rates import (
     NOTHING,
     OTHERS,
@@ -104,6 +112,28 @@ def test_an_effect_that_the_catalogue_lacks() -> None:
     assert (named.unknown_recognised, named.located_right) == (False, True)
 
 
+@pytest.mark.parametrize(("elsewhere", "right"), [(0.5, True), (6.0, False), (None, False)])
+def test_a_law_in_place_of_an_effect_may_be_learned_where_that_would_do_the_same(
+    elsewhere: float | None, right: bool
+) -> None:
+    found = diagnosis("effect", "rail_viscous", beside=["sensor.sprung_accel"])
+    found["verdict"]["law_known"] = False
+    assert port_in_question(GONE, found) == "rail"
+    score = score_of(GONE, found, elsewhere=elsewhere)
+    assert (score.unknown_recognised, score.located_right, score.located_exactly) == (True, right, False)
+    assert not said_right(score)
+
+
+def test_only_a_learned_law_at_a_wrong_port_beside_a_listed_one_is_in_question() -> None:
+    learned = diagnosis("effect", "accel_gain", beside=["rail"])
+    learned["verdict"]["law_known"] = False
+    assert port_in_question(GONE, learned) is None
+    assert port_in_question(GONE, diagnosis("effect", "rail_viscous", beside=["sensor.sprung_accel"])) is None
+    unlisted = diagnosis("effect", "rail_viscous", beside=["strut"])
+    unlisted["verdict"]["law_known"] = False
+    assert port_in_question(GONE, unlisted) is None
+
+
 def test_of_two_effects_the_one_that_calibration_hides_may_be_left_out() -> None:
     """Its four standard deviations are seen by nobody; the other's twenty are."""
     dim = replace(PAIR, sigmas={"accel_lag": 20.0, "rail_viscous": 4.0})
@@ -153,6 +183,31 @@ def test_in_place_of_one_of_two_effects_another_may_be_named_that_does_the_same(
     assert (told.both_named, told.located_right) == (True, True)
     untold = score_of(pair, diagnosis("several", "accel_lag", "rail_preload"))
     assert untold.both_named is False
+
+
+@pytest.mark.parametrize(
+    ("stated", "like", "right"),
+    [
+        ((0.55, 0.44), ["rail_viscous"], True),
+        ((0.99, 0.008), ["rail_viscous"], True),
+        ((0.99, 0.005), ["rail_viscous"], False),
+        ((0.55, 0.44), [], False),
+        ((0.0, 0.0), ["rail_viscous"], False),
+    ],
+)
+def test_or_one_of_two_effects_that_are_about_as_probable(
+    stated: tuple[float, float], like: list[str], right: bool
+) -> None:
+    """Within 5 nat, a ratio of 148, by the recordings that were diagnosed."""
+    found = diagnosis("several", "accel_lag", "cam_scale", like=like)
+    found["which"] = [
+        {"effects": [*names], "probability": probability, "parameters": {}}
+        for names, probability in zip(
+            (("accel_lag", "cam_scale"), ("rail_viscous", "accel_lag")), stated, strict=True
+        )
+    ]
+    score = score_of(PAIR, found)
+    assert (score.both_named, score.located_right, score.located_exactly) == (right, right, False)
 
 
 def test_a_law_that_is_said_to_be_none_of_the_catalogue() -> None:

@@ -19,11 +19,11 @@ from savgs_ident.diagnosis.evidence import (
     FlexibleMember,
     is_better_form,
 )
+from savgs_ident.diagnosis.findings import Findings, LostHypothesis
 from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, PortFamily
 from savgs_ident.diagnosis.score_test import PriorConflict
-from savgs_ident.diagnosis.search import Findings, LostHypothesis
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.diagnosis.verdict import (
     BrokenTolerance,
@@ -234,10 +234,22 @@ def test_a_number_is_one_with_a_law_of_which_it_is_the_linear_part() -> None:
 )
 def test_a_tolerance_that_does_not_hold_is_named(weights: dict[str, float], start: str) -> None:
     verdict = write_verdict(PROBLEM, _evidence("unknown", "tolerance", weights), (), GAP)
-    assert verdict.sentence.endswith(
+    assert verdict.sentence.startswith("A number of the data sheet does not hold")
+    assert (
         f"{start} `k_t` 4.2 tolerances below its data sheet, which acts at the tyre (radial)."
+        in verdict.sentence
     )
     assert verdict.ports == ("tyre_radial",)
+    assert verdict.confusable_with == ()
+
+
+def test_an_effect_that_explains_nearly_as_much_as_a_wrong_sheet_is_listed() -> None:
+    evidence = _evidence("unknown", "tolerance", {"none": 0.0, "unknown": 100.0, "rail_viscous": 96.0})
+    alone = replace(evidence, broken=evidence.broken._replace(beside=NONE))
+    verdict = write_verdict(PROBLEM, alone, (), GAP)
+    assert (verdict.confusable_with, verdict.confusable_ports) == (("rail_viscous",), ("rail",))
+    assert verdict.sentence.endswith("About as probable: `rail_viscous`.")
+    assert verdict.probability == pytest.approx(1.0 / (1.0 + np.exp(-4.0)))
 
 
 def test_a_law_that_the_catalogue_does_not_have_is_reported_with_the_nearest_formula() -> None:
@@ -343,7 +355,8 @@ def test_no_verdict_contradicts_its_numbers(
     scatter: float,
 ) -> None:
     evidence = replace(_evidence("none", reason, {"none": 0.0} | odds, off=off), left=left)
-    kind, chosen = decide(evidence.weighed, Change(change, change), left)
+    alone = reason == "tolerance"
+    kind, chosen = decide(evidence.weighed, Change(change, change), left, tolerance_alone=alone)
     # Parameters have something to do with the gap: the noise is the least that is left.
     before, recalibrated, after, floor = gaps[0], max(gaps[1], gaps[3]), max(gaps[2], gaps[3]), gaps[3]
     after = recalibrated if kind == "none" else after
@@ -358,8 +371,11 @@ def test_no_verdict_contradicts_its_numbers(
     tolerance = reason == "tolerance" and verdict.kind == "unknown"
     if verdict.kind == "none":
         assert not large
-    if verdict.kind == "unknown" and odds["rail_viscous"] > DEFAULTS.alarm_log_odds and explained:
+    named = odds["rail_viscous"] > DEFAULTS.alarm_log_odds and explained
+    if verdict.kind == "unknown" and named and not tolerance:
         assert gap.after >= gap.recalibrated
+    if tolerance and named:
+        assert odds["unknown"] > odds["rail_viscous"]
     if verdict.kind in ("effect", "several"):
         spared = 0.5 * off**2 >= DEFAULTS.alarm_log_odds and not large
         assert gap.after < gap.recalibrated or spared

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from savgs_ident.core.status import Status
+from savgs_ident.diagnosis.findings import Findings, excess, left_over, to_be_gained
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out, predict_left_out, select_in_folds
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation, anywhere, localise
 from savgs_ident.diagnosis.result import Hypothesis
-from savgs_ident.diagnosis.score_test import cosine, score_terms
-from savgs_ident.diagnosis.search import Findings, excess, left_over, pairs_with, to_be_gained
+from savgs_ident.diagnosis.score_test import best_pairs, cosine, score_terms
+from savgs_ident.diagnosis.search import pairs_with
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
 from savgs_ident.inference.likelihood import noise_scales
@@ -345,6 +346,24 @@ def test_a_fit_without_motion_is_lost_and_a_column_that_is_no_number_not_scored(
     assert ripple.status is Status.NOT_FINITE
 
 
+class _Squared(ToyPlant):
+    """What ripples grows with the square of its size: to first order it does nothing."""
+
+    def rows(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+        return super().rows(dict(values) | {"s": values.get("s", 0.0) ** 2})
+
+
+@over("seed", range(5))
+def test_what_shows_nothing_to_first_order_is_found_from_its_typical_size(seed: int) -> None:
+    plant = _Squared()
+    search = search_of(plant, draw(plant, {"a": 1.0, "s": 0.4, "w": 11.0}, NOISE, seed))
+    findings = forward_selection(search, find_map(search, (), {}, None), TERMS)
+    ripple = next(each for each in findings.scores if each.term.name == "ripple")
+    assert ripple.sigma < 1.0
+    assert best_of(findings).terms == ("ripple",)
+    assert best_of(findings).values["w"] == pytest.approx(11.0, rel=0.05)
+
+
 class _Shapes(ToyPlant):
     """A line and six shapes.
 
@@ -376,6 +395,26 @@ def test_a_stand_in_for_two_does_not_keep_its_place_beside_one_of_them(seed: int
     findings = forward_selection(search, find_map(search, (), {}, None), SHAPES)
     assert {score.term.name for score in findings.scores[:2]} == {"stand-in", "other"}
     assert set(best_of(findings).terms) == {"round", "wavy"}
+
+
+@over("seed", range(5))
+def test_two_of_which_neither_is_beside_the_nearest_are_found_together(seed: int) -> None:
+    """With so few fits that exchanging one of two never meets them; to first order they promise most."""
+    plant = _Shapes()
+    search = search_of(plant, draw(plant, {"a": 1.0, "b": 0.3, "d": 0.15}, NOISE, seed))
+    base = find_map(search, (), {}, None)
+    findings = forward_selection(
+        search, base, SHAPES, constants=replace(DEFAULTS, pairs_per_parent=1, parents=1)
+    )
+    assert set(best_of(findings).terms) == {"round", "wavy"}
+    first, *_, last = best_pairs(search, base, findings.scores, 10)
+    assert {term.name for term in first.terms} == {"round", "wavy"}
+    for pair in (first, last):
+        fit = find_map(search, pair.terms, pair.start, None)
+        assert pair.evidence == pytest.approx(fit.evidence, abs=0.05)
+        assert [pair.start[name] for name in "bd" if name in fit.values] == pytest.approx(
+            [fit.values[name] for name in "bd" if name in fit.values], abs=1e-3
+        )
 
 
 @over("seed", range(5))

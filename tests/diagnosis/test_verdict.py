@@ -11,9 +11,9 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from savgs_ident.core.status import Status
+from savgs_ident.diagnosis.findings import Findings, LostHypothesis
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
 from savgs_ident.diagnosis.score_test import PriorConflict
-from savgs_ident.diagnosis.search import Findings, LostHypothesis
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
     Change,
@@ -117,6 +117,12 @@ def _weighed(weights: Mapping[str, float], scored: tuple[str, ...] = ()) -> list
 def test_kinds(weights: dict[str, float], change: float, left: float, kind: str, name: str) -> None:
     found, chosen = decide(_weighed(weights), Change(change, change), left)
     assert (found, chosen.hypothesis) == (kind, _hypothesis(name))
+
+
+@pytest.mark.parametrize(("unknown", "kind"), [(600.0, "unknown"), (499.0, "effect")])
+def test_a_tolerance_that_explains_more_alone_comes_before_an_effect(unknown: float, kind: str) -> None:
+    weighed = _weighed({"none": 0.0, "unknown": unknown, "rail_viscous": 500.0})
+    assert decide(weighed, Change(0.05, 0.05), 0.0, tolerance_alone=True)[0] == kind
 
 
 def test_only_what_was_fitted_can_be_named() -> None:

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.presentation import no_progress
 from savgs_ident.core.status import Status
-from savgs_ident.diagnosis.search import Findings, single_effects, with_pairs
+from savgs_ident.diagnosis.findings import Findings
+from savgs_ident.diagnosis.search import single_effects, with_pairs
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Prediction, Term
