@@ -3,18 +3,22 @@
 A force in the strut and the same beside it in the wishbone joints move the rig nearly alike. How far a campaign
 distinguishes two such ports is not a matter of the diagnosis alone: here the drawn law itself is fitted at its own
 port and at another one, with the search, the priors and the background of a diagnosis. The difference of their log
-evidences is all that a diagnosis could have to go on that knew the formula.
+evidences is all that a diagnosis could have to go on that knew the formula. Ports count their displacements to
+different sides, so that a law which knows up from down, as a stop does, is fitted the other way round, too.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
+from types import new_class
+from typing import Any
 
 from savgs_ident.core.presentation import no_progress
+from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.diagnose import baseline_problem
 from savgs_ident.diagnosis.model_selection import recalibrate
 from savgs_ident.diagnosis.result import DiagnosisSettings
 from savgs_ident.diagnosis.search import single_effects, singles_among
-from savgs_ident.effects.base import Port
+from savgs_ident.effects.base import AbstractForceLaw, Port, PortSignals
 from savgs_ident.effects.effect import Effect, typical_effect
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.model import RigModel
@@ -24,6 +28,9 @@ from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 ELSEWHERE = "elsewhere"
 """The name of the effect at the other port."""
+
+TURNED = "elsewhere_turned"
+"""That of the same the other way round."""
 
 
 def log_odds_of_port(
@@ -36,11 +43,36 @@ def log_odds_of_port(
     port = _port_for(drawn, location)
     if port is None:
         return None
-    there = typical_effect(ELSEWHERE, port, drawn.law, symptom=drawn.symptom, reference=drawn.reference)
-    evidence = _log_evidences(measured, rig, {drawn.name: drawn, ELSEWHERE: there}, settings)
-    if not {drawn.name, ELSEWHERE} <= set(evidence):
-        return None
-    return evidence[drawn.name] - evidence[ELSEWHERE]
+    laws = {ELSEWHERE: drawn.law}
+    if isinstance(drawn.law, AbstractForceLaw):
+        laws[TURNED] = turned(drawn.law)
+    there = {
+        name: typical_effect(name, port, law, symptom=drawn.symptom, reference=drawn.reference)
+        for name, law in laws.items()
+    }
+    evidence = _log_evidences(measured, rig, {drawn.name: drawn, **there}, settings)
+    found = [evidence[name] for name in there if name in evidence]
+    return evidence[drawn.name] - max(found) if drawn.name in evidence and found else None
+
+
+def turned(law: AbstractForceLaw) -> AbstractForceLaw:
+    """The law with both directions of its port exchanged: a stop at the other end."""
+    base = type(law)
+
+    def seen(signals: PortSignals) -> PortSignals:
+        return PortSignals(-signals.displacement, -signals.velocity, signals.load, -signals.rest)
+
+    def force(self: Any, v: Values, signals: PortSignals, state: Any) -> Any:
+        return -law.force(v, seen(signals), state)
+
+    def rate(self: Any, v: Values, signals: PortSignals, state: Any) -> Any:
+        return law.rate(v, seen(signals), state)
+
+    body = {"force": force, "rate": rate, "__module__": __name__, "__doc__": "The other way round."}
+    other = new_class(f"Turned{base.__name__}", (base,), exec_body=lambda names: names.update(body))
+    found = other(**{each.name: getattr(law, each.name) for each in fields(law)})
+    assert isinstance(found, AbstractForceLaw)
+    return found
 
 
 def _port_for(drawn: Effect, location: str) -> Port | None:
