@@ -202,14 +202,14 @@ class _Fits:
         self.progress(f"fitting {name} from its value in {hypothesis_of(pair)}")
         return find_map(self.search, (self.terms[name],), pair.values, pair.prediction.warm_start)
 
-    def from_typical_size(self, term: Term) -> LaplaceFit:
-        """The fit of a term from its typical size, where of all that is tried it comes nearest to the data."""
+    def from_typical_size(self, term: Term, least: float) -> LaplaceFit:
+        """The fit of a term from its typical size, of all that is tried where that is nearest; or given up."""
         self.progress(f"fitting {term.name} from its typical size")
         typical = {each.name: each.value(self.constants.typical_coordinate) for each in term.amplitudes}
         starts = [self.base.values | typical | shapes for shapes in term.tried]
         warm_start = self.base.prediction.warm_start
         start = densest(self.search, (term,), starts, warm_start)
-        return find_map_from_both(self.search, (term,), start, warm_start)
+        return find_map_from_both(self.search, (term,), start, warm_start, least=least)
 
     def extended(
         self, parent: LaplaceFit, scores: Sequence[Score], least: float = -np.inf
@@ -279,7 +279,9 @@ def _single_effects(fits: _Fits, scores: Sequence[Score]) -> list[LaplaceFit]:
     else:
         later = later[: constants.further_fits]
         # A strong resonance is far from what it does to first order, wherever it is.
-        swinging = in_parallel(fits.from_typical_size, [term for term in fits.terms.values() if term.tries])
+        near = max((mode.evidence for mode in ranked), default=-np.inf) - constants.refined_log_evidence
+        several = [term for term in fits.terms.values() if term.tries]
+        swinging = in_parallel(lambda term: fits.from_typical_size(term, near), several)
     more = fits.extended(base, later, max(least, fits.negligible(ranked)))
     return fits.refined(_best_of_each([*ranked, *more, *swinging]))
 
