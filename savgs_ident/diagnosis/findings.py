@@ -72,3 +72,15 @@ def left_over(
 def to_be_gained(search: Search, mode: LaplaceFit) -> float:
     """By how much the log density of one that leaves nothing but the noise would be greater [nat], if at all."""
     return max(-0.5 * search.rows.measured.size - mode.noise_scales.value, 0.0)
+
+
+def explains_all(
+    search: Search, base: LaplaceFit, mode: LaplaceFit, constants: DecisionConstants = DEFAULTS
+) -> bool:
+    """Whether a hypothesis leaves next to nothing of the baseline's misfit, and next to no log density to be gained.
+
+    A formula that only resembles the right one may leave less of the misfit than its noise, spread over all rows, and
+    yet be much less probable than the right one is.
+    """
+    little = left_over(search, base, mode, constants) <= constants.explained_share
+    return little and to_be_gained(search, mode) <= constants.negligible_gain * search.rows.measured.size

@@ -31,7 +31,13 @@ from savgs_ident.diagnosis.evidence import (
     FlexibleMember,
     is_better_form,
 )
-from savgs_ident.diagnosis.findings import Findings, hypothesis_of, left_over, to_be_gained
+from savgs_ident.diagnosis.findings import (
+    Findings,
+    explains_all,
+    hypothesis_of,
+    left_over,
+    to_be_gained,
+)
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.materiality import change_of, change_without, immaterial, material
@@ -220,7 +226,7 @@ def _learned_laws(
         return ()
     count = len(findings.scores)
     weight = best.evidence + log_prior(hypothesis_of(best), count, constants)
-    explained = left_over(problem.search, base, best, constants) <= constants.explained_share
+    explained = explains_all(problem.search, base, best, constants)
     if explained and weight >= linear + log_prior(UNKNOWN, count, constants):
         return ()
     ports = _worth_learning(problem, findings, localisations)

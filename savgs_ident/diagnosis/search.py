@@ -22,7 +22,13 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
-from savgs_ident.diagnosis.findings import Findings, LostHypothesis, hypothesis_of, left_over
+from savgs_ident.diagnosis.findings import (
+    Findings,
+    LostHypothesis,
+    explains_all,
+    hypothesis_of,
+    left_over,
+)
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import (
     PairScore,
@@ -165,8 +171,8 @@ class _Fits:
     constants: DecisionConstants
 
     def explains_all(self, mode: LaplaceFit) -> bool:
-        """Whether a hypothesis leaves next to nothing of the baseline's misfit."""
-        return mode.solved and self._left(mode) <= self.constants.explained_share
+        """Whether a hypothesis leaves next to nothing."""
+        return mode.solved and explains_all(self.search, self.base, mode, self.constants)
 
     def is_spotless(self, mode: LaplaceFit) -> bool:
         """Whether a hypothesis leaves hardly more than the noise, and every parameter within its tolerance."""

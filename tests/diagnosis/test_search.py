@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from savgs_ident.core.status import Status
-from savgs_ident.diagnosis.findings import Findings, excess, left_over, to_be_gained
+from savgs_ident.diagnosis.findings import Findings, excess, explains_all, left_over, to_be_gained
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out, predict_left_out, select_in_folds
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation, anywhere, localise
 from savgs_ident.diagnosis.result import Hypothesis
@@ -282,6 +282,21 @@ def test_what_a_fit_leaves_to_be_gained_is_what_the_right_one_gains() -> None:
     gained = right.noise_scales.value - findings.base.noise_scales.value
     assert gained > 10.0 * chance
     assert to_be_gained(search, findings.base) == pytest.approx(gained, abs=chance)
+
+
+@pytest.mark.parametrize(("off", "all_of_it"), [(0.2, True), (0.6, False)])
+def test_what_resembles_the_right_one_leaves_little_of_the_misfit_and_does_not_explain_all(
+    off: float, all_of_it: bool
+) -> None:
+    """Six tenths of the noise, added in squares, are less than is known of the noise, but not in 120 rows."""
+    search, findings = _found({"c": 1.5}, 5)
+    right = next(each for each in findings.modes if each.terms == ("bend",))
+    size = NOISE * np.sign(search.residual(right.prediction))
+    rows = search.data.measured - size * np.sqrt(1.0 + off**2)
+    like = replace(right, prediction=right.prediction._replace(rows=rows))
+    like = replace(like, noise_scales=noise_scales(search.rows, search.missed(like.prediction)))
+    assert left_over(search, findings.base, like) < DEFAULTS.explained_share
+    assert explains_all(search, findings.base, like) == all_of_it
 
 
 def test_a_law_anywhere_is_as_probable_as_its_places_are_on_average() -> None:
