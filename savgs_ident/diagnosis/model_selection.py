@@ -107,6 +107,7 @@ def compare_models(problem: DiagnosisProblem, progress: Progress) -> FittedHypot
     )
     laws = _learned_laws(problem, findings, localisations, progress)
     members = _flexible_members(problem, laws, len(localisations))
+    findings = _with_formulas_of(problem, findings, members, progress)
     beside, least = -np.inf, -np.inf
     law_explains = _law_explains(members, localisations, constants)
     if law_explains:
@@ -120,6 +121,20 @@ def compare_models(problem: DiagnosisProblem, progress: Progress) -> FittedHypot
     return FittedHypotheses(
         findings, tuple(localisations), laws, beside, best, change_without(problem, best, best.terms)
     )
+
+
+def _with_formulas_of(
+    problem: DiagnosisProblem, findings: Findings, members: Sequence[FlexibleMember], progress: Progress
+) -> Findings:
+    """The findings, and the catalogue's formulas of the most probable learned law's family at its location.
+
+    The law is known where one of them does as much.
+    """
+    if not members:
+        return findings
+    family, candidates = members[0].hypothesis.flexible, problem.plant.candidates
+    wanted = [each for each in candidates if family in problem.families(Hypothesis((each.name,)))]
+    return singles_among(problem.search, findings, wanted, candidates, progress, problem.constants)
 
 
 def _law_explains(

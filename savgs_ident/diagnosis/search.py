@@ -107,15 +107,17 @@ def singles_among(
 ) -> Findings:
     """The findings, and each of the ``wanted`` among the ``terms`` alone that has not been fitted yet.
 
-    An effect that acts far from in proportion to its size scores little at its null.
+    An effect that acts far from in proportion to its size scores little at its null: it is fitted from its typical
+    size, too.
     """
     tried = {mode.terms for mode in findings.modes}
     fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
     others = [term for term in wanted if (term.name,) not in tried]
     singles = fits.extended(findings.base, score_terms(search, findings.base, others, constants))
-    more = _findings(
-        findings.base, findings.scores, fits.refined([*findings.modes, *singles]), findings.sensitivities
-    )
+    least = max((mode.evidence for mode in findings.modes), default=-np.inf) - constants.refined_log_evidence
+    singles += in_parallel(lambda term: fits.from_typical_size(term, least), others)
+    found = fits.refined([*findings.modes, *_best_of_each(singles)])
+    more = _findings(findings.base, findings.scores, found, findings.sensitivities)
     return replace(more, lost=(*findings.lost, *more.lost))
 
 

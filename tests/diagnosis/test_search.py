@@ -15,7 +15,7 @@ from savgs_ident.diagnosis.held_out import HeldOut, hold_out, predict_left_out, 
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation, anywhere, localise
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import best_pairs, cosine, score_terms
-from savgs_ident.diagnosis.search import pairs_with
+from savgs_ident.diagnosis.search import pairs_with, singles_among
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
 from savgs_ident.inference.likelihood import noise_scales
@@ -362,10 +362,10 @@ def test_a_fit_without_motion_is_lost_and_a_column_that_is_no_number_not_scored(
 
 
 class _Squared(ToyPlant):
-    """What ripples grows with the square of its size: to first order it does nothing."""
+    """What ripples and what bends grow with the square of their size: to first order they do nothing."""
 
     def rows(self, values: Mapping[str, float]) -> NDArray[np.float64]:
-        return super().rows(dict(values) | {"s": values.get("s", 0.0) ** 2})
+        return super().rows(dict(values) | {name: values.get(name, 0.0) ** 2 for name in "sc"})
 
 
 @over("seed", range(5))
@@ -377,6 +377,17 @@ def test_what_shows_nothing_to_first_order_is_found_from_its_typical_size(seed: 
     assert ripple.sigma < 1.0
     assert best_of(findings).terms == ("ripple",)
     assert best_of(findings).values["w"] == pytest.approx(11.0, rel=0.05)
+
+
+@over("seed", range(5))
+def test_a_wanted_one_that_shows_nothing_to_first_order_is_found_from_its_typical_size(seed: int) -> None:
+    plant = _Squared()
+    search = search_of(plant, draw(plant, {"a": 1.0, "c": 0.6}, NOISE, seed))
+    findings = forward_selection(search, find_map(search, (), {}, None), TERMS)
+    assert "bend" not in best_of(findings).terms
+    more = singles_among(search, findings, TERMS[:1], TERMS, _silent)
+    assert best_of(more).terms == ("bend",)
+    assert abs(best_of(more).values["c"]) == pytest.approx(0.6, rel=0.05)
 
 
 class _Shapes(ToyPlant):
