@@ -164,6 +164,7 @@ def _regimes_of(damping: np.ndarray) -> dict[str, float]:
     return _significant(problem.regimes(data, fit))
 
 
+@pytest.mark.slow
 def test_a_damping_that_fades_over_the_campaign_is_found_as_a_drift() -> None:
     with as_users_have_it():
         fading = _regimes_of(PARAMETERS["c"].value * (1.1 - 0.2 * ORDER / 7.0))

@@ -113,9 +113,13 @@ def test_a_chain_says_where_it_was(name: str, chains: Mapping[str, Chains], bent
     assert reported.evaluations >= reported.accepted.size
 
 
-@pytest.mark.parametrize("name", SAMPLERS)
 @pytest.mark.parametrize(
-    "share", [pytest.param(0.5, id="half", marks=pytest.mark.slow), pytest.param(0.1, id="a tenth")]
+    ("name", "share"),
+    [
+        *(pytest.param(name, 0.5, id=f"half-{name}", marks=pytest.mark.slow) for name in SAMPLERS),
+        pytest.param("nuts", 0.1, id="a tenth-nuts", marks=pytest.mark.slow),
+        pytest.param("emcee", 0.1, id="a tenth-emcee"),
+    ],
 )
 def test_no_point_without_a_solution_is_drawn(
     name: str, share: float, bent: Toy, rough: Stand, reference: Reference
