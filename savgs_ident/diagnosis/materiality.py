@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from savgs_ident.diagnosis.background import relative_change
 from savgs_ident.diagnosis.evidence import DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.findings import Findings, hypothesis_of
+from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import Amplitudes
 from savgs_ident.diagnosis.verdict import Change, without_immaterial_members
@@ -73,6 +74,16 @@ def change_without(problem: DiagnosisProblem, mode: LaplaceFit, gone: Sequence[s
     if not without.solved:
         return Change(np.inf, np.inf)
     return change_of(problem, mode.prediction.rows - without.rows)
+
+
+def change_by_law(problem: DiagnosisProblem, law: LearnedLaw) -> Change:
+    """What a learned law does to the response, all other parameters as they are beside it; infinite as above."""
+    plant = problem.plant
+    values = {each.name: law.mode.values[each.name] for each in plant.nuisances}
+    without = plant.predict((), values, (), problem.base.prediction.warm_start)
+    if not without.solved:
+        return Change(np.inf, np.inf)
+    return change_of(problem, law.mode.prediction.rows - without.rows)
 
 
 def change_of(problem: DiagnosisProblem, rows: NDArray[np.float64]) -> Change:

@@ -40,7 +40,7 @@ from savgs_ident.diagnosis.findings import (
 )
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
-from savgs_ident.diagnosis.materiality import change_of, change_without, immaterial, material
+from savgs_ident.diagnosis.materiality import change_by_law, change_of, change_without, immaterial, material
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
 from savgs_ident.diagnosis.score_test import prior_conflict
@@ -181,6 +181,10 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
     kind, chosen = decide(weighed, change, left, constants, tolerance_alone)
     more = [WeighedHypothesis(each.hypothesis, each.weight, each.law.mode, each.sd) for each in members]
     weighed = tuple(sorted((*weighed, *more), key=lambda each: -each.weight))
+    too_little = dict(immaterial(problem, findings, members))
+    if tolerance_alone:
+        # The recalibrated baseline has the number that is off already.
+        too_little[UNKNOWN] = 1.0
     found = DiagnosisEvidence(
         findings=findings,
         localisations=localisations,
@@ -191,7 +195,7 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
         kind=kind,
         chosen=chosen,
         left=left,
-        immaterial=immaterial(problem, findings, members),
+        immaterial=too_little,
         insufficient=_insufficient(problem, findings, members),
     )
     if not members or not (
@@ -220,8 +224,8 @@ def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: Fl
     fitted = [each.weight for each in evidence.weighed if each.mode is not None and each.hypothesis.effects]
     if member.weight < max([none.weight + constants.alarm_log_odds, evidence.unknown.weight, *fitted]):
         return False
-    change = change_of(problem, member.law.mode.prediction.rows - problem.base.prediction.rows)
-    return member.left <= constants.unexplained_share_flexible and change.matters(constants)
+    explains = member.left <= constants.unexplained_share_flexible
+    return explains and change_by_law(problem, member.law).matters(constants)
 
 
 def _learned_laws(

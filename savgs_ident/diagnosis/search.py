@@ -288,7 +288,7 @@ def _single_effects(fits: _Fits, scores: Sequence[Score]) -> list[LaplaceFit]:
         later = later[: constants.further_fits]
         # A strong resonance is far from what it does to first order, wherever it is.
         near = max((mode.evidence for mode in ranked), default=-np.inf) - constants.refined_log_evidence
-        several = [term for term in fits.terms.values() if term.tries]
+        several = [] if fits.explains_all(base) else [term for term in fits.terms.values() if term.tries]
         swinging = in_parallel(lambda term: fits.from_typical_size(term, near), several)
     more = fits.extended(base, later, max(least, fits.negligible(ranked)))
     return fits.refined(_best_of_each([*ranked, *more, *swinging]))
