@@ -1,14 +1,24 @@
-"""Hypotheses as a report shows them."""
+"""Hypotheses as a report shows them, and which formulas are tried beside a learned law."""
 
+from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from savgs_ident.core.presentation import no_progress
+from savgs_ident.diagnosis import model_selection
 from savgs_ident.diagnosis.candidates import joint_sigma
+from savgs_ident.diagnosis.evidence import DiagnosisProblem
+from savgs_ident.diagnosis.result import Hypothesis, PortFamily
 from savgs_ident.diagnosis.score_test import Score
+from savgs_ident.effects.base import Family
+from savgs_ident.inference.observations import Term
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 
 TERM: Any = None
+FOUND: Any = object()
 
 
 def _score(sigma: float, *direction: float) -> Score:
@@ -31,3 +41,30 @@ def test_effects_that_do_the_same_are_as_significant_as_one() -> None:
 def test_one_alone_has_its_own_and_none_has_none() -> None:
     assert joint_sigma([_score(7.0, 1.0, 2.0)]) == pytest.approx(7.0)
     assert joint_sigma([]) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("location", "formulas"),
+    [("tyre_lateral", {"tyre_lateral_compliance"}), ("strut", {"mount_compliance", "damper_hysteresis"})],
+)
+def test_the_formulas_of_a_learned_law_are_those_of_its_family_at_its_location(
+    location: str, formulas: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    absent: Any = None
+    terms = [Term(name, each.port.location, ()) for name, each in CATALOGUE.items()]
+    plant: Any = SimpleNamespace(catalogue=CATALOGUE, candidates=terms)
+    problem = DiagnosisProblem(plant, absent, absent, absent, absent)
+    member: Any = SimpleNamespace(hypothesis=Hypothesis(flexible=PortFamily(location, Family.COMPLIANCE)))
+    wanted: set[str] = set()
+
+    def fitted(search: Any, findings: Any, some: Sequence[Term], *rest: Any) -> Any:
+        del search, rest
+        wanted.update(each.name for each in some)
+        return findings
+
+    monkeypatch.setattr(model_selection, "singles_among", fitted)
+    assert model_selection._with_formulas_of(problem, FOUND, [member], no_progress) is FOUND
+    assert wanted == formulas
+    wanted.clear()
+    assert model_selection._with_formulas_of(problem, FOUND, [], no_progress) is FOUND
+    assert not wanted
