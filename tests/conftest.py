@@ -103,7 +103,7 @@ COMPILED_MORE_THAN_COMPUTED = (
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Nothing is cached outside temporary folders; and the compiler is set up before the first program."""
+    """Nothing is cached outside temporary folders; compiler and cores are set up before the first program."""
     if not hasattr(config, "workerinput"):
         folder = Path(tempfile.mkdtemp(prefix="savgs-ident-tests-"))
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
@@ -111,9 +111,11 @@ def pytest_configure(config: pytest.Config) -> None:
         flags = os.environ.get("XLA_FLAGS", "")
         if _only_the_fast(config) and "optimization_level" not in flags:
             os.environ["XLA_FLAGS"] = f"{flags} {UNOPTIMISED}".strip()
-    from savgs_ident.simulate.program_cache import spare_the_compiler
+    from savgs_ident.simulate.program_cache import compute_on_one_core, spare_the_compiler
 
     spare_the_compiler()
+    if hasattr(config, "workerinput"):
+        compute_on_one_core()
 
 
 def _only_the_fast(config: pytest.Config) -> bool:

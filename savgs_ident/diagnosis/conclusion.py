@@ -162,7 +162,7 @@ def decide_by_held_out(
     is small, something is missing, whether anything explains it or not. A tolerance that does not hold is in the
     recalibrated baseline already.
     """
-    if evidence.kind == "unknown" and evidence.unknown.reason == "tolerance":
+    if evidence.kind == "unknown" and evidence.unknown.is_tolerance:
         return evidence
     least = constants.material_share**2 + constants.sure_of_gap * gap.scatter
     small = min(gap.recalibrated, fitted) ** 2 - gap.floor**2 <= least

@@ -246,7 +246,7 @@ class DiagnosisEvidence:
         """Where something unknown acts: the port of a broken tolerance, if that is it, or that of the law."""
         if self.named_law is not None:
             return self.named_law.location
-        broken = self.broken.port if self.unknown.reason == "tolerance" else None
+        broken = self.broken.port if self.unknown.is_tolerance else None
         return self.localisation.name if broken is None else broken
 
     def indistinguishable_ports(self, constants: DecisionConstants = DEFAULTS) -> tuple[str, ...]:

@@ -175,14 +175,13 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
     if others:
         first = max(others, key=lambda each: each.evidence)
         alone = anywhere(others) if change_of(problem, first.moved).matters(constants) else -np.inf
-    unknown = unknown_evidence(findings, alone, fitted.beside, broken.weight, constants)
+    unknown = unknown_evidence(findings, alone, fitted.beside, broken, constants)
     weighed = weigh(findings, unknown, constants)
-    tolerance_alone = unknown.reason == "tolerance" and not broken.beside.effects
-    kind, chosen = decide(weighed, change, left, constants, tolerance_alone)
+    kind, chosen = decide(weighed, change, left, constants, unknown.reason)
     more = [WeighedHypothesis(each.hypothesis, each.weight, each.law.mode, each.sd) for each in members]
     weighed = tuple(sorted((*weighed, *more), key=lambda each: -each.weight))
     too_little = dict(immaterial(problem, findings, members))
-    if tolerance_alone:
+    if unknown.reason == "tolerance":
         # The recalibrated baseline has the number that is off already.
         too_little[UNKNOWN] = 1.0
     found = DiagnosisEvidence(

@@ -244,7 +244,7 @@ def _something_unknown(problem: DiagnosisProblem, evidence: DiagnosisEvidence, g
 
 def _is_sheet_wrong(evidence: DiagnosisEvidence) -> bool:
     """Whether a tolerance that does not hold is more probable than anything else."""
-    return evidence.unknown.reason == "tolerance" and evidence.weighed[0].hypothesis.unknown
+    return evidence.unknown.is_tolerance and evidence.weighed[0].hypothesis.unknown
 
 
 def _sheet_wrong(problem: DiagnosisProblem, evidence: DiagnosisEvidence, gap: Shrink) -> Verdict:
@@ -367,7 +367,7 @@ def write_warnings(
             found.append(f"The search for {name} did not converge: {mode.status.advice}.")
     conflict, chosen = evidence.broken.conflict, evidence.chosen
     if evidence.kind in ("effect", "several") and evidence.unknown.weight > chosen.weight:
-        if evidence.unknown.reason == "tolerance":
+        if evidence.unknown.is_tolerance:
             found.append(
                 f"Besides, the model would need `{conflict.parameter}` {abs(conflict.tolerances):.1f} tolerances "
                 f"{'above' if conflict.tolerances > 0.0 else 'below'} its data sheet."

@@ -52,8 +52,8 @@ class Change(NamedTuple):
         return self.overall >= constants.material_share or local
 
 
-Reason = Literal["law", "law beside effects", "tolerance"]
-"""What speaks for something unknown: a law at a port, one beside the best effects, a tolerance that does not hold."""
+Reason = Literal["law", "law beside effects", "tolerance", "tolerance beside effects"]
+"""What speaks for something unknown: a law at a port, a tolerance that does not hold, or either beside effects."""
 
 
 class UnknownEvidence(NamedTuple):
@@ -61,6 +61,11 @@ class UnknownEvidence(NamedTuple):
 
     weight: float
     reason: Reason
+
+    @property
+    def is_tolerance(self) -> bool:
+        """Whether it is a number of the data sheet that does not hold."""
+        return self.reason in ("tolerance", "tolerance beside effects")
 
 
 class BrokenTolerance(NamedTuple):
@@ -145,19 +150,23 @@ def broken_tolerance(
 
 
 def unknown_evidence(
-    findings: Findings, alone: float, beside: float, broken: float, constants: DecisionConstants = DEFAULTS
+    findings: Findings,
+    alone: float,
+    beside: float,
+    broken: BrokenTolerance,
+    constants: DecisionConstants = DEFAULTS,
 ) -> UnknownEvidence:
     """What speaks most for something unknown.
 
     ``alone`` is the log evidence of a law learned at some port, ``beside`` that of one beside the most probable
-    hypothesis, whose prior it shares; ``broken`` is the log weight of a broken tolerance.
+    hypothesis, whose prior it shares; ``broken`` the most probable tolerance that does not hold.
     """
     prior = log_prior(hypothesis_of(most_probable(findings, constants)), len(findings.scores), constants)
     unknown = log_prior(UNKNOWN, len(findings.scores), constants)
     found = (
         UnknownEvidence(alone + unknown, "law"),
         UnknownEvidence(beside + unknown + prior, "law beside effects"),
-        UnknownEvidence(broken, "tolerance"),
+        UnknownEvidence(broken.weight, "tolerance beside effects" if broken.beside.effects else "tolerance"),
     )
     return max(found, key=lambda each: each.weight)
 
@@ -227,14 +236,14 @@ def decide(
     change: Change,
     left: float,
     constants: DecisionConstants = DEFAULTS,
-    tolerance_alone: bool = False,
+    unknown_by: Reason = "law",
 ) -> tuple[Kind, WeighedHypothesis]:
     """What may be said, and the hypothesis that it rests on.
 
     ``change`` is what the best fitted hypothesis does to the response; ``left`` the share of the baseline's misfit
-    that it leaves. What leaves next to nothing is named though something unknown may explain the rest as well; but
-    not where ``tolerance_alone`` speaks for something unknown, one that does not hold in the baseline as it is:
-    then it is known what is off, and that it is more probable.
+    that it leaves; ``unknown_by`` what speaks for something unknown. What leaves next to nothing is named though
+    something unknown may explain the rest as well; but not where that is a tolerance which does not hold in the
+    baseline as it is: then it is known what is off, and that it is more probable.
     """
     none, unknown = (
         next(each for each in weighed if each.hypothesis == hypothesis) for hypothesis in (NONE, UNKNOWN)
@@ -244,7 +253,7 @@ def decide(
     if alarm_odds(weighed) < constants.alarm_log_odds:
         return "none", none
     explains = best.weight >= none.weight + constants.alarm_log_odds and left <= constants.explained_share
-    named = explains and change.matters(constants) and not tolerance_alone
+    named = explains and change.matters(constants) and unknown_by != "tolerance"
     if unknown.weight > best.weight and not named:
         return "unknown", unknown
     if not change.matters(constants):

@@ -3,7 +3,7 @@
 import re
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -338,7 +338,7 @@ GAPS = st.floats(0.0, 0.3)
     odds=st.fixed_dictionaries({"unknown": st.floats(-50.0, 900.0), "rail_viscous": st.floats(-50.0, 900.0)}),
     left=st.floats(0.0, 1.0),
     change=st.floats(0.0, 0.1),
-    reason=st.sampled_from(("law", "law beside effects", "tolerance")),
+    reason=st.sampled_from(get_args(Reason)),
     gaps=st.tuples(GAPS, GAPS, GAPS, GAPS),
     off=st.floats(-8.0, 8.0),
     worse=st.sampled_from((0.0, 0.2)),
@@ -355,8 +355,7 @@ def test_no_verdict_contradicts_its_numbers(
     scatter: float,
 ) -> None:
     evidence = replace(_evidence("none", reason, {"none": 0.0} | odds, off=off), left=left)
-    alone = reason == "tolerance"
-    kind, chosen = decide(evidence.weighed, Change(change, change), left, tolerance_alone=alone)
+    kind, chosen = decide(evidence.weighed, Change(change, change), left, unknown_by=reason)
     # Parameters have something to do with the gap: the noise is the least that is left.
     before, recalibrated, after, floor = gaps[0], max(gaps[1], gaps[3]), max(gaps[2], gaps[3]), gaps[3]
     after = recalibrated if kind == "none" else after
@@ -368,7 +367,7 @@ def test_no_verdict_contradicts_its_numbers(
     by_chance = DEFAULTS.sure_of_gap * scatter
     large = fitted**2 - floor**2 > DEFAULTS.material_share**2 + by_chance
     explained = left <= DEFAULTS.explained_share and change >= DEFAULTS.material_share_of_test
-    tolerance = reason == "tolerance" and verdict.kind == "unknown"
+    tolerance = decided.unknown.is_tolerance and verdict.kind == "unknown"
     if verdict.kind == "none":
         assert not large
     named = odds["rail_viscous"] > DEFAULTS.alarm_log_odds and explained

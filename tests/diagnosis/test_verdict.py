@@ -16,7 +16,9 @@ from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
 from savgs_ident.diagnosis.score_test import PriorConflict
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
+    BrokenTolerance,
     Change,
+    Reason,
     UnknownEvidence,
     WeighedHypothesis,
     alarm_odds,
@@ -122,7 +124,7 @@ def test_kinds(weights: dict[str, float], change: float, left: float, kind: str,
 @pytest.mark.parametrize(("unknown", "kind"), [(600.0, "unknown"), (499.0, "effect")])
 def test_a_tolerance_that_explains_more_alone_comes_before_an_effect(unknown: float, kind: str) -> None:
     weighed = _weighed({"none": 0.0, "unknown": unknown, "rail_viscous": 500.0})
-    assert decide(weighed, Change(0.05, 0.05), 0.0, tolerance_alone=True)[0] == kind
+    assert decide(weighed, Change(0.05, 0.05), 0.0, unknown_by="tolerance")[0] == kind
 
 
 def test_only_what_was_fitted_can_be_named() -> None:
@@ -247,18 +249,20 @@ def test_a_pair_must_be_better_by_what_it_is_less_probable_beforehand() -> None:
 
 
 @pytest.mark.parametrize(
-    ("alone", "beside", "broken", "reason"),
+    ("alone", "beside", "broken", "tolerance_beside", "reason"),
     [
-        (600.0, -np.inf, 500.0, "law"),
-        (400.0, 600.0, 500.0, "law beside effects"),
-        (400.0, 500.0, 595.0, "tolerance"),
+        (600.0, -np.inf, 500.0, NONE, "law"),
+        (400.0, 600.0, 500.0, NONE, "law beside effects"),
+        (400.0, 500.0, 595.0, NONE, "tolerance"),
+        (400.0, 500.0, 595.0, Hypothesis(("rail_stribeck",)), "tolerance beside effects"),
     ],
 )
 def test_what_speaks_for_something_unknown_is_known(
-    alone: float, beside: float, broken: float, reason: str
+    alone: float, beside: float, broken: float, tolerance_beside: Hypothesis, reason: Reason
 ) -> None:
     findings = Findings(_mode(0.0), SCORES, (_mode(500.0, "rail_stribeck"),))
-    found = unknown_evidence(findings, alone, beside, broken)
+    tolerance = BrokenTolerance(broken, PriorConflict(20.0, "k_sd", 8.7), tolerance_beside, "strut")
+    found = unknown_evidence(findings, alone, beside, tolerance)
     assert found.reason == reason
     assert 590.0 < found.weight < 600.0
 

@@ -181,15 +181,26 @@ class SectionCurves(eqx.Module):
         return Section._make((*entries[:10], entries[10:].reshape(4, 3)))
 
 
-# Compiled by itself: it is traced once for the solver and for its derivatives.
-@eqx.filter_jit
+_SHAPING = (
+    *(f"{point}_{axis}" for point in ("A", "B", "C", "D", "E", "W", "cg_L", "cg_U", "cg_K") for axis in "yz"),
+    *("m_s", "m_u", "m_L", "m_U", "J_L", "J_U", "J_K", "z_tb", "g"),
+)
+"""The parameters that curves depend on."""
+
+
 def section_curves(p: Values) -> SectionCurves:
     """The curves of a parameter set.
 
     Pose and slope are evaluated in closed form; the curvature at the nodes is that of the polynomial through the
     slopes, which is exact to rounding and much less to compile.
     """
+    # Without the parameters of effects: with them it would be compiled anew for each model.
+    return _section_curves({name: p[name] for name in _SHAPING})
 
+
+# Compiled by itself: it is traced once for the solver and for its derivatives.
+@eqx.filter_jit
+def _section_curves(p: Values) -> SectionCurves:
     def pose_and_slope(theta: Array) -> tuple[Linkage, Linkage]:
         return jax.jvp(lambda angle: linkage(p, angle), (theta,), (jnp.ones_like(theta),))
 
