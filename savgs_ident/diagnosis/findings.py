@@ -1,11 +1,9 @@
 """What a search for what is missing has tried, and what its fits leave of the misfit."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.result import Hypothesis
@@ -30,14 +28,12 @@ class Findings:
         scores: scores of all effects at the baseline, best first.
         modes: hypotheses that were fitted in full, the best first; the baseline is not among them.
         lost: hypotheses whose fit found no solution of the plant, and how that ended.
-        sensitivities: by effect, what it does to the rows about the baseline [units of the rows], (tries, m, k).
     """
 
     base: LaplaceFit
     scores: tuple[Score, ...]
     modes: tuple[LaplaceFit, ...]
     lost: tuple[LostHypothesis, ...] = ()
-    sensitivities: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
 def hypothesis_of(mode: LaplaceFit) -> Hypothesis:

@@ -12,7 +12,7 @@ data alone estimate x / (1 - v) with variance v / (1 - v), from which both evide
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from math import exp, inf, log, sqrt
 from typing import NamedTuple
@@ -101,6 +101,16 @@ def scores_of(
     sigma = constants.visible_sigma
     found = [_score(search, mode, term, each, sigma) for term, each in zip(terms, sensitivities, strict=True)]
     return sorted(found, key=lambda each: -each.evidence)
+
+
+def scores_by_try(
+    search: Search, mode: LaplaceFit, term: Term, constants: DecisionConstants = DEFAULTS
+) -> list[Score]:
+    """Scores of one candidate about a fit, each with its shapes at one of what is tried, best first."""
+    given = mode.values, mode.prediction.warm_start
+    (sensitivities,) = search.plant.sensitivities(mode.terms, *given, [term])
+    one_each = [replace(term, tries=(shapes,)) for shapes in term.tried]
+    return scores_of(search, mode, one_each, list(sensitivities[:, None]), constants)
 
 
 def _score(

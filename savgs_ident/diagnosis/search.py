@@ -18,7 +18,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
@@ -37,7 +36,7 @@ from savgs_ident.diagnosis.score_test import (
     cosine,
     prior_conflict,
     score_terms,
-    scores_of,
+    scores_by_try,
 )
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.find_map import (
@@ -70,10 +69,8 @@ def single_effects(
         progress(f"{hypothesis_of(together[0])}: nothing is left")
         return _findings(base, score_terms(search, base, list(terms), constants), together)
     progress(f"scores of {len(terms)} effects")
-    sensitivities = search.plant.sensitivities((), base.values, base.prediction.warm_start, list(terms))
-    scores = scores_of(search, base, terms, sensitivities, constants)
-    by_name = dict(zip((term.name for term in terms), sensitivities, strict=True))
-    return _findings(base, scores, [*together, *_single_effects(fits, scores)], by_name)
+    scores = score_terms(search, base, list(terms), constants)
+    return _findings(base, scores, [*together, *_single_effects(fits, scores)])
 
 
 def with_pairs(
@@ -92,8 +89,8 @@ def with_pairs(
     singles = [mode for mode in findings.modes if len(mode.terms) == 1]
     if not singles or singles[0].evidence <= findings.base.evidence + constants.pair_log_evidence:
         return findings
-    pairs = _pairs(fits, singles, findings.scores, findings.sensitivities, least)
-    more = _findings(findings.base, findings.scores, [*findings.modes, *pairs], findings.sensitivities)
+    pairs = _pairs(fits, singles, findings.scores, least)
+    more = _findings(findings.base, findings.scores, [*findings.modes, *pairs])
     return replace(more, lost=(*findings.lost, *more.lost))
 
 
@@ -108,7 +105,8 @@ def singles_among(
     """The findings, and each of the ``wanted`` among the ``terms`` alone that has not been fitted yet.
 
     An effect that acts far from in proportion to its size scores little at its null: it is fitted from its typical
-    size, too.
+    size, too; and what swings from every natural frequency that is tried, fitted already or not, because a sharp
+    resonance shows to first order, and at a typical size, only where it is met to a few per cent.
     """
     tried = {mode.terms for mode in findings.modes}
     fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
@@ -116,8 +114,13 @@ def singles_among(
     singles = fits.extended(findings.base, score_terms(search, findings.base, others, constants))
     least = max((mode.evidence for mode in findings.modes), default=-np.inf) - constants.refined_log_evidence
     singles += in_parallel(lambda term: fits.from_typical_size(term, least), others)
-    found = fits.refined([*findings.modes, *_best_of_each(singles)])
-    more = _findings(findings.base, findings.scores, found, findings.sensitivities)
+    for term in wanted:
+        if term.tries:
+            singles += fits.extended(
+                findings.base, scores_by_try(search, findings.base, term, constants), least
+            )
+    found = fits.refined(_best_of_each([*findings.modes, *singles]))
+    more = _findings(findings.base, findings.scores, found)
     return replace(more, lost=(*findings.lost, *more.lost))
 
 
@@ -145,9 +148,7 @@ def pairs_with(
                 if term.name not in parent.terms and hypothesis_of(parent).with_effect(term.name) not in tried
             ]
             pairs += fits.extended(parent, score_terms(search, parent, untried, constants))
-    more = _findings(
-        findings.base, findings.scores, fits.refined([*findings.modes, *pairs]), findings.sensitivities
-    )
+    more = _findings(findings.base, findings.scores, fits.refined([*findings.modes, *pairs]))
     return replace(more, lost=(*findings.lost, *more.lost))
 
 
@@ -155,11 +156,10 @@ def _findings(
     base: LaplaceFit,
     scores: Sequence[Score],
     modes: Sequence[LaplaceFit],
-    sensitivities: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> Findings:
     found = sorted((mode for mode in modes if mode.solved), key=lambda mode: -mode.evidence)
     lost = tuple(LostHypothesis(hypothesis_of(mode), mode.status) for mode in modes if not mode.solved)
-    return Findings(base, tuple(scores), tuple(found), lost, sensitivities or {})
+    return Findings(base, tuple(scores), tuple(found), lost)
 
 
 @dataclass(frozen=True)
@@ -304,13 +304,9 @@ def _pairs(
     fits: _Fits,
     singles: Sequence[LaplaceFit],
     scores: Sequence[Score],
-    sensitivities: Mapping[str, NDArray[np.float64]],
     least: float,
 ) -> list[LaplaceFit]:
-    """Fits of pairs that promise more than ``least``, best first.
-
-    ``sensitivities`` are those of all effects about the baseline, by name.
-    """
+    """Fits of pairs that promise more than ``least``, best first."""
     best = singles[0]
     wanting = not fits.explains_all(best)
     if wanting or fits.conflicts(best):
@@ -322,7 +318,7 @@ def _pairs(
         if pairs and not fits.is_spotless(pairs[0]):
             pairs = _with_other_second_effects(fits, pairs, {hypothesis_of(mode) for mode in parents}, least)
     else:
-        pairs = fits.refined(_with_small_second_effects(fits, best, sensitivities))
+        pairs = fits.refined(_with_small_second_effects(fits, best))
     pairs = fits.refined([*pairs, *_best_to_first_order(fits, pairs or [best], scores, least)])
     if pairs and pairs[0].evidence > best.evidence:
         pairs = _with_lookalikes(fits, pairs, scores)
@@ -392,17 +388,10 @@ def _with_lookalikes(fits: _Fits, pairs: list[LaplaceFit], scores: Sequence[Scor
     return fits.refined([*pairs, *in_parallel(lambda each: fits.exchanged(best, *each), exchanges)])
 
 
-def _with_small_second_effects(
-    fits: _Fits, parent: LaplaceFit, sensitivities: Mapping[str, NDArray[np.float64]]
-) -> list[LaplaceFit]:
-    """Pairs of a term that explains nearly all with effects so small that one alone does not show the other.
-
-    What such an effect does is taken from the ``sensitivities`` about the baseline: near enough to say whether it is
-    worth a fit.
-    """
+def _with_small_second_effects(fits: _Fits, parent: LaplaceFit) -> list[LaplaceFit]:
+    """Pairs of a term that explains nearly all with effects so small that one alone does not show the other."""
     others = [term for name, term in fits.terms.items() if name not in parent.terms]
-    known = [sensitivities[term.name] for term in others]
-    scores = scores_of(fits.search, parent, others, known, fits.constants)
+    scores = score_terms(fits.search, parent, others, fits.constants)
     least = parent.evidence + fits.constants.promising_log_evidence
     worth = [each for each in scores if each.evidence > least]
     return fits.extended(parent, worth[: fits.constants.pairs_per_parent])
