@@ -268,6 +268,40 @@ def test_a_wanted_one_that_shows_nothing_to_first_order_is_found_from_its_typica
     assert abs(best_of(more).values["c"]) == pytest.approx(0.6, rel=0.05)
 
 
+@over("seed", range(5))
+def test_what_has_many_maxima_is_fitted_from_all_that_is_tried_though_it_was_fitted_before(seed: int) -> None:
+    """A ripple was found where it was looked for, at one of the small maxima beside the great one."""
+    ripple = TERMS[1:2]
+    search = search_of(PLANT, draw(PLANT, {"a": 1.0, "s": 0.3, "w": 12.5}, NOISE, seed))
+    beside = find_map(search, ripple, {"s": 0.03, "w": 20.0}, None)
+    assert beside.values["w"] > 15.0
+    findings = Findings(find_map(search, (), {}, None), (), (beside,))
+    more = singles_among(search, findings, ripple, ripple, _silent)
+    assert best_of(more).values["w"] == pytest.approx(12.5, rel=0.02)
+    assert [mode.terms for mode in more.modes] == [("ripple",)]
+
+
+class _Beside(ToyPlant):
+    """What ripples does so beside a bend alone."""
+
+    def rows(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+        return super().rows(dict(values) | {"s": values.get("s", 0.0) * values.get("c", 0.0)})
+
+
+@over("seed", (0, 1, 3))
+def test_a_small_second_effect_is_scored_beside_the_first(seed: int) -> None:
+    """In draws of the noise where the first one leaves no more than noise may."""
+    plant = _Beside(tests=60)
+    search = search_of(plant, draw(plant, {"a": 1.0, "c": 0.5, "s": 0.013, "w": 12.0}, NOISE, seed))
+    base = find_map(search, (), {}, None)
+    findings = forward_selection(search, base, TERMS)
+    alone = next(mode for mode in findings.modes if mode.terms == ("bend",))
+    assert explains_all(search, base, alone)
+    (ripple,) = (score for score in findings.scores if score.term.name == "ripple")
+    assert ripple.sigma < 1.0
+    assert set(best_of(findings).terms) == {"bend", "ripple"}
+
+
 class _Shapes(ToyPlant):
     """A line and six shapes.
 
