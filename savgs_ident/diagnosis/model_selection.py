@@ -255,9 +255,9 @@ def _learned_laws(
 def _laws_instead_of_two(
     problem: DiagnosisProblem, findings: Findings, best: LaplaceFit, progress: Progress
 ) -> tuple[LearnedLaw, ...]:
-    """Learned laws at the ports of effects that explain all alone, where two effects are more probable still.
+    """Learned laws where effects act that explain all alone, if two effects are more probable still.
 
-    The second may stand for what the first one's formula has wrong.
+    The second may stand for what a formula has wrong: of the first, or of what does nearly the same elsewhere.
     """
     if len(best.terms) < 2:
         return ()
@@ -266,12 +266,12 @@ def _laws_instead_of_two(
         mode
         for mode in findings.modes
         if len(mode.terms) == 1
-        and mode.terms[0] in best.terms
         and left_over(search, problem.base, mode, constants) <= constants.explained_share
     ]
     ports = dict.fromkeys(problem.plant.catalogue[mode.terms[0]].port.name for mode in alone)
+    nearest = list(ports)[: constants.nearest_ports]
+    wanted = [problem.port(name) for name in dict.fromkeys([*nearest, *_in_series(problem, nearest)])]
     least = best.evidence - constants.refined_log_evidence
-    wanted = [problem.port(name) for name in ports]
     return learn(problem.plant, problem.data, problem.base, wanted, constants, search.given, progress, least)
 
 
@@ -315,17 +315,22 @@ def _worth_learning(
         if name and weight > least
     }
     ranked = sorted(ports, key=lambda name: -ports[name])[: constants.learned_fits]
-    nearest = {problem.port(name).location for name in ranked[: constants.nearest_ports]}
-    ranked += [
-        each.name
-        for each in problem.plant.plant.ports
-        if each.kind is PortKind.SERIES and each.location in nearest
-    ]
+    ranked += _in_series(problem, ranked[: constants.nearest_ports])
     singles = [mode for mode in findings.modes if len(mode.terms) == 1]
     ranked += [
         problem.plant.catalogue[mode.terms[0]].port.name for mode in singles[: constants.nearest_ports]
     ]
     return [problem.port(name) for name in dict.fromkeys(ranked)]
+
+
+def _in_series(problem: DiagnosisProblem, names: Sequence[str]) -> list[str]:
+    """The series ports at the locations of some ports."""
+    locations = {problem.port(name).location for name in names}
+    return [
+        each.name
+        for each in problem.plant.plant.ports
+        if each.kind is PortKind.SERIES and each.location in locations
+    ]
 
 
 def _with_nearest(
