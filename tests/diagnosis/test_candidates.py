@@ -11,11 +11,13 @@ from savgs_ident.core.presentation import no_progress
 from savgs_ident.diagnosis import model_selection
 from savgs_ident.diagnosis.candidates import joint_sigma
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
+from savgs_ident.diagnosis.findings import Findings
 from savgs_ident.diagnosis.result import Hypothesis, PortFamily
 from savgs_ident.diagnosis.score_test import Score
 from savgs_ident.effects.base import Family
 from savgs_ident.inference.observations import Term
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.plants.quarter_car.ports import PORTS
 
 TERM: Any = None
 FOUND: Any = object()
@@ -68,3 +70,41 @@ def test_the_formulas_of_a_learned_law_are_those_of_its_family_at_its_location(
     wanted.clear()
     assert model_selection._with_formulas_of(problem, FOUND, [], no_progress) is FOUND
     assert not wanted
+
+
+def _mode(evidence: float, *terms: str, left: float = 0.0) -> Any:
+    return SimpleNamespace(terms=terms, evidence=evidence, left=left)
+
+
+@pytest.mark.parametrize(
+    ("best", "ports"),
+    [
+        (("gear_compliance", "link_offset"), ["link", "damper", "mount"]),
+        (("gear_compliance",), None),
+    ],
+)
+def test_laws_are_weighed_against_two_effects_wherever_one_formula_explains_all(
+    best: tuple[str, ...], ports: list[str] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A strut's mount, which the catalogue may not have, does nearly what a damper's end or the gear does."""
+    absent: Any = None
+    plant: Any = SimpleNamespace(catalogue=CATALOGUE, plant=SimpleNamespace(ports=PORTS))
+    search: Any = SimpleNamespace(given=None)
+    problem = DiagnosisProblem(plant, absent, search, absent, absent)
+    singles = (
+        _mode(50.0, "gear_compliance"),
+        _mode(45.0, "damper_hysteresis"),
+        _mode(9.0, "cam_scale", left=0.5),
+    )
+    learned: list[list[str]] = []
+
+    def learn(plant: Any, data: Any, base: Any, wanted: Any, *rest: Any) -> tuple[()]:
+        del plant, data, base, rest
+        learned.append([each.name for each in wanted])
+        return ()
+
+    monkeypatch.setattr(model_selection, "learn", learn)
+    monkeypatch.setattr(model_selection, "left_over", lambda search, base, mode, constants: mode.left)
+    findings = Findings(_mode(0.0), (), (_mode(60.0, *best), *singles))
+    assert model_selection._laws_instead_of_two(problem, findings, findings.modes[0], no_progress) == ()
+    assert learned == ([] if ports is None else [ports])
