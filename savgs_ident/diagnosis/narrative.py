@@ -317,7 +317,8 @@ def _effects_missing(
 
 def _shrinking(evidence: DiagnosisEvidence, gap: Shrink, named: str) -> str:
     """How far the gap shrinks with what is ``named``; where it does not, what calibration needs in its place."""
-    if gap.after < gap.recalibrated:
+    # To the digits that are shown, or the sentence would contradict itself.
+    if gap.after < gap.recalibrated and _percent(gap.after) != _percent(gap.recalibrated):
         return (
             f" With {named} the gap shrinks from {_percent(gap.recalibrated)} recalibrated "
             f"({_percent(gap.before)} as given) to {_percent(gap.after)} of the response in held-out tests; the "
