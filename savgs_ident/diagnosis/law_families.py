@@ -230,6 +230,8 @@ def _needed(
         left = found[-1].functions
         fewer = [alone(tuple(each for each in left if each != gone), found[-1].width) for gone in left]
         found.append(max(fewer, key=lambda each: each.weight))
+    # One alone that calibration nearly takes up is far larger than all of them together seem to be.
+    found += [at_its_width((name,)) for name in first]
     return at_its_width(max(found, key=lambda each: each.weight).functions)
 
 

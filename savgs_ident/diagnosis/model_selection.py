@@ -235,8 +235,8 @@ def _learned_laws(
 ) -> tuple[LearnedLaw, ...]:
     """Learned laws on the nonlinear plant at the ports that explain most.
 
-    None where a single effect explains all, and more than a law to first order would, or where nothing seems to be
-    missing.
+    None where a single effect explains all, and a law to first order is certainly less probable, or where nothing
+    seems to be missing.
     """
     constants, base = problem.constants, problem.base
     best, linear = most_probable(findings, constants), anywhere(localisations)
@@ -245,7 +245,9 @@ def _learned_laws(
     count = len(findings.scores)
     weight = best.evidence + log_prior(hypothesis_of(best), count, constants)
     explained = explains_all(problem.search, base, best, constants)
-    if explained and weight >= linear + log_prior(UNKNOWN, count, constants):
+    law = linear + log_prior(UNKNOWN, count, constants)
+    # To first order a law that calibration nearly takes up is less probable than it is.
+    if explained and weight >= law + constants.indistinguishable_log_odds:
         return ()
     ports = _worth_learning(problem, findings, localisations)
     least, given = best.evidence - constants.refined_log_evidence, problem.search.given

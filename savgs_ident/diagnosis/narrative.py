@@ -142,20 +142,22 @@ def _law_missing(
             )
         else:
             sentence += "promised too little for a fit."
+    else:
+        sentence += " The catalogue has no formula of this kind there."
     return sentence + _not_apart(problem, evidence)
 
 
 def _nearest_effect(
     problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: FlexibleMember
 ) -> str | None:
-    """The catalogue's effect that comes nearest to a learned law: of its family if there is one, at its location."""
+    """The catalogue's effect of a learned law's family at its location that comes nearest; None if there is none."""
     catalogue = problem.plant.catalogue
     scored = {each.term.name: each.evidence for each in evidence.findings.scores}
     fitted = {mode.terms[0]: mode.evidence for mode in evidence.findings.modes if len(mode.terms) == 1}
     known = scored | fitted
-    there = [name for name in known if problem.location(name) == member.location]
-    same = [name for name in there if catalogue[name].law.family is member.family]
-    return max(same or there, key=lambda name: known[name], default=None)
+    there = (name for name in known if problem.location(name) == member.location)
+    same = (name for name in there if catalogue[name].law.family is member.family)
+    return max(same, key=lambda name: known[name], default=None)
 
 
 def _words(problem: DiagnosisProblem, effect: str) -> str:

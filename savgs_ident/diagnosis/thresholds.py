@@ -102,11 +102,11 @@ class DecisionConstants:
     decides. Halved or doubled: as there.
     """
 
-    family_widths: tuple[float, ...] = (0.1, 1.0, 10.0)
+    family_widths: tuple[float, ...] = (0.1, 1.0, 10.0, 100.0)
     """Widths tried for the prior of one family's functions, over that of all functions of a learned law.
 
-    Origin: by choice, a factor of ten apart. Halved or doubled: Occam's factor moves by up to 0.7 nat a
-    coefficient.
+    Origin: by choice, a factor of ten apart; the greatest for one that calibration nearly takes up. Halved or
+    doubled: Occam's factor moves by up to 0.7 nat a coefficient.
     """
 
     # Thresholds on log odds

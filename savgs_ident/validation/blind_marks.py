@@ -5,7 +5,8 @@
 An effect counts as named by its own name, and as a formula of the catalogue. Where another effect does the same to
 the campaign, so that nothing shows which it is, naming that one counts too, if the verdict says that it cannot
 distinguish the two: where the draw found so, or where the drawn effects are about as probable by the same recordings
-(log odds below 5 nat). Instead of an effect that was removed one that does the same may be named without.
+(log odds below 5 nat). Instead of an effect that was removed one that does the same may be named without: where the
+draw found so, or where the removed effect, fitted to the same recordings, is no more probable (by 5 nat).
 The port of something unknown counts as found, too, where the verdict says that it cannot distinguish it from the one
 that it names; that of an effect in whose place a law was learned, where the effect itself explains the recordings as
 well there. Marks that do not apply to a kind of trial are None.
@@ -89,8 +90,8 @@ class Score:
         port_listed: the ports are right, or a right one is listed as indistinguishable from them; of the same.
         family_right: a family is named, with ports that are right as above and families that are; of the same.
         family_exactly: the same, at ports that are right alone; of the same.
-        elsewhere: log odds [nat] of the drawn law itself at its own port against it at the port that is named; None
-            where that was not looked at.
+        elsewhere: log odds [nat] of the drawn law itself at its own port against it at the port that is named, or
+            against the effect that is named instead of it; None where that was not looked at.
         probability: that the verdict states; None if it states none.
         closed_by_effect: share of the recalibrated gap that what is named closes, on tests held out; None as above.
         version: of the code that made the diagnosis.
@@ -203,12 +204,20 @@ def port_in_question(answer: Answer, diagnosis: Mapping[str, Any]) -> str | None
     return str(verdict["ports"][0]) if len(verdict["ports"]) == 1 else None
 
 
+def stand_in(answer: Answer, diagnosis: Mapping[str, Any]) -> str | None:
+    """The one effect that is named instead of one that was removed from the catalogue."""
+    verdict = diagnosis["verdict"]
+    one = answer.kind == "unknown" and verdict["kind"] == "effect" and not _no_known_law(verdict)
+    return str(verdict["effects"][0]) if one else None
+
+
 def score_of(
     answer: Answer, diagnosis: Mapping[str, Any], version: str = "", elsewhere: float | None = None
 ) -> Score:
     """The marks of a diagnosis, given as the object of its ``diagnosis.json``; ``version`` is that of the code.
 
-    ``elsewhere`` are the log odds of the drawn law at its own port against it at the :func:`port_in_question`.
+    ``elsewhere`` are the log odds of the drawn law at its own port against it at the :func:`port_in_question`, or
+    against its :func:`stand_in`.
     """
     verdict, kind = diagnosis["verdict"], answer.kind
     said, true = tuple(verdict["effects"]), {*answer.effects}
@@ -221,6 +230,7 @@ def score_of(
     families, foreign = tuple(verdict.get("families", ())), answer.small_errors is not None
     accepted = _accepted(answer, diagnosis, elsewhere)
     own = _intervals(answer, diagnosis) if right else {}
+    instead = stand_in(answer, diagnosis)
     score = Score(
         number=answer.number,
         kind=kind,
@@ -254,7 +264,7 @@ def score_of(
         version=version,
         hidden=_hidden(answer, diagnosis),
         law_known=known,
-        imitated=kind == "unknown" and known and len(said) == 1 and said[0] in answer.imitators,
+        imitated=instead is not None and (instead in answer.imitators or _does_the_same(elsewhere)),
     )
     unmarked: dict[str, Any] = dict.fromkeys(_OF_WHAT_IS_THERE)
     return replace(score, **unmarked) if score.left_alone or score.imitated else score

@@ -35,10 +35,10 @@ from savgs_ident.simulate.excitation import first_sweep, measured_response
 from savgs_ident.simulate.public import DWELLS
 from savgs_ident.validation.blind_answer import Answer, Envelope, Seal, envelope_of, opened, sealed
 from savgs_ident.validation.blind_draw import Shares, draw_answer
-from savgs_ident.validation.blind_marks import Score, failed, port_in_question, score_of
+from savgs_ident.validation.blind_marks import Score, failed, port_in_question, score_of, stand_in
 from savgs_ident.validation.foreign_draw import draw_foreign, true_bench
 from savgs_ident.validation.foreign_laws import FOREIGN
-from savgs_ident.validation.other_port import log_odds_of_port
+from savgs_ident.validation.other_port import log_odds_of_port, log_odds_of_stand_in
 from savgs_ident.validation.trials import code_version, rig_marks
 from savgs_ident.validation.varied_constants import varied_into
 from savgs_ident.validation.virtual_campaign import FILE, record_campaign, write_recordings
@@ -162,15 +162,17 @@ def run_trial(plan: Plan, draw: Draw, diagnose: Diagnose, out: Path, number: int
 
 
 def _elsewhere(answer: Answer, found: Mapping[str, Any], campaign: Path, rig: Rig) -> float | None:
-    """Log odds of the drawn law at its own port against it at the port in question; None if there is none."""
-    other = port_in_question(answer, found)
-    if other is None:
+    """Log odds of the drawn law against it at the port in question, or against its stand-in; None without both."""
+    other, instead = port_in_question(answer, found), stand_in(answer, found)
+    if other is None and instead is None:
         return None
     name = answer.effects[0]
     drawn = FOREIGN[name].effect if answer.kind == "foreign" else CATALOGUE[name]
     measured = measured_response(load_campaign(campaign), QuarterCar, SIMTR.orders)
     try:
-        return log_odds_of_port(measured, rig, drawn, other, SIMTR)
+        if instead is not None:
+            return log_odds_of_stand_in(measured, rig, drawn, instead, SIMTR)
+        return None if other is None else log_odds_of_port(measured, rig, drawn, other, SIMTR)
     except InputError:
         # A baseline without a solution says nothing of the ports: the trial has its strict marks.
         return None

@@ -1,4 +1,4 @@
-"""Whether the recordings of a trial show at which of two ports a law acts.
+"""Whether the recordings of a trial show at which of two ports a law acts, or which of two effects is there.
 
 A force in the strut and the same beside it in the wishbone joints move the rig nearly alike. How far a campaign
 distinguishes two such ports is not a matter of the diagnosis alone: here the drawn law itself is fitted at its own
@@ -53,6 +53,17 @@ def log_odds_of_port(
     evidence = _log_evidences(measured, rig, {drawn.name: drawn, **there}, settings)
     found = [evidence[name] for name in there if name in evidence]
     return evidence[drawn.name] - max(found) if drawn.name in evidence and found else None
+
+
+def log_odds_of_stand_in(
+    measured: HarmonicResponse, rig: Rig, drawn: Effect, named: str, settings: DiagnosisSettings
+) -> float | None:
+    """Log odds [nat] of an effect against one of the catalogue that is ``named`` instead of it.
+
+    None where one of the two fits has no solution.
+    """
+    evidence = _log_evidences(measured, rig, {drawn.name: drawn, named: CATALOGUE[named]}, settings)
+    return evidence[drawn.name] - evidence[named] if len(evidence) == 2 else None
 
 
 def turned(law: AbstractForceLaw) -> AbstractForceLaw:

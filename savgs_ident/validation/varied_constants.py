@@ -20,7 +20,7 @@ from savgs_ident.diagnosis.result import Verdict
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.diagnosis.verdict import indistinguishable
 from savgs_ident.validation.blind_answer import Answer
-from savgs_ident.validation.blind_marks import Score, port_in_question, score_of
+from savgs_ident.validation.blind_marks import Score, port_in_question, score_of, stand_in
 from savgs_ident.validation.blind_rates import Rate, rates_of
 
 VARIED = (
@@ -158,8 +158,8 @@ def _moved(varied_trials: Sequence[tuple[Score, Answer, Mapping[str, Any]]]) -> 
 def _marked(score: Score, answer: Answer, diagnosis: Mapping[str, Any], name: str, factor: float) -> Score:
     """The score with another verdict; intervals and gaps, which were not computed again, are those of the trial."""
     moved = {**diagnosis, "verdict": diagnosis[KEY][name][str(factor)]}
-    # Of another port than the one that was named it was not looked at whether the law would do the same there.
-    same = port_in_question(answer, moved) == port_in_question(answer, diagnosis)
+    # Of another port or effect than what was named it was not looked at whether it would do the same.
+    same = all(asked(answer, moved) == asked(answer, diagnosis) for asked in (port_in_question, stand_in))
     other = score_of(answer, moved, score.version, score.elsewhere if same else None)
     return replace(
         other,

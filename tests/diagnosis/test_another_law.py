@@ -39,7 +39,7 @@ from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
 from savgs_ident.validation.foreign_laws import FOREIGN
-from savgs_ident.validation.other_port import log_odds_of_port
+from savgs_ident.validation.other_port import log_odds_of_port, log_odds_of_stand_in
 
 from .conftest import Measure, rig_problem
 
@@ -165,6 +165,9 @@ def test_a_friction_of_the_joints_would_do_the_same_in_the_strut_and_not_at_the_
     assert rail is not None
     assert rail > 50.0
     assert road is None
+    instead = log_odds_of_stand_in(response, rig, joints, "rail_viscous", COARSE)
+    assert instead is not None
+    assert instead > 50.0
 
 
 @pytest.mark.slow

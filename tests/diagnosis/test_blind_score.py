@@ -17,6 +17,7 @@ from savgs_ident.validation.blind_marks import (
     said_right,
     score_from,
     score_of,
+    stand_in,
 )
 from savgs_ident.validation.blind_rates import (
     NOTHING,
@@ -110,6 +111,30 @@ def test_an_effect_that_the_catalogue_lacks() -> None:
     assert (there.located_exactly, elsewhere.located_exactly) == (True, False)
     named = score_of(GONE, diagnosis("effect", "accel_gain"))
     assert (named.unknown_recognised, named.located_right) == (False, True)
+
+
+@pytest.mark.parametrize(("odds", "same"), [(0.5, True), (-3.0, True), (6.0, False), (None, False)])
+def test_in_place_of_a_removed_effect_one_may_be_named_that_does_the_same(
+    odds: float | None, same: bool
+) -> None:
+    found = diagnosis("effect", "rail_viscous")
+    assert stand_in(GONE, found) == "rail_viscous"
+    score = score_of(GONE, found, elsewhere=odds)
+    assert (score.imitated, is_right(score)) == (same, same)
+    assert (score.unknown_recognised, score.located_right) == ((None, None) if same else (False, False))
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        diagnosis("none"),
+        diagnosis("unknown", ports=["rail"]),
+        diagnosis("several", "rail_viscous", "cam_scale"),
+    ],
+)
+def test_nothing_stands_in_for_a_removed_effect_but_one_effect(found: dict[str, object]) -> None:
+    assert stand_in(GONE, found) is None
+    assert not score_of(GONE, found, elsewhere=0.0).imitated
 
 
 @pytest.mark.parametrize(("elsewhere", "right"), [(0.5, True), (6.0, False), (None, False)])

@@ -22,7 +22,7 @@ from savgs_ident.diagnosis.evidence import (
 from savgs_ident.diagnosis.findings import Findings, LostHypothesis
 from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
-from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, PortFamily
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, PortFamily, Verdict
 from savgs_ident.diagnosis.score_test import PriorConflict
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.diagnosis.verdict import (
@@ -252,19 +252,23 @@ def test_an_effect_that_explains_nearly_as_much_as_a_wrong_sheet_is_listed() -> 
     assert verdict.probability == pytest.approx(1.0 / (1.0 + np.exp(-4.0)))
 
 
-def test_a_law_that_the_catalogue_does_not_have_is_reported_with_the_nearest_formula() -> None:
+def _verdict_of_a_learned_law(family: Family) -> Verdict:
+    """At the rail, where the catalogue's friction explains 96 %."""
     weights = {"none": 0.0, "unknown": 100.0, "rail_stribeck": 900.0}
-    hypothesis = Hypothesis(flexible=RAIL_FRICTION)
     mode = _mode(990.0, "learned_rail")
-    law: Any = SimpleNamespace(mode=mode, port=CATALOGUE["rail_stribeck"].port, family=Family.FRICTION)
+    law: Any = SimpleNamespace(mode=mode, port=CATALOGUE["rail_stribeck"].port, family=family)
     member = FlexibleMember(law, 980.0, 0.004)
     evidence = _evidence("rail_stribeck", "law", weights, flexible=(member,), named_law=member)
-    mine = WeighedHypothesis(hypothesis, 980.0, mode)
+    mine = WeighedHypothesis(member.hypothesis, 980.0, mode)
     evidence = replace(evidence, kind="effect", chosen=mine, weighed=(mine, *evidence.weighed))
     problem: Any = SimpleNamespace(**vars(PROBLEM), search=None, base=None)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(narrative, "left_over", lambda *args: 0.04)
-        verdict = write_verdict(problem, evidence, (), GAP)
+        return write_verdict(problem, evidence, (), GAP)
+
+
+def test_a_law_that_the_catalogue_does_not_have_is_reported_with_the_nearest_formula() -> None:
+    verdict = _verdict_of_a_learned_law(Family.FRICTION)
     assert verdict.effects == ("rail_stribeck",)
     assert verdict.families == (RAIL_FRICTION,)
     assert not verdict.law_known
@@ -276,6 +280,13 @@ def test_a_law_that_the_catalogue_does_not_have_is_reported_with_the_nearest_for
         "more friction at low speed than at high speed (`rail_stribeck`), explains 96 % of the misfit beyond the "
         "noise, the learned law 99.6 %."
     )
+
+
+def test_of_a_kind_that_the_catalogue_does_not_have_there_no_formula_is_nearest() -> None:
+    verdict = _verdict_of_a_learned_law(Family.STIFFNESS)
+    assert verdict.effects == ()
+    assert tuple(map(str, verdict.families)) == ("rail/stiffness",)
+    assert verdict.sentence.endswith("The catalogue has no formula of this kind there.")
 
 
 @pytest.mark.parametrize(
