@@ -28,7 +28,8 @@ from benchmarks.sparse_selection import PEERS, THRESHOLDS, Peer, Said
 from benchmarks.trial_regression import VARIANTS, Trial, Variant, read_trial, trial_folders
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.validation.blind_answer import Answer
-from savgs_ident.validation.blind_marks import Score, failed, said_words, score_of, truth_words
+from savgs_ident.validation.blind_marks import failed, score_of
+from savgs_ident.validation.blind_score import Score, said_words, truth_words
 from savgs_ident.validation.trials import side_by_side
 
 Marks = Mapping[str, bool]

@@ -32,7 +32,8 @@ from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_response
 from savgs_ident.validation.blind_answer import Answer, Seal, envelope_of, opened
-from savgs_ident.validation.blind_marks import Score, score_of
+from savgs_ident.validation.blind_marks import score_of
+from savgs_ident.validation.blind_score import Score
 from savgs_ident.validation.trials import rig_marks
 
 SAME = 1.0 - 1e-6

@@ -28,7 +28,7 @@ from savgs_ident.report.campaigns.record import campaigns_columns, campaigns_rec
 from savgs_ident.report.present_validation import alarms_record, calibration_record
 from savgs_ident.validation.blind import BlindRequest, plan_of
 from savgs_ident.validation.blind_answer import Answer, Envelope, sealed
-from savgs_ident.validation.blind_marks import Interval, Score, score_from
+from savgs_ident.validation.blind_score import Interval, Score, score_from
 from savgs_ident.validation.blind_trial import Drawn, Plan, run_trial
 from savgs_ident.validation.calibration import CalibrationStudy, Trial, trial_reader
 from savgs_ident.validation.false_alarms import AlarmStudy, NullDraw, read_draw

@@ -14,7 +14,6 @@ from savgs_ident.core.presentation import package_versions
 from savgs_ident.report.html import embed, render_page
 from savgs_ident.report.text import DASH, decimal, percentage, plain, table
 from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, new_figure, printable, styled
-from savgs_ident.validation.blind_marks import Score, is_right, said_words, truth_words
 from savgs_ident.validation.blind_rates import (
     Rate,
     Reliability,
@@ -23,6 +22,7 @@ from savgs_ident.validation.blind_rates import (
     rates_of,
     reliability_of,
 )
+from savgs_ident.validation.blind_score import Score, is_right, said_words, truth_words
 from savgs_ident.validation.foreign_laws import TRIAL_EFFECTS
 from savgs_ident.validation.varied_constants import MovedMarks
 

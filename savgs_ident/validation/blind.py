@@ -22,8 +22,8 @@ from savgs_ident.core.presentation import Origin, Progress, Result, no_progress
 from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig, rig_content
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.validation.blind_draw import Shares
-from savgs_ident.validation.blind_marks import Score, score_from
 from savgs_ident.validation.blind_rates import rates_of
+from savgs_ident.validation.blind_score import Score, score_from
 from savgs_ident.validation.blind_trial import (
     Diagnose,
     Draw,

@@ -15,7 +15,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.validation.blind_marks import FAILED, Score, said_right
+from savgs_ident.validation.blind_score import FAILED, Score, said_right
 
 Z = 1.959964
 """Standard deviations of a 95 % interval."""

@@ -35,7 +35,8 @@ from savgs_ident.simulate.excitation import first_sweep, measured_response
 from savgs_ident.simulate.public import DWELLS
 from savgs_ident.validation.blind_answer import Answer, Envelope, Seal, envelope_of, opened, sealed
 from savgs_ident.validation.blind_draw import Shares, draw_answer
-from savgs_ident.validation.blind_marks import Score, failed, port_in_question, score_of, stand_in
+from savgs_ident.validation.blind_marks import failed, port_in_question, score_of, stand_in
+from savgs_ident.validation.blind_score import Score
 from savgs_ident.validation.foreign_draw import draw_foreign, true_bench
 from savgs_ident.validation.foreign_laws import FOREIGN
 from savgs_ident.validation.other_port import log_odds_of_port, log_odds_of_stand_in

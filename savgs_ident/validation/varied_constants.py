@@ -20,8 +20,9 @@ from savgs_ident.diagnosis.result import Verdict
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.diagnosis.verdict import indistinguishable
 from savgs_ident.validation.blind_answer import Answer
-from savgs_ident.validation.blind_marks import Score, port_in_question, score_of, stand_in
+from savgs_ident.validation.blind_marks import port_in_question, score_of, stand_in
 from savgs_ident.validation.blind_rates import Rate, rates_of
+from savgs_ident.validation.blind_score import Score
 
 VARIED = (
     "prior_none",

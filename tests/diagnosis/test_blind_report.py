@@ -14,7 +14,8 @@ from savgs_ident.report.blind import (
     blind_text,
     confusion_figure,
 )
-from savgs_ident.validation.blind_marks import Score, failed, score_of
+from savgs_ident.validation.blind_marks import failed, score_of
+from savgs_ident.validation.blind_score import Score
 from savgs_ident.validation.varied_constants import FACTORS, KEY, VARIED, moved_marks
 
 from .blind_answers import answer, diagnosis

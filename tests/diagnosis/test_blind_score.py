@@ -9,16 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.validation.blind_marks import (
-    Score,
-    failed,
-    is_right,
-    port_in_question,
-    said_right,
-    score_from,
-    score_of,
-    stand_in,
-)
+from savgs_ident.validation.blind_marks import failed, port_in_question, score_of, stand_in
 from savgs_ident.validation.blind_rates import (
     NOTHING,
     OTHERS,
@@ -28,6 +19,7 @@ from savgs_ident.validation.blind_rates import (
     confusion_of,
     rates_of,
 )
+from savgs_ident.validation.blind_score import Score, is_right, said_right, score_from
 
 from .blind_answers import answer, diagnosis
 

@@ -8,15 +8,7 @@ import pytest
 
 from savgs_ident.report.blind import blind_html, blind_record, blind_text, reliability_figure
 from savgs_ident.validation.blind_answer import Answer, SmallErrors
-from savgs_ident.validation.blind_marks import (
-    Score,
-    failed,
-    is_right,
-    port_in_question,
-    said_right,
-    score_from,
-    score_of,
-)
+from savgs_ident.validation.blind_marks import failed, port_in_question, score_of
 from savgs_ident.validation.blind_rates import (
     EDGES,
     confusion_of,
@@ -24,6 +16,7 @@ from savgs_ident.validation.blind_rates import (
     rates_of,
     reliability_of,
 )
+from savgs_ident.validation.blind_score import Score, is_right, said_right, score_from
 from savgs_ident.validation.foreign_laws import FOREIGN
 
 from ..diagnosis.blind_answers import BLANK, answer, diagnosis
