@@ -1,7 +1,7 @@
 """Hypotheses as a report shows them: with probabilities, parameters and what they gain on tests left out."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from math import nan
+from math import nan, sqrt
 
 import numpy as np
 
@@ -74,7 +74,8 @@ def joint_sigma(scores: Sequence[Score], constants: DecisionConstants = DEFAULTS
     sigma = np.array([each.sigma for each in scores])
     alike = np.array([[1.0 if one is other else cosine(one, other) for other in scores] for one in scores])
     independent = np.linalg.pinv(alike, rcond=constants.cosine_resolution)
-    return max(float(sigma.max()), float(np.sqrt(sigma @ independent @ sigma)))
+    # Of opposite effects nothing but a rounding is left of the square, on either side of zero.
+    return max(float(sigma.max()), sqrt(max(float(sigma @ independent @ sigma), 0.0)))
 
 
 def estimates_of(mode: LaplaceFit, scores: Mapping[str, Score]) -> tuple[Estimate, ...]:

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
 from savgs_ident.core.presentation import no_progress
 from savgs_ident.diagnosis import model_selection
@@ -38,6 +40,13 @@ def test_what_two_effects_share_counts_once() -> None:
 
 def test_effects_that_do_the_same_are_as_significant_as_one() -> None:
     assert joint_sigma([_score(7.0, 1.0, 2.0), _score(7.0, 1.0, 2.0)]) == pytest.approx(7.0)
+
+
+@given(st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=6), st.floats(0.0, 30.0))
+def test_opposite_effects_are_as_significant_as_one(along: list[float], sigma: float) -> None:
+    assume(np.linalg.norm(along) > 1e-3)
+    opposite = [_score(sigma, *along), _score(sigma, *(-each for each in along))]
+    assert joint_sigma(opposite) == pytest.approx(sigma)
 
 
 def test_one_alone_has_its_own_and_none_has_none() -> None:
