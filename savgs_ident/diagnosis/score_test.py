@@ -107,10 +107,28 @@ def scores_by_try(
     search: Search, mode: LaplaceFit, term: Term, constants: DecisionConstants = DEFAULTS
 ) -> list[Score]:
     """Scores of one candidate about a fit, each with its shapes at one of what is tried, best first."""
+    return sorted(_in_order_of_tries(search, mode, term, constants), key=lambda each: -each.evidence)
+
+
+def peaks_by_try(
+    search: Search, mode: LaplaceFit, term: Term, constants: DecisionConstants = DEFAULTS
+) -> list[Score]:
+    """Those of the same that no neighbour among what is tried exceeds: of a resonance, its likely frequencies."""
+    found = _in_order_of_tries(search, mode, term, constants)
+    evidence = np.array([-np.inf, *(each.evidence for each in found), -np.inf])
+    above = evidence[1:-1] >= np.maximum(evidence[:-2], evidence[2:])
+    peaks = [each for each, is_peak in zip(found, above, strict=True) if is_peak]
+    return sorted(peaks, key=lambda each: -each.evidence)
+
+
+def _in_order_of_tries(
+    search: Search, mode: LaplaceFit, term: Term, constants: DecisionConstants
+) -> list[Score]:
     given = mode.values, mode.prediction.warm_start
     (sensitivities,) = search.plant.sensitivities(mode.terms, *given, [term])
     one_each = [replace(term, tries=(shapes,)) for shapes in term.tried]
-    return scores_of(search, mode, one_each, list(sensitivities[:, None]), constants)
+    both = zip(one_each, sensitivities[:, None], strict=True)
+    return [_score(search, mode, each, moved, constants.visible_sigma) for each, moved in both]
 
 
 def _score(

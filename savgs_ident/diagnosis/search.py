@@ -34,6 +34,7 @@ from savgs_ident.diagnosis.score_test import (
     Score,
     best_pairs,
     cosine,
+    peaks_by_try,
     prior_conflict,
     score_terms,
     scores_by_try,
@@ -234,6 +235,20 @@ class _Fits:
 
         return in_parallel(fit, scores)
 
+    def beside(self, parent: LaplaceFit, scores: Sequence[Score], least: float) -> list[LaplaceFit]:
+        """Fits of the scored terms, each added to those of ``parent``: what swings, from its likely frequencies.
+
+        Frequencies that score no more than ``least`` are left out.
+        """
+
+        def starts(score: Score) -> list[Score]:
+            if not score.term.tries:
+                return [score]
+            peaks = peaks_by_try(self.search, parent, score.term, self.constants)
+            return [each for each in peaks if each.evidence > least][: self.constants.resonance_peaks]
+
+        return _best_of_each(self.extended(parent, [start for score in scores for start in starts(score)]))
+
     def together(self, pairs: Sequence[PairScore]) -> list[LaplaceFit]:
         """Fits of scored pairs from where they promise most."""
 
@@ -340,8 +355,9 @@ def _with_second_effects(
         if name not in parent.terms and alone.with_effect(name) not in tried
     ]
     scores = score_terms(fits.search, parent, others, fits.constants)
-    worth = [each for each in scores if each.evidence > max(parent.evidence, least)]
-    return fits.extended(parent, worth[: fits.constants.pairs_per_parent])
+    least = max(parent.evidence, least)
+    worth = [each for each in scores if each.evidence > least]
+    return fits.beside(parent, worth[: fits.constants.pairs_per_parent], least)
 
 
 def _with_other_second_effects(
@@ -394,4 +410,4 @@ def _with_small_second_effects(fits: _Fits, parent: LaplaceFit) -> list[LaplaceF
     scores = score_terms(fits.search, parent, others, fits.constants)
     least = parent.evidence + fits.constants.promising_log_evidence
     worth = [each for each in scores if each.evidence > least]
-    return fits.extended(parent, worth[: fits.constants.pairs_per_parent])
+    return fits.beside(parent, worth[: fits.constants.pairs_per_parent], least)

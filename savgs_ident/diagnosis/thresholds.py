@@ -416,6 +416,12 @@ class DecisionConstants:
     pairs_per_parent: int = 3
     """Pairs fitted with an effect that leaves something. Origin: computing time."""
 
+    resonance_peaks: int = 3
+    """Frequencies from which what swings is fitted beside another effect, at most. Origin: computing time.
+
+    In one blind trial the right one of two peaks scored 0.7 nat less than the wrong one and fitted 249 nat better.
+    """
+
     first_order_pairs: int = 12
     """Pairs whose evidence to first order about the baseline is evaluated. Origin: computing time."""
 

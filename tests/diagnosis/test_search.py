@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.findings import Findings, excess, explains_all, left_over, to_be_gained
 from savgs_ident.diagnosis.result import Hypothesis
-from savgs_ident.diagnosis.score_test import best_pairs, cosine, score_terms
+from savgs_ident.diagnosis.score_test import best_pairs, cosine, peaks_by_try, score_terms, scores_by_try
 from savgs_ident.diagnosis.search import pairs_with, singles_among
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.find_map import Search, find_map, search_of
@@ -300,6 +300,37 @@ def test_a_small_second_effect_is_scored_beside_the_first(seed: int) -> None:
     (ripple,) = (score for score in findings.scores if score.term.name == "ripple")
     assert ripple.sigma < 1.0
     assert set(best_of(findings).terms) == {"bend", "ripple"}
+
+
+FAR_OFF = replace(TERMS[1], tries=({"w": 9.6}, {"w": 15.6}, {"w": 20.2}))
+"""The ripple where a wave of 12.5 shows more at one of its small maxima than at the foot of the great one."""
+
+
+@over("seed", range(5))
+def test_what_swings_beside_another_is_fitted_from_each_of_its_peaks(seed: int) -> None:
+    plant, both = _Beside(tests=60), (TERMS[0], FAR_OFF)
+    search = search_of(plant, draw(plant, {"a": 0.9, "c": 0.9, "s": 0.3, "w": 12.5}, NOISE, seed))
+    peaks = peaks_by_try(search, find_map(search, TERMS[:1], {}, None), FAR_OFF)
+    assert [each.start["w"] for each in peaks] == [20.2, 9.6]
+    base = find_map(search, (), {}, None)
+    one = forward_selection(search, base, both, constants=replace(DEFAULTS, resonance_peaks=1))
+    assert best_of(one).values.get("w") != pytest.approx(12.5, rel=0.02)
+    findings = forward_selection(search, base, both)
+    assert set(best_of(findings).terms) == {"bend", "ripple"}
+    assert best_of(findings).values["w"] == pytest.approx(12.5, rel=0.02)
+
+
+@over("seed", range(5))
+def test_the_first_peak_of_what_is_tried_is_where_it_scores_best(seed: int) -> None:
+    values = {"a": 1.0, "s": 0.3, "w": np.random.default_rng(seed).uniform(4.0, 14.0)}
+    search = search_of(PLANT, draw(PLANT, values, NOISE, seed))
+    base = find_map(search, (), {}, None)
+    ripple = replace(TERMS[1], tries=tuple({"w": float(w)} for w in np.arange(3.0, 16.0)))
+    every = scores_by_try(search, base, ripple)
+    peaks = peaks_by_try(search, base, ripple)
+    assert len(every) == 13 > len(peaks)
+    assert peaks[0].evidence == every[0].evidence
+    assert peaks[0].start["w"] == pytest.approx(values["w"], abs=0.6)
 
 
 class _Shapes(ToyPlant):
