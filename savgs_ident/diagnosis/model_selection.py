@@ -126,14 +126,17 @@ def compare_models(problem: DiagnosisProblem, progress: Progress) -> FittedHypot
 def _with_formulas_of(
     problem: DiagnosisProblem, findings: Findings, members: Sequence[FlexibleMember], progress: Progress
 ) -> Findings:
-    """The findings, and the catalogue's formulas of the most probable learned law's family at its location.
+    """The findings, and the catalogue's formulas of the families of those learned laws that leave little.
 
-    The law is known where one of them does as much.
+    The law is known where one of them does as much, at its own location or beside it.
     """
     if not members:
         return findings
-    family, candidates = members[0].hypothesis.flexible, problem.plant.candidates
-    wanted = [each for each in candidates if family in problem.families(Hypothesis((each.name,)))]
+    most, candidates = problem.constants.unexplained_share_flexible, problem.plant.candidates
+    families = {each.hypothesis.flexible for each in members if each is members[0] or each.left <= most}
+    wanted = [
+        each for each in candidates if not families.isdisjoint(problem.families(Hypothesis((each.name,))))
+    ]
     return singles_among(problem.search, findings, wanted, candidates, progress, problem.constants)
 
 

@@ -212,13 +212,18 @@ class _Fits:
         return find_map(self.search, (self.terms[name],), pair.values, pair.prediction.warm_start)
 
     def from_typical_size(self, term: Term, least: float) -> LaplaceFit:
-        """The fit of a term from its typical size, of all that is tried where that is nearest; or given up."""
+        """The best fit of a term from its typical size and the shapes that are tried; those below ``least`` given up.
+
+        Of what swings from the frequency that is nearest. A stop is fitted from each gap: the nearest of all may be
+        one that is never closed, from where nothing leads on.
+        """
         self.progress(f"fitting {term.name} from its typical size")
         typical = {each.name: each.value(self.constants.typical_coordinate) for each in term.amplitudes}
         starts = [self.base.values | typical | shapes for shapes in term.tried]
-        warm_start = self.base.prediction.warm_start
-        start = densest(self.search, (term,), starts, warm_start)
-        return find_map_from_both(self.search, (term,), start, warm_start, least=least)
+        near = self.base.prediction.warm_start
+        chosen = [densest(self.search, (term,), starts, near)] if term.tries else starts
+        fits = [find_map_from_both(self.search, (term,), start, near, least=least) for start in chosen]
+        return max(fits, key=lambda fit: fit.evidence)
 
     def extended(
         self, parent: LaplaceFit, scores: Sequence[Score], least: float = -np.inf

@@ -155,10 +155,12 @@ def is_right(score: Score) -> bool:
 def said_right(score: Score) -> bool:
     """Whether what the verdict says is true: what its stated probability is to be compared with.
 
-    That a foreign effect is unknown, at its port, is true; that it is at a port where it would do the same is not. A
-    law of something that was removed from the catalogue is true at its port alone; an effect that does the same as
-    what was removed is not.
+    That a foreign effect is unknown, at its port, is true; that it is at a port where it would do the same is not. An
+    effect that does the same as the drawn one is not there, however right it is to name it. A law of something that
+    was removed from the catalogue is true at its port alone.
     """
+    if score.kind in ("effect", "two") and not score.left_alone:
+        return score.law_known and {*score.said} == {*score.effects}
     if score.family_right:
         return score.family_exactly is True
     if score.kind == "unknown" and score.verdict == "effect":

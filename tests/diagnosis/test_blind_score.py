@@ -59,6 +59,14 @@ def test_what_does_the_same_counts_where_the_verdict_says_so(
     truth = replace(answer("effect", "mount_compliance"), imitators=imitators)
     score = score_of(truth, diagnosis("effect", "gear_compliance", like=like))
     assert (score.named_right, score.located_right, score.named_exactly) == (right, right, False)
+    assert not said_right(score)
+
+
+def test_what_is_said_is_true_of_the_drawn_effects_alone() -> None:
+    assert said_right(score_of(LAG, diagnosis("effect", "accel_lag")))
+    assert said_right(score_of(PAIR, diagnosis("several", "rail_viscous", "accel_lag")))
+    assert not said_right(score_of(PAIR, diagnosis("effect", "accel_lag")))
+    assert not said_right(score_of(LAG, diagnosis("none")))
 
 
 @pytest.mark.parametrize("verdict", [diagnosis("none"), diagnosis("unknown", ports=["rail"])])

@@ -15,10 +15,10 @@ from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import best_pairs, cosine, peaks_by_try, score_terms, scores_by_try
 from savgs_ident.diagnosis.search import pairs_with, singles_among
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.inference.find_map import Search, find_map, search_of
+from savgs_ident.inference.find_map import Search, densest, find_map, search_of
 from savgs_ident.inference.likelihood import noise_scales
 from savgs_ident.inference.observations import Prediction, Term
-from savgs_ident.inference.prior import Linear
+from savgs_ident.inference.prior import Linear, Logarithmic
 
 from ..in_one_test import over
 from .toy import TERMS, ToyPlant, best_of, draw, forward_selection
@@ -279,6 +279,31 @@ def test_what_has_many_maxima_is_fitted_from_all_that_is_tried_though_it_was_fit
     more = singles_among(search, findings, ripple, ripple, _silent)
     assert best_of(more).values["w"] == pytest.approx(12.5, rel=0.02)
     assert [mode.terms for mode in more.modes] == [("ripple",)]
+
+
+class _Stopped(ToyPlant):
+    """A ripple's shape is the gap of a stop, never closed beyond 1; to first order it does nothing."""
+
+    def rows(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+        v = {"s": 0.0, "w": 0.4} | dict(values)
+        return super().rows(dict(values) | {"s": 0.0}) + v["s"] ** 2 * np.maximum(self.x - v["w"], 0.0)
+
+
+@over("seed", range(5))
+def test_a_stop_is_found_though_one_that_is_never_closed_is_nearest_of_what_is_tried(seed: int) -> None:
+    plant = _Stopped()
+    stop = replace(
+        TERMS[1],
+        amplitudes=(Linear("s", "N", 0.0, 2.0, lower=0.0),),
+        shapes=(Logarithmic("w", "1", 0.4, 0.25),),
+        tries=(),
+    )
+    search = search_of(plant, draw(plant, {"a": 1.0, "s": 1.0, "w": 0.7}, NOISE, seed))
+    base = find_map(search, (), {}, None)
+    starts = [{"a": base.values["a"], "s": 1.0} | shapes for shapes in stop.tried]
+    assert densest(search, (stop,), starts, None)["w"] == stop.tried[-1]["w"] == 1.0
+    found = singles_among(search, Findings(base, (), ()), (stop,), (stop,), _silent)
+    assert best_of(found).values["w"] == pytest.approx(0.7, rel=0.03)
 
 
 class _Beside(ToyPlant):
