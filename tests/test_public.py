@@ -150,6 +150,18 @@ def test_importing_the_package_loads_nothing_and_takes_no_time() -> None:
     assert min(times) < 0.1
 
 
+def test_nothing_is_computed_before_the_compiler_is_set_up() -> None:
+    """What is computed as a module is loaded has XLA read its flags, and programs of later runs differ."""
+    code = (
+        "import jax, savgs_ident as si\n"
+        "from jax._src.xla_bridge import backends_are_initialized\n"
+        "for name in si.__all__:\n"
+        "    getattr(si, name)\n"
+        "    assert not backends_are_initialized(), name\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_effects_are_added_by_name() -> None:
     model = si.QuarterCar(si.load_rig()) + "rail_coulomb" + "tyre_friction"
     assert model == si.load_model()

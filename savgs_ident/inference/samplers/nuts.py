@@ -21,17 +21,17 @@ The tail of the weights w at the proposals, which are nearly draws of s, shows w
 posterior: its Pareto index k is reported.
 """
 
+import importlib
 from collections.abc import Generator
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
-import blackjax
 import equinox as eqx
 import h5py
 import jax
 import jax.numpy as jnp
 import numpy as np
-from blackjax.adaptation.step_size import dual_averaging_adaptation
 from jaxtyping import Array, Bool, Float
 
 from savgs_ident.inference.near_mode import ExactModel, Surrogate
@@ -188,6 +188,16 @@ def _chains(state: State, evaluations: int, unsolved: int) -> Chains:
     )
 
 
+def _blackjax() -> ModuleType:
+    """blackjax, loaded where a program is traced and no sooner.
+
+    It computes as it is loaded: with the rest of this module it would do so before the compiler is set up, which by
+    then has read its flags. Loaded within a trace it would keep what is traced.
+    """
+    with jax.ensure_compile_time_eval():
+        return importlib.import_module("blackjax")
+
+
 @eqx.filter_jit
 def _adapted(*args: Any) -> tuple[Array, ...]:
     return run_cached(_adapt, *args)
@@ -200,7 +210,8 @@ def _transitions(*args: Any) -> tuple[Array, ...]:
 
 def _adapt(surrogate: Surrogate, key: Array) -> tuple[Array, ...]:
     """The step size by dual averaging, on one chain from the mode."""
-    start, update, final = dual_averaging_adaptation(ACCEPTANCE)
+    blackjax = _blackjax()
+    start, update, final = blackjax.adaptation.step_size.dual_averaging_adaptation(ACCEPTANCE)
     kernel = blackjax.nuts.build_kernel()
     unit = jnp.ones_like(surrogate.centre)
 
@@ -219,6 +230,7 @@ def _transit(
     surrogate: Surrogate, key: Array, start: Array, step_size: Array, count: int
 ) -> tuple[Array, ...]:
     """Ends (C, n + 2) of ``count`` transitions of each chain, their log densities (C,), divergences in all."""
+    blackjax = _blackjax()
     kernel = blackjax.nuts.build_kernel()
 
     def transition(state: Any, key: Array) -> tuple[Any, Array]:
