@@ -59,7 +59,7 @@ SHARING = {
     **dict.fromkeys(("effects", "symbolic"), "laws"),
     **{
         f"diagnosis/test_{name}.py": "diagnoses of few dwells"
-        for name in ("another_law", "background", "diagnose", "intervals")
+        for name in ("another_law", "background", "diagnose", "false_alarms", "intervals", "learning")
     },
     **{f"cli/test_{name}.py": "diagnoses of two dwells" for name in ("exit_codes", "false_alarms")},
 }

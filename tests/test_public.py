@@ -190,6 +190,10 @@ def test_a_result_shows_itself_and_writes_what_the_command_writes(tmp_path: Path
         si.plot_bode(summary)
 
 
+SHIPPED = {"mu_r": 0.03, "mu_t": 0.25, "ydot_Hth": 0.05, "c_sd": 0.93 * 5792.0}
+"""What the shipped campaign was made with, in SI."""
+
+
 @pytest.mark.slow
 def test_the_ten_lines_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With fewer draws than by default."""
@@ -209,6 +213,8 @@ def test_the_ten_lines_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.Mon
     assert fit.trusted
     assert (post.sampler, post.convergence.converged) == ("nuts", True)
     assert abs(post["mu_r"].median - fit["mu_r"].value) < fit["mu_r"].stderr
+    for name, true in SHIPPED.items():
+        assert post[name].q025 < true < post[name].q975, name
     assert (gap.verdict.kind, gap.verdict.effects, gap.converged) == ("none", (), True)
     assert loop.stable
     assert (tmp_path / "gap.html").stat().st_size > 100_000

@@ -12,7 +12,6 @@ from typing import Any
 
 import h5py
 import numpy as np
-import pandas as pd
 import pytest
 import xarray as xr
 from click.testing import Result
@@ -20,9 +19,8 @@ from click.testing import Result
 from savgs_ident.core.errors import InputError
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import RigModel, model_of
-from savgs_ident.plants.quarter_car.rig import default_campaign_path, default_rig_path, read_rig, write_rig
+from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig, write_rig
 
-from ..fit.bench import FEW
 from ..in_one_test import over
 
 TRUTH = {"mu_r": 0.03, "mu_t": 0.25, "ydot_Hth": 0.05, "c_sd": 0.93 * 5792.0}
@@ -228,42 +226,3 @@ def test_killed_and_resumed_the_chain_is_the_same(
     with h5py.File(killed) as one, h5py.File(sampled[0] / "chain-emcee.h5") as other:
         steps = min(one["mcmc"].attrs["iteration"], other["mcmc"].attrs["iteration"])
         np.testing.assert_array_equal(one["mcmc"]["chain"][:steps], other["mcmc"]["chain"][:steps])
-
-
-def _draws(folder: Path) -> dict[str, np.ndarray]:
-    with xr.open_datatree(folder / "posterior.nc", engine="h5netcdf") as tree:
-        return {name: tree["posterior"][name].to_numpy() for name in TRUTH}
-
-
-@pytest.mark.slow
-def test_both_samplers_find_the_same_posterior_of_four_dwells_of_the_shipped_campaign(
-    cache: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    as_users_have_it: Callable[[Sequence[str]], Result],
-) -> None:
-    """Enough draws that Monte-Carlo error does not decide.
-
-    Of a difference of means its standard deviation is 0.035 of one of the posterior, of a ratio of widths 0.025.
-    """
-    monkeypatch.setenv("SAVGS_IDENT_CACHE", str(cache))
-    table, campaign = pd.read_csv(default_campaign_path()), str(tmp_path / "four.csv")
-    kept = ["standstill", *(f"dwell_{frequency:.2f}Hz" for frequency in FEW[::2])]
-    table[table["test"].isin(kept)].to_csv(campaign, index=False)
-    fitted = as_users_have_it(["fit", campaign, "--quiet", "--out", str(tmp_path)])
-    assert fitted.exit_code == 0, fitted.stderr
-    draws = {}
-    for sampler in ("emcee", "nuts"):
-        out = tmp_path / sampler
-        words = ["posterior", str(tmp_path / "model.toml"), campaign, "--sampler", sampler]
-        enough = ["--target-ess", "1600", "--patience", "0"]
-        done = as_users_have_it([*words, *enough, "--quiet", "--out", str(out)])
-        assert done.exit_code == 0, done.stderr
-        draws[sampler] = _draws(out)
-    for name, true in TRUTH.items():
-        one, other = (draws[sampler][name] for sampler in ("emcee", "nuts"))
-        assert abs(one.mean() - other.mean()) < 0.1 * one.std(), name
-        assert one.std() == pytest.approx(other.std(), rel=0.1), name
-        for each in (one, other):
-            low, high = np.quantile(each, (0.025, 0.975))
-            assert low < true < high, name

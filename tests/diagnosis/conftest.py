@@ -1,12 +1,14 @@
 """The problem of the rig on a few dwells."""
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
+from savgs_ident.diagnosis.public import SIMTR
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
@@ -27,6 +29,9 @@ DWELLS = (0.8, 1.85, 2.35, 2.85, 4.0, 5.5)
 
 FEW = (0.5, 1.1, 1.85, 2.15, 2.35, 2.55, 3.0, 4.0, 6.0)
 """Dwells that are enough for a whole diagnosis [Hz]: all of a campaign take three times as long."""
+
+COARSE = replace(SIMTR, periodic=PeriodicSettings(nodes=128, adaptations=1))
+"""Settings that are enough for these dwells: tests that share them share compiled programs, too."""
 
 Measure = Callable[[str], HarmonicResponse]
 

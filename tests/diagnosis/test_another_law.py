@@ -16,7 +16,7 @@ import pytest
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
-from savgs_ident.diagnosis.public import SIMTR, diagnose_response
+from savgs_ident.diagnosis.public import diagnose_response
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.effects.base import (
     AbstractFrictionLimitLaw,
@@ -41,7 +41,7 @@ from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_
 from savgs_ident.validation.foreign_laws import FOREIGN
 from savgs_ident.validation.other_port import log_odds_of_port, log_odds_of_stand_in
 
-from .conftest import Measure, rig_problem
+from .conftest import COARSE, Measure, rig_problem
 
 
 class ExponentialStribeck(AbstractFrictionLimitLaw):
@@ -72,8 +72,6 @@ class WavyCam(AbstractInputLaw):
         turned = 4.0 * fundamental.angle
         return InputSignal(1e-4 * jnp.cos(turned), -4e-4 * jnp.sin(turned) * fundamental.speed)
 
-
-COARSE = replace(SIMTR, periodic=PeriodicSettings(nodes=128, adaptations=1))
 
 STRIBECK = effect_at("exponential_stribeck", RAIL, ExponentialStribeck(), {"coefficient": "mu_r"})
 WAVY = effect_at("wavy_cam", ROAD, WavyCam(), {})

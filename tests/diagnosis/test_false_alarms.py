@@ -1,19 +1,13 @@
 """How often something is found where nothing is missing."""
 
-from dataclasses import replace
-
-import numpy as np
 import pytest
 from scipy.stats import binom
 
-from savgs_ident.diagnosis.public import SIMTR
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.simulate.periodic import PeriodicSettings
 from savgs_ident.validation.false_alarms import CONFIDENCE, alarm_bench, rate_bound
 
-from ..fit.bench import only
-from .conftest import DWELLS, Measure
+from .conftest import COARSE, Measure
 
 
 @pytest.mark.parametrize(("alarms", "drawn"), [(0, 60), (1, 100), (7, 30)])
@@ -34,19 +28,12 @@ def _silent(line: str) -> None:
 
 @pytest.mark.slow
 def test_campaigns_with_nothing_missing_give_no_alarm_and_one_with_a_gap_does(
-    measure: Measure, rig: Rig
+    measure_few: Measure, rig: Rig
 ) -> None:
-    """On six dwells."""
-    settings = replace(SIMTR, periodic=PeriodicSettings(nodes=128, adaptations=1))
-    few = {
-        name: only(measure(name), np.isin(np.round(measure(name).frequency, 2), DWELLS))
-        for name in ("nominal", "stribeck_rail")
-    }
-    bench = alarm_bench(few["nominal"], rig, settings, {}, 3, _silent)
+    bench = alarm_bench(measure_few("nominal"), rig, COARSE, {}, 3, _silent)
     draws = [bench.draw(number) for number in range(2)]
     assert not any(each.alarm for each in draws)
     assert all(each.odds is not None and each.odds < DEFAULTS.alarm_log_odds for each in draws)
     assert draws[1] != draws[0]
-    assert (
-        alarm_bench(few["stribeck_rail"], rig, settings, {}, 3, _silent).odds > 10.0 * DEFAULTS.alarm_log_odds
-    )
+    with_a_gap = alarm_bench(measure_few("stribeck_rail"), rig, COARSE, {}, 3, _silent)
+    assert with_a_gap.odds > 10.0 * DEFAULTS.alarm_log_odds

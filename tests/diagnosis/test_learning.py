@@ -18,22 +18,18 @@ from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
 from savgs_ident.plants.quarter_car.ports import DAMPER, RAIL
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.simulate.periodic import PeriodicSettings, resolve
+from savgs_ident.simulate.periodic import resolve
 
-from ..fit.bench import only
-from .conftest import DWELLS, Measure, rig_problem
+from .conftest import COARSE, Measure, rig_problem
 
 BASELINE = MODELS["simtr"]
 
 
 @pytest.fixture(scope="module")
-def case(measure: Measure, rig: Rig) -> tuple[DwellProblem, Data, LaplaceFit]:
-    """SimTR, recalibrated on six dwells of a rail that it does not have."""
-    response = measure("stribeck_rail")
-    few = only(response, np.isin(np.round(response.frequency, 2), DWELLS))
-    settings = PeriodicSettings(nodes=128, adaptations=1)
+def case(measure_few: Measure, rig: Rig) -> tuple[DwellProblem, Data, LaplaceFit]:
+    """SimTR, recalibrated on a few dwells of a rail that it does not have."""
     catalogue = {name: CATALOGUE[name] for name in BASELINE}
-    plant, data = rig_problem(few, rig, catalogue, settings)
+    plant, data = rig_problem(measure_few("stribeck_rail"), rig, catalogue, COARSE.periodic)
     return plant, data, find_map(search_of(plant, data), (), {}, plant.start({}))
 
 
