@@ -5,6 +5,7 @@ ranks, no silent promotion of dtypes. Warnings are errors (pyproject.toml).
 """
 
 import gc
+import getpass
 import json
 import os
 import shutil
@@ -53,6 +54,13 @@ SHARED = REPOSITORY.parent / "shared" / "data"
 
 SCRATCH = ("SAVGS_IDENT_CACHE", "XDG_CACHE_HOME", "MPLCONFIGDIR", "HYPOTHESIS_STORAGE_DIRECTORY")
 """Variables that name folders of caches; all processes of a run share one that is removed in the end."""
+
+KEPT = {"SAVGS_IDENT_CACHE": "as-users-have-it", "JAX_COMPILATION_CACHE_DIR": "strict"}
+"""Caches of programs that the slow tests keep from one run to the next, among the temporary files; the fast ones
+begin with empty ones. A program is known by all that shapes it: what a change shapes is made anew."""
+
+ENOUGH_KEPT = 4 * 2**30
+"""Size of these caches [byte] above which a run begins with empty ones."""
 
 SHARING = {
     **{folder: folder for folder in ("control", "export", "fit", "inference", "simulate")},
@@ -109,13 +117,28 @@ def pytest_configure(config: pytest.Config) -> None:
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
         os.environ.update({name: str(folder / name.lower()) for name in SCRATCH})
         flags = os.environ.get("XLA_FLAGS", "")
-        if _only_the_fast(config) and "optimization_level" not in flags:
+        if not _only_the_fast(config):
+            os.environ.update({name: str(_kept() / each) for name, each in KEPT.items()})
+            os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.1"
+        elif "optimization_level" not in flags:
             os.environ["XLA_FLAGS"] = f"{flags} {UNOPTIMISED}".strip()
     from savgs_ident.simulate.program_cache import compute_on_one_core, spare_the_compiler
 
     spare_the_compiler()
     if hasattr(config, "workerinput"):
         compute_on_one_core()
+
+
+def _kept() -> Path:
+    """The folder of :data:`KEPT`, this user's alone: what is read from there runs."""
+    folder = Path(tempfile.gettempdir()) / f"savgs-ident-tests-{getpass.getuser()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    if folder.is_symlink() or folder.owner() != getpass.getuser() or folder.stat().st_mode & 0o077:
+        raise pytest.UsageError(f"{folder} is not this user's alone. Remedy: remove it.")
+    if sum(each.stat().st_size for each in folder.rglob("*") if each.is_file()) > ENOUGH_KEPT:
+        shutil.rmtree(folder)
+        folder.mkdir(mode=0o700)
+    return folder
 
 
 def _only_the_fast(config: pytest.Config) -> bool:
