@@ -1,7 +1,7 @@
 """Dwells of a campaign to one harmonic response.
 
     response = estimate_response(campaign, orders=9)
-    accel = response.harmonics[:, response.channel("sprung_accel"), 1]
+    accel = response.harmonics[:, response.channel("body_accel"), 1]
 
 Every dwell is fitted on its actual stamps, channel by channel as far as the sampling carries, spikes and dropouts
 left out; the noise is what does not repeat from period to period; then the time origin is moved to the instant,

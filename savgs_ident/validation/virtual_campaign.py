@@ -190,25 +190,19 @@ def _test(
     shown = sensors.converted(truth + noise * sensors.noise(truth.shape, random))
     count = 2.0 * np.pi / sensors.counts
     link = count * np.round((angle + sensors.hunting * random.standard_normal(stamps.size)) / count)
-    names = ("road_height", "sprung_accel", "susp_deflection", "link_angle")
-    values = (*shown, link)
+    driven, held = QuarterCar.inputs
+    names = (driven.name, *(each.name for each in QuarterCar.channels), held.name)
     channels = {
-        name: RecordedChannel(name, RIG_LAYOUT.si_unit(name), stamps, each)
-        for name, each in zip(names, values, strict=True)
+        name: RecordedChannel(name, RIG_LAYOUT.si_unit(name), stamps, values)
+        for name, values in zip(names, (*shown, link), strict=True)
     }
     return Recording(name, kind, frequency, channels)
 
 
 FILE = "campaign.csv.gz"
 
-DECIMALS = {
-    "time": 5,
-    "road_height": 6,
-    "sprung_accel": 4,
-    "susp_deflection": 6,
-    "link_angle": 6,
-}
-"""Decimals of each column in its SI unit."""
+DECIMALS = {"s": 5, "m": 6, "m/s^2": 4, "rad": 6}
+"""Decimals of a column by its SI unit."""
 
 
 def write_recordings(recordings: Sequence[Recording], folder: Path) -> Path:
@@ -222,7 +216,7 @@ def write_recordings(recordings: Sequence[Recording], folder: Path) -> Path:
     for each in recordings:
         channels = [each.channels[name] for name in units]
         table = np.column_stack([channels[0].time, *(channel.values for channel in channels)])
-        form = [f"%.{DECIMALS[name]}f" for name in ("time", *units)]
+        form = [f"%.{DECIMALS[unit]}f" for unit in ("s", *units.values())]
         np.savetxt(text, table, fmt=",".join([each.name, *form]))
     packed = gzip.compress(text.getvalue().encode(), compresslevel=6, mtime=0)
     return write_bytes(folder / FILE, packed)
