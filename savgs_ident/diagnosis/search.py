@@ -301,17 +301,27 @@ def _single_effects(fits: _Fits, scores: Sequence[Score]) -> list[LaplaceFit]:
     ranked = fits.refined([*begun, *fits.extended(base, alike, least)])
     names = {each.term.name for each in (*worth[:first], *alike)}
     later = [each for each in worth if each.term.name not in names]
-    swinging: list[LaplaceFit] = []
+    beyond = max(least, fits.negligible(ranked))
     if ranked and fits.explains_all(ranked[0]):
-        later = fits.lookalikes(later, [each for each in scores if each.term.name == ranked[0].terms[0]])
+        named = [each for each in scores if each.term.name == ranked[0].terms[0]]
+        more = fits.extended(base, fits.lookalikes(later, named), beyond)
     else:
-        later = later[: constants.further_fits]
-        # A strong resonance is far from what it does to first order, wherever it is.
-        near = max((mode.evidence for mode in ranked), default=-np.inf) - constants.refined_log_evidence
-        several = [] if fits.explains_all(base) else [term for term in fits.terms.values() if term.tries]
-        swinging = in_parallel(lambda term: fits.from_typical_size(term, near), several)
-    more = fits.extended(base, later, max(least, fits.negligible(ranked)))
-    return fits.refined(_best_of_each([*ranked, *more, *swinging]))
+        more = fits.extended(base, later[: constants.further_fits], beyond)
+        if not any(fits.explains_all(mode) for mode in more):
+            more += _swinging(fits, ranked)
+    return fits.refined(_best_of_each([*ranked, *more]))
+
+
+def _swinging(fits: _Fits, ranked: Sequence[LaplaceFit]) -> list[LaplaceFit]:
+    """Fits of what swings from its typical size, as far as they come near to the best of those ``ranked``.
+
+    A strong resonance is far from what it does to first order, wherever it is.
+    """
+    if fits.explains_all(fits.base):
+        return []
+    near = max((mode.evidence for mode in ranked), default=-np.inf) - fits.constants.refined_log_evidence
+    several = [term for term in fits.terms.values() if term.tries]
+    return in_parallel(lambda term: fits.from_typical_size(term, near), several)
 
 
 def _best_of_each(modes: Sequence[LaplaceFit]) -> list[LaplaceFit]:
