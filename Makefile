@@ -2,7 +2,7 @@
 #   make demo        the main job on the shipped recordings
 #   make test        lint, types, import contracts, tests: at most five minutes on two cores
 #   make test-all    what make test leaves out: processes, browsers, notebooks, documents, FMUs, long simulations;
-#                    and the property tests once more, with more examples
+#                    and the property tests once more, with more examples; keeps what it compiles in /tmp
 #   make bench       the benchmark table
 #   make docs        the guide and the reference, in build/docs
 #   make fuzz        every loader on damaged files, counted in docs/fuzzing.md

@@ -37,7 +37,7 @@ EVIL = "<script>alert(1)</script><img src=x onerror=alert(2)>[bold]\"'&\x1b[31m.
 
 TOPICS = (EVIL, "/" + "t" * 5000, "two\nlines\x1b[31m")
 
-STARTED = 2
+STARTED = 1
 """So many names of each kind are given to the installed program, the others to the same commands in this process."""
 
 Started = Callable[[int], Program]

@@ -13,15 +13,20 @@ BASE = {"mass": 80.0, "viscous": 150.0}
 
 
 def recorded_axis(
-    laws: Mapping[str, float], seed: int, cycles: int = 4, noise: float = 0.3, colour: float = 0.9
+    laws: Mapping[str, float],
+    seed: int,
+    cycles: int = 4,
+    noise: float = 0.3,
+    colour: float = 0.9,
+    rate: float = RATE_HZ,
 ) -> AxisRecording:
-    """A recording of an axis with mass, viscous friction and the given ``laws`` (SI).
+    """A recording of an axis with mass, viscous friction and the given ``laws`` (SI), sampled at a ``rate`` [Hz].
 
     The force has noise of standard deviation ``noise`` [N] with correlation ``colour`` from sample to sample, the
     position has the steps of an encoder of 0.1 micrometre.
     """
     p = BASE | dict.fromkeys(("coulomb", "offset", "spring", "viscous_difference"), 0.0) | dict(laws)
-    time = np.arange(round(cycles * PERIOD_S * RATE_HZ)) / RATE_HZ
+    time = np.arange(round(cycles * PERIOD_S * rate)) / rate
     q, v, a = np.zeros((3, time.size))
     for order, size, phase in ((1, 0.09, 0.3), (2, 0.02, 1.1), (5, 0.008, 2.0), (9, 0.002, 0.7)):
         w = 2.0 * np.pi * order / PERIOD_S
