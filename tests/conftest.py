@@ -55,12 +55,8 @@ SHARED = REPOSITORY.parent / "shared" / "data"
 SCRATCH = ("SAVGS_IDENT_CACHE", "XDG_CACHE_HOME", "MPLCONFIGDIR", "HYPOTHESIS_STORAGE_DIRECTORY")
 """Variables that name folders of caches; all processes of a run share one that is removed in the end."""
 
-KEPT = {"SAVGS_IDENT_CACHE": "as-users-have-it", "JAX_COMPILATION_CACHE_DIR": "strict"}
-"""Caches of programs that the slow tests keep from one run to the next, among the temporary files; the fast ones
-begin with empty ones. A program is known by all that shapes it: what a change shapes is made anew."""
-
 ENOUGH_KEPT = 4 * 2**30
-"""Size of these caches [byte] above which a run begins with empty ones."""
+"""Size of the programs [byte] that slow tests keep from one run to the next, above which a run begins with none."""
 
 SHARING = {
     **{folder: folder for folder in ("control", "export", "fit", "inference", "simulate")},
@@ -118,8 +114,7 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.update({name: str(folder / name.lower()) for name in SCRATCH})
         flags = os.environ.get("XLA_FLAGS", "")
         if not _only_the_fast(config):
-            os.environ.update({name: str(_kept() / each) for name, each in KEPT.items()})
-            os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.1"
+            os.environ["SAVGS_IDENT_CACHE"] = str(_kept())
         elif "optimization_level" not in flags:
             os.environ["XLA_FLAGS"] = f"{flags} {UNOPTIMISED}".strip()
     from savgs_ident.simulate.program_cache import compute_on_one_core, spare_the_compiler
@@ -130,7 +125,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _kept() -> Path:
-    """The folder of :data:`KEPT`, this user's alone: what is read from there runs."""
+    """Where the slow tests keep programs from one run to the next; the fast ones begin with none.
+
+    Among the temporary files, and this user's alone: what is read from there runs. A program is known by all that
+    shapes it, so that what a change shapes is made anew.
+    """
     folder = Path(tempfile.gettempdir()) / f"savgs-ident-tests-{getpass.getuser()}"
     folder.mkdir(mode=0o700, exist_ok=True)
     if folder.is_symlink() or folder.owner() != getpass.getuser() or folder.stat().st_mode & 0o077:

@@ -131,7 +131,6 @@ def _description(value: Any) -> Iterator[str]:
             raise _UndescribedError(type(value).__name__)
 
 
-_SUBFOLDER = "traced"
 _DIGEST = hashlib.sha256().digest_size
 
 
@@ -142,9 +141,9 @@ def run_cached(function: Callable[..., tuple[Array, ...]], *args: Any) -> tuple[
     of any shape and any units. A cached program can be compiled within a larger one, but neither
     differentiated nor batched.
     """
-    folder = _folder_of_traced()
+    folder = jax.config.values["jax_compilation_cache_dir"]
     key = fingerprint(function, args) if folder else None
-    if folder is None or key is None:
+    if key is None:
         return function(*args)
     leaves, structure = jax.tree.flatten(args, is_leaf=lambda each: each is None)
     places = [place for place, leaf in enumerate(leaves) if isinstance(leaf, jax.Array)]
@@ -155,7 +154,7 @@ def run_cached(function: Callable[..., tuple[Array, ...]], *args: Any) -> tuple[
             every[place] = array
         return function(*jax.tree.unflatten(structure, every))
 
-    file = folder / key
+    file = Path(folder) / f"traced-{key}"
     arrays = [leaves[place] for place in places]
     program = _read(file)
     if program is None:
@@ -163,13 +162,6 @@ def run_cached(function: Callable[..., tuple[Array, ...]], *args: Any) -> tuple[
         program = export.export(jax.jit(of_arrays))(*shapes)
         _write(file, program)
     return tuple(program.call(*arrays))
-
-
-def _folder_of_traced() -> Path | None:
-    """Where traced programs are kept; None where none are: by settings of JAX a user may keep compiled ones alone."""
-    compiled = jax.config.values["jax_compilation_cache_dir"]
-    folder = Path(compiled) / _SUBFOLDER if compiled else None
-    return folder if folder and folder.is_dir() else None
 
 
 def placed(tree: Any) -> Any:
@@ -262,7 +254,7 @@ def use_persistent_cache() -> bool:
     spare_the_compiler()
     try:
         folder = cache_folder()
-        (folder / _SUBFOLDER).mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         room = shutil.disk_usage(folder).free
     except (OSError, RuntimeError):
         return False
