@@ -14,8 +14,8 @@ Every hypothesis that is fitted in full comes out with its evidence; one whose f
 named in :attr:`~savgs_ident.diagnosis.findings.Findings.lost`.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,18 +24,13 @@ from savgs_ident.core.presentation import Progress
 from savgs_ident.diagnosis.findings import (
     Findings,
     LostHypothesis,
-    explains_all,
     hypothesis_of,
-    left_over,
 )
+from savgs_ident.diagnosis.full_fits import Fits, best_of_each
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import (
-    PairScore,
     Score,
     best_pairs,
-    cosine,
-    peaks_by_try,
-    prior_conflict,
     score_terms,
     scores_by_try,
 )
@@ -43,10 +38,6 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.find_map import (
     LaplaceFit,
     Search,
-    densest,
-    find_map,
-    find_map_from_both,
-    refine,
 )
 from savgs_ident.inference.observations import Term
 
@@ -64,7 +55,7 @@ def single_effects(
     ``known`` are sets of terms that are often missing together. They are fitted from their typical sizes, because a
     search from a baseline that lacks all of them, and misses by as much as it moves, would not arrive.
     """
-    fits = _Fits(search, base, {term.name: term for term in terms}, progress, constants)
+    fits = Fits(search, base, {term.name: term for term in terms}, progress, constants)
     together = fits.refined([fits.fitted_together(names) for names in known])
     if any(fits.explains_all(mode) for mode in together):
         progress(f"{hypothesis_of(together[0])}: nothing is left")
@@ -86,7 +77,7 @@ def with_pairs(
 
     Pairs whose score promises no log evidence beyond ``least`` are not fitted.
     """
-    fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
+    fits = Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
     singles = [mode for mode in findings.modes if len(mode.terms) == 1]
     if not singles or singles[0].evidence <= findings.base.evidence + constants.pair_log_evidence:
         return findings
@@ -110,7 +101,7 @@ def singles_among(
     resonance shows to first order, and at a typical size, only where it is met to a few per cent.
     """
     tried = {mode.terms for mode in findings.modes}
-    fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
+    fits = Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
     others = [term for term in wanted if (term.name,) not in tried]
     singles = fits.extended(findings.base, score_terms(search, findings.base, others, constants))
     least = max((mode.evidence for mode in findings.modes), default=-np.inf) - constants.refined_log_evidence
@@ -120,7 +111,7 @@ def singles_among(
             singles += fits.extended(
                 findings.base, scores_by_try(search, findings.base, term, constants), least
             )
-    found = fits.refined(_best_of_each([*findings.modes, *singles]))
+    found = fits.refined(best_of_each([*findings.modes, *singles]))
     more = _findings(findings.base, findings.scores, found)
     return replace(more, lost=(*findings.lost, *more.lost))
 
@@ -138,7 +129,7 @@ def pairs_with(
 
     Beside a stand-in the right second effect explains little: it has to be fitted beside the right member alone.
     """
-    fits = _Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
+    fits = Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
     tried = {hypothesis_of(mode) for mode in findings.modes}
     pairs: list[LaplaceFit] = []
     for parent in findings.modes:
@@ -163,134 +154,7 @@ def _findings(
     return Findings(base, tuple(scores), tuple(found), lost)
 
 
-@dataclass(frozen=True)
-class _Fits:
-    """Full fits of hypotheses to the same data: what all steps of a search share."""
-
-    search: Search
-    base: LaplaceFit
-    terms: Mapping[str, Term]
-    progress: Progress
-    constants: DecisionConstants
-
-    def explains_all(self, mode: LaplaceFit) -> bool:
-        """Whether a hypothesis leaves next to nothing."""
-        return mode.solved and explains_all(self.search, self.base, mode, self.constants)
-
-    def is_spotless(self, mode: LaplaceFit) -> bool:
-        """Whether a hypothesis leaves hardly more than the noise, and every parameter within its tolerance."""
-        return self._left(mode) == 0.0 and not self.conflicts(mode)
-
-    def negligible(self, modes: Sequence[LaplaceFit]) -> float:
-        """The log evidence below which nothing is worth fitting beside ``modes``, one of which explains all."""
-        enough = [mode.evidence for mode in modes if self.explains_all(mode)]
-        return max(enough, default=-np.inf) - self.constants.refined_log_evidence
-
-    def conflicts(self, mode: LaplaceFit) -> bool:
-        """Whether the data speak for a tolerance that does not hold beside this hypothesis."""
-        found = prior_conflict(mode, self.search.plant.nuisances, self.constants)
-        return found.gain > self.constants.promising_log_evidence
-
-    def lookalikes(self, scores: Sequence[Score], of: Sequence[Score]) -> list[Score]:
-        """Those scores whose effect does nearly the same as any of the others."""
-        least = self.constants.lookalike_cosine
-        return [each for each in scores if any(abs(cosine(each, other)) > least for other in of)]
-
-    def fitted_together(self, names: tuple[str, ...]) -> LaplaceFit:
-        """The fit of several terms together, from their typical sizes."""
-        self.progress(f"fitting {Hypothesis(names)} from typical sizes")
-        chosen, typical = tuple(self.terms[name] for name in names), self.constants.typical_coordinate
-        start = {each.name: each.value(typical) for term in chosen for each in term.amplitudes}
-        start |= {each.name: each.centre for term in chosen for each in term.shapes}
-        return find_map_from_both(
-            self.search, chosen, self.base.values | start, self.base.prediction.warm_start
-        )
-
-    def fitted_alone(self, name: str, pair: LaplaceFit) -> LaplaceFit:
-        """The fit of one member of a pair, from where it is beside the other."""
-        self.progress(f"fitting {name} from its value in {hypothesis_of(pair)}")
-        return find_map(self.search, (self.terms[name],), pair.values, pair.prediction.warm_start)
-
-    def from_typical_size(self, term: Term, least: float) -> LaplaceFit:
-        """The best fit of a term from its typical size and the shapes that are tried; those below ``least`` given up.
-
-        Of what swings from the frequency that is nearest. A stop is fitted from each gap: the nearest of all may be
-        one that is never closed, from where nothing leads on.
-        """
-        self.progress(f"fitting {term.name} from its typical size")
-        typical = {each.name: each.value(self.constants.typical_coordinate) for each in term.amplitudes}
-        starts = [self.base.values | typical | shapes for shapes in term.tried]
-        near = self.base.prediction.warm_start
-        chosen = [densest(self.search, (term,), starts, near)] if term.tries else starts
-        fits = [find_map_from_both(self.search, (term,), start, near, least=least) for start in chosen]
-        return max(fits, key=lambda fit: fit.evidence)
-
-    def extended(
-        self, parent: LaplaceFit, scores: Sequence[Score], least: float = -np.inf
-    ) -> list[LaplaceFit]:
-        """Fits of the scored terms, each added to those of ``parent``; those below ``least`` are given up."""
-        inherited = tuple(self.terms[name] for name in parent.terms)
-
-        def fit(score: Score) -> LaplaceFit:
-            self.progress(f"fitting {hypothesis_of(parent).with_effect(score.term.name)}")
-            start = parent.values | score.start
-            return find_map_from_both(
-                self.search, (*inherited, score.term), start, parent.prediction.warm_start, least=least
-            )
-
-        return in_parallel(fit, scores)
-
-    def beside(self, parent: LaplaceFit, scores: Sequence[Score], least: float) -> list[LaplaceFit]:
-        """Fits of the scored terms, each added to those of ``parent``: what swings, from its likely frequencies.
-
-        Frequencies that score no more than ``least`` are left out.
-        """
-
-        def starts(score: Score) -> list[Score]:
-            if not score.term.tries:
-                return [score]
-            peaks = peaks_by_try(self.search, parent, score.term, self.constants)
-            return [each for each in peaks if each.evidence > least][: self.constants.resonance_peaks]
-
-        return _best_of_each(self.extended(parent, [start for score in scores for start in starts(score)]))
-
-    def together(self, pairs: Sequence[PairScore]) -> list[LaplaceFit]:
-        """Fits of scored pairs from where they promise most."""
-
-        def fit(pair: PairScore) -> LaplaceFit:
-            self.progress(f"fitting {Hypothesis(tuple(term.name for term in pair.terms))}")
-            start, warm_start = self.base.values | pair.start, self.base.prediction.warm_start
-            return find_map_from_both(self.search, pair.terms, start, warm_start)
-
-        return in_parallel(fit, pairs)
-
-    def exchanged(self, pair: LaplaceFit, kept: str, score: Score) -> LaplaceFit:
-        """The fit of a pair with the member that is not ``kept`` exchanged for the scored term."""
-        self.progress(f"fitting {Hypothesis((kept, score.term.name))}")
-        start = pair.values | score.start
-        return find_map(self.search, (self.terms[kept], score.term), start, pair.prediction.warm_start)
-
-    def refined(self, modes: Sequence[LaplaceFit]) -> list[LaplaceFit]:
-        """The hypotheses, best first, the best of them on a mesh adapted to their own motion."""
-        ranked = sorted(modes, key=lambda mode: -mode.evidence)
-
-        def again(mode: LaplaceFit) -> LaplaceFit:
-            self.progress(f"refining {hypothesis_of(mode)}")
-            better = refine(self.search, mode, tuple(self.terms[name] for name in mode.terms))
-            return better if better.solved else mode
-
-        solved = [mode for mode in ranked[: self.constants.refined_fits] if mode.solved]
-        least = ranked[0].evidence - self.constants.refined_log_evidence if ranked else 0.0
-        close = [mode for mode in solved if mode.evidence > least]
-        finer = in_parallel(again, [mode for mode in close if not mode.precise])
-        others = [mode for mode in ranked if not any(mode is each and not mode.precise for each in close)]
-        return sorted([*finer, *others], key=lambda mode: -mode.evidence)
-
-    def _left(self, mode: LaplaceFit) -> float:
-        return left_over(self.search, self.base, mode, self.constants)
-
-
-def _single_effects(fits: _Fits, scores: Sequence[Score]) -> list[LaplaceFit]:
+def _single_effects(fits: Fits, scores: Sequence[Score]) -> list[LaplaceFit]:
     """Fits of the single effects whose scores promise most, best first."""
     constants, base = fits.constants, fits.base
     worth = [each for each in scores if each.evidence > base.evidence + constants.promising_log_evidence]
@@ -309,10 +173,10 @@ def _single_effects(fits: _Fits, scores: Sequence[Score]) -> list[LaplaceFit]:
         more = fits.extended(base, later[: constants.further_fits], beyond)
         if not any(fits.explains_all(mode) for mode in more):
             more += _swinging(fits, ranked)
-    return fits.refined(_best_of_each([*ranked, *more]))
+    return fits.refined(best_of_each([*ranked, *more]))
 
 
-def _swinging(fits: _Fits, ranked: Sequence[LaplaceFit]) -> list[LaplaceFit]:
+def _swinging(fits: Fits, ranked: Sequence[LaplaceFit]) -> list[LaplaceFit]:
     """Fits of what swings from its typical size, as far as they come near to the best of those ``ranked``.
 
     A strong resonance is far from what it does to first order, wherever it is.
@@ -324,14 +188,8 @@ def _swinging(fits: _Fits, ranked: Sequence[LaplaceFit]) -> list[LaplaceFit]:
     return in_parallel(lambda term: fits.from_typical_size(term, near), several)
 
 
-def _best_of_each(modes: Sequence[LaplaceFit]) -> list[LaplaceFit]:
-    """Of fits of the same hypothesis the best."""
-    ranked = sorted(modes, key=lambda mode: mode.evidence)
-    return list({hypothesis_of(mode): mode for mode in ranked}.values())
-
-
 def _pairs(
-    fits: _Fits,
+    fits: Fits,
     singles: Sequence[LaplaceFit],
     scores: Sequence[Score],
     least: float,
@@ -356,7 +214,7 @@ def _pairs(
 
 
 def _with_second_effects(
-    fits: _Fits, parent: LaplaceFit, known: Sequence[LaplaceFit], least: float
+    fits: Fits, parent: LaplaceFit, known: Sequence[LaplaceFit], least: float
 ) -> list[LaplaceFit]:
     """Pairs of a fitted term with the effects that score best beside it, and more than ``least``.
 
@@ -376,7 +234,7 @@ def _with_second_effects(
 
 
 def _with_other_second_effects(
-    fits: _Fits, pairs: list[LaplaceFit], parents: set[Hypothesis], least: float
+    fits: Fits, pairs: list[LaplaceFit], parents: set[Hypothesis], least: float
 ) -> list[LaplaceFit]:
     """The pairs, and those that keep a member of the best ones and exchange the other.
 
@@ -393,7 +251,7 @@ def _with_other_second_effects(
 
 
 def _best_to_first_order(
-    fits: _Fits, found: Sequence[LaplaceFit], scores: Sequence[Score], least: float
+    fits: Fits, found: Sequence[LaplaceFit], scores: Sequence[Score], least: float
 ) -> list[LaplaceFit]:
     """Pairs that are not ``found`` yet and promise more about the baseline than the best of these has."""
     tried = {hypothesis_of(mode) for mode in found}
@@ -406,7 +264,7 @@ def _best_to_first_order(
     return fits.together(worth[: fits.constants.pairs_per_parent])
 
 
-def _with_lookalikes(fits: _Fits, pairs: list[LaplaceFit], scores: Sequence[Score]) -> list[LaplaceFit]:
+def _with_lookalikes(fits: Fits, pairs: list[LaplaceFit], scores: Sequence[Score]) -> list[LaplaceFit]:
     """The pairs, and the best one with either member exchanged for its lookalikes."""
     by_name = {score.term.name: score for score in scores}
     best, tried = pairs[0], {hypothesis_of(mode) for mode in pairs}
@@ -419,7 +277,7 @@ def _with_lookalikes(fits: _Fits, pairs: list[LaplaceFit], scores: Sequence[Scor
     return fits.refined([*pairs, *in_parallel(lambda each: fits.exchanged(best, *each), exchanges)])
 
 
-def _with_small_second_effects(fits: _Fits, parent: LaplaceFit) -> list[LaplaceFit]:
+def _with_small_second_effects(fits: Fits, parent: LaplaceFit) -> list[LaplaceFit]:
     """Pairs of a term that explains nearly all with effects so small that one alone does not show the other."""
     others = [term for name, term in fits.terms.items() if name not in parent.terms]
     scores = score_terms(fits.search, parent, others, fits.constants)
