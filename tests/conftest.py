@@ -117,7 +117,8 @@ def pytest_configure(config: pytest.Config) -> None:
             os.environ["SAVGS_IDENT_CACHE"] = str(_kept())
         elif "optimization_level" not in flags:
             os.environ["XLA_FLAGS"] = f"{flags} {UNOPTIMISED}".strip()
-    from savgs_ident.simulate.program_cache import compute_on_one_core, spare_the_compiler
+    from savgs_ident.core.executor import compute_on_one_core
+    from savgs_ident.simulate.program_cache import spare_the_compiler
 
     spare_the_compiler()
     if hasattr(config, "workerinput"):

@@ -33,7 +33,7 @@ from savgs_ident.campaigns.store import (
 )
 from savgs_ident.campaigns.study import CampaignRow, CampaignStudy, RowStatus, row_of, study_campaigns
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.executor import Lost, cores, run_tasks
+from savgs_ident.core.executor import Lost, compute_on_one_core, cores, run_tasks
 from savgs_ident.core.files import prepare_folder, spelled_out
 from savgs_ident.core.presentation import Origin, Progress, no_progress
 from savgs_ident.fit.least_squares import FitSettings
@@ -44,11 +44,7 @@ from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig, rig_
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.recordings.channels import read_channel_map
 from savgs_ident.recordings.read import map_digest
-from savgs_ident.simulate.program_cache import (
-    compute_on_one_core,
-    make_room_for_programs,
-    use_persistent_cache,
-)
+from savgs_ident.simulate.program_cache import make_room_for_programs, use_persistent_cache
 
 FILE_NAMES = (
     "campaign.json", "campaigns.csv", "campaigns.parquet", "campaign.png", "campaign.pdf", "campaign.html"

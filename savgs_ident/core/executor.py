@@ -61,6 +61,13 @@ _ENVIRONMENT = {"EQX_ON_ERROR": "nan"}
 """Of the processes, unless the user says otherwise. Checks that call back into Python from a compiled program would
 keep it from being stored for the next run; a failed one gives NaN then, which is looked for."""
 
+_CORES = "NPROC"
+"""The variable that reserves cores for a process. XLA takes the size of its pool of threads from it."""
+
+_THREADS = (_CORES, "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+"""The variables from which libraries take how many threads to use. Each process of several is told its share of the
+cores: were each to use all of them, the threads would only get in each other's way."""
+
 
 @dataclass(frozen=True)
 class Lost:
@@ -109,8 +116,18 @@ def run_tasks(
 
 
 def cores() -> int:
-    """The cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """The cores that this process may use: those that it is bound to, or fewer where ``NPROC`` says so."""
+    bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    reserved = os.environ.get(_CORES, "")
+    return min(bound, max(1, int(reserved))) if reserved.isdecimal() else bound
+
+
+def compute_on_one_core() -> None:
+    """Have this process use one core: for processes of which there are as many as cores.
+
+    To be called before anything is computed.
+    """
+    os.environ[_CORES] = "1"
 
 
 def _attempt(work: Callable[[Task], Result], task: Task) -> Result | _Raised:
@@ -123,14 +140,14 @@ def _attempt(work: Callable[[Task], Result], task: Task) -> Result | _Raised:
 class _Worker(Generic[Task, Result]):
     """A process, our end of its pipe, the number of the task it has in hand, and how many it was given."""
 
-    def __init__(self, work: Callable[[Task], Result]) -> None:
+    def __init__(self, work: Callable[[Task], Result], share: int) -> None:
         self.number: int | None = None
         self.given = 0
         # Forked processes would share the threads of JAX.
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.process: SpawnProcess = context.Process(target=_serve, args=(theirs,), daemon=True)
-        with _environment_of_workers():
+        with _environment_of_workers(share):
             self.process.start()
         # With its own end closed here, the death of the process is the end of what can be read.
         theirs.close()
@@ -176,16 +193,17 @@ def on_processes(
     """Numbers of tasks and what ``work`` made of them in processes of this machine, ``workers`` at a time.
 
     A process makes room for a new one when it was given as many tasks as ``each_does``. A task whose process ends is
-    begun again, :data:`ATTEMPTS` times at most.
+    begun again, :data:`ATTEMPTS` times at most. Each process is told its share of the cores.
     """
     waiting, begun = deque(range(len(tasks))), [0] * len(tasks)
+    share = max(1, cores() // workers)
     crew: list[_Worker[Task, Result]] = []
     try:
         while waiting or any(each.number is not None for each in crew):
             while waiting and len(crew) < workers:
                 # An interrupt in between would leave a process that nobody ends.
                 with _interrupts_held_back():
-                    crew.append(_Worker(work))
+                    crew.append(_Worker(work, share))
             for each in crew:
                 if each.number is None and waiting:
                     each.give(waiting[0], tasks[waiting[0]])
@@ -234,15 +252,17 @@ def _end_after_parent() -> None:
 
 
 @contextmanager
-def _environment_of_workers() -> Iterator[None]:
+def _environment_of_workers(share: int) -> Iterator[None]:
     """New processes inherit it; libraries read it when they are loaded, before the first task."""
-    added = {name: value for name, value in _ENVIRONMENT.items() if name not in os.environ}
-    os.environ.update(added)
+    before = dict(os.environ)
+    os.environ.update({**_ENVIRONMENT, **dict.fromkeys(_THREADS, str(share)), **before})
+    os.environ[_CORES] = str(share)
     try:
         yield
     finally:
-        for name in added:
+        for name in {*_ENVIRONMENT, *_THREADS}:
             del os.environ[name]
+        os.environ.update(before)
 
 
 @contextmanager

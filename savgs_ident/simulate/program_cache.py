@@ -220,15 +220,6 @@ def spare_the_compiler() -> None:
         os.environ["XLA_FLAGS"] = f"{flags} {_QUICK}".strip()
 
 
-def compute_on_one_core() -> None:
-    """Have programs of this process use one core: for processes of which there are as many as cores.
-
-    Threads beyond the cores only get in each other's way. To be called before anything is computed.
-    """
-    # The variable from which XLA takes the size of its pool of threads.
-    os.environ["NPROC"] = "1"
-
-
 def cache_folder() -> Path:
     """Where programs are kept: ``SAVGS_IDENT_CACHE``, else the platform's cache folder.
 

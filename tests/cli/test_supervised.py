@@ -1,4 +1,4 @@
-"""Processes that work for this one, interrupted while they start."""
+"""Processes that work for this one: interrupted while they start, and each on its share of the cores."""
 
 import os
 import signal
@@ -8,7 +8,7 @@ from multiprocessing.context import SpawnProcess
 
 import pytest
 
-from savgs_ident.core.executor import on_processes
+from savgs_ident.core.executor import cores, on_processes
 
 
 def _started(monkeypatch: pytest.MonkeyPatch, whom: str) -> list[SpawnProcess]:
@@ -65,3 +65,28 @@ def test_a_program_that_ends_between_two_results_leaves_no_process() -> None:
     assert result == ["(0, 1)"]
     with pytest.raises(ProcessLookupError):
         os.kill(int(process), 0)
+
+
+@pytest.mark.parametrize(("workers", "share"), [(1, 4), (2, 2), (3, 1), (8, 1)])
+def test_processes_side_by_side_share_the_cores(
+    monkeypatch: pytest.MonkeyPatch, workers: int, share: int
+) -> None:
+    """What the user says of a library's threads stands; this process is left as it was."""
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(4)))
+    monkeypatch.delenv("NPROC", raising=False)
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "7")
+    before = dict(os.environ)
+    names = ["NPROC", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"]
+    told = [found for _, found in on_processes(os.getenv, names, workers)]
+    assert sorted(map(str, told)) == sorted([str(share), str(share), "7"])
+    assert dict(os.environ) == before
+
+
+@pytest.mark.parametrize(("reserved", "used"), [("", 4), ("2", 2), ("0", 1), ("9", 4), ("all", 4)])
+def test_cores_are_those_bound_to_or_fewer_if_reserved(
+    monkeypatch: pytest.MonkeyPatch, reserved: str, used: int
+) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(4)))
+    monkeypatch.setenv("NPROC", reserved)
+    assert cores() == used
