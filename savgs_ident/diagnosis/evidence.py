@@ -263,17 +263,26 @@ class DiagnosisEvidence:
         )
 
     def ports_alike(self, port: str, constants: DecisionConstants = DEFAULTS) -> tuple[str, ...]:
-        """Other ports at which a law is to first order about as probable as one at ``port``, or more, the best first.
+        """Other ports at which a law would do as much as the effect that is named, at ``port``, the best first.
 
-        A formula at the port may be far more probable than the catalogue's formulas there: what it does may be that
-        of another law all the same. None where a law at the port explains little to first order.
+        A learned law that is about as probable as the effect; and a law that is to first order about as probable as
+        one at the port, or more: a formula may be far more probable than the catalogue's formulas elsewhere, but what
+        it does may be that of another law all the same. None of these where a law at the port explains little.
         """
+        near = constants.indistinguishable_log_odds
+        learned = [
+            each.hypothesis.flexible.port
+            for each in self.weighed
+            if each.hypothesis.flexible is not None
+            and uncertain_odds(self.chosen.weight - each.weight, hypot(self.chosen.sd, each.sd)) < near
+        ]
         here = next((each for each in self.localisations if each.name == port), None)
         if here is None or here.share < constants.alike_share:
-            return ()
-        least = here.evidence - constants.indistinguishable_log_odds
-        ranked = sorted(self.localisations, key=lambda each: -each.evidence)
-        return tuple(each.name for each in ranked if each.name != port and each.evidence > least)
+            likely = []
+        else:
+            ranked = sorted(self.localisations, key=lambda each: -each.evidence)
+            likely = [each.name for each in ranked if each.evidence > here.evidence - near]
+        return tuple(name for name in dict.fromkeys([*learned, *likely]) if name != port)
 
 
 def is_better_form(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: FlexibleMember) -> bool:

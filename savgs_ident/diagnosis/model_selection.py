@@ -128,14 +128,21 @@ def _with_formulas_of(
 ) -> Findings:
     """The findings, and the catalogue's formulas of the families of those learned laws that leave little.
 
-    The law is known where one of them does as much, at its own location or beside it.
+    The law is known where one of them does as much, at its own location or beside it. Of a law in series, all
+    formulas at its port: without what gives way calibration turns the forces behind it into others, beside which it
+    would do hardly anything, and what is learned there may be of another family.
     """
     if not members:
         return findings
     most, candidates = problem.constants.unexplained_share_flexible, problem.plant.candidates
-    families = {each.hypothesis.flexible for each in members if each is members[0] or each.left <= most}
+    little = [each for each in members if each is members[0] or each.left <= most]
+    families = {each.hypothesis.flexible for each in little}
+    series = {each.law.port.name for each in little if each.law.port.kind is PortKind.SERIES}
     wanted = [
-        each for each in candidates if not families.isdisjoint(problem.families(Hypothesis((each.name,))))
+        each
+        for each in candidates
+        if not families.isdisjoint(problem.families(Hypothesis((each.name,))))
+        or problem.plant.catalogue[each.name].port.name in series
     ]
     return singles_among(problem.search, findings, wanted, candidates, progress, problem.constants)
 

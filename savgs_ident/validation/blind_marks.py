@@ -108,6 +108,7 @@ def score_of(
         closed_by_effect=_number_or_none(diagnosis["shrink"].get("closed_by_effect")),
         version=version,
         hidden=_hidden(answer, diagnosis),
+        meant=tuple(sorted(_meant(answer, diagnosis))),
         law_known=known,
         imitated=instead is not None and (instead in answer.imitators or _does_the_same(elsewhere)),
     )
@@ -132,7 +133,12 @@ def _as_well(answer: Answer, diagnosis: Mapping[str, Any]) -> bool:
     instead, left_out = said - true, true - said
     one_for_one = len(said) == len(true) and len(instead) == 1
     listed = one_for_one and left_out <= {*verdict["confusable_with"]}
-    return listed and (instead <= {*answer.imitators} or _about_as_probable(true, said, diagnosis))
+    return listed and _does_as_well(answer, true, said, diagnosis)
+
+
+def _does_as_well(answer: Answer, true: set[str], said: set[str], diagnosis: Mapping[str, Any]) -> bool:
+    """Whether what is named does the same as what was drawn: by the draw, or by the same recordings."""
+    return said - true <= {*answer.imitators} or _about_as_probable(true, said, diagnosis)
 
 
 def _about_as_probable(true: set[str], said: set[str], diagnosis: Mapping[str, Any]) -> bool:
@@ -148,9 +154,20 @@ def _hidden(answer: Answer, diagnosis: Mapping[str, Any]) -> bool:
     """Whether calibration hides every drawn effect that is not named; of a foreign one, none has its name."""
     all_of_it = answer.kind != "none" and _calibrated(diagnosis["shrink"])
     unseen = {*answer.effects} if all_of_it else answer.out_of_sight
-    said = set() if answer.kind == "foreign" else {*diagnosis["verdict"]["effects"]}
-    missed = {*answer.effects} - said
+    missed = {*answer.effects} - _meant(answer, diagnosis)
     return bool(missed) and missed <= unseen
+
+
+def _meant(answer: Answer, diagnosis: Mapping[str, Any]) -> set[str]:
+    """The drawn effects that a verdict names, or the one in whose place it names another that does the same."""
+    if answer.kind == "foreign":
+        return set()
+    verdict = diagnosis["verdict"]
+    said, true = {*verdict["effects"]}, {*answer.effects}
+    listed = (true - said) & {*verdict["confusable_with"]}
+    if len(said) == len(said - true) == len(listed) == 1 and _does_as_well(answer, listed, said, diagnosis):
+        return listed
+    return said & true
 
 
 def _calibrated(shrink: Mapping[str, Any]) -> bool:

@@ -74,6 +74,8 @@ class Score:
         version: of the code that made the diagnosis.
         hidden: whether calibration leaves too little of a foreign effect, or of every effect that is not named, in
             the draw or in held-out tests.
+        meant: the drawn effects that the verdict names, or the one that it says it cannot distinguish from what it
+            names in its place, which does the same; of trials of the catalogue.
         law_known: whether what is named is a formula of the catalogue; if not, ``said`` is the nearest one.
         imitated: whether, instead of an effect that was removed, one is named that does the same.
     """
@@ -107,13 +109,16 @@ class Score:
     closed_by_effect: float | None = None
     version: str = ""
     hidden: bool = False
+    meant: tuple[str, ...] = ()
     law_known: bool = True
     imitated: bool = False
 
     @property
     def left_alone(self) -> bool:
         """Whether an effect that calibration hides is not named, and no other instead of it."""
-        one_of_two = self.kind == "two" and self.verdict == "effect" and {*self.said} < {*self.effects}
+        one_of_two = (
+            self.kind == "two" and self.verdict == "effect" and len(self.said) == len(self.meant) == 1
+        )
         return self.hidden and (self.verdict == "none" or (one_of_two and self.law_known))
 
     def __str__(self) -> str:
@@ -159,8 +164,9 @@ def said_right(score: Score) -> bool:
     effect that does the same as the drawn one is not there, however right it is to name it. A law of something that
     was removed from the catalogue is true at its port alone.
     """
-    if score.kind in ("effect", "two") and not score.left_alone:
-        return score.law_known and {*score.said} == {*score.effects}
+    if score.kind in ("effect", "two"):
+        hidden = {*score.effects} - {*score.meant} if score.left_alone else set()
+        return score.law_known and {*score.said} == {*score.effects} - hidden
     if score.family_right:
         return score.family_exactly is True
     if score.kind == "unknown" and score.verdict == "effect":
@@ -173,6 +179,7 @@ def score_from(record: object) -> Score:
     if isinstance(record, Mapping):
         # Marks of versions that did not look at other ports are strict.
         strict = {"port_exactly": record.get("port_right"), "family_exactly": record.get("family_right")}
+        strict["meant"] = [name for name in record.get("said", ()) if name in record.get("effects", ())]
         record = {**strict, **record}
     score = record_of(Score, record)
     known = {*CATALOGUE, *FOREIGN} if score.kind == "foreign" else {*CATALOGUE}

@@ -173,6 +173,26 @@ def test_of_two_effects_the_one_that_calibration_hides_may_be_left_out() -> None
     assert rates_of([seen, both, other])["hidden_left_alone"] == Rate(1, 1)
 
 
+def test_beside_a_hidden_effect_another_may_be_named_that_does_the_same_as_the_other_one() -> None:
+    dim = replace(PAIR, sigmas={"accel_lag": 20.0, "rail_viscous": 4.0}, imitators=("deflection_delay",))
+    told = score_of(dim, diagnosis("effect", "deflection_delay", like=["accel_lag"]))
+    assert (told.left_alone, told.both_named, told.located_right, is_right(told)) == (True, None, None, True)
+    # It is right to name it, but it is not there.
+    assert not said_right(told)
+    assert score_from(json.loads(json.dumps(asdict(told)))) == told
+    untold = score_of(dim, diagnosis("effect", "deflection_delay"))
+    assert (untold.left_alone, is_right(untold)) == (False, False)
+    # What is listed is the hidden one, or what is named does not do the same.
+    hidden = score_of(dim, diagnosis("effect", "deflection_delay", like=["rail_viscous"]))
+    assert (hidden.left_alone, is_right(hidden)) == (False, False)
+    unlike = score_of(dim, diagnosis("effect", "accel_gain", like=["accel_lag"]))
+    assert (unlike.left_alone, is_right(unlike)) == (False, False)
+    seen = score_of(
+        replace(dim, sigmas={"accel_lag": 20.0, "rail_viscous": 9.0}), diagnosis("effect", "accel_lag")
+    )
+    assert (seen.left_alone, is_right(seen)) == (False, False)
+
+
 def test_an_effect_of_which_held_out_tests_show_too_little_may_be_left_alone() -> None:
     alone = diagnosis("none")
     alone["shrink"] |= {"recalibrated": 0.0032, "floor": 0.002}

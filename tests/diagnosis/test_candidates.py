@@ -16,10 +16,10 @@ from savgs_ident.diagnosis.evidence import DiagnosisProblem
 from savgs_ident.diagnosis.findings import Findings
 from savgs_ident.diagnosis.result import Hypothesis, PortFamily
 from savgs_ident.diagnosis.score_test import Score
-from savgs_ident.effects.base import Family
+from savgs_ident.effects.base import Family, Port
 from savgs_ident.inference.observations import Term
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.plants.quarter_car.ports import PORTS
+from savgs_ident.plants.quarter_car.ports import CARCASS, PORTS, STRUT
 
 TERM: Any = None
 FOUND: Any = object()
@@ -55,17 +55,25 @@ def test_one_alone_has_its_own_and_none_has_none() -> None:
 
 
 @pytest.mark.parametrize(
-    ("location", "formulas"),
-    [("tyre_lateral", {"tyre_lateral_compliance"}), ("strut", {"mount_compliance", "damper_hysteresis"})],
+    ("port", "family", "formulas"),
+    [
+        (CARCASS, Family.COMPLIANCE, {"tyre_lateral_compliance"}),
+        (STRUT, Family.COMPLIANCE, {"mount_compliance", "damper_hysteresis"}),
+        # At a port in series those of other families, too.
+        (CARCASS, Family.STIFFNESS, {"tyre_lateral_compliance"}),
+        (STRUT, Family.STOP, {"bump_stop"}),
+    ],
 )
 def test_the_formulas_of_a_learned_law_are_those_of_its_family_at_its_location(
-    location: str, formulas: set[str], monkeypatch: pytest.MonkeyPatch
+    port: Port, family: Family, formulas: set[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     absent: Any = None
     terms = [Term(name, each.port.location, ()) for name, each in CATALOGUE.items()]
     plant: Any = SimpleNamespace(catalogue=CATALOGUE, candidates=terms)
     problem = DiagnosisProblem(plant, absent, absent, absent, absent)
-    member: Any = SimpleNamespace(hypothesis=Hypothesis(flexible=PortFamily(location, Family.COMPLIANCE)))
+    member: Any = SimpleNamespace(
+        hypothesis=Hypothesis(flexible=PortFamily(port.location, family)), law=SimpleNamespace(port=port)
+    )
     wanted: set[str] = set()
 
     def fitted(search: Any, findings: Any, some: Sequence[Term], *rest: Any) -> Any:

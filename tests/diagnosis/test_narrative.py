@@ -188,6 +188,23 @@ def test_a_port_at_which_another_law_would_do_as_much_is_listed_beside_a_formula
     assert beside.confusable_ports == ("sensor.sprung_accel",)
 
 
+def test_a_port_where_a_learned_law_is_about_as_probable_is_listed_beside_a_formula() -> None:
+    """However little a law explains to first order: calibration may have taken up what is missing."""
+    evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 5.0, "rail_viscous": 700.0})
+
+    def listed(weight: float, sd: float, port: str = "suspension") -> tuple[str, ...]:
+        learned = Hypothesis(flexible=PortFamily(port, Family.STIFFNESS))
+        weighed = (*evidence.weighed, WeighedHypothesis(learned, weight, None, sd))
+        told = replace(evidence, kind="effect", localisations=(), weighed=weighed)
+        return write_verdict(PROBLEM, told, (), GAP).confusable_ports
+
+    assert listed(699.4, 0.0) == ("suspension",)
+    assert listed(690.0, 0.0) == ()
+    # Where what the law lacks may decide between them.
+    assert listed(690.0, 4.0) == ("suspension",)
+    assert listed(699.4, 0.0, "rail") == ()
+
+
 def test_nothing_that_counts_is_missing_where_what_is_more_probable_does_too_little() -> None:
     evidence = _evidence("none", "law", {"none": 0.0, "unknown": -5.0, "rail_viscous": 6.0, "accel_lag": 1.0})
     plain = write_verdict(PROBLEM, evidence, (), GAP)

@@ -230,7 +230,7 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
     effect_at("tyre_lateral_compliance", CARCASS, MassiveCompliance(),
         {
             "compliance": _own(
-                "tyre_lateral_compliance", 2e-6, "m/N", 0.0, 1e-3, "lateral compliance of the carcass"),
+                "tyre_lateral_compliance", 7e-6, "m/N", 0.0, 1e-3, "lateral compliance of the carcass"),
             "damping": 1000.0,
             "mass": 5.0,
         },
