@@ -196,7 +196,7 @@ def on_processes(
     begun again, :data:`ATTEMPTS` times at most. Each process is told its share of the cores.
     """
     waiting, begun = deque(range(len(tasks))), [0] * len(tasks)
-    share = max(1, cores() // workers)
+    share = max(1, cores() // max(1, workers))
     crew: list[_Worker[Task, Result]] = []
     try:
         while waiting or any(each.number is not None for each in crew):

@@ -8,7 +8,7 @@ from multiprocessing.context import SpawnProcess
 
 import pytest
 
-from savgs_ident.core.executor import cores, on_processes
+from savgs_ident.core.executor import cores, on_processes, run_tasks
 
 
 def _started(monkeypatch: pytest.MonkeyPatch, whom: str) -> list[SpawnProcess]:
@@ -81,6 +81,10 @@ def test_processes_side_by_side_share_the_cores(
     told = [found for _, found in on_processes(os.getenv, names, workers)]
     assert sorted(map(str, told)) == sorted([str(share), str(share), "7"])
     assert dict(os.environ) == before
+
+
+def test_no_task_needs_no_process() -> None:
+    assert list(run_tasks(abs, [], workers=2)) == []
 
 
 @pytest.mark.parametrize(("reserved", "used"), [("", 4), ("2", 2), ("0", 1), ("9", 4), ("all", 4)])
