@@ -25,6 +25,7 @@ from savgs_ident.core.errors import InputError, blamed_on
 from savgs_ident.core.files import is_begun, prepare_folder, record_of, write_json
 from savgs_ident.diagnosis.diagnose import Watch, nobody
 from savgs_ident.diagnosis.public import SIMTR, diagnose_response
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
@@ -180,10 +181,14 @@ def _elsewhere(answer: Answer, found: Mapping[str, Any], campaign: Path, rig: Ri
 
 
 def diagnose_folder(
-    folder: Path, rig: Rig, without: tuple[str, ...], watch: Watch = nobody
+    folder: Path,
+    rig: Rig,
+    without: tuple[str, ...],
+    watch: Watch = nobody,
+    constants: DecisionConstants = DEFAULTS,
 ) -> Mapping[str, Any]:
     """The diagnosis of a recorded campaign as its ``diagnosis.json`` has it."""
-    settings = replace(SIMTR, without=without)
+    settings = replace(SIMTR, without=without, constants=constants)
     campaign = load_campaign(folder)
     measured = measured_response(campaign, QuarterCar, settings.orders)
     sweep, _ = first_sweep(campaign, QuarterCar)
