@@ -169,6 +169,9 @@ def test_effects_are_added_by_name() -> None:
     assert model.name == "simtr"
     assert model.free() == ("mu_r", "mu_t", "ydot_Hth", "c_sd")
     assert si.QuarterCar(si.load_rig()).free() == ("c_sd",)
+    # What a further effect brings along is known from nowhere; what it shares with the sheet is known to a tolerance.
+    assert (model + "rail_stribeck").free() == (*model.free(), "stribeck_rise", "stribeck_velocity")
+    assert (model + "accel_lag").free(("c_sd",)) == ("c_sd",)
     with pytest.raises(si.InputError, match=r"there is no effect 'magic'\. Remedy: choose among"):
         model + "magic"
 

@@ -19,6 +19,7 @@ from savgs_ident.cli.options import (
     OutOption,
     PlantName,
     QuietOption,
+    WithOption,
     command_line,
     effects_of,
     read_campaign,
@@ -51,10 +52,7 @@ def diagnose(
         typer.Option("--rig", metavar="FILE", help="Rig file, or model.toml of an earlier fit."),
     ] = None,
     model: BaselineOption = None,
-    beside: Annotated[
-        list[str] | None,
-        typer.Option("--with", metavar="EFFECT ...", help="Effects that the baseline has besides."),
-    ] = None,
+    beside: WithOption = None,
     without: Annotated[
         list[str] | None,
         typer.Option("--without", metavar="EFFECT ...", help="Leave effects out of the catalogue."),

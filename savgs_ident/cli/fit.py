@@ -1,5 +1,7 @@
 """``savgs-ident fit``: identify the rig."""
 
+from functools import reduce
+from operator import add
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +21,7 @@ from savgs_ident.cli.options import (
     OutOption,
     QuietOption,
     RigOption,
+    WithOption,
     command_line,
     effects_of,
     read_campaign,
@@ -30,6 +33,7 @@ def fit(
     campaign: CampaignArgument,
     rig: RigOption = None,
     model: ModelOption = ModelName.simtr,
+    beside: WithOption = None,
     free: FreeOption = None,
     channels: ChannelsOption = None,
     orders: FitOrdersOption = 9,
@@ -46,17 +50,21 @@ def fit(
 
     Writes fit.json, model.toml (the identified rig), bode.png and bode.pdf.
 
+    Effects that a diagnosis names are put into the model by --with, and their parameters are identified, too.
+
     Exit code 1 if the fit did not converge, the model does not explain the data, or they do not identify every
     parameter.
 
     Example: savgs-ident fit campaign.csv.gz --free mu_r c_sd --max-frequency 4
+
+    Example: savgs-ident fit campaign.csv.gz --with rail_stribeck
     """
     import savgs_ident as si
     from savgs_ident.core.files import prepare_folder
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    start = si.load_model(rig, effects_of(model))
+    start = reduce(add, beside or (), si.load_model(rig, effects_of(model)))
     with reporter.working() as progress:
         found = si.fit(
             start,

@@ -61,6 +61,12 @@ RigOption = Annotated[
 ModelOption = Annotated[
     ModelName, typer.Option("--model", help="simtr: with rail and tyre friction; simqc: without.")
 ]
+WithOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--with", metavar="EFFECT ...", help="Effects that the model has besides, as a diagnosis names them."
+    ),
+]
 BaselineOption = Annotated[
     ModelName | None,
     typer.Option(

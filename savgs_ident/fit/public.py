@@ -48,8 +48,8 @@ def fit(
         model: the rig, or another plant, with its effects; one that was identified before starts from what was known
             then, for its values would count the data twice.
         measured: the recordings, or the response of their dwells.
-        free: names of the parameters to identify; if empty the paper's four, as far as the rig has them, or those of
-            another plant of which nothing is known but two bounds.
+        free: names of the parameters to identify; if empty the paper's four, as far as the rig has them, and what its
+            further effects bring along; or those of another plant of which nothing is known but two bounds.
         orders: highest harmonic order to fit.
         peak_to_peak: fit peak-to-peak values only, as the paper did.
         fixed_tolerances: hold what is known to a tolerance at its value instead of estimating it along.

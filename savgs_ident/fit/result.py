@@ -146,8 +146,12 @@ class Fit(Result):
 
     @property
     def doubt(self) -> str:
-        """The first reason why the fit is not to be trusted; empty if it is."""
-        if not self.status.ok:
+        """The first reason why the fit is not to be trusted; empty if it is.
+
+        That more steps are needed where the model does not explain the data is no advice: they would end at a misfit.
+        """
+        out_of_steps = self.status is Status.MAX_ITERATIONS
+        if not self.status.ok and (self.verdict.explained or not out_of_steps):
             return self.status.advice
         if not all(each.ok for each in self.dwell_status):
             return "the model's periodic motion was not found in every dwell"

@@ -128,10 +128,41 @@ def test_without_json_a_table_is_shown_and_no_progress_on_it(again: Any, fitted:
 
 
 def test_a_fit_that_did_not_converge_is_code_1_with_the_reason(again: Any, fitted: Any) -> None:
-    done = again(replace(fitted[2], status=Status.MAX_ITERATIONS), "--quiet")
+    explained = replace(fitted[2], status=Status.MAX_ITERATIONS, verdict=Verdict(True, ("",)))
+    done = again(explained, "--quiet")
     assert done.exit_code == 1
     assert done.stdout == ""
     assert done.stderr == f"Not to be trusted: {Status.MAX_ITERATIONS.advice}.\n"
+
+
+def test_a_model_that_misses_is_not_told_to_take_more_steps(again: Any, fitted: Any) -> None:
+    missed = replace(fitted[2], status=Status.MAX_ITERATIONS, verdict=Verdict(True, ("",), explained=False))
+    done = again(missed, "--quiet")
+    assert done.exit_code == 1
+    assert done.stderr == (
+        "Not to be trusted: the model does not explain the data: look for what is missing with `diagnose`.\n"
+    )
+
+
+def test_effects_that_a_diagnosis_names_are_fitted_along(
+    invoke: Invoke, fitted: Any, short_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: dict[str, Any] = {}
+
+    def remembering(response: Any, model: Any, **given: Any) -> Fit:
+        asked.update(given, effects=model.effects)
+        return fitted[2]
+
+    monkeypatch.setattr(public, "fit_least_squares", remembering)
+    monkeypatch.setattr(present_campaign, "draw_comparison", _no_picture)
+    words = ("--with", "rail_stribeck", "accel_lag", "--quiet", "--out", tmp_path)
+    invoke("fit", short_campaign, *words)
+    assert asked["effects"] == ("rail_coulomb", "tyre_friction", "rail_stribeck", "accel_lag")
+    own = ("stribeck_rise", "stribeck_velocity", "accel_lag_time")
+    assert asked["free"] == ("mu_r", "mu_t", "ydot_Hth", "c_sd", *own)
+    done = invoke("fit", short_campaign, "--with", "magic", "--out", tmp_path)
+    assert done.exit_code == 2
+    assert "there is no effect 'magic'" in done.stderr
 
 
 def test_data_that_identify_too_little_are_code_1_with_the_verdict(again: Any, fitted: Any) -> None:

@@ -11,8 +11,12 @@ import pytest
 from savgs_ident.core.errors import InputError
 from savgs_ident.diagnosis.public import SIMTR, diagnose_response
 from savgs_ident.diagnosis.result import Diagnosis
+from savgs_ident.fit.public import fit
+from savgs_ident.fit.result import UNEXPLAINED
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 
+from ..fit.bench import TRUTH as PAPER_TRUTH
 from ..fit.bench import only
 from .conftest import Measure
 
@@ -78,3 +82,20 @@ def test_a_mount_is_found_in_every_third_dwell(measure: Measure, rig: Rig) -> No
     response = measure("mount_compliance")
     third = only(response, np.arange(len(response.tests)) % 3 == 1)
     _check(diagnose_response(third, rig), "mount_compliance")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("recorded", TRUTH)
+def test_with_the_effect_that_is_named_a_fit_is_to_be_trusted(
+    recorded: str, measure_few: Measure, rig: Rig
+) -> None:
+    effect, _, truth = TRUTH[recorded]
+    lacking, response = RigModel(rig, SIMTR.baseline), measure_few(recorded)
+    alone, found = fit(lacking, response), fit(lacking + effect, response)
+    assert alone.doubt == UNEXPLAINED
+    assert found.trusted
+    expected = {**PAPER_TRUTH, **truth}
+    assert len(found.free_names) == 4 + len(truth)
+    for name in found.free_names:
+        each = found.by_name[name]
+        assert abs(each.value - expected[name]) < 3.0 * each.stderr, each
