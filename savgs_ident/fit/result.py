@@ -148,15 +148,15 @@ class Fit(Result):
     def doubt(self) -> str:
         """The first reason why the fit is not to be trusted; empty if it is.
 
-        That more steps are needed where the model does not explain the data is no advice: they would end at a misfit.
+        Where the model does not explain the data, that steps or motions are lacking is no advice: parameters that are
+        to make up for what is missing lead far away.
         """
-        out_of_steps = self.status is Status.MAX_ITERATIONS
-        if not self.status.ok and (self.verdict.explained or not out_of_steps):
+        if not self.verdict.explained and self.status in (Status.CONVERGED, Status.MAX_ITERATIONS):
+            return UNEXPLAINED
+        if not self.status.ok:
             return self.status.advice
         if not all(each.ok for each in self.dwell_status):
             return "the model's periodic motion was not found in every dwell"
-        if not self.verdict.explained:
-            return UNEXPLAINED
         return "" if self.verdict.identifiable else "the data do not identify every free parameter"
 
     @property
