@@ -226,7 +226,8 @@ CATALOGUE: Mapping[str, Effect] = _by_name(
         symptom="the phase of both channels lags or leads in the fast tests, the amplitude fits",
         reference="Wong 2008, Theory of Ground Vehicles, ch. 1, ride properties of tyres",
     ),
-    # The tread stays behind when the wheel scrubs; the friction acts on a belt of 5 kg, damped by 1000 N s/m.
+    # The tread stays behind when the wheel scrubs; the friction acts on a belt of 5 kg, damped by 1000 N s/m. The
+    # compliance is that of a relaxation length of 0.5 m at a cornering stiffness of 70 kN/rad.
     effect_at("tyre_lateral_compliance", CARCASS, MassiveCompliance(),
         {
             "compliance": _own(

@@ -30,8 +30,8 @@ FREE = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
 _FREE_WITH_AN_EFFECT = {"mu_r": "rail_coulomb", "mu_t": "tyre_friction", "ydot_Hth": "tyre_friction"}
 """Those that mean something in the presence of an effect only."""
 
-PAPER = frozenset(name for effects in MODELS.values() for name in effects)
-"""The effects of the paper's models."""
+_OF_NO_PAPER = frozenset(CATALOGUE).difference(*MODELS.values())
+"""The catalogue's effects that are in none of the paper's models."""
 
 
 @dataclass(frozen=True)
@@ -124,11 +124,14 @@ class RigModel:
     def free(self, wanted: Sequence[str] = ()) -> tuple[str, ...]:
         """The parameters to identify: those ``wanted``, or what the model has of the paper's four.
 
-        And what effects that are in none of the paper's models bring along, of which nothing is known beforehand.
-        Raises :class:`InputError` for a name that the model does not know.
+        And what effects of the catalogue that are in none of the paper's models bring along, of which nothing is
+        known beforehand; what a diagnosis learned stays as it was learned. Raises :class:`InputError` for a name that
+        the model does not know.
         """
         if not wanted:
-            own = [each for name in self.effects if name not in PAPER for each in EFFECTS[name].parameters]
+            own = [
+                each for name in self.effects if name in _OF_NO_PAPER for each in CATALOGUE[name].parameters
+            ]
             known = tuple(name for name in FREE if _FREE_WITH_AN_EFFECT.get(name) in (None, *self.effects))
             return (*known, *(each.name for each in own if each.tolerance == 0.0))
         table = self.table
