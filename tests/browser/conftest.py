@@ -37,7 +37,13 @@ class Browser:
         """Show a file in a window of this width [CSS pixel], as a phone would if it is narrow."""
         self.resize(width)
         self.heard()
+        from selenium.webdriver.support.wait import WebDriverWait
+
         self.driver.get(page.as_uri())
+        # Beside other work the driver may return while a long page is still being read.
+        WebDriverWait(self.driver, 30.0).until(
+            lambda driver: driver.execute_script("return document.readyState") == "complete"
+        )
 
     def resize(self, width: int) -> None:
         """Make the window this wide."""
