@@ -79,7 +79,8 @@ class CyclicFactors(NamedTuple):
     closing: Float[Array, "D m m"]
 
 
-def _inside_chunks(array: Float[Array, "*k P"]) -> Float[Array, "L *k C"]:
+def by_chunks(array: Float[Array, "*k P"]) -> Float[Array, "L *k C"]:
+    """Numbers at all nodes, of any units, by their place in a chunk."""
     return jnp.moveaxis(array.reshape(*array.shape[:-1], -1, CHUNK), -1, 0)
 
 
@@ -98,7 +99,7 @@ def factorise_recurrence(layout: Layout, steps: Float[Array, "m m P"]) -> Cyclic
         return total
 
     eye = jnp.eye(steps.shape[0])
-    chunks = compose(_inside_chunks(steps))
+    chunks = compose(by_chunks(steps))
     period = compose(_over_chunks(layout, chunks, eye))
     closing = jnp.linalg.inv(jnp.moveaxis(eye[:, :, None] - period, -1, 0))
     return CyclicFactors(steps, chunks, closing)
@@ -119,7 +120,7 @@ def solve_recurrence(
         return apply_nodes(step[0], x) + step[1], x
 
     size = right.shape[0]
-    inside = (_inside_chunks(factors.steps), _inside_chunks(right))
+    inside = (by_chunks(factors.steps), by_chunks(right))
     sides, _ = jax.lax.scan(end, jnp.zeros_like(inside[1][0]), inside)
     over = (
         _over_chunks(layout, factors.chunks, jnp.eye(size)),

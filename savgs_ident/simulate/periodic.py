@@ -17,6 +17,7 @@ rule is of second order. How the response changes with the parameters is in :mod
 """
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -36,13 +37,14 @@ from savgs_ident.simulate.collocation import (
     Linearised,
     Trajectory,
     blank_linearised,
+    by_chunks,
     linearise,
     node_motion,
     solve_linearised,
     step_defects,
 )
 from savgs_ident.simulate.excitation import inputs_at, signals_at
-from savgs_ident.simulate.mesh import Layout, Mesh, adapted_mesh, layout_for, turns, uniform_mesh
+from savgs_ident.simulate.mesh import CHUNK, Layout, Mesh, adapted_mesh, layout_for, turns, uniform_mesh
 from savgs_ident.simulate.program_cache import placed, run_cached
 
 TOLERANCE = 1e-7
@@ -340,12 +342,21 @@ def _readings(
 
 
 def analyse(signals: Float[Array, "P C"], mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
-    """Complex harmonics 0..orders of C signals at the nodes of a mesh, in their own units."""
+    """Complex harmonics 0..orders of C signals at the nodes of a mesh, in their own units.
+
+    Summed over the nodes of all chunks at a time, then over the chunks of a dwell, so that every operation is a long
+    vector.
+    """
     twice = jnp.full(orders + 1, 2.0).at[0].set(1.0)
-    kernel = twice * jnp.conj(turns(mesh.phase, orders))
-    terms = signals[:, :, None] * (kernel * jnp.asarray(mesh.weight)[:, None])[:, None, :]
+    kernel = twice * jnp.conj(turns(mesh.phase, orders)) * jnp.asarray(mesh.weight)[:, None]
+    real = by_chunks(jnp.concatenate([kernel.real, kernel.imag], axis=1).T)
+    given = by_chunks(signals.T)
+    chunks = reduce(jnp.add, [given[i][:, None] * real[i] for i in range(CHUNK)])
     layout = mesh.layout
-    return jax.ops.segment_sum(terms, layout.dwell, len(layout.counts), indices_are_sorted=True)
+    seen = jax.ops.segment_sum(
+        jnp.moveaxis(chunks, -1, 0), layout.dwell[::CHUNK], len(layout.counts), indices_are_sorted=True
+    )
+    return seen[..., : orders + 1] + 1j * seen[..., orders + 1 :]
 
 
 @eqx.filter_jit
