@@ -134,6 +134,21 @@ def test_both_samplers_find_the_same_posterior_and_it_agrees_with_the_fit(fit: s
 
 
 @pytest.mark.slow
+def test_a_posterior_without_the_friction_that_is_there_is_not_to_be_trusted(model: si.PlantModel) -> None:
+    rubbing = (model + "guide_coulomb").with_values(TRUTH | {"guide_coulomb_coefficient": 0.03})
+    measured = si.simulate_dwells(rubbing, DWELLS, {"road_height": 0.01}, NOISE, seed=3)
+    found = si.sample(si.fit(model, measured), target_ess=100.0, patience=0.0)
+    assert found.convergence.converged
+    assert not found.explained
+    assert not found.trusted
+    assert "does not explain the data" in str(found).splitlines()[0]
+    assert "diagnose" in found.doubts[0]
+    complete = si.sample(si.fit(model + "guide_coulomb", measured), target_ess=100.0, patience=0.0)
+    assert complete.explained
+    assert complete.trusted
+
+
+@pytest.mark.slow
 def test_friction_of_the_guide_is_diagnosed_and_reported_without_a_word_of_the_quarter_car(
     model: si.PlantModel, tmp_path: Path
 ) -> None:

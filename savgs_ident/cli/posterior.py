@@ -66,7 +66,7 @@ def posterior(
     Writes posterior.html (the report), posterior.json, posterior.nc (ArviZ inference data) and chain-emcee.h5 or
     chain-nuts.h5, from which a run that was stopped is continued with --resume.
 
-    Exit code 1 if the chains did not converge.
+    Exit code 1 if the chains did not converge, or the model does not explain the data.
 
     Example: savgs-ident posterior out/fit/model.toml campaign.csv.gz --sampler nuts
     """

@@ -22,6 +22,7 @@ from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import Verdict, comparable, gaps
 from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import Pins, Problem, Task
+from savgs_ident.inference.result import MATERIAL_MISFIT
 from savgs_ident.plants.base import Excitation
 from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
 
@@ -243,14 +244,6 @@ def _proposals(
 
 EXPLAINED = 2.0
 """chi2 per datum up to which the data count as explained."""
-
-
-MATERIAL_MISFIT = 0.005
-"""Share of the response, beyond the noise, by which a model may miss and still be the right one [1].
-
-Origin: by choice. Small errors that every model has add up to so much: 0.2 % at each of the ports of a plant, a
-damper's table that is 2 % off point by point. Halved or doubled: not measured.
-"""
 
 
 def assess(task: Task, minimiser: Minimiser, best: Minimum, progress: Progress) -> Verdict:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.files import spelled_out
 from savgs_ident.core.presentation import Result, package_versions
 from savgs_ident.core.status import Status
+from savgs_ident.inference.result import UNEXPLAINED
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
 
@@ -40,9 +41,6 @@ class Estimate:
     free: bool
     prior: float
     prior_sd: float
-
-
-UNEXPLAINED = "the model does not explain the data"
 
 
 @dataclass(frozen=True)

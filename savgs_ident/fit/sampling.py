@@ -24,7 +24,7 @@ from savgs_ident.fit.minimise import Minimiser
 from savgs_ident.fit.result import Fit
 from savgs_ident.inference.posterior_mode import PosteriorMode
 from savgs_ident.inference.problem import Task
-from savgs_ident.inference.result import Marginal, Posterior, Sampler
+from savgs_ident.inference.result import MATERIAL_MISFIT, Marginal, Posterior, Sampler
 from savgs_ident.inference.sample import Question, sample_posterior
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.plants.model import Model
@@ -186,7 +186,7 @@ def _tied(
 def _discrepancy(marginals: Sequence[Marginal]) -> list[str]:
     scale = next(each for each in marginals if each.name == "discrepancy")
     noise = next(each for each in marginals if each.name == "noise_scale")
-    if scale.q975 < 0.01:
+    if not scale.q025 > MATERIAL_MISFIT:
         miss = f"The model misses by less than {100.0 * scale.q975:.2g} % of the response beyond the noise (95 %)."
     else:
         miss = (

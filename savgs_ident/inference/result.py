@@ -137,6 +137,17 @@ class Predictive:
         return int(np.sum(self.inside & self.used)), int(np.sum(self.used))
 
 
+UNEXPLAINED = "the model does not explain the data"
+"""Why a fit or a posterior is not to be trusted."""
+
+MATERIAL_MISFIT = 0.005
+"""Share of the response, beyond the noise, by which a model may miss and still be the right one [1].
+
+Origin: by choice. Small errors that every model has add up to so much: 0.2 % at each of the ports of a plant, a
+damper's table that is 2 % off point by point. Halved or doubled: not measured.
+"""
+
+
 @dataclass(frozen=True)
 class Posterior(Result):
     """A finished run; arrays are read-only.
@@ -183,8 +194,23 @@ class Posterior(Result):
 
     @property
     def trusted(self) -> bool:
-        """Whether the chains converged."""
-        return self.convergence.converged
+        """Whether the chains converged, and the model explains the data."""
+        return self.convergence.converged and self.explained
+
+    @property
+    def explained(self) -> bool:
+        """Whether the model may miss by no more than small errors of any model, to 97.5 %."""
+        return not self["discrepancy"].q025 > MATERIAL_MISFIT
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why the draws are not to be trusted, the most important first."""
+        missed = 100.0 * self["discrepancy"].median
+        what = (
+            f"{UNEXPLAINED}: it misses by {missed:.2g} % of the response beyond the noise; look for what is missing "
+            "with `diagnose`, until then the parameters make up for it by more than their intervals say"
+        )
+        return (*(() if self.explained else (what,)), *self.convergence.reasons)
 
     def to_arviz(self) -> "xr.DataTree":
         """The draws as ArviZ's inference data: the content of ``posterior.nc``."""

@@ -82,7 +82,7 @@ class _Fit(_Identified["Fit"]):
         return fit_text(result)
 
     def doubts(self, result: "Fit") -> tuple[str, ...]:
-        from savgs_ident.fit.result import UNEXPLAINED
+        from savgs_ident.inference.result import UNEXPLAINED
 
         if not result.doubt:
             return ()
@@ -171,7 +171,7 @@ class _Posterior(AbstractPresenter["Posterior"]):
         return posterior_text(result)
 
     def doubts(self, result: "Posterior") -> tuple[str, ...]:
-        return () if result.trusted else (f"{'; '.join(result.convergence.reasons)}.",)
+        return () if result.trusted else (f"{'; '.join(result.reasons)}.",)
 
     def page(self, result: "Posterior") -> str | None:
         from savgs_ident.report.posterior.page import posterior_html

@@ -12,7 +12,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.diagnosis.public import SIMTR, diagnose_response
 from savgs_ident.diagnosis.result import Diagnosis
 from savgs_ident.fit.public import fit
-from savgs_ident.fit.result import UNEXPLAINED
+from savgs_ident.inference.result import UNEXPLAINED
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 

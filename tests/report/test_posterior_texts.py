@@ -111,8 +111,27 @@ def test_a_posterior_that_did_not_converge_says_so_first_and_hostile_names_stay_
     assert "[bold red]\\x1b[2J" in reported
 
 
+def test_that_the_model_does_not_explain_the_data_is_said_first(posterior: Posterior) -> None:
+    missed = tuple(
+        replace(each, q025=0.02, median=0.03, q975=0.05) if each.name == "discrepancy" else each
+        for each in posterior.marginals
+    )
+    unexplained = replace(posterior, marginals=missed)
+    first = "The model does not explain the data: look for what is missing with `diagnose`."
+    for each in (unexplained, unconverged(unexplained, "the chains do not agree")):
+        assert not each.trusted
+        assert "does not explain the data: it misses by 3 %" in each.doubts[0]
+        page = Reader(posterior_html(each, ORIGIN))
+        assert page.texts[0] == first
+        assert rendered(each, width=200).splitlines()[0] == first
+        assert record_of(each)["explained"] is False
+    assert "The chains do not agree." in page.texts[:4]
+    assert record_of(posterior)["explained"] is True
+
+
 def test_a_posterior_of_one_parameter_and_one_channel_has_a_page(posterior: Posterior) -> None:
-    kept = tuple(replace(each, profile=None) for each in posterior.of_role("identified")[:1])
+    identified = tuple(replace(each, profile=None) for each in posterior.of_role("identified")[:1])
+    kept = (*identified, *posterior.of_role("nuisance"))
     used = posterior.predictive.used & np.array([True, False])[:, None]
     predictive = replace(posterior.predictive, used=used)
     bare = replace(
@@ -124,8 +143,8 @@ def test_a_posterior_of_one_parameter_and_one_channel_has_a_page(posterior: Post
         sampler="emcee",
     )
     page = Reader(posterior_html(bare, replace(ORIGIN, warnings=())))
-    # A corner plot, a trace and the one channel that was compared.
-    assert sum(tag == "img" for tag, _ in page.tags) == 3
+    # A corner plot, traces of the parameter and of the two scales, and the one channel that was compared.
+    assert sum(tag == "img" for tag, _ in page.tags) == 5
     text = " ".join(page.texts)
     assert "No profiles were computed." in text
     assert "All other parameters were fixed" in text

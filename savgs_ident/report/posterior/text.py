@@ -56,15 +56,17 @@ class Check:
 
 def verdict_line(posterior: Posterior) -> str:
     """Whether the numbers may be used, first of all."""
-    if posterior.convergence.converged:
+    if posterior.trusted:
         return "Converged: these numbers may be used."
+    if not posterior.explained:
+        return "The model does not explain the data: look for what is missing with `diagnose`."
     return "Not converged: these numbers must not be used."
 
 
 def reasons(posterior: Posterior) -> tuple[str, ...]:
-    """Why not, at least one sentence where it did not converge."""
-    given = posterior.convergence.reasons or ("The sampler gave no reason.",)
-    return () if posterior.convergence.converged else tuple(map(_as_sentence, given))
+    """Why not, at least one sentence where they may not."""
+    given = posterior.reasons or ("The sampler gave no reason.",)
+    return () if posterior.trusted else tuple(map(_as_sentence, given))
 
 
 def scope_sentence(posterior: Posterior) -> str:
