@@ -205,12 +205,14 @@ class Posterior(Result):
     @property
     def reasons(self) -> tuple[str, ...]:
         """Why the draws are not to be trusted, the most important first."""
+        if self.explained:
+            return self.convergence.reasons
         missed = 100.0 * self["discrepancy"].median
         what = (
             f"{UNEXPLAINED}: it misses by {missed:.2g} % of the response beyond the noise; look for what is missing "
             "with `diagnose`, until then the parameters make up for it by more than their intervals say"
         )
-        return (*(() if self.explained else (what,)), *self.convergence.reasons)
+        return (what, *self.convergence.reasons)
 
     def to_arviz(self) -> "xr.DataTree":
         """The draws as ArviZ's inference data: the content of ``posterior.nc``."""

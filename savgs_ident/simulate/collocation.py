@@ -25,8 +25,8 @@ Arrays are laid out with the matrix indices first and the nodes of all dwells la
 a long vector.
 """
 
-import functools
 from collections.abc import Callable
+from functools import reduce
 from typing import Any, NamedTuple
 
 import jax
@@ -47,12 +47,12 @@ def multiply_nodes(left: Matrices, right: Matrices) -> Matrices:
     Term by term: as a sum over an axis that is not the last one the compiler makes no vectors of it, and it takes
     fifteen times as long.
     """
-    return functools.reduce(jnp.add, [left[:, j, None] * right[None, j] for j in range(left.shape[1])])
+    return reduce(jnp.add, [left[:, j, None] * right[None, j] for j in range(left.shape[1])])
 
 
 def apply_nodes(left: Matrices, right: Vectors) -> Vectors:
     """Matrix times vector at every node, of any units."""
-    return functools.reduce(jnp.add, [left[:, j] * right[j] for j in range(left.shape[1])])
+    return reduce(jnp.add, [left[:, j] * right[j] for j in range(left.shape[1])])
 
 
 def solve_nodes(matrix: Matrices, right: Matrices) -> Matrices:
