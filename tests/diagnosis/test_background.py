@@ -27,7 +27,7 @@ from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.simulate.excitation import measured_response
 
 from ..fit.bench import only
-from .conftest import FEW
+from .conftest import DWELLS
 
 
 def _data(tests: int = 5, rows: int = 40) -> Data:
@@ -109,7 +109,7 @@ def _with_damper_off(rig: Rig, share: float, seed: int) -> Rig:
 def _selected(rig: Rig, campaign: Path) -> DiagnosisEvidence:
     model = RigModel(rig, ("rail_coulomb", "tyre_friction"))
     response = measured_response(load_campaign(campaign), model.plant, 9)
-    response = only(response, np.isin(np.round(response.frequency, 2), FEW))
+    response = only(response, np.isin(np.round(response.frequency, 2), DWELLS))
     plant, data = quarter_car_problem(response, *baseline_of(model)[:2])
     problem = recalibrate(plant, data, {}, no_progress)
     return decide_among(problem, compare_models(problem, no_progress))
