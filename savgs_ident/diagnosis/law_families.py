@@ -21,7 +21,6 @@ from savgs_ident.effects.learned_functions import (
     coefficients_of,
     functions_at,
     interactions_at,
-    placed_at,
 )
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, find_map_again
 from savgs_ident.inference.laplace import linearised_optimum, log_evidence
@@ -101,15 +100,16 @@ def families_fitted(
     search: Search,
     every: FittedFunctions,
     port: Port,
+    alone: Mapping[tuple[str, ...], float],
     start: Mapping[str, float],
     worth: float,
     constants: DecisionConstants,
 ) -> tuple[dict[Family, float], list[FittedFunctions]]:
     """The log weight of each family alone, and the likely ones fitted by themselves.
 
-    Those functions whose places are estimated are looked for alone from ``start`` [SI], too. ``worth`` is the log
-    evidence from which on more than one family is fitted: to first order about all functions together the families
-    are not known well enough to take the first.
+    Those functions that could be all of a law are looked for ``alone``, too, with priors so many times as wide, from
+    ``start`` [SI]. ``worth`` is the log evidence from which on more than one family is fitted: to first order about
+    all functions together the families are not known well enough to take the first.
     """
     found = families_alone(search, every.mode, port, constants)
     weights, fits = {family: each.weight for family, each in found.items()}, list[FittedFunctions]()
@@ -118,7 +118,7 @@ def families_fitted(
         if family is not likely[0] and found[family].weight <= worth:
             continue
         solved = list[FittedFunctions]()
-        for each in (found[family], *_placed_alone(every.term, port, family, start, constants)):
+        for each in (found[family], *_by_themselves(every.term, port, family, alone, start, constants)):
             least = max(fit.weight for fit in (every, *fits, *solved)) - constants.alarm_log_odds
             fitted = _fitted(search, every, port, family, each, least, constants)
             solved += [] if fitted is None else [fitted]
@@ -133,16 +133,25 @@ def _seen_of(term: Term, port: Port, family: Family) -> tuple[str, ...]:
     return tuple(name for name in coefficients_of(port, family) if name in seen)
 
 
-def _placed_alone(
-    term: Term, port: Port, family: Family, start: Mapping[str, float], constants: DecisionConstants
+def _by_themselves(
+    term: Term,
+    port: Port,
+    family: Family,
+    alone: Mapping[tuple[str, ...], float],
+    start: Mapping[str, float],
+    constants: DecisionConstants,
 ) -> list[FamilyAlone]:
-    """Those functions of a family alone whose places are estimated."""
+    """Those functions of a family that could be all of it.
+
+    Where their prior is wider or narrower than beside all others, each is a start: the first step from the wider one
+    may leave the range in which the plant is solved, and the narrower one may promise too little.
+    """
     mine = _seen_of(term, port, family)
-    groups = (tuple(name for name in each if name in mine) for each in placed_at(port).values())
     return [
-        FamilyAlone(group, 1.0, -np.inf, _log_prior(group, mine, port, constants), start)
-        for group in groups
-        if group
+        FamilyAlone(group, each, -np.inf, _log_prior(group, mine, port, constants), start)
+        for group, width in alone.items()
+        if {*group} <= {*mine}
+        for each in dict.fromkeys((1.0, width))
     ]
 
 
@@ -157,8 +166,8 @@ def _fitted(
 ) -> FittedFunctions | None:
     """The functions of a family by themselves at their best; None where that has no solution.
 
-    What is needed to first order about all functions together may be more than what is needed about their own fit.
-    What cannot come to a log weight of ``least`` is given up.
+    What is needed to first order about all functions together may be more than what is needed about their own fit,
+    and their prior another one. What cannot come to a log weight of ``least`` is given up.
     """
     term, mine, best = every.term, _seen_of(every.term, port, family), None
     near = every.mode.prediction.warm_start
@@ -177,7 +186,7 @@ def _fitted(
         best, near = fitted, mode.prediction.warm_start
         left = tuple(each.name for each in term.amplitudes)
         found = _needed(search, mode, port, mine, left, constants)
-        if len(found.functions) == len(left):
+        if len(found.functions) == len(left) and found.width == 1.0:
             return best
 
 

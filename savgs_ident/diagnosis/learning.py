@@ -27,7 +27,7 @@ from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out
 from savgs_ident.diagnosis.law_families import FittedFunctions, families_fitted, families_spared
-from savgs_ident.diagnosis.learning_start import best_places, with_amplitudes
+from savgs_ident.diagnosis.learning_start import best_places, widths_alone, with_amplitudes
 from savgs_ident.diagnosis.problem import AbstractProblem, term_of
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Family, Port, PortKind
@@ -174,13 +174,17 @@ def _as_probable_as(fitted: Sequence["_Begun"], constants: DecisionConstants) ->
 
 
 class _Begun(NamedTuple):
-    """All functions of a port fitted, and those of a play that is blocked, if any; see :class:`LearnedLaw`."""
+    """All functions of a port fitted, and those of a play that is blocked, if any; see :class:`LearnedLaw`.
+
+    ``places`` is what :func:`best_places` says and ``alone`` what :func:`widths_alone` does.
+    """
 
     port: Port
     problem: AbstractProblem
     search: Search
     spans: Mapping[str, float]
     places: Mapping[str, float]
+    alone: Mapping[tuple[str, ...], float]
     every: FittedFunctions
     blocked: FittedFunctions | None
 
@@ -260,7 +264,8 @@ def _begin_learning(
     if not mode.solved:
         return None
     blocked = _blocked_play(search, effect, blank, port, base, near, constants)
-    return _Begun(port, mine, search, spans, places, FittedFunctions(term, mode), blocked)
+    alone = widths_alone(term, port, search, base, columns, constants)
+    return _Begun(port, mine, search, spans, places, alone, FittedFunctions(term, mode), blocked)
 
 
 def _is_impossible(law: LearnedLaw) -> bool:
@@ -284,7 +289,9 @@ def _most_probable(
     best, weights = begun.best, dict[Family, float]()
     if begun.every.attainable > least:
         worth, start = base.evidence + constants.alarm_log_odds, {**base.values, **begun.places}
-        weights, fitted = families_fitted(begun.search, begun.every, begun.port, start, worth, constants)
+        weights, fitted = families_fitted(
+            begun.search, begun.every, begun.port, begun.alone, start, worth, constants
+        )
         best = max((best, *fitted), key=lambda each: each.weight)
     if best.only is None:
         return best, families_spared(begun.search, begun.every.mode, begun.port)

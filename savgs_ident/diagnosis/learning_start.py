@@ -15,7 +15,7 @@ from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.effects.base import Port
 from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.learned_functions import placed_at
+from savgs_ident.effects.learned_functions import alone_at, placed_at
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import Linear
@@ -83,3 +83,26 @@ def with_amplitudes(
         Linear(name, units[name], 0.0, float(width)) for name, width in zip(seen, widths, strict=True)
     )
     return replace(term, amplitudes=amplitudes)
+
+
+def widths_alone(
+    term: Term,
+    port: Port,
+    search: Search,
+    base: LaplaceFit,
+    columns: Mapping[str, NDArray[np.float64]],
+    constants: DecisionConstants,
+) -> dict[tuple[str, ...], float]:
+    """By the functions that could be all of a law, the width of their prior then, over that beside all others.
+
+    To first order about the baseline, too: one alone that calibration nearly takes up is far larger than all together
+    seem to be. ``term`` has the others; ``columns`` are as for :func:`with_amplitudes`.
+    """
+    scale = {each.name: each.scale for each in term.amplitudes}
+    groups = (tuple(name for name in each if name in scale) for each in alone_at(port))
+
+    def width(group: tuple[str, ...]) -> float:
+        mine = np.stack([columns[name] for name in group], axis=1)
+        return float(widths_of(search, base, mine, constants)[0]) / scale[group[0]]
+
+    return {group: width(group) for group in groups if group}

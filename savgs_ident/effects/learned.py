@@ -49,6 +49,7 @@ from savgs_ident.effects.effect import Effect, typical_effect
 from savgs_ident.effects.learned_functions import (
     FALL,
     GAP,
+    LAG,
     OF_A_FALL,
     OF_A_LOADED_FALL,
     OF_CONTACTS,
@@ -68,9 +69,6 @@ from savgs_ident.effects.learned_functions import (
     values_of,
     what_gives,
 )
-
-SLIDER_LAG = 3e-4
-"""Damping over stiffness of a spring-slider [s]."""
 
 BLOCKED_AS = 8
 """Exponent with which a play is blocked at its ends [1]."""
@@ -99,7 +97,7 @@ class LearnedForce(AbstractForceLaw):
     name: ClassVar[str] = "learned"
     family: ClassVar[Family] = Family.LEARNED
     roles: ClassVar[tuple[Role, ...]] = _roles(
-        ("middle", "stroke", "speed", "carried", "turn", "give", "gap", "fall"),
+        ("middle", "stroke", "speed", "carried", "turn", "give", "gap", "fall", "lag"),
         len((*OF_THE_MOTION, *OF_SLIDERS, *OF_THE_LOAD, *OF_CONTACTS, OF_A_FALL, OF_A_LOADED_FALL)),
     )
     port: Port = eqx.field(static=True)
@@ -112,6 +110,7 @@ class LearnedForce(AbstractForceLaw):
         give = "how far spring-sliders give before they slide, over what their functions say"
         gap = "displacement at which contacts begin, over the stroke"
         fall = "velocity over which a friction falls, over the largest seen"
+        lag = "damping over stiffness of spring-sliders"
         spans = {
             "middle": Parameter("middle", 0.0, unit, about="displacement in the middle of what was seen"),
             "stroke": Parameter("stroke", 1.0, unit, lower=SMALLEST, about="largest displacement from there"),
@@ -121,6 +120,7 @@ class LearnedForce(AbstractForceLaw):
             "give": Parameter("give", 1.0, "1", lower=0.05, upper=5.0, about=give),
             "gap": Parameter("gap", GAP, "1", lower=0.02, upper=0.9, about=gap),
             "fall": Parameter("fall", FALL, "1", lower=0.02, upper=1.0, about=fall),
+            "lag": Parameter("lag", LAG, "s", lower=1e-5, upper=0.03, about=lag),
         }
         return {role.name: 0.0 for role in self.roles} | spans | _coefficients(port, force)
 
@@ -156,7 +156,7 @@ class LearnedForce(AbstractForceLaw):
         limit = FrictionLimit(one, one)
         moved = signals._replace(displacement=signals.displacement - signals.rest)
         widths = [share * self.port.displacement * v["give"] for share in STRETCHES]
-        sticks = [Presliding(one / width, one * (SLIDER_LAG / width)) for width in widths]
+        sticks = [Presliding(one / width, one * (v["lag"] / width)) for width in widths]
         return [bristle(stick, moved, limit, state[place]) for place, stick in enumerate(sticks)]
 
 

@@ -61,6 +61,9 @@ STRETCHES = (0.01, 0.03, 0.07, 0.2)
 In a learned law they are multiplied by a number that is estimated along.
 """
 
+LAG = 1e-3
+"""Damping over stiffness of a spring-slider, which is estimated along: what it begins with [s]."""
+
 SMALLEST = 1e-9
 """Least stroke [m], speed [m/s] and load [N] by which is divided."""
 
@@ -330,6 +333,17 @@ def placed_at(port: Port) -> dict[str, tuple[str, ...]]:
         f"learned_{port.name}_{number}": tuple(name for name, function in both if function in group)
         for number, group in groups.items()
     }
+
+
+def alone_at(port: Port) -> tuple[tuple[str, ...], ...]:
+    """Coefficients of functions at a port that could be all of a law, with the numbers that are estimated along.
+
+    Contacts, a friction that falls, and one that does not.
+    """
+    if port.kind is not PortKind.FORCE:
+        return ()
+    both = zip(coefficients_at(port), functions_at(port), strict=True)
+    return (*placed_at(port).values(), tuple(name for name, function in both if function is OF_SLIDERS[0]))
 
 
 def interactions_at(port: Port) -> tuple[str, ...]:

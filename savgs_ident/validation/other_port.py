@@ -4,7 +4,8 @@ A force in the strut and the same beside it in the wishbone joints move the rig 
 distinguishes two such ports is not a matter of the diagnosis alone: here the drawn law itself is fitted at its own
 port and at another one, with the search, the priors and the background of a diagnosis. The difference of their log
 evidences is all that a diagnosis could have to go on that knew the formula. Ports count their displacements to
-different sides, so that a law which knows up from down, as a stop does, is fitted the other way round, too.
+different sides, so that a law which knows up from down, as a stop does, is fitted the other way round, too. What is
+known of the law at its own port, as how far a joint gives before it slides, is estimated at the other one.
 """
 
 from collections.abc import Mapping
@@ -12,6 +13,7 @@ from dataclasses import fields, replace
 from types import new_class
 from typing import Any
 
+from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.presentation import no_progress
 from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.diagnose import baseline_problem
@@ -19,7 +21,7 @@ from savgs_ident.diagnosis.model_selection import recalibrate
 from savgs_ident.diagnosis.result import DiagnosisSettings
 from savgs_ident.diagnosis.search import single_effects, singles_among
 from savgs_ident.effects.base import AbstractForceLaw, Port, PortSignals
-from savgs_ident.effects.effect import Effect, typical_effect
+from savgs_ident.effects.effect import Effect, effect_at, typical_effect
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
@@ -47,7 +49,7 @@ def log_odds_of_port(
     if isinstance(drawn.law, AbstractForceLaw):
         laws[TURNED] = turned(drawn.law)
     there = {
-        name: typical_effect(name, port, law, symptom=drawn.symptom, reference=drawn.reference)
+        name: estimated(typical_effect(name, port, law, symptom=drawn.symptom, reference=drawn.reference))
         for name, law in laws.items()
     }
     evidence = _log_evidences(measured, rig, {drawn.name: drawn, **there}, settings)
@@ -64,6 +66,26 @@ def log_odds_of_stand_in(
     """
     evidence = _log_evidences(measured, rig, {drawn.name: drawn, named: CATALOGUE[named]}, settings)
     return evidence[drawn.name] - evidence[named] if len(evidence) == 2 else None
+
+
+def estimated(effect: Effect) -> Effect:
+    """The effect with parameters in place of the numbers of its law, but for those that are 0."""
+    own: dict[str, Parameter | str] = {each.name: each for each in effect.parameters}
+    numbers: dict[str, Parameter | str | float] = {
+        role: own.get(given, given)
+        if isinstance(given, str)
+        else given and Parameter(f"{effect.name}_{role}", given, "SI", lower=0.0, about=role)
+        for role, given in effect.numbers
+    }
+    return effect_at(
+        effect.name,
+        effect.port,
+        effect.law,
+        numbers,
+        states=effect.state_names,
+        symptom=effect.symptom,
+        reference=effect.reference,
+    )
 
 
 def turned(law: AbstractForceLaw) -> AbstractForceLaw:

@@ -169,6 +169,38 @@ def test_a_friction_of_the_joints_would_do_the_same_in_the_strut_and_not_at_the_
 
 
 @pytest.mark.slow
+def test_a_friction_is_learned_with_the_velocity_over_which_it_turns_round(
+    measure_few: Measure, rig: Rig
+) -> None:
+    """That of the joints does so over ten times the velocity of that of a seal."""
+    there, force = CATALOGUE["joint_friction"], 12.0
+    law, gain = _learned(
+        _recorded(measure_few("nominal"), rig, there, joint_friction_force=force), rig, SUSPENSION
+    )
+    assert law.mode.status.ok
+    assert law.only is Family.FRICTION
+    assert gain > 100.0
+    (slider,) = law.term.amplitudes
+    assert law.values[slider.name] == pytest.approx(-force, rel=0.1)
+    numbers = {role: number for role, number in there.numbers if isinstance(number, float)}
+    assert law.values["learned_suspension_lag"] == pytest.approx(numbers["lag"], rel=0.4)
+
+
+@pytest.mark.slow
+def test_a_friction_that_calibration_nearly_takes_up_is_learned_as_large_as_it_is(
+    measure_few: Measure, rig: Rig
+) -> None:
+    """A preload of the rail does nearly what a greater friction coefficient does."""
+    there, force = CATALOGUE["rail_preload"], 25.0
+    law, gain = _learned(_recorded(measure_few("nominal"), rig, there, rail_preload_force=force), rig, RAIL)
+    assert law.mode.status.ok
+    assert law.only is Family.FRICTION
+    assert gain > 20.0
+    (slider,) = law.term.amplitudes
+    assert law.values[slider.name] == pytest.approx(-force, rel=0.25)
+
+
+@pytest.mark.slow
 def test_a_play_with_a_film_is_learned_as_one_that_is_blocked_at_its_ends(
     measure_few: Measure, rig: Rig
 ) -> None:

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import Family, Fundamental, InputSignal, Load, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
-from savgs_ident.effects.learned import SLIDER_LAG, LearnedForce
+from savgs_ident.effects.learned import LearnedForce
 from savgs_ident.effects.learned_functions import (
     blocking_at,
     coefficients_at,
@@ -88,6 +88,8 @@ GAP = 0.25
 
 FALL = 0.15
 
+LAG = 2e-3
+
 SPANS = {
     "middle": 0.4,
     "stroke": 0.03,
@@ -97,6 +99,7 @@ SPANS = {
     "give": GIVE,
     "gap": GAP,
     "fall": FALL,
+    "lag": LAG,
 }
 
 
@@ -134,7 +137,7 @@ def _force(effect: Effect, p: Values, displacement: float, velocity: float, load
 def _carried(effect: Effect, words: str, displacement: float, velocity: float) -> float:
     """What a spring-slider of these words carries, anchored in the nominal state."""
     width = GIVE * float(words.split()[-3]) * effect.port.displacement
-    return float(np.clip((displacement + SLIDER_LAG * velocity) / width, -1.0, 1.0))
+    return float(np.clip((displacement + LAG * velocity) / width, -1.0, 1.0))
 
 
 def _said(effect: Effect, words: str, x: float, v: float, n: float) -> float:

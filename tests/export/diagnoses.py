@@ -57,6 +57,7 @@ SPANS = {
     "learned_strut_give": 1.2,
     "learned_strut_gap": 0.2,
     "learned_strut_fall": 0.1,
+    "learned_strut_lag": 5e-4,
 }
 COEFFICIENTS = {name: 3.0 * number for number, name in enumerate(coefficients_at(STRUT), 1)}
 LEARNED = diagnosis(

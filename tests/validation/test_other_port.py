@@ -8,10 +8,13 @@ from hypothesis import strategies as st
 
 from savgs_ident.core.values import as_values
 from savgs_ident.effects.base import AbstractForceLaw, PortSignals
+from savgs_ident.effects.effect import typical_effect
+from savgs_ident.effects.laws.presliding_friction import PreslidingFriction
 from savgs_ident.effects.laws.stop import LowerStop, UpperStop
 from savgs_ident.effects.laws.viscous import Viscous
+from savgs_ident.plants.quarter_car.ports import STRUT
 from savgs_ident.validation.foreign_forces import ExponentialStop, HardeningOscillator
-from savgs_ident.validation.other_port import turned
+from savgs_ident.validation.other_port import estimated, turned
 
 NOTHING = jnp.zeros(0)
 SIZES = st.floats(-0.05, 0.05)
@@ -59,3 +62,16 @@ def test_what_swings_swings_the_other_way() -> None:
     behind = PortSignals(-seen.displacement, -seen.velocity, seen.load, -seen.rest)
     np.testing.assert_allclose(turned(law).rate(numbers, seen, state), law.rate(numbers, behind, state))
     assert float(turned(law).force(numbers, seen, state)) == -float(law.force(numbers, behind, state))
+
+
+def test_numbers_that_are_known_at_one_port_are_estimated_at_another() -> None:
+    known = typical_effect("seal", STRUT, PreslidingFriction())
+    other = estimated(known)
+    assert [each.name for each in known.parameters] == ["seal_force"]
+    assert [each.name for each in other.parameters] == ["seal_force", "seal_stretch", "seal_lag"]
+    assert other.state_names == known.state_names
+    signals, state = _seen(0.01, 0.2, 0.0), jnp.zeros(1)
+    p = as_values({each.name: each.value for each in other.parameters})
+    assert float(other.force(p, signals, state)) == float(known.force(p, signals, state))
+    softer = p | as_values({"seal_stretch": 10.0})
+    assert abs(float(other.force(softer, signals, state))) < 0.1 * abs(float(known.force(p, signals, state)))
