@@ -123,21 +123,16 @@ def test_a_topic_of_any_name(started: Started, tmp_path: Path, place: int) -> No
 @pytest.mark.slow
 def test_an_identified_rig_remembers_any_name(installed: Installed, short_campaign: Path) -> None:
     quick = ("--free", "c_sd", "--max-frequency", "2", "--fixed-tolerances", "--quiet")
-    for number, name in enumerate(FILES[:2]):
-        shutil.copy(short_campaign, installed.folder / os.fsdecode(name))
-        done = installed.run("fit", *quick, "--out", f"o{number}", b"./" + name)
-        # The damping alone does not explain the recordings; the model is written, and exported, all the same.
-        assert (done.returncode, done.stdout) == (1, "")
-        assert "the model does not explain the data" in done.stderr
-        again = installed.run(
-            "export", f"o{number}/model.toml", "--to", "json", "--out", f"e{number}", "--quiet"
-        )
-        assert again.returncode == 1
-        assert "the rig file's own fit is not to be trusted" in again.stderr.lower()
-    names = {os.fsdecode(name) for name in FILES[:2]}
-    assert {path.name for path in installed.folder.iterdir()} == names | {
-        f"{kind}{number}" for kind in "oe" for number in range(2)
-    }
+    name = FILES[1]
+    shutil.copy(short_campaign, installed.folder / os.fsdecode(name))
+    done = installed.run("fit", *quick, "--out", "o", b"./" + name)
+    # The damping alone does not explain the recordings; the model is written, and exported, all the same.
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "the model does not explain the data" in done.stderr
+    again = installed.run("export", "o/model.toml", "--to", "json", "--out", "e", "--quiet")
+    assert again.returncode == 1
+    assert "the rig file's own fit is not to be trusted" in again.stderr.lower()
+    assert {path.name for path in installed.folder.iterdir()} == {os.fsdecode(name), "o", "e"}
 
 
 @pytest.mark.slow

@@ -137,19 +137,6 @@ def test_a_wave_that_no_cam_of_the_catalogue_has_is_a_shape_of_the_road(
 
 
 @pytest.mark.slow
-def test_a_sensor_by_another_law_is_not_a_lag_beside_something_else(measure_few: Measure, rig: Rig) -> None:
-    """The lag leaves next to nothing, and a second effect would take that up."""
-    there = FOREIGN["accel_second_order"].effect
-    values = {"accel_second_order_time": 2.1e-3, "accel_second_order_damping_ratio": 1.4}
-    diagnosis = diagnose_response(_recorded(measure_few("nominal"), rig, there, **values), rig, COARSE)
-    assert diagnosis.verdict.kind == "effect"
-    assert diagnosis.verdict.effects == ("accel_lag",)
-    assert tuple(map(str, diagnosis.verdict.families)) == ("sensor.sprung_accel/dynamics",)
-    assert not diagnosis.verdict.law_known
-    assert diagnosis.shrink.closed_by_effect > 0.9
-
-
-@pytest.mark.slow
 def test_a_friction_of_the_joints_would_do_the_same_in_the_strut_and_not_at_the_rail(
     measure_few: Measure, rig: Rig
 ) -> None:

@@ -162,15 +162,9 @@ def test_where_nothing_is_missing_nothing_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("laws", "effect", "seed"),
-    [({"coulomb": 12.0}, "guide_saturating_friction", 2), ({"spring": 60.0}, "screw_stiffness", 4)],
-    ids=["friction", "spring"],
-)
-def test_what_was_put_in_is_named_and_nothing_else(laws: dict[str, float], effect: str, seed: int) -> None:
-    """Dry friction without presliding is a saturating friction of a velocity near zero."""
-    gap = si.diagnose(_axis(), driven_motion(_held(laws, seed)))
-    assert gap.verdict.effects == (effect,)
+def test_a_spring_that_was_put_in_is_named_and_nothing_else() -> None:
+    gap = si.diagnose(_axis(), driven_motion(_held({"spring": 60.0}, 4)))
+    assert gap.verdict.effects == ("screw_stiffness",)
     assert gap.identified["mass"] == pytest.approx(BASE["mass"], rel=0.005)
     assert gap.shrink.after < 1.1 * gap.shrink.floor
 

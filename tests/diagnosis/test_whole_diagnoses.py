@@ -23,6 +23,7 @@ from savgs_ident.plants.model import PlantModel
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
+from savgs_ident.validation.foreign_laws import SecondOrderFilter
 from savgs_ident.validation.varied_constants import VARIED, vary_constants
 
 from ..relaxed import as_users_have_it
@@ -55,8 +56,13 @@ class CubicDamping(AbstractForceLaw):
         return -v["coefficient"] * signals.velocity**3
 
 
-GUIDE = next(port for port in TwoMass.ports if port.name == "guide")
+GUIDE, ACCELEROMETER = (
+    next(port for port in TwoMass.ports if port.name == name) for name in ("guide", "accelerometer")
+)
 FOREIGN = effect_at("guide_cubic", GUIDE, CubicDamping(), {"coefficient": 3000.0})
+
+
+FILTERED = effect_at("filtered", ACCELEROMETER, SecondOrderFilter(), {"time": 2.1e-3, "damping_ratio": 1.4})
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -99,11 +105,13 @@ def _recorded(*effects: Effect, miss: float = 0.0) -> HarmonicResponse:
     )
 
 
-def _diagnosed(response: HarmonicResponse, watch: Watch = nobody) -> Diagnosis:
+def _diagnosed(
+    response: HarmonicResponse, watch: Watch = nobody, names: tuple[str, ...] = OFFERED
+) -> Diagnosis:
     settings = DiagnosisSettings(
         "two_mass", free=("k", "c"), orders=ORDERS, periodic=PeriodicSettings(nodes=128, adaptations=0)
     )
-    offered = {name: ALL[name] for name in OFFERED}
+    offered = {name: ALL[name] for name in names}
     problem, data = baseline_problem(response, TwoMass(), PARAMETERS, offered, settings)
     return diagnose_dwells(
         problem, data, response, PlantModel(TwoMass(), PARAMETERS), settings, {}, watch=watch
@@ -181,6 +189,16 @@ def test_a_law_that_the_catalogue_does_not_have_is_learned_at_its_port() -> None
     assert found.learned is not None
     # What a force with the cube of the velocity does not need is not in the law.
     assert 1 <= sum(each.value != 0.0 for each in found.learned.parameters) <= 4
+
+
+@pytest.mark.slow
+def test_a_sensor_by_another_law_is_not_a_lag_beside_something_else() -> None:
+    """The lag leaves next to nothing, and a second effect would take that up."""
+    found = _diagnosed(_recorded(FILTERED), names=(*OFFERED, "accelerometer_lag"))
+    assert (found.verdict.kind, found.verdict.effects) == ("effect", ("accelerometer_lag",))
+    assert tuple(map(str, found.verdict.families)) == ("sensor.body_accel/dynamics",)
+    assert not found.verdict.law_known
+    assert found.shrink.closed_by_effect > 0.9
 
 
 def test_what_follows_no_law_is_unknown() -> None:
