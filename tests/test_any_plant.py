@@ -116,14 +116,14 @@ def test_a_model_is_compared_and_what_is_saved_is_read_back(
 def test_both_samplers_find_the_same_posterior_and_it_agrees_with_the_fit(fit: si.Fit) -> None:
     """Enough draws that Monte-Carlo error does not decide.
 
-    Of a difference of means its standard deviation is 0.035 of one of the posterior, of a ratio of widths 0.025.
+    Of a difference of means its standard deviation is 0.05 of one of the posterior, of a ratio of widths 0.035.
     """
     one, other = (
-        si.sample(fit, sampler=sampler, target_ess=1600.0, patience=0.0) for sampler in ("emcee", "nuts")
+        si.sample(fit, sampler=sampler, target_ess=800.0, patience=0.0) for sampler in ("emcee", "nuts")
     )
     for name, true in TRUTH.items():
-        assert abs(one.draws[name].mean() - other.draws[name].mean()) < 0.1 * one[name].sd, name
-        assert one[name].sd == pytest.approx(other[name].sd, rel=0.1), name
+        assert abs(one.draws[name].mean() - other.draws[name].mean()) < 0.14 * one[name].sd, name
+        assert one[name].sd == pytest.approx(other[name].sd, rel=0.14), name
         for posterior in (one, other):
             assert posterior.trusted
             assert posterior[name].q025 < true < posterior[name].q975, name
