@@ -1,4 +1,4 @@
-"""JSON documents: readable writing and strict reading.
+"""JSON documents: readable writing and strict reading, of parameters, too.
 
 What is written is made to be read: a table stands over several lines, a list of plain values on one, and numbers keep
 all their digits.
@@ -25,8 +25,8 @@ What is read is checked: a :class:`JsonValue` knows its place in the document, s
 
 import json
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
-from math import isfinite
+from dataclasses import asdict, dataclass
+from math import inf, isfinite
 from pathlib import Path
 from typing import TypeVar
 
@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import write_bytes
+from savgs_ident.core.parameter import Parameter
 
 Plain = dict[str, object] | list[object] | str | int | float | bool | None
 """The values of JSON, numbers in any unit."""
@@ -205,3 +206,41 @@ def _finite(text: str) -> float:
     if not isfinite(number):
         raise ValueError(f"{text} is no finite number")
     return number
+
+
+NUMBERS = ("value", "tolerance", "lower", "upper")
+"""The entries of a parameter that are numbers."""
+TEXTS = ("unit", "about", "source")
+"""Those that are texts."""
+BOUNDS = ("lower", "upper")
+"""Those that may be null."""
+
+
+def parameter_record(entry: Parameter) -> dict[str, object]:
+    """What is known of a parameter, but for its name; an absent bound is null.
+
+    >>> found = parameter_record(Parameter("k", 6e4, "N/m", lower=0.0))
+    >>> found["lower"], found["upper"]
+    (0.0, None)
+    """
+    bounds = {name: value if isfinite(value := getattr(entry, name)) else None for name in BOUNDS}
+    return {name: value for name, value in asdict(entry).items() if name != "name"} | bounds
+
+
+def parse_parameter(place: JsonValue, known: Parameter) -> Parameter:
+    """The parameter at a place, by name and unit the ``known`` one; raises :class:`InputError` for an invalid one."""
+    fields = place.table((*NUMBERS, *TEXTS))
+    lower, upper = (
+        without if fields[name].value is None else fields[name].number()
+        for name, without in zip(BOUNDS, (-inf, inf), strict=True)
+    )
+    return Parameter(
+        known.name,
+        fields["value"].number(),
+        fields["unit"].text((known.unit,)),
+        fields["tolerance"].number(),
+        lower,
+        upper,
+        fields["about"].text(),
+        fields["source"].text(),
+    )

@@ -24,10 +24,17 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.export.document import JsonValue, Plain, as_plain, read_document, write_json_text
+from savgs_ident.export.document import (
+    JsonValue,
+    Plain,
+    as_plain,
+    parameter_record,
+    parse_parameter,
+    read_document,
+    write_json_text,
+)
 from savgs_ident.export.exported_model import Equations, ExportedModel, Signal, with_effects
 from savgs_ident.export.gather import parse_diagnosis
-from savgs_ident.export.parameters import parameter_record, parse_parameter
 from savgs_ident.export.rig_document import (
     check_linear_equivalent,
     parse_rig,

@@ -7,7 +7,7 @@ linear equivalent follows from the rig; it is for readers without this package.
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.export.document import JsonValue
+from savgs_ident.export.document import BOUNDS, NUMBERS, TEXTS, JsonValue, parameter_record
 from savgs_ident.export.linear_models import (
     EQUATION_8,
     EQUIVALENT_UNITS,
@@ -16,7 +16,6 @@ from savgs_ident.export.linear_models import (
     parse_space,
     space_record,
 )
-from savgs_ident.export.parameters import BOUNDS, NUMBERS, TEXTS, parameter_record
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_toml import (
