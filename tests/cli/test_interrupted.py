@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
@@ -83,8 +85,18 @@ def test_a_posterior_that_is_interrupted_keeps_its_chain(installed: Installed, s
         STOPPED,
     ]
     assert files_in(installed.folder / "o") == ["chain-emcee.h5"]
+    before = _steps(chain)
     again = installed.run(*words, "--resume", "--time-limit", "1")
     assert again.returncode in (0, 1), again.stderr
+    after = _steps(chain)
+    assert 0 < len(before) < len(after)
+    np.testing.assert_array_equal(after[: len(before)], before)
+
+
+def _steps(chain: Path) -> np.ndarray:
+    """The draws of all walkers (steps, walkers, parameters)."""
+    with h5py.File(chain, "r") as file:
+        return np.asarray(file["mcmc"]["chain"][: file["mcmc"].attrs["iteration"]])
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])

@@ -1,16 +1,11 @@
 """``posterior`` on a few dwells, end to end, and ``calibrate`` by its trials; on the whole campaign where slow."""
 
 import json
-import os
-import signal
-import subprocess
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -183,46 +178,3 @@ def test_what_a_model_file_remembers_is_refused_with_its_name() -> None:
         _ = RigModel(rig, MODELS["simtr"]).before
     with pytest.raises(InputError, match=r"model\.toml: provenance\.effects"):
         model_of(rig)
-
-
-@pytest.fixture
-def outside(environment: dict[str, str]) -> dict[str, str]:
-    """The environment of a user, without the strictness of tests."""
-    return {name: value for name, value in environment.items() if not name.startswith("JAX_")}
-
-
-def _steps(chain: Path) -> int:
-    try:
-        with h5py.File(chain, "r") as file:
-            return int(file["mcmc"].attrs["iteration"])
-    except FileNotFoundError:
-        return 0
-
-
-@pytest.mark.slow
-def test_killed_and_resumed_the_chain_is_the_same(
-    sampled: tuple[Path, Result],
-    model: Path,
-    short_campaign: Path,
-    tmp_path: Path,
-    outside: dict[str, str],
-) -> None:
-    """Killed with SIGKILL twice, at any moment, against a run that nobody disturbed."""
-    from .conftest import COMMAND
-
-    run = _short_run(model, short_campaign)
-    words = [*COMMAND, *run, "--quiet", "--out", str(tmp_path), "--resume"]
-    killed, random = tmp_path / "chain-emcee.h5", np.random.default_rng(5)
-    for _ in range(2):
-        before = _steps(killed)
-        process = subprocess.Popen(words, env=outside)
-        while _steps(killed) <= before and process.poll() is None:
-            time.sleep(0.01)
-        time.sleep(float(random.uniform(0.0, 0.3)))
-        os.kill(process.pid, signal.SIGKILL)
-        process.wait()
-    assert _steps(killed) > 0
-    subprocess.run(words, env=outside, check=True)
-    with h5py.File(killed) as one, h5py.File(sampled[0] / "chain-emcee.h5") as other:
-        steps = min(one["mcmc"].attrs["iteration"], other["mcmc"].attrs["iteration"])
-        np.testing.assert_array_equal(one["mcmc"]["chain"][:steps], other["mcmc"]["chain"][:steps])
