@@ -76,6 +76,23 @@ class DiagnosisProblem:
         found = ((place, whole if (place, whole) in laws else family) for place, whole, family in wholes)
         return tuple(dict.fromkeys(PortFamily(place, family) for place, family in found))
 
+    def is_tolerance(self, hypothesis: Hypothesis, broken: BrokenTolerance) -> bool:
+        """Whether a hypothesis is a tolerance that does not hold, with what is assumed beside it, by other names.
+
+        Its effect changes the number, in place of the tolerance or beside it; or the tolerance is assumed beside the
+        hypothesis, and the number is the linear part of one of its laws.
+        """
+        effects, beside, number = {*hypothesis.effects}, {*broken.beside.effects}, broken.conflict.parameter
+        changing = {name for name in effects if self.plant.catalogue[name].number == number}
+        if changing:
+            return effects - changing == beside - changing
+        return effects == beside and any(self._is_linear_part(number, name) for name in effects)
+
+    def _is_linear_part(self, number: str, effect: str) -> bool:
+        law, place = self.plant.catalogue[effect].law, self.location(effect)
+        ports = [port for port in self.plant.model(()).ports if port.location == place]
+        return any((each.name, each.of) == (number, law.family) for port in ports for each in port.numbers)
+
     def location_text(self, location: str) -> str:
         """What a reader calls a location."""
         return self.plant.plant.location_words.get(location, location)

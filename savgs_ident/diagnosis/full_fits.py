@@ -12,7 +12,7 @@ from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import PairScore, Score, cosine, peaks_by_try, prior_conflict
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.inference.find_map import LaplaceFit, Search, densest, find_map, find_map_from_both, refine
-from savgs_ident.inference.observations import Term
+from savgs_ident.inference.observations import NumberChange, Term
 
 
 @dataclass(frozen=True)
@@ -85,10 +85,12 @@ class Fits:
 
         def fit(score: Score) -> LaplaceFit:
             self.progress(f"fitting {hypothesis_of(parent).with_effect(score.term.name)}")
-            start = parent.values | score.start
-            return find_map_from_both(
-                self.search, (*inherited, score.term), start, parent.prediction.warm_start, least=least
-            )
+            terms, near = (*inherited, score.term), parent.prediction.warm_start
+            start: Mapping[str, float] = parent.values | score.start
+            if score.term.change is not None:
+                instead = parent.values | _in_place_of_its_number(score.term.change, score.term, parent)
+                start = densest(self.search, terms, (start, instead), near)
+            return find_map_from_both(self.search, terms, start, near, least=least)
 
         return in_parallel(fit, scores)
 
@@ -140,6 +142,17 @@ class Fits:
 
     def _left(self, mode: LaplaceFit) -> float:
         return left_over(self.search, self.base, mode, self.constants)
+
+
+def _in_place_of_its_number(change: NumberChange, term: Term, parent: LaplaceFit) -> dict[str, float]:
+    """The number that a term changes as on its sheet, and the term with all that ``parent`` has it off; SI.
+
+    Where calibration has taken up a large change, no step leads from there to the change itself: both do the same
+    along a curve.
+    """
+    (amplitude,) = term.amplitudes
+    off = amplitude.centre + (parent.values[change.number] - change.sheet) / change.slope
+    return {change.number: change.sheet, amplitude.name: min(max(off, amplitude.lower), amplitude.upper)}
 
 
 def best_of_each(modes: Sequence[LaplaceFit]) -> list[LaplaceFit]:

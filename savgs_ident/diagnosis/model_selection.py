@@ -185,8 +185,12 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
     if others:
         first = max(others, key=lambda each: each.evidence)
         alone = anywhere(others) if change_of(problem, first.moved).matters(constants) else -np.inf
-    unknown = unknown_evidence(findings, alone, fitted.beside, broken, constants)
-    weighed = weigh(findings, unknown, constants)
+    # A number that is off where the catalogue has its change is that effect.
+    tolerance = {}
+    if problem.is_tolerance(hypothesis_of(best), broken):
+        tolerance = {hypothesis_of(best): broken.weight}
+    unknown = unknown_evidence(findings, alone, fitted.beside, None if tolerance else broken, constants)
+    weighed = weigh(findings, unknown, constants, tolerance)
     kind, chosen = decide(weighed, change, left, constants, unknown.reason)
     more = [WeighedHypothesis(each.hypothesis, each.weight, each.law.mode, each.sd) for each in members]
     weighed = tuple(sorted((*weighed, *more), key=lambda each: -each.weight))

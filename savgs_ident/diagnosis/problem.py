@@ -15,7 +15,7 @@ log-normal about its typical value; :class:`~savgs_ident.diagnosis.thresholds.De
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -33,7 +33,7 @@ from savgs_ident.effects.base import AbstractFrictionLimitLaw, Port, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned_functions import SMALLEST
 from savgs_ident.inference.find_map import LaplaceFit, Search
-from savgs_ident.inference.observations import Data, Prediction, Term
+from savgs_ident.inference.observations import Data, NumberChange, Prediction, Term
 from savgs_ident.inference.prior import Coordinates, Linear, Logarithmic, sheet_coordinate
 from savgs_ident.inference.problem import used_parameters
 from savgs_ident.plants.base import AbstractPlant
@@ -48,6 +48,16 @@ def term_of(effect: Effect, constants: DecisionConstants = DEFAULTS) -> Term:
     )
     shapes = tuple(_shape(each, shape_width) for each in own if each.name not in effect.null)
     return Term(effect.name, effect.port.location, amplitudes, shapes, effect.tried)
+
+
+def _change_of_number(effect: Effect, parameters: ParameterTable) -> NumberChange | None:
+    """What an effect does to a number of the plant, where that is all that it does."""
+    if effect.number is None:
+        return None
+    sheet = parameters[effect.number].value
+    ((change, null),) = effect.null.items()
+    there = effect.changes(as_values({effect.number: sheet, change: null + 1.0}))[effect.number]
+    return NumberChange(effect.number, sheet, float(there) - sheet)
 
 
 def spans_of_force(port: Port, signals: PortSignals, constants: DecisionConstants) -> dict[str, float]:
@@ -131,10 +141,10 @@ class AbstractProblem(ABC):
     @cached_property
     def candidates(self) -> tuple[Term, ...]:
         """All effects that the baseline does not have."""
+        absent = [effect for name, effect in self.catalogue.items() if name not in self.baseline]
         terms = [
-            term_of(effect, self.constants)
-            for name, effect in self.catalogue.items()
-            if name not in self.baseline
+            replace(term_of(each, self.constants), change=_change_of_number(each, self.parameters))
+            for each in absent
         ]
         return tuple(term for term in terms if term.amplitudes)
 

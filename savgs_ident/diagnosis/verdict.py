@@ -12,9 +12,10 @@ Something is missing where the best fitted hypothesis, or *unknown*, has log odd
 of an alarm, and where it changes the response by enough to matter.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import log, pi, sqrt
+from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -153,32 +154,43 @@ def unknown_evidence(
     findings: Findings,
     alone: float,
     beside: float,
-    broken: BrokenTolerance,
+    broken: BrokenTolerance | None,
     constants: DecisionConstants = DEFAULTS,
 ) -> UnknownEvidence:
     """What speaks most for something unknown.
 
     ``alone`` is the log evidence of a law learned at some port, ``beside`` that of one beside the most probable
-    hypothesis, whose prior it shares; ``broken`` the most probable tolerance that does not hold.
+    hypothesis, whose prior it shares; ``broken`` the most probable tolerance that does not hold, None where that is
+    what an effect of the catalogue is.
     """
     prior = log_prior(hypothesis_of(most_probable(findings, constants)), len(findings.scores), constants)
     unknown = log_prior(UNKNOWN, len(findings.scores), constants)
-    found = (
+    found = [
         UnknownEvidence(alone + unknown, "law"),
         UnknownEvidence(beside + unknown + prior, "law beside effects"),
-        UnknownEvidence(broken.weight, "tolerance beside effects" if broken.beside.effects else "tolerance"),
-    )
+    ]
+    if broken is not None:
+        reason: Reason = "tolerance beside effects" if broken.beside.effects else "tolerance"
+        found.append(UnknownEvidence(broken.weight, reason))
     return max(found, key=lambda each: each.weight)
 
 
 def weigh(
-    findings: Findings, unknown: UnknownEvidence, constants: DecisionConstants = DEFAULTS
+    findings: Findings,
+    unknown: UnknownEvidence,
+    constants: DecisionConstants = DEFAULTS,
+    as_tolerance: Mapping[Hypothesis, float] = MappingProxyType({}),
 ) -> tuple[WeighedHypothesis, ...]:
-    """All hypotheses by falling weight, but for those whose fit was lost."""
+    """All hypotheses by falling weight, but for those whose fit was lost.
+
+    ``as_tolerance`` has log weights of hypotheses that are a tolerance which does not hold, as such: both count.
+    """
     count = len(findings.scores)
 
     def weighed(hypothesis: Hypothesis, evidence: float, mode: LaplaceFit | None) -> WeighedHypothesis:
-        return WeighedHypothesis(hypothesis, evidence + log_prior(hypothesis, count, constants), mode)
+        weight = evidence + log_prior(hypothesis, count, constants)
+        both = float(np.logaddexp(weight, as_tolerance.get(hypothesis, -np.inf)))
+        return WeighedHypothesis(hypothesis, both, mode)
 
     fits = [(hypothesis_of(mode), mode) for mode in findings.modes]
     decided = {*(hypothesis for hypothesis, _ in fits), *(each.hypothesis for each in findings.lost)}

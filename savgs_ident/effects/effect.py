@@ -101,10 +101,15 @@ class Effect(eqx.Module):
         return {name: null for name, null in found.items() if isinstance(name, str)}
 
     @property
+    def number(self) -> str | None:
+        """Name of the plant's number that it changes; None for all but laws of a number."""
+        changed = dict(self.numbers).get("number")
+        return None if changed is None else str(changed)
+
+    @property
     def linear_part_of(self) -> Family:
         """What kind of law the number is the linear part of that it changes; else that of its own law."""
-        changed = dict(self.numbers).get("number")
-        return next((each.of for each in self.port.numbers if each.name == changed), self.law.family)
+        return next((each.of for each in self.port.numbers if each.name == self.number), self.law.family)
 
     @property
     def states(self) -> tuple[InternalState, ...]:
@@ -144,7 +149,7 @@ class Effect(eqx.Module):
     def changes(self, p: Values) -> Mapping[str, Float[Array, ""]]:
         """The plant's number that it changes, by name, SI."""
         assert isinstance(self.law, AbstractNumberLaw), self.name
-        return {str(dict(self.numbers)["number"]): self.law.changed(self._values(p))}
+        return {str(self.number): self.law.changed(self._values(p))}
 
     def shift(self, p: Values, signal: InputSignal, fundamental: Fundamental) -> InputSignal:
         """What comes on top of a recorded input, value and rate."""

@@ -33,6 +33,20 @@ class Prediction(NamedTuple):
         return self.status.ok
 
 
+class NumberChange(NamedTuple):
+    """What a term does that is the change of one number of the plant: the number is ``sheet + slope * amplitude``.
+
+    Attributes:
+        number: name of the number.
+        sheet: its value on the data sheet [its unit].
+        slope: its change per unit of the term's amplitude [unit of the number per unit of the amplitude].
+    """
+
+    number: str
+    sheet: float
+    slope: float
+
+
 @dataclass(frozen=True)
 class Term:
     """A candidate: something that may be missing in the plant's baseline.
@@ -43,6 +57,7 @@ class Term:
         amplitudes: coordinates at whose centres it vanishes.
         shapes: coordinates that say nothing while it vanishes.
         tries: values of shapes [SI] by name at which it is looked for; typical ones where left out.
+        change: the number of the plant that it changes, where it does nothing else.
     """
 
     name: str
@@ -50,6 +65,7 @@ class Term:
     amplitudes: EffectCoordinates
     shapes: EffectCoordinates = ()
     tries: tuple[Mapping[str, float], ...] = ()
+    change: NumberChange | None = None
 
     @property
     def coordinates(self) -> EffectCoordinates:

@@ -267,6 +267,17 @@ def test_what_speaks_for_something_unknown_is_known(
     assert 590.0 < found.weight < 600.0
 
 
+def test_a_tolerance_that_an_effect_is_counts_for_the_effect() -> None:
+    findings = Findings(_mode(0.0), SCORES, (_mode(500.0, "rail_stribeck"),))
+    unknown = unknown_evidence(findings, 400.0, 500.0, None)
+    assert unknown.reason == "law beside effects"
+    named = Hypothesis(("rail_stribeck",))
+    alone = {each.hypothesis: each.weight for each in weigh(findings, unknown)}
+    both = {each.hypothesis: each.weight for each in weigh(findings, unknown, as_tolerance={named: 510.0})}
+    assert both[named] == pytest.approx(np.logaddexp(alone[named], 510.0))
+    assert {each for each in alone if alone[each] != both[each]} == {named}
+
+
 @pytest.mark.parametrize(("pair", "beside"), [(510.0, ()), (560.0, ("rail_stribeck", "strut_friction"))])
 def test_a_broken_tolerance_is_held_against_a_pair(pair: float, beside: tuple[str, ...]) -> None:
     """The baseline gains 540 from it and the pair nothing: one is simpler than two, unless two explain more."""

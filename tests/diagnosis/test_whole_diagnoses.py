@@ -71,13 +71,13 @@ def _relaxed() -> Iterator[None]:
         yield
 
 
-def _recorded(*effects: Effect, miss: float = 0.0) -> HarmonicResponse:
+def _recorded(*effects: Effect, miss: float = 0.0, numbers: Mapping[str, float] = TRUTH) -> HarmonicResponse:
     """Dwells of the plant with effects of typical size; ``miss`` is a relative error of every test by itself."""
     random, model = np.random.default_rng(5), TwoMass()
     for each in effects:
         model = model + each
     own = [parameter for each in effects for parameter in each.parameters]
-    p = as_values((PARAMETERS.with_values(TRUTH) + ParameterTable(tuple(own))).as_dict())
+    p = as_values((PARAMETERS.with_values(numbers) + ParameterTable(tuple(own))).as_dict())
     road = np.zeros((FREQUENCY.size, 2), complex)
     road[:, 1] = STROKE
     excitation = Excitation(jnp.asarray(FREQUENCY), {"road_height": jnp.asarray(road)})
@@ -153,6 +153,15 @@ def test_an_effect_is_named() -> None:
     assert found.shrink.closed_by_effect > 0.98
     (damping,) = found.candidates[0].parameters
     assert damping.lo < ALL["guide_viscous"].parameters[0].value < damping.hi
+
+
+@pytest.mark.parametrize("times", [1.4, 2.3])
+def test_a_number_far_off_its_sheet_is_the_effect_that_does_the_same(times: float) -> None:
+    """Calibration takes up the first. That a tolerance does not hold is nothing unknown where it is an effect."""
+    found = _diagnosed(_recorded(numbers=TRUTH | {"k_t": times * PARAMETERS["k_t"].value}))
+    assert (found.verdict.kind, found.verdict.effects) == ("effect", ("tyre_stiffness",))
+    assert found.verdict.probability > 0.9
+    assert found.shrink.after < 1.3 * found.shrink.floor
 
 
 TWO = (ALL["guide_viscous"], ALL["potentiometer_delay"])
