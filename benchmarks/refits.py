@@ -42,6 +42,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
             "further_fits",
             "pairs_per_parent",
             "resonance_peaks",
+            "resonance_steps",
             "first_order_pairs",
             "parents",
         ),

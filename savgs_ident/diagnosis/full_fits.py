@@ -9,9 +9,24 @@ from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
 from savgs_ident.diagnosis.findings import explains_all, hypothesis_of, left_over
 from savgs_ident.diagnosis.result import Hypothesis
-from savgs_ident.diagnosis.score_test import PairScore, Score, cosine, peaks_by_try, prior_conflict
+from savgs_ident.diagnosis.score_test import (
+    PairScore,
+    Score,
+    cosine,
+    peaks_by_try,
+    prior_conflict,
+    scores_by_try,
+)
 from savgs_ident.diagnosis.thresholds import DecisionConstants
-from savgs_ident.inference.find_map import LaplaceFit, Search, densest, find_map, find_map_from_both, refine
+from savgs_ident.inference.find_map import (
+    LaplaceFit,
+    Search,
+    densest,
+    find_map,
+    find_map_from_both,
+    find_map_from_several,
+    refine,
+)
 from savgs_ident.inference.observations import NumberChange, Term
 
 
@@ -76,6 +91,25 @@ class Fits:
         chosen = [densest(self.search, (term,), starts, near)] if term.tries else starts
         fits = [find_map_from_both(self.search, (term,), start, near, least=least) for start in chosen]
         return max(fits, key=lambda fit: fit.evidence)
+
+    def from_every_frequency(self, term: Term) -> LaplaceFit:
+        """The best fit of what swings from all natural frequencies that are tried.
+
+        From its typical size, and from that which promises most to first order: a sharp resonance shows to first
+        order only where it is met to a few per cent, and a strong one is far from that.
+        """
+        self.progress(f"fitting {term.name} from every natural frequency")
+        typical = {each.name: each.value(self.constants.typical_coordinate) for each in term.amplitudes}
+        scores = scores_by_try(self.search, self.base, term, self.constants)
+        starts = [*(typical | shapes for shapes in term.tried), *(dict(each.start) for each in scores)]
+        return find_map_from_several(
+            self.search,
+            (term,),
+            [self.base.values | each for each in starts],
+            self.base.prediction.warm_start,
+            self.constants.resonance_steps,
+            self.constants.resonance_peaks,
+        )
 
     def extended(
         self, parent: LaplaceFit, scores: Sequence[Score], least: float = -np.inf

@@ -15,7 +15,7 @@ from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import Amplitudes
 from savgs_ident.diagnosis.verdict import Change, without_immaterial_members
-from savgs_ident.inference.find_map import LaplaceFit
+from savgs_ident.inference.find_map import LaplaceFit, find_map
 
 
 def immaterial(
@@ -53,8 +53,13 @@ def _chance_of_little(problem: DiagnosisProblem, amplitudes: Amplitudes) -> floa
 
 def material(problem: DiagnosisProblem, findings: Findings) -> Findings:
     """The findings less those that need an effect which does too little to matter."""
+
+    def without(mode: LaplaceFit, gone: Sequence[str]) -> LaplaceFit:
+        terms = problem.terms(Hypothesis(tuple(name for name in mode.terms if name not in gone)))
+        return find_map(problem.search, terms, mode.values, mode.prediction.warm_start)
+
     return without_immaterial_members(
-        findings, lambda mode, gone: change_without(problem, mode, gone), problem.constants
+        findings, lambda mode, gone: change_without(problem, mode, gone), without, problem.constants
     )
 
 

@@ -352,7 +352,10 @@ def _in_series(problem: DiagnosisProblem, names: Sequence[str]) -> list[str]:
 def _with_nearest(
     problem: DiagnosisProblem, findings: Findings, localisations: Sequence[Localisation], progress: Progress
 ) -> Findings:
-    """The findings, and where they leave much, the single effects at the locations that explain most."""
+    """The findings, and where they leave much, the single effects at the locations that explain most.
+
+    And what swings, wherever it is: about the recalibrated baseline a sharp resonance may show at none of them.
+    """
     constants = problem.constants
     left = left_over(problem.search, problem.base, most_probable(findings, constants), constants)
     if left <= constants.unexplained_share:
@@ -362,7 +365,7 @@ def _with_nearest(
         each.name for each in ranked[: constants.nearest_ports] if each.evidence > problem.base.evidence
     ]
     candidates = problem.plant.candidates
-    wanted = [term for term in candidates if problem.location(term.name) in nearest]
+    wanted = [term for term in candidates if term.tries or problem.location(term.name) in nearest]
     if not wanted:
         return findings
     return singles_among(problem.search, findings, wanted, candidates, progress, constants)

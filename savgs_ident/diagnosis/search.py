@@ -32,7 +32,6 @@ from savgs_ident.diagnosis.score_test import (
     Score,
     best_pairs,
     score_terms,
-    scores_by_try,
 )
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.find_map import (
@@ -97,8 +96,7 @@ def singles_among(
     """The findings, and each of the ``wanted`` among the ``terms`` alone that has not been fitted yet.
 
     An effect that acts far from in proportion to its size scores little at its null: it is fitted from its typical
-    size, too; and what swings from every natural frequency that is tried, fitted already or not, because a sharp
-    resonance shows to first order, and at a typical size, only where it is met to a few per cent.
+    size, too; and what swings from every natural frequency that is tried, fitted already or not.
     """
     tried = {mode.terms for mode in findings.modes}
     fits = Fits(search, findings.base, {term.name: term for term in terms}, progress, constants)
@@ -106,11 +104,7 @@ def singles_among(
     singles = fits.extended(findings.base, score_terms(search, findings.base, others, constants))
     least = max((mode.evidence for mode in findings.modes), default=-np.inf) - constants.refined_log_evidence
     singles += in_parallel(lambda term: fits.from_typical_size(term, least), others)
-    for term in wanted:
-        if term.tries:
-            singles += fits.extended(
-                findings.base, scores_by_try(search, findings.base, term, constants), least
-            )
+    singles += [fits.from_every_frequency(term) for term in wanted if term.tries]
     found = fits.refined(best_of_each([*findings.modes, *singles]))
     more = _findings(findings.base, findings.scores, found)
     return replace(more, lost=(*findings.lost, *more.lost))

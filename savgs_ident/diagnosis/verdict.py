@@ -113,18 +113,35 @@ def most_probable(findings: Findings, constants: DecisionConstants = DEFAULTS) -
 def without_immaterial_members(
     findings: Findings,
     change: Callable[[LaplaceFit, Sequence[str]], Change],
+    without: Callable[[LaplaceFit, Sequence[str]], LaplaceFit],
     constants: DecisionConstants = DEFAULTS,
 ) -> Findings:
     """The findings less the most probable ones that need an effect which does too little to matter.
 
     What a wrong effect leaves, a trace of a second one often takes away: that does not make both of them right.
-    ``change`` is what some terms of a hypothesis do to the response.
+    ``change`` is what some terms of a hypothesis do to the response; ``without`` fits it without some, from where it
+    is: what matters may have been found beside the trace alone.
     """
     best = most_probable(findings, constants)
-    while len(best.terms) > 1 and any(not change(best, (name,)).matters(constants) for name in best.terms):
-        findings = replace(findings, modes=tuple(each for each in findings.modes if each is not best))
+    while len(best.terms) > 1:
+        gone = [name for name in best.terms if not change(best, (name,)).matters(constants)]
+        if not gone:
+            break
+        modes = [each for each in findings.modes if each is not best]
+        if len(gone) < len(best.terms):
+            modes = _with_better(modes, without(best, gone))
+        findings = replace(findings, modes=tuple(modes))
         best = most_probable(findings, constants)
     return findings
+
+
+def _with_better(modes: Sequence[LaplaceFit], found: LaplaceFit) -> list[LaplaceFit]:
+    """The fits, best first, with another one where it is the best of its hypothesis."""
+    same = [each for each in modes if hypothesis_of(each) == hypothesis_of(found)]
+    if not found.solved or any(each.evidence >= found.evidence for each in same):
+        return list(modes)
+    others = [each for each in modes if each not in same]
+    return sorted([*others, found], key=lambda each: -each.evidence)
 
 
 def broken_tolerance(

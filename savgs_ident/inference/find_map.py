@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
 from savgs_ident.inference.laplace import linearised_optimum, log_evidence, precision_of
@@ -344,6 +345,31 @@ def densest(
     """
     ascent = _Ascent(search, terms, {})
     return max(starts, key=lambda each: ascent.density(each, warm_start))
+
+
+def find_map_from_several(
+    search: Search,
+    terms: tuple[Term, ...],
+    starts: Sequence[Mapping[str, float]],
+    warm_start: Any,
+    first: int,
+    going_on: int,
+) -> LaplaceFit:
+    """The best mode of the baseline with ``terms`` from many starts [SI].
+
+    After the ``first`` steps from each, so many as are ``going_on`` are followed to their end: the highest ones.
+    """
+    ascent = _Ascent(search, terms, {})
+
+    def begun(start: Mapping[str, float]) -> _Point:
+        point = ascent.start(start, warm_start)
+        for _ in range(first):
+            point = ascent.step(point)
+        return point
+
+    highest = sorted(in_parallel(begun, starts), key=lambda each: -each.value)[:going_on]
+    modes = in_parallel(lambda point: ascent.mode(point, STEPS - first), highest)
+    return max(modes, key=lambda mode: mode.evidence)
 
 
 def refine(search: Search, mode: LaplaceFit, terms: tuple[Term, ...]) -> LaplaceFit:

@@ -12,7 +12,7 @@ from savgs_ident.diagnosis.findings import Findings, explains_all
 from savgs_ident.diagnosis.score_test import peaks_by_try, scores_by_try
 from savgs_ident.diagnosis.search import singles_among
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.inference.find_map import densest, find_map, search_of
+from savgs_ident.inference.find_map import densest, find_map, find_map_from_several, search_of
 from savgs_ident.inference.prior import Linear, Logarithmic
 
 from ..in_one_test import over
@@ -33,6 +33,19 @@ def test_what_has_many_maxima_is_fitted_from_all_that_is_tried_though_it_was_fit
     more = singles_among(search, findings, ripple, ripple, no_progress)
     assert best_of(more).values["w"] == pytest.approx(12.5, rel=0.02)
     assert [mode.terms for mode in more.modes] == [("ripple",)]
+
+
+@over("seed", range(5))
+def test_of_many_starts_those_that_are_highest_after_some_steps_are_followed(seed: int) -> None:
+    """At its typical size a ripple is nowhere good; each start alone ends at a maximum of its own."""
+    ripple = TERMS[1:2]
+    search = search_of(PLANT, draw(PLANT, {"a": 1.0, "s": 0.3, "w": 12.5}, NOISE, seed))
+    starts = [{"s": 0.3, "w": w} for w in (4.0, 7.0, 11.5, 20.0, 26.0)]
+    alone = [find_map(search, ripple, start, None) for start in starts]
+    assert len({round(each.evidence) for each in alone}) > 2
+    found = find_map_from_several(search, ripple, starts, None, 4, 2)
+    assert found.values["w"] == pytest.approx(12.5, rel=0.02)
+    assert found.evidence == pytest.approx(max(each.evidence for each in alone), abs=0.1)
 
 
 class _Stopped(ToyPlant):
