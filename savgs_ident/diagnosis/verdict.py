@@ -137,10 +137,12 @@ def without_immaterial_members(
 
 def _with_better(modes: Sequence[LaplaceFit], found: LaplaceFit) -> list[LaplaceFit]:
     """The fits, best first, with another one where it is the best of its hypothesis."""
-    same = [each for each in modes if hypothesis_of(each) == hypothesis_of(found)]
-    if not found.solved or any(each.evidence >= found.evidence for each in same):
+    others = [each for each in modes if hypothesis_of(each) != hypothesis_of(found)]
+    least = max(
+        (each.evidence for each in modes if hypothesis_of(each) == hypothesis_of(found)), default=-np.inf
+    )
+    if not found.solved or found.evidence <= least:
         return list(modes)
-    others = [each for each in modes if each not in same]
     return sorted([*others, found], key=lambda each: -each.evidence)
 
 
