@@ -19,12 +19,14 @@ from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import NONE, Hypothesis, Kind, PortFamily
+from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
     BrokenTolerance,
     Change,
     UnknownEvidence,
     WeighedHypothesis,
+    broken_tolerance,
     uncertain_odds,
 )
 from savgs_ident.effects.base import Family, Port
@@ -77,29 +79,19 @@ class DiagnosisProblem:
         return tuple(dict.fromkeys(PortFamily(place, family) for place, family in found))
 
     def is_tolerance(self, hypothesis: Hypothesis, broken: BrokenTolerance) -> bool:
-        """Whether a hypothesis is a tolerance that does not hold, with what is assumed beside it, by other names.
-
-        Its effect changes the number, in place of the tolerance or beside it; or the tolerance is assumed beside the
-        hypothesis, and the number is the linear part of one of its laws.
-        """
-        effects, beside, number = {*hypothesis.effects}, {*broken.beside.effects}, broken.conflict.parameter
-        changing = {name for name in effects if self.plant.catalogue[name].number == number}
-        if changing:
-            return effects - changing == beside - changing
-        return effects == beside and any(self._is_linear_part(number, name) for name in effects)
-
-    def _is_linear_part(self, number: str, effect: str) -> bool:
-        law, place = self.plant.catalogue[effect].law, self.location(effect)
-        ports = [port for port in self.plant.model(()).ports if port.location == place]
-        return any((each.name, each.of) == (number, law.family) for port in ports for each in port.numbers)
+        """Whether effects are tolerances that do not hold, by other names: they change numbers that are off."""
+        numbers = {self.plant.catalogue[name].number for name in hypothesis.effects}
+        return bool(numbers) and numbers <= set(broken.conflict.off)
 
     def location_text(self, location: str) -> str:
         """What a reader calls a location."""
         return self.plant.plant.location_words.get(location, location)
 
-    def parameter_port(self, parameter: str) -> str | None:
-        """The location at which a parameter of the plant acts; None for one that no port has (hardpoints)."""
-        return self._parameter_ports.get(parameter)
+    def broken_beside(self, mode: LaplaceFit, count: int) -> BrokenTolerance:
+        """The tolerances that do not hold beside a fit, where the catalogue has ``count`` effects."""
+        conflict = prior_conflict(mode, self.plant.nuisances, self.constants)
+        ports = {number.name: port.location for port in self.plant.model(()).ports for number in port.numbers}
+        return broken_tolerance(mode, conflict, count, ports, self.constants)
 
     def port(self, name: str) -> Port:
         """The port of a name."""
@@ -108,10 +100,6 @@ class DiagnosisProblem:
     def terms(self, hypothesis: Hypothesis) -> tuple[Term, ...]:
         """The candidates that a hypothesis consists of."""
         return tuple(self._candidates[name] for name in hypothesis.effects)
-
-    @cached_property
-    def _parameter_ports(self) -> Mapping[str, str]:
-        return {number.name: port.location for port in self.plant.model(()).ports for number in port.numbers}
 
     @cached_property
     def _candidates(self) -> Mapping[str, Term]:
@@ -182,7 +170,9 @@ class DiagnosisEvidence:
         flexible: learned laws that were fitted on the nonlinear plant, the most probable first.
         weighed: hypotheses by falling weight.
         unknown: what speaks most for something that the catalogue lacks.
-        broken: the tolerance that most probably does not hold.
+        broken: the tolerances that most probably do not hold where nothing else is missing.
+        off: how many tolerances [1] parameters are off their sheet beside the effects that are named, by name; none
+            where all tolerances hold more probably.
         kind: what may be said.
         chosen: the hypothesis that it rests on.
         left: share of the baseline's misfit that the most probable effects leave.
@@ -212,6 +202,7 @@ class DiagnosisEvidence:
     refuted: Hypothesis = NONE
     immaterial: Mapping[Hypothesis, float] = field(default_factory=dict)
     insufficient: tuple[Hypothesis, ...] = ()
+    off: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def localisation(self) -> Localisation:
@@ -263,8 +254,8 @@ class DiagnosisEvidence:
         """Where something unknown acts: the port of a broken tolerance, if that is it, or that of the law."""
         if self.named_law is not None:
             return self.named_law.location
-        broken = self.broken.port if self.unknown.is_tolerance else None
-        return self.localisation.name if broken is None else broken
+        broken = self.broken.ports if self.unknown.is_tolerance else ()
+        return broken[0] if broken else self.localisation.name
 
     def indistinguishable_ports(self, constants: DecisionConstants = DEFAULTS) -> tuple[str, ...]:
         """Other ports at which a law of something unknown is nearly as probable, the most probable first."""

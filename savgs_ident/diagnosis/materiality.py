@@ -91,6 +91,13 @@ def change_by_law(problem: DiagnosisProblem, law: LearnedLaw) -> Change:
     return change_of(problem, law.mode.prediction.rows - without.rows)
 
 
+def change_by_tolerances(problem: DiagnosisProblem, off: Mapping[str, float]) -> Change:
+    """What numbers ``off`` their sheet by so many tolerances [1], by name, do to the response, to first order."""
+    base = problem.base
+    x = np.array([off.get(each.name, 0.0) for each in base.coordinates])
+    return change_of(problem, base.slopes @ x)
+
+
 def change_of(problem: DiagnosisProblem, rows: NDArray[np.float64]) -> Change:
     """A change of the rows (m,), in the channel where it is greatest."""
     return _changes(problem, rows[:, None])[0]

@@ -40,15 +40,20 @@ from savgs_ident.diagnosis.findings import (
 )
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
-from savgs_ident.diagnosis.materiality import change_by_law, change_of, change_without, immaterial, material
+from savgs_ident.diagnosis.materiality import (
+    change_by_law,
+    change_by_tolerances,
+    change_of,
+    change_without,
+    immaterial,
+    material,
+)
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis
-from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.search import pairs_with, single_effects, singles_among, with_pairs
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
     WeighedHypothesis,
-    broken_tolerance,
     decide,
     log_prior,
     log_prior_of_pair,
@@ -170,13 +175,8 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
     search, base, constants = problem.search, problem.base, problem.constants
     findings, localisations = fitted.findings, fitted.localisations
     members = _flexible_members(problem, fitted.laws, len(localisations))
-    broken = broken_tolerance(
-        findings,
-        lambda mode: prior_conflict(mode, problem.plant.nuisances, constants),
-        problem.parameter_port,
-        constants,
-    )
-    best = most_probable(findings, constants)
+    best, count = most_probable(findings, constants), len(findings.scores)
+    broken, beside = problem.broken_beside(base, count), problem.broken_beside(best, count)
     change = fitted.change if best is fitted.best else change_without(problem, best, best.terms)
     left = left_over(search, base, best, constants)
     # A law that was learned on the nonlinear plant stands for itself.
@@ -186,11 +186,11 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
         first = max(others, key=lambda each: each.evidence)
         alone = anywhere(others) if change_of(problem, first.moved).matters(constants) else -np.inf
     # A number that is off where the catalogue has its change is that effect.
-    tolerance = {}
-    if problem.is_tolerance(hypothesis_of(best), broken):
-        tolerance = {hypothesis_of(best): broken.weight}
-    unknown = unknown_evidence(findings, alone, fitted.beside, None if tolerance else broken, constants)
-    weighed = weigh(findings, unknown, constants, tolerance)
+    is_effect = problem.is_tolerance(hypothesis_of(best), broken)
+    also = [] if not best.terms else [beside.weight, broken.weight] if is_effect else [beside.weight]
+    is_unknown = not is_effect and change_by_tolerances(problem, broken.conflict.off).matters(constants)
+    unknown = unknown_evidence(findings, alone, fitted.beside, broken if is_unknown else None, constants)
+    weighed = weigh(findings, unknown, constants, {hypothesis_of(best): also})
     kind, chosen = decide(weighed, change, left, constants, unknown.reason)
     more = [WeighedHypothesis(each.hypothesis, each.weight, each.law.mode, each.sd) for each in members]
     weighed = tuple(sorted((*weighed, *more), key=lambda each: -each.weight))
@@ -210,6 +210,7 @@ def decide_among(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnos
         left=left,
         immaterial=too_little,
         insufficient=_insufficient(problem, findings, members),
+        off=beside.conflict.off if best.terms and beside.is_likely(constants) else {},
     )
     if not members or not (
         _is_named(problem, found, members[0]) or is_better_form(problem, found, members[0])

@@ -250,32 +250,40 @@ def _is_sheet_wrong(evidence: DiagnosisEvidence) -> bool:
 
 
 def _sheet_wrong(problem: DiagnosisProblem, evidence: DiagnosisEvidence, gap: Shrink) -> Verdict:
-    """The verdict where a number of the sheet does not hold: which one, and what would explain nearly as much."""
-    conflict, effects = evidence.broken.conflict, evidence.broken.beside.effects
-    start = f"With {' and '.join(f'`{name}`' for name in effects)} the" if effects else "The"
+    """The verdict where numbers of the sheet do not hold: which ones, and what would explain nearly as much."""
+    off, ports = evidence.broken.conflict.off, evidence.broken.ports or (evidence.port,)
+    places = " and the ".join(map(problem.location_text, ports))
+    count = _COUNTS.get(len(off), "several").capitalize()
+    numbers, do, act = ("A number", "does", "acts") if len(off) == 1 else (f"{count} numbers", "do", "act")
     sentence = (
-        "A number of the data sheet does not hold, and no effect of the catalogue is as good an explanation. "
-        f"{start} model would need `{conflict.parameter}` {abs(conflict.tolerances):.1f} tolerances "
-        f"{'above' if conflict.tolerances > 0.0 else 'below'} its data sheet, which acts at the "
-        f"{problem.location_text(evidence.port)}. Recalibrated it misses by {_percent(gap.recalibrated)} of the "
-        f"response in held-out tests ({_percent(gap.before)} as given); the noise is {_percent(gap.floor)}."
+        f"{numbers} of the data sheet {do} not hold, and no effect of the catalogue is as good an explanation. "
+        f"The model would need {_off_sheet(off)}, which {act} at the {places}. Recalibrated it misses by "
+        f"{_percent(gap.recalibrated)} of the response in held-out tests ({_percent(gap.before)} as given); the "
+        f"noise is {_percent(gap.floor)}."
     )
     least = evidence.unknown.weight - problem.constants.indistinguishable_log_odds
     fitted = [each for each in evidence.weighed if each.mode is not None and each.hypothesis.effects]
-    near = [each.hypothesis for each in fitted if each.weight > least]
-    others = [each for each in near if each != evidence.broken.beside]
+    others = [each.hypothesis for each in fitted if each.weight > least]
     if others:
         sentence += f" About as probable: {' or '.join(f'`{each}`' for each in others)}."
-    ports = dict.fromkeys(place for each in others for place in problem.locations(each))
+    there = dict.fromkeys(place for each in others for place in problem.locations(each))
     return Verdict(
         "unknown",
         (),
-        (evidence.port,),
+        ports,
         tuple(dict.fromkeys(name for each in others for name in each.effects)),
         sentence,
-        tuple(each for each in ports if each != evidence.port),
+        tuple(each for each in there if each not in ports),
         law_known=False,
         probability=_probability(evidence, UNKNOWN, *evidence.insufficient),
+    )
+
+
+def _off_sheet(off: Mapping[str, float]) -> str:
+    """Which numbers are how far off their sheet; ``off`` in tolerances [1], by name."""
+    return " and ".join(
+        f"`{name}` {abs(far):.1f} tolerances {'above' if far > 0.0 else 'below'} its data sheet"
+        for name, far in off.items()
     )
 
 
@@ -306,6 +314,8 @@ def _effects_missing(
         each = "; ".join(f"at the {place}, {word}" for place, word in zip(places, words, strict=True))
         sentence = f"The model lacks {_COUNTS.get(len(effects), 'several')} things: {each}."
     sentence += _shrinking(evidence, gap, "it" if one else "them")
+    if evidence.off:
+        sentence += f" Besides, the model needs {_off_sheet(evidence.off)}."
     if alternatives:
         others = " or ".join(f"`{name}`" for name in alternatives)
         sentence += f" This campaign cannot distinguish {'it' if one else 'one of them'} from {others}."
@@ -368,15 +378,9 @@ def write_warnings(
     ):
         if not mode.status.ok:
             found.append(f"The search for {name} did not converge: {mode.status.advice}.")
-    conflict, chosen = evidence.broken.conflict, evidence.chosen
-    if evidence.kind in ("effect", "several") and evidence.unknown.weight > chosen.weight:
-        if evidence.unknown.is_tolerance:
-            found.append(
-                f"Besides, the model would need `{conflict.parameter}` {abs(conflict.tolerances):.1f} tolerances "
-                f"{'above' if conflict.tolerances > 0.0 else 'below'} its data sheet."
-            )
-        else:
-            found.append("Something more may be missing that is too small to be identified.")
+    named_first = evidence.unknown.weight <= evidence.chosen.weight
+    if evidence.kind in ("effect", "several") and not named_first:
+        found.append("Something more may be missing that is too small to be identified.")
     if evidence.kind in ("effect", "several") and evidence.left_by_named > constants.reported_share:
         found.append(
             f"The named effects leave {100.0 * evidence.left_by_named:.1f} % of the baseline's misfit beyond the "

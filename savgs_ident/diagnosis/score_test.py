@@ -4,17 +4,18 @@ The score of an effect is taken at its null. Its first-order change of the rows 
 in the model, so that it gets no credit for what these can explain. Two numbers come out: the significance at the
 weights of the fit, and the log evidence of the linearised hypothesis, noise scale and discrepancy estimated anew.
 
-A prior conflict is a parameter that the data pull further from its sheet than its tolerance allows. A model may
+A prior conflict are parameters that the data pull further from their sheet than their tolerances allow. A model may
 explain everything and still be wrong, if it does so with a spring ten standard deviations off its sheet. The
 alternative to all tolerances as they are is that one of them does not hold: its prior is ``broken_tolerance_width``
 times as wide. To first order about a fit, with coordinate x ~ N(0, 1) before the data and posterior variance v, the
-data alone estimate x / (1 - v) with variance v / (1 - v), from which both evidences follow.
+data alone estimate x / (1 - v) with variance v / (1 - v), from which both evidences follow. Where a further one is
+more probable than not beside those that do not hold, it is let go, too.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
-from math import exp, inf, log, sqrt
+from math import inf, log, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -286,17 +287,17 @@ def _significance(
 
 
 class PriorConflict(NamedTuple):
-    """What speaks for a tolerance that does not hold.
+    """What speaks for tolerances that do not hold.
 
     Attributes:
-        gain: rise of the log evidence of a fit if one of the tolerances may not hold, each with equal probability.
-        parameter: the one whose tolerance gains most; empty where none is known to a tolerance.
-        tolerances: how many of its tolerances (standard deviations) it is off its sheet.
+        gain: rise of the log evidence of a fit if one of the tolerances may not hold, each with equal probability,
+            and with it those that are more probable than not; these with their prior.
+        off: how many tolerances (standard deviations) a parameter is off its sheet, by name: the one whose tolerance
+            gains most first. Empty where none is known to a tolerance.
     """
 
     gain: float
-    parameter: str
-    tolerances: float
+    off: Mapping[str, float]
 
 
 def prior_conflict(
@@ -304,17 +305,31 @@ def prior_conflict(
 ) -> PriorConflict:
     """The conflict of a fit with the tolerances of its ``nuisances``."""
     known = {each.name for each in nuisances if isinstance(each, Sheet) and each.known}
-    variance = np.diag(mode.covariance())
-    gains = {
-        each.name: (_gain(float(x), float(v), constants.broken_tolerance_width), float(x))
-        for each, x, v in zip(mode.coordinates, mode.x, variance, strict=True)
-        if each.name in known
-    }
-    if not gains:
-        return PriorConflict(-inf, "", 0.0)
-    name, (best, off) = max(gains.items(), key=lambda each: each[1][0])
-    mean = best + log(sum(exp(each - best) for each, _ in gains.values()) / len(gains))
-    return PriorConflict(mean, name, off)
+    left = [k for k, each in enumerate(mode.coordinates) if each.name in known]
+    x, precision, width = mode.x, mode.precision, constants.broken_tolerance_width
+    total, off = -inf, list[int]()
+    while left:
+        variance = np.diag(np.linalg.inv(precision))
+        gains = [_gain(float(x[k]), float(variance[k]), width) for k in left]
+        gain = float(np.logaddexp.reduce(gains)) - log(len(left))
+        if off:
+            gain += log(constants.prior_broken_tolerance)
+            if gain <= 0.0:
+                break
+        best = left.pop(int(np.argmax(gains)))
+        x, precision = _let_go(x, precision, best, width)
+        total, off = gain if not off else total + gain, [*off, best]
+    return PriorConflict(total, {mode.coordinates[k].name: float(x[k]) for k in off})
+
+
+def _let_go(
+    x: NDArray[np.float64], precision: NDArray[np.float64], one: int, width: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A mode (n,) [1] and its precision (n, n), to first order, with ``width`` in place of 1 as the prior of one."""
+    given = 1.0 - 1.0 / width**2
+    less = precision.copy()
+    less[one, one] -= given
+    return x + np.linalg.solve(less, given * x[one] * np.eye(x.size)[one]), less
 
 
 def _gain(x: float, variance: float, width: float) -> float:

@@ -6,7 +6,9 @@ probability one:
     none        the recalibrated baseline
     one effect  fitted in full, or by its score where that promised too little for a fit
     two effects fitted in full
-    unknown     a law learned at a port, alone or beside the best effects, or a tolerance that does not hold
+    unknown     a law learned at a port, alone or beside the best effects, or tolerances that do not hold
+
+What the most probable effects are with tolerances that do not hold beside them says the same of effects: both count.
 
 Something is missing where the best fitted hypothesis, or *unknown*, has log odds against *none* beyond the threshold
 of an alarm, and where it changes the response by enough to matter.
@@ -53,8 +55,8 @@ class Change(NamedTuple):
         return self.overall >= constants.material_share or local
 
 
-Reason = Literal["law", "law beside effects", "tolerance", "tolerance beside effects"]
-"""What speaks for something unknown: a law at a port, a tolerance that does not hold, or either beside effects."""
+Reason = Literal["law", "law beside effects", "tolerance"]
+"""What speaks for something unknown: a law at a port, alone or beside effects, or tolerances that do not hold."""
 
 
 class UnknownEvidence(NamedTuple):
@@ -65,24 +67,28 @@ class UnknownEvidence(NamedTuple):
 
     @property
     def is_tolerance(self) -> bool:
-        """Whether it is a number of the data sheet that does not hold."""
-        return self.reason in ("tolerance", "tolerance beside effects")
+        """Whether it is numbers of the data sheet that do not hold."""
+        return self.reason == "tolerance"
 
 
 class BrokenTolerance(NamedTuple):
-    """A tolerance that does not hold.
+    """Tolerances that do not hold.
 
     Attributes:
         weight: log weight, prior included.
-        conflict: which parameter is how far off its sheet.
+        conflict: which parameters are how far off their sheet.
         beside: the hypothesis that is assumed besides.
-        port: the location at which the parameter acts; None where no port has it, or no tolerance was tested.
+        ports: the locations at which these parameters act, each once; of those that no port has (hardpoints) none.
     """
 
     weight: float
     conflict: PriorConflict
     beside: Hypothesis
-    port: str | None
+    ports: tuple[str, ...]
+
+    def is_likely(self, constants: DecisionConstants = DEFAULTS) -> bool:
+        """Whether beside this hypothesis they are more probable than tolerances that hold."""
+        return self.conflict.gain + log(constants.prior_broken_tolerance) > 0.0
 
 
 def log_prior(hypothesis: Hypothesis, count: int, constants: DecisionConstants = DEFAULTS) -> float:
@@ -147,26 +153,20 @@ def _with_better(modes: Sequence[LaplaceFit], found: LaplaceFit) -> list[Laplace
 
 
 def broken_tolerance(
-    findings: Findings,
-    conflict: Callable[[LaplaceFit], PriorConflict],
-    port: Callable[[str], str | None],
+    mode: LaplaceFit,
+    conflict: PriorConflict,
+    count: int,
+    ports: Mapping[str, str],
     constants: DecisionConstants = DEFAULTS,
 ) -> BrokenTolerance:
-    """The most probable tolerance that does not hold.
+    """The tolerances that do not hold beside a fit, where the catalogue has ``count`` effects that may be missing.
 
-    Beside the most probable hypothesis, and beside none: an effect may only stand in for the number that is off.
-    ``conflict`` is that of a fit, ``port`` the location at which a parameter acts.
+    ``ports`` are the locations at which parameters act, by name; hardpoints act at none.
     """
-    count = len(findings.scores)
-
-    def broken(mode: LaplaceFit) -> BrokenTolerance:
-        found, beside = conflict(mode), hypothesis_of(mode)
-        prior = log_prior(beside, count, constants) + log(constants.prior_broken_tolerance)
-        return BrokenTolerance(mode.evidence + found.gain + prior, found, beside, port(found.parameter))
-
-    best = most_probable(findings, constants)
-    modes = (best, findings.base) if best.terms else (best,)
-    return max(map(broken, modes), key=lambda each: each.weight)
+    beside = hypothesis_of(mode)
+    prior = log_prior(beside, count, constants) + log(constants.prior_broken_tolerance)
+    places = tuple(dict.fromkeys(ports[name] for name in conflict.off if name in ports))
+    return BrokenTolerance(mode.evidence + conflict.gain + prior, conflict, beside, places)
 
 
 def unknown_evidence(
@@ -179,8 +179,8 @@ def unknown_evidence(
     """What speaks most for something unknown.
 
     ``alone`` is the log evidence of a law learned at some port, ``beside`` that of one beside the most probable
-    hypothesis, whose prior it shares; ``broken`` the most probable tolerance that does not hold, None where that is
-    what an effect of the catalogue is.
+    hypothesis, whose prior it shares; ``broken`` are the tolerances that do not hold where nothing else is missing,
+    None where an effect of the catalogue is that.
     """
     prior = log_prior(hypothesis_of(most_probable(findings, constants)), len(findings.scores), constants)
     unknown = log_prior(UNKNOWN, len(findings.scores), constants)
@@ -189,8 +189,7 @@ def unknown_evidence(
         UnknownEvidence(beside + unknown + prior, "law beside effects"),
     ]
     if broken is not None:
-        reason: Reason = "tolerance beside effects" if broken.beside.effects else "tolerance"
-        found.append(UnknownEvidence(broken.weight, reason))
+        found.append(UnknownEvidence(broken.weight, "tolerance"))
     return max(found, key=lambda each: each.weight)
 
 
@@ -198,18 +197,18 @@ def weigh(
     findings: Findings,
     unknown: UnknownEvidence,
     constants: DecisionConstants = DEFAULTS,
-    as_tolerance: Mapping[Hypothesis, float] = MappingProxyType({}),
+    as_tolerance: Mapping[Hypothesis, Sequence[float]] = MappingProxyType({}),
 ) -> tuple[WeighedHypothesis, ...]:
     """All hypotheses by falling weight, but for those whose fit was lost.
 
-    ``as_tolerance`` has log weights of hypotheses that are a tolerance which does not hold, as such: both count.
+    ``as_tolerance`` has log weights of hypotheses as, or with, tolerances that do not hold: all count.
     """
     count = len(findings.scores)
 
     def weighed(hypothesis: Hypothesis, evidence: float, mode: LaplaceFit | None) -> WeighedHypothesis:
         weight = evidence + log_prior(hypothesis, count, constants)
-        both = float(np.logaddexp(weight, as_tolerance.get(hypothesis, -np.inf)))
-        return WeighedHypothesis(hypothesis, both, mode)
+        every = float(np.logaddexp.reduce([weight, *as_tolerance.get(hypothesis, ())]))
+        return WeighedHypothesis(hypothesis, every, mode)
 
     fits = [(hypothesis_of(mode), mode) for mode in findings.modes]
     decided = {*(hypothesis for hypothesis, _ in fits), *(each.hypothesis for each in findings.lost)}

@@ -90,13 +90,14 @@ def _evidence(kind: Any, reason: Reason, weights: dict[str, float], **more: Any)
         weighed=ranked,
         unknown=UnknownEvidence(weights["unknown"], reason),
         broken=BrokenTolerance(
-            weights["unknown"], PriorConflict(20.0, "k_t", -4.2), Hypothesis(tuple(effects)), "tyre_radial"
+            weights["unknown"], PriorConflict(20.0, more.get("broken", {"k_t": -4.2})), NONE, ("tyre_radial",)
         ),
         kind=kind,
         chosen=next(each for each in ranked if str(each.hypothesis) == kind),
         left=0.08,
         named_law=more.get("named_law"),
         refit_failed=more.get("refit_failed", False),
+        off=more.get("off_beside", {}),
     )
 
 
@@ -243,27 +244,42 @@ def test_a_number_is_one_with_a_law_of_which_it_is_the_linear_part() -> None:
 
 
 @pytest.mark.parametrize(
-    ("weights", "start"),
+    ("off", "start", "needs"),
     [
-        ({"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0}, "With `rail_viscous` the model would need"),
-        ({"none": 0.0, "unknown": 900.0}, "The model would need"),
+        (
+            {"k_t": -4.2},
+            "A number of the data sheet does not hold,",
+            "The model would need `k_t` 4.2 tolerances below its data sheet, which acts at the tyre (radial).",
+        ),
+        (
+            {"k_t": -4.2, "c_t": 5.13},
+            "Two numbers of the data sheet do not hold,",
+            "`k_t` 4.2 tolerances below its data sheet and `c_t` 5.1 tolerances above its data sheet, which act at",
+        ),
     ],
 )
-def test_a_tolerance_that_does_not_hold_is_named(weights: dict[str, float], start: str) -> None:
-    verdict = write_verdict(PROBLEM, _evidence("unknown", "tolerance", weights), (), GAP)
-    assert verdict.sentence.startswith("A number of the data sheet does not hold")
-    assert (
-        f"{start} `k_t` 4.2 tolerances below its data sheet, which acts at the tyre (radial)."
-        in verdict.sentence
-    )
+def test_tolerances_that_do_not_hold_are_named(off: dict[str, float], start: str, needs: str) -> None:
+    evidence = _evidence("unknown", "tolerance", {"none": 0.0, "unknown": 900.0}, broken=off)
+    verdict = write_verdict(PROBLEM, evidence, (), GAP)
+    assert verdict.sentence.startswith(start)
+    assert needs in verdict.sentence
     assert verdict.ports == ("tyre_radial",)
     assert verdict.confusable_with == ()
 
 
+def test_tolerances_that_do_not_hold_beside_an_effect_are_said_with_it() -> None:
+    weights = {"none": 0.0, "unknown": 5.0, "rail_viscous": 700.0}
+    evidence = _evidence("rail_viscous", "law", weights, off_beside={"k_t": 5.8, "k_sd": -7.7})
+    verdict = write_verdict(PROBLEM, replace(evidence, kind="effect", left=0.0), (), GAP)
+    assert verdict.sentence.endswith(
+        "Besides, the model needs `k_t` 5.8 tolerances above its data sheet and `k_sd` 7.7 tolerances below its data "
+        "sheet."
+    )
+
+
 def test_an_effect_that_explains_nearly_as_much_as_a_wrong_sheet_is_listed() -> None:
     evidence = _evidence("unknown", "tolerance", {"none": 0.0, "unknown": 100.0, "rail_viscous": 96.0})
-    alone = replace(evidence, broken=evidence.broken._replace(beside=NONE))
-    verdict = write_verdict(PROBLEM, alone, (), GAP)
+    verdict = write_verdict(PROBLEM, evidence, (), GAP)
     assert (verdict.confusable_with, verdict.confusable_ports) == (("rail_viscous",), ("rail",))
     assert verdict.sentence.endswith("About as probable: `rail_viscous`.")
     assert verdict.probability == pytest.approx(1.0 / (1.0 + np.exp(-4.0)))
@@ -347,15 +363,11 @@ def test_what_was_tried_together_from_the_first_is_said_so() -> None:
     assert not any(said in each for each in write_warnings(_problem(), evidence, _mode(0.0), 1.0))
 
 
-@pytest.mark.parametrize(
-    ("reason", "reported"),
-    [("tolerance", "would need `k_t` 4.2 tolerances below"), ("law", "Something more may be missing")],
-)
-def test_what_an_effect_does_not_explain_is_a_warning(reason: Reason, reported: str) -> None:
-    evidence = _evidence("rail_viscous", reason, {"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0})
+def test_what_an_effect_does_not_explain_is_a_warning() -> None:
+    evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0})
     evidence = replace(evidence, kind="effect", left=0.0)
-    problem: Any = _problem()
-    assert any(reported in each for each in write_warnings(problem, evidence, _mode(0.0), 1.0))
+    warnings = write_warnings(_problem(), evidence, _mode(0.0), 1.0)
+    assert any("Something more may be missing" in each for each in warnings)
 
 
 GAPS = st.floats(0.0, 0.3)

@@ -253,19 +253,18 @@ def test_a_pair_must_be_better_by_what_it_is_less_probable_beforehand() -> None:
 
 
 @pytest.mark.parametrize(
-    ("alone", "beside", "broken", "tolerance_beside", "reason"),
+    ("alone", "beside", "broken", "reason"),
     [
-        (600.0, -np.inf, 500.0, NONE, "law"),
-        (400.0, 600.0, 500.0, NONE, "law beside effects"),
-        (400.0, 500.0, 595.0, NONE, "tolerance"),
-        (400.0, 500.0, 595.0, Hypothesis(("rail_stribeck",)), "tolerance beside effects"),
+        (600.0, -np.inf, 500.0, "law"),
+        (400.0, 600.0, 500.0, "law beside effects"),
+        (400.0, 500.0, 595.0, "tolerance"),
     ],
 )
 def test_what_speaks_for_something_unknown_is_known(
-    alone: float, beside: float, broken: float, tolerance_beside: Hypothesis, reason: Reason
+    alone: float, beside: float, broken: float, reason: Reason
 ) -> None:
     findings = Findings(_mode(0.0), SCORES, (_mode(500.0, "rail_stribeck"),))
-    tolerance = BrokenTolerance(broken, PriorConflict(20.0, "k_sd", 8.7), tolerance_beside, "strut")
+    tolerance = BrokenTolerance(broken, PriorConflict(20.0, {"k_sd": 8.7}), NONE, ("strut",))
     found = unknown_evidence(findings, alone, beside, tolerance)
     assert found.reason == reason
     assert 590.0 < found.weight < 600.0
@@ -277,26 +276,25 @@ def test_a_tolerance_that_an_effect_is_counts_for_the_effect() -> None:
     assert unknown.reason == "law beside effects"
     named = Hypothesis(("rail_stribeck",))
     alone = {each.hypothesis: each.weight for each in weigh(findings, unknown)}
-    both = {each.hypothesis: each.weight for each in weigh(findings, unknown, as_tolerance={named: 510.0})}
+    both = {each.hypothesis: each.weight for each in weigh(findings, unknown, as_tolerance={named: (510.0,)})}
     assert both[named] == pytest.approx(np.logaddexp(alone[named], 510.0))
     assert {each for each in alone if alone[each] != both[each]} == {named}
 
 
-@pytest.mark.parametrize(("pair", "beside"), [(510.0, ()), (560.0, ("rail_stribeck", "strut_friction"))])
-def test_a_broken_tolerance_is_held_against_a_pair(pair: float, beside: tuple[str, ...]) -> None:
-    """The baseline gains 540 from it and the pair nothing: one is simpler than two, unless two explain more."""
-    modes = (_mode(pair, "rail_stribeck", "strut_friction"), _mode(300.0, "rail_stribeck"))
-    gains = {(): 540.0, modes[0].terms: 0.0, modes[1].terms: 1000.0}
-    found = broken_tolerance(
-        Findings(_mode(0.0), SCORES, modes),
-        lambda mode: PriorConflict(gains[mode.terms], "k_sd", 8.7),
-        {"k_sd": "strut"}.get,
-    )
-    assert found.beside == Hypothesis(beside)
-    assert found.port == "strut"
-    assert found.weight == pytest.approx(
-        np.log(0.01) + (540.0 + np.log(0.4) if not beside else 560.0 + np.log(0.1 / 3.0))
-    )
+@pytest.mark.parametrize(
+    ("terms", "prior"),
+    [((), 0.4), (("rail_stribeck",), 0.4 / 3.0), (("rail_stribeck", "tyre_damping"), 0.1 / 3.0)],
+)
+def test_broken_tolerances_have_the_prior_of_what_is_beside_them(
+    terms: tuple[str, ...], prior: float
+) -> None:
+    conflict = PriorConflict(40.0, {"k_sd": 8.7, "A_y": -6.0, "m_u": 5.0})
+    found = broken_tolerance(_mode(500.0, *terms), conflict, 3, {"k_sd": "strut", "m_u": "mass"})
+    assert found.beside == Hypothesis(terms)
+    assert found.ports == ("strut", "mass")
+    assert found.weight == pytest.approx(540.0 + np.log(0.01 * prior))
+    assert found.is_likely()
+    assert not found._replace(conflict=PriorConflict(4.0, {"k_sd": 3.0})).is_likely()
 
 
 def test_an_effect_whose_fit_was_lost_is_not_weighed_by_its_score() -> None:
