@@ -130,7 +130,8 @@ def conclude(left_out: LeftOut, values: Mapping[str, float], further: FurtherRec
     model = _corrected_model(problem, evidence, law)
     gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
     named = problem.locations(evidence.chosen.hypothesis) if member is None else (member.location,)
-    decided = decide_by_held_out(evidence, gap, left_out.fitted, problem.constants, named)
+    gain = held[model.hypothesis].total - held[NONE].total
+    decided = decide_by_held_out(evidence, gap, left_out.fitted, gain, problem.constants, named)
     if decided is not evidence:
         evidence, law = decided, None
         held = {**held, UNKNOWN: _held_out_unknown(evidence, held[NONE])}
@@ -149,24 +150,27 @@ def decide_by_held_out(
     evidence: DiagnosisEvidence,
     gap: Shrink,
     fitted: float,
+    gain: float,
     constants: DecisionConstants = DEFAULTS,
     named: tuple[str, ...] = (),
 ) -> DiagnosisEvidence:
     """The evidence as tests that were held out allow it to be said: their ``gap`` has the last word.
 
     ``fitted`` is the gap [1] that the recalibrated baseline leaves where it was fitted to all tests: few or noisy
-    tests predict others badly though nothing is missing. ``named`` are the locations of what is named.
+    tests predict others badly though nothing is missing. ``gain`` is by how much what is named predicts all tests
+    better, each left out once: rise of their log density [nat]. ``named`` are the locations of what is named.
 
-    Where what is named predicts them no better than the recalibrated baseline, nothing may be named, unless the
-    baseline predicts them by parameters that are far off their sheet. And where the baseline misses them by more than
-    is small, something is missing, whether anything explains it or not. A tolerance that does not hold is in the
-    recalibrated baseline already.
+    Where what is named predicts them no better than the recalibrated baseline, or by less than could be by chance,
+    nothing may be named, unless the baseline predicts them by parameters that are far off their sheet. And where the
+    baseline misses them by more than is small, something is missing, whether anything explains it or not. A tolerance
+    that does not hold is in the recalibrated baseline already.
     """
     if evidence.kind == "unknown" and evidence.unknown.is_tolerance:
         return evidence
     least = constants.material_share**2 + constants.sure_of_gap * gap.scatter
     small = min(gap.recalibrated, fitted) ** 2 - gap.floor**2 <= least
-    supported = gap.after < gap.recalibrated or (small and evidence.prior_gain >= constants.alarm_log_odds)
+    predicts = gap.after < gap.recalibrated and gain >= constants.alarm_log_odds
+    supported = predicts or (small and evidence.prior_gain >= constants.alarm_log_odds)
     if evidence.kind == "none":
         return evidence if small else _unexplained(evidence)
     if supported or (evidence.kind == "unknown" and not small):

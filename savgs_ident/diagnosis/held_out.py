@@ -38,6 +38,11 @@ class HeldOut:
         """Mean log density of a row."""
         return float(np.mean(self.log_density))
 
+    @property
+    def total(self) -> float:
+        """Log density of all rows."""
+        return float(np.sum(self.log_density))
+
 
 def hold_out(
     search: Search, mode: LaplaceFit, terms: tuple[Term, ...], constants: DecisionConstants = DEFAULTS

@@ -118,7 +118,7 @@ def test_what_predicts_no_tests_is_unknown_at_its_port() -> None:
     strut: Any = SimpleNamespace(name="strut", share=0.9, evidence=60.0)
     evidence = replace(evidence, kind="effect", localisations=(strut, RAIL))
     gap = replace(GAP, after=0.05)
-    decided = decide_by_held_out(evidence, gap, gap.recalibrated, named=("rail",))
+    decided = decide_by_held_out(evidence, gap, gap.recalibrated, -5.0, named=("rail",))
     verdict = write_verdict(PROBLEM, decided, (), gap)
     assert (verdict.kind, verdict.ports) == ("unknown", ("rail",))
     # To first order a law at the strut explains more: it is not ruled out.
@@ -383,6 +383,7 @@ GAPS = st.floats(0.0, 0.3)
     off=st.floats(-8.0, 8.0),
     worse=st.sampled_from((0.0, 0.2)),
     scatter=st.sampled_from((0.0, 1e-5, 1e-3)),
+    gain=st.floats(-20.0, 50.0),
 )
 def test_no_verdict_contradicts_its_numbers(
     odds: dict[str, float],
@@ -393,6 +394,7 @@ def test_no_verdict_contradicts_its_numbers(
     off: float,
     worse: float,
     scatter: float,
+    gain: float,
 ) -> None:
     evidence = replace(_evidence("none", reason, {"none": 0.0} | odds, off=off), left=left)
     kind, chosen = decide(evidence.weighed, Change(change, change), left, unknown_by=reason)
@@ -402,7 +404,9 @@ def test_no_verdict_contradicts_its_numbers(
     gap = Shrink(before, recalibrated, after, floor, 0.9, (0.8, 1.0), scatter=scatter)
     # Tests that were held out are predicted worse than tests that were not.
     fitted = max((1.0 - worse) * recalibrated, floor)
-    decided = decide_by_held_out(replace(evidence, kind=kind, chosen=chosen), gap, fitted, named=("rail",))
+    decided = decide_by_held_out(
+        replace(evidence, kind=kind, chosen=chosen), gap, fitted, gain, named=("rail",)
+    )
     verdict = write_verdict(PROBLEM, decided, (), gap)
     by_chance = DEFAULTS.sure_of_gap * scatter
     large = fitted**2 - floor**2 > DEFAULTS.material_share**2 + by_chance
@@ -411,13 +415,14 @@ def test_no_verdict_contradicts_its_numbers(
     if verdict.kind == "none":
         assert not large
     named = odds["rail_viscous"] > DEFAULTS.alarm_log_odds and explained
+    predicts = gap.after < gap.recalibrated and gain >= DEFAULTS.alarm_log_odds
     if verdict.kind == "unknown" and named and not tolerance:
-        assert gap.after >= gap.recalibrated
+        assert not predicts
     if tolerance and named:
         assert odds["unknown"] > odds["rail_viscous"]
     if verdict.kind in ("effect", "several"):
         spared = 0.5 * off**2 >= DEFAULTS.alarm_log_odds and not large
-        assert gap.after < gap.recalibrated or spared
+        assert predicts or spared
         digits = {f"{100.0 * each:.2g}" for each in (gap.after, gap.recalibrated)}
         seen = gap.after < gap.recalibrated and len(digits) == 2
         assert ("needs `m_u`" in verdict.sentence) != seen
