@@ -288,9 +288,9 @@ def _most_probable(
     """
     best, weights = begun.best, dict[Family, float]()
     if begun.every.attainable > least:
-        worth, start = base.evidence + constants.alarm_log_odds, {**base.values, **begun.places}
+        start = {**base.values, **begun.places}
         weights, fitted = families_fitted(
-            begun.search, begun.every, begun.port, begun.alone, start, worth, constants
+            begun.search, begun.every, begun.port, begun.alone, start, constants
         )
         best = max((best, *fitted), key=lambda each: each.weight)
     if best.only is None:
