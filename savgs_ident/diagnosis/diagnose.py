@@ -20,6 +20,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progress
 from savgs_ident.diagnosis.candidates import candidates_of, confusable_of, estimates_among, not_judgeable_of
+from savgs_ident.diagnosis.caveats import write_warnings
 from savgs_ident.diagnosis.conclusion import (
     CorrectedModel,
     FurtherRecording,
@@ -36,7 +37,7 @@ from savgs_ident.diagnosis.model_selection import (
     decide_among,
     recalibrate,
 )
-from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
+from savgs_ident.diagnosis.narrative import write_verdict
 from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import (
     NONE,
@@ -162,8 +163,14 @@ def diagnose_problem(
     ``further`` predicts a recording that takes no part; ``measured``, the dwells that the data come from, is handed
     on to the result like ``given`` and ``origin``; ``watch`` gets what the verdict was decided from.
 
-    Look at ``converged`` of the result. Raises :class:`InputError` for a baseline that has no solution.
+    Look at ``converged`` of the result. Raises :class:`InputError` for a baseline that has no solution, and for a
+    single test.
     """
+    if data.tests < 2:
+        raise InputError(
+            "there is one test only, so that none can be left out to see whether what is found predicts it",
+            remedy=f"record {settings.constants.fewest_held_out_tests} tests or more, at different frequencies",
+        )
     # Threads of the linear algebra only get in each other's way: its matrices are small, and there are many.
     with threadpool_limits(1, "blas"):
         began = time.perf_counter()

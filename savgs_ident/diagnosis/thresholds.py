@@ -383,6 +383,13 @@ class DecisionConstants:
     Origin: by choice.
     """
 
+    fewest_held_out_tests: int = 4
+    """Tests below which a warning says that figures of tests that were left out are rough.
+
+    Origin: by choice; each of three parts that are left out is then predicted from two tests at the least. It changes
+    no verdict.
+    """
+
     fewest_trend_tests: int = 4
     """Fewest tests with a trend over time. Origin: fewer have no scatter to compare it with."""
 

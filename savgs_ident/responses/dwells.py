@@ -19,9 +19,9 @@ from savgs_ident.recordings.recording import Campaign, Recording
 from savgs_ident.responses.dwell_fit import ChannelFit, DwellFit
 from savgs_ident.responses.fundamental import (
     ClockGroup,
-    coarse_frequency,
     group_by_clock,
     highest_valid_order,
+    strongest_line,
 )
 from savgs_ident.responses.harmonic_response import HarmonicResponse, unbiased_peak_to_peak
 from savgs_ident.responses.outliers import check_outliers, estimate_standstill_noise, fit_robust_dwell
@@ -33,6 +33,9 @@ _STEADY_SIGMAS = 5.0
 _STEADY_ORDERS = 3
 _NOISE_FACTOR = 1.5
 _CLOCK_SIGMAS = 5.0
+_LINE_SHARE = 0.2
+"""Share of the driven input's mean square in its strongest line from which on it moves periodically: noise of some
+hundred samples has a twentieth at most, a sawtooth three fifths."""
 _NO_MOTION = {"road_height": "no_road_motion"}
 """Codes of warnings are contract: that of the road is older than tests of other inputs."""
 
@@ -119,7 +122,13 @@ def _start_frequency(
     moved = lead.values[lead.names.index(driven)]
     if np.ptp(moved) == 0.0:
         return refuse(still, f"{driven} does not move", "name this test a standstill")
-    frequency = coarse_frequency(lead.time, moved)
+    frequency, share = strongest_line(lead.time, moved)
+    if share < _LINE_SHARE:
+        return refuse(
+            still,
+            f"{driven} does not move to and fro: its strongest line has {100 * share:.2g} % of its mean square",
+            "name this test a standstill, or look at what drives it",
+        )
     periods = min(group.span_s for group in groups) * frequency
     if periods < FEWEST_PERIODS - 0.3:
         return refuse(

@@ -146,14 +146,19 @@ _PADDING = 8
 _CONVERGED = 1e-8
 
 
-def coarse_frequency(time: NDArray[np.float64], values: NDArray[np.float64]) -> float:
-    """Frequency [Hz] of the strongest line of one signal (N,), to about a tenth of 1 / duration."""
+def strongest_line(time: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[float, float]:
+    """Frequency [Hz] of the strongest line of one signal (N,), to about a tenth of 1 / duration, and its share.
+
+    The share [1] is that of the signal's mean square about its mean.
+    """
     even = np.linspace(time[0], time[-1], time.size)
     signal = np.interp(even, time, values)
-    windowed = (signal - np.mean(signal)) * np.hanning(signal.size)
+    signal -= np.mean(signal)
     length = _PADDING * signal.size
-    strength = np.abs(np.fft.rfft(windowed, length))
-    return float((np.argmax(strength[1:]) + 1) / (length * (even[1] - even[0])))
+    strength = np.abs(np.fft.rfft(signal * np.hanning(signal.size), length))
+    frequency = float((np.argmax(strength[1:]) + 1) / (length * (even[1] - even[0])))
+    line = np.exp(2j * np.pi * frequency * even)
+    return frequency, float(2.0 * abs(np.mean(line * signal)) ** 2 / np.mean(signal**2))
 
 
 def refine_frequency(group: ClockGroup, channel: int, start: float) -> float:

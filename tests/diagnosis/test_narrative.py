@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis import narrative
+from savgs_ident.diagnosis.caveats import write_warnings
 from savgs_ident.diagnosis.conclusion import decide_by_held_out
 from savgs_ident.diagnosis.evidence import (
     DiagnosisEvidence,
@@ -21,7 +22,7 @@ from savgs_ident.diagnosis.evidence import (
 )
 from savgs_ident.diagnosis.findings import Findings, LostHypothesis
 from savgs_ident.diagnosis.gap import Shrink
-from savgs_ident.diagnosis.narrative import write_verdict, write_warnings
+from savgs_ident.diagnosis.narrative import write_verdict
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, PortFamily, Verdict
 from savgs_ident.diagnosis.score_test import PriorConflict
 from savgs_ident.diagnosis.thresholds import DEFAULTS
@@ -66,8 +67,9 @@ def _mode(evidence: float, *terms: str, off: float = 0.0) -> Any:
     )
 
 
-def _problem(known: tuple[tuple[str, ...], ...] = ()) -> Any:
-    return SimpleNamespace(base=_mode(0.0), constants=DEFAULTS, drifts={}, plant=SimpleNamespace(known=known))
+def _problem(known: tuple[tuple[str, ...], ...] = (), tests: int = 9) -> Any:
+    plant, data = SimpleNamespace(known=known), SimpleNamespace(tests=tests)
+    return SimpleNamespace(base=_mode(0.0), constants=DEFAULTS, drifts={}, plant=plant, data=data)
 
 
 def _evidence(kind: Any, reason: Reason, weights: dict[str, float], **more: Any) -> DiagnosisEvidence:
@@ -351,6 +353,16 @@ def test_what_could_not_be_evaluated_or_refitted_is_a_warning() -> None:
     assert "The fit of gear_backlash found no periodic motion of the plant" in reported
     assert "not evaluated: stopped at the iteration limit" in reported
     assert "on twice as many mesh nodes failed" in reported
+
+
+@pytest.mark.parametrize("tests", [2, 3, 4])
+def test_few_tests_are_said_to_make_held_out_figures_rough(tests: int) -> None:
+    evidence = _evidence("none", "law", {"none": 5.0, "unknown": 0.0})
+    rough = any(
+        "held-out tests are rough" in each
+        for each in write_warnings(_problem(tests=tests), evidence, _mode(0.0), 1.0)
+    )
+    assert rough == (tests < 4)
 
 
 def test_what_was_tried_together_from_the_first_is_said_so() -> None:

@@ -3,13 +3,16 @@
 Of a learned law, and by other constants, where slow.
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import Parameter, ParameterTable
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.diagnosis.diagnose import Watch, baseline_problem, diagnose_dwells, nobody
@@ -71,37 +74,43 @@ def _relaxed() -> Iterator[None]:
         yield
 
 
-def _recorded(*effects: Effect, miss: float = 0.0, numbers: Mapping[str, float] = TRUTH) -> HarmonicResponse:
+def _recorded(
+    *effects: Effect,
+    miss: float = 0.0,
+    numbers: Mapping[str, float] = TRUTH,
+    frequency: NDArray[np.float64] = FREQUENCY,
+    noise: float = NOISE,
+) -> HarmonicResponse:
     """Dwells of the plant with effects of typical size; ``miss`` is a relative error of every test by itself."""
     random, model = np.random.default_rng(5), TwoMass()
     for each in effects:
         model = model + each
     own = [parameter for each in effects for parameter in each.parameters]
     p = as_values((PARAMETERS.with_values(numbers) + ParameterTable(tuple(own))).as_dict())
-    road = np.zeros((FREQUENCY.size, 2), complex)
+    road = np.zeros((frequency.size, 2), complex)
     road[:, 1] = STROKE
-    excitation = Excitation(jnp.asarray(FREQUENCY), {"road_height": jnp.asarray(road)})
+    excitation = Excitation(jnp.asarray(frequency), {"road_height": jnp.asarray(road)})
     solution = simulate_periodic(model, p, excitation, PeriodicSettings(nodes=256))
     assert all(status.ok for status in solution.status())
-    seen = np.zeros((FREQUENCY.size, len(CHANNELS), ORDERS + 1), complex)
+    seen = np.zeros((frequency.size, len(CHANNELS), ORDERS + 1), complex)
     seen[:, 0, :2] = road
     seen[:, 1:] = np.asarray(harmonics(model, p, solution, ORDERS))
-    seen[:, 1:] *= np.exp(miss * random.standard_normal((FREQUENCY.size, len(CHANNELS) - 1, 1)))
-    sd = NOISE * np.abs(seen[:, :, 1])
-    noise = random.standard_normal(seen.shape) + 1j * random.standard_normal(seen.shape)
-    seen[:, 1:] += (sd[:, :, None] * noise)[:, 1:]
+    seen[:, 1:] *= np.exp(miss * random.standard_normal((frequency.size, len(CHANNELS) - 1, 1)))
+    sd = noise * np.abs(seen[:, :, 1])
+    drawn = random.standard_normal(seen.shape) + 1j * random.standard_normal(seen.shape)
+    seen[:, 1:] += (sd[:, :, None] * drawn)[:, 1:]
     return HarmonicResponse(
-        tests=tuple(f"dwell_{f}Hz" for f in FREQUENCY),
+        tests=tuple(f"dwell_{f}Hz" for f in frequency),
         channels=CHANNELS,
-        frequency=FREQUENCY,
-        frequency_sd=np.zeros(FREQUENCY.size),
+        frequency=frequency,
+        frequency_sd=np.zeros(frequency.size),
         harmonics=seen,
         covariance=sd[:, :, None, None, None] ** 2 * np.ones(ORDERS + 1)[:, None, None] * np.eye(2),
         valid=np.ones(seen.shape, bool),
         peak_to_peak=np.zeros(sd.shape),
         peak_to_peak_sd=np.zeros(sd.shape),
         noise_sd=sd,
-        periods=np.full(FREQUENCY.size, 20),
+        periods=np.full(frequency.size, 20),
     )
 
 
@@ -162,6 +171,42 @@ def test_a_number_far_off_its_sheet_is_the_effect_that_does_the_same(times: floa
     assert (found.verdict.kind, found.verdict.effects) == ("effect", ("tyre_stiffness",))
     assert found.verdict.probability > 0.9
     assert found.shrink.after < 1.3 * found.shrink.floor
+
+
+@pytest.mark.parametrize("tolerances", [-9.0, 12.0])
+def test_a_number_that_is_off_beside_an_effect_is_said_with_it(tolerances: float) -> None:
+    """The catalogue has no change of the unsprung mass."""
+    sheet = PARAMETERS["m_u"]
+    numbers = TRUTH | {"m_u": sheet.value + tolerances * sheet.tolerance}
+    found = _diagnosed(_recorded(ALL["guide_viscous"], numbers=numbers))
+    assert found.verdict.effects == ("guide_viscous",)
+    assert found.verdict.probability > 0.9
+    off = re.search(
+        r"Besides, the model needs `m_u` ([0-9.]+) tolerances (above|below)", found.verdict.sentence
+    )
+    assert off is not None
+    assert float(off[1]) == pytest.approx(abs(tolerances), rel=0.1)
+    assert off[2] == ("above" if tolerances > 0.0 else "below")
+
+
+def test_a_single_test_is_refused() -> None:
+    with pytest.raises(InputError, match="one test only"):
+        _diagnosed(_recorded(ALL["guide_viscous"], frequency=FREQUENCY[3:4]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("dwells", "noise"), [(3, NOISE), (9, 3.0 * NOISE)])
+def test_what_is_strong_is_named_from_few_tests_and_in_noise(dwells: int, noise: float) -> None:
+    frequency = FREQUENCY[:: FREQUENCY.size // dwells]
+    found = _diagnosed(_recorded(ALL["guide_viscous"], frequency=frequency, noise=noise))
+    assert found.verdict.effects == ("guide_viscous",)
+    assert any("held-out tests are rough" in each for each in found.warnings) == (dwells < 4)
+
+
+@pytest.mark.slow
+def test_nothing_is_named_in_noise_where_nothing_is_missing() -> None:
+    for frequency in (FREQUENCY, FREQUENCY[::3]):
+        assert _diagnosed(_recorded(frequency=frequency, noise=3.0 * NOISE)).verdict.kind == "none"
 
 
 TWO = (ALL["guide_viscous"], ALL["potentiometer_delay"])

@@ -275,12 +275,17 @@ def test_unusable_dwells_are_named_and_the_others_kept(synthetic: Any, bus: Any)
         synthetic.dwell(rng, bus, 2.2, 6.4, name="dead"),
         road_height=lambda c: replace(c, values=np.zeros_like(c.values)),
     )
+    noisy = change(
+        synthetic.dwell(rng, bus, 2.2, 6.4, name="noisy"),
+        road_height=lambda c: replace(c, values=1e-5 * rng.standard_normal(c.values.size)),
+    )
     whole = synthetic.dwell(rng, bus, 2.2, 6.4, name="blind")
     blind = replace(whole, channels={k: v for k, v in whole.channels.items() if k != "road_height"})
-    response = estimate_response(synthetic.campaign(short, good, dead, blind))
+    response = estimate_response(synthetic.campaign(short, good, dead, noisy, blind))
     assert response.tests == ("good",)
     found = {(w.test, w.code) for w in response.warnings}
-    assert found == {("short", "too_few_periods"), ("dead", "no_road_motion"), ("blind", "no_road_motion")}
+    still = {(name, "no_road_motion") for name in ("dead", "noisy", "blind")}
+    assert found == {("short", "too_few_periods"), *still}
     assert all(w.remedy for w in response.warnings)
 
 
