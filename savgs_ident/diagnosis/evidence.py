@@ -30,6 +30,7 @@ from savgs_ident.diagnosis.verdict import (
     uncertain_odds,
 )
 from savgs_ident.effects.base import Family, Port
+from savgs_ident.effects.effect import families_of
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Term
 
@@ -66,17 +67,11 @@ class DiagnosisProblem:
         return tuple(dict.fromkeys(self.location(name) for name in hypothesis.effects))
 
     def families(self, hypothesis: Hypothesis) -> tuple[PortFamily, ...]:
-        """Where a hypothesis acts and of which kind it is, each once.
-
-        A number that is the linear part of a law beside it, as a tyre's rate of its stiffening, is one with it.
-        """
+        """Where a hypothesis acts and of which kind it is, each once."""
         if hypothesis.flexible:
             return (hypothesis.flexible,)
-        effects = [self.plant.catalogue[name] for name in hypothesis.effects]
-        laws = {(each.port.location, each.law.family) for each in effects}
-        wholes = ((each.port.location, each.linear_part_of, each.law.family) for each in effects)
-        found = ((place, whole if (place, whole) in laws else family) for place, whole, family in wholes)
-        return tuple(dict.fromkeys(PortFamily(place, family) for place, family in found))
+        found = families_of([self.plant.catalogue[name] for name in hypothesis.effects])
+        return tuple(PortFamily(place, family) for place, family in found)
 
     def is_tolerance(self, hypothesis: Hypothesis, broken: BrokenTolerance) -> bool:
         """Whether effects are tolerances that do not hold, by other names: they change numbers that are off."""

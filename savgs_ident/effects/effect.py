@@ -8,7 +8,7 @@ Such an effect is named after its port and its law: ``suspension_viscous``. At a
 number: ``inertia_m_s_offset``.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -189,6 +189,17 @@ def effect_at(
         (role, given.name if isinstance(given, Parameter) else given) for role, given in numbers.items()
     )
     return Effect(name, port, law, (*own, *brings), named, states, symptom, reference)
+
+
+def families_of(effects: Sequence[Effect]) -> tuple[tuple[str, Family], ...]:
+    """Where effects that act together are, and of which kind, each once.
+
+    A number that is the linear part of a law beside it, as a tyre's rate of its stiffening, is one with it.
+    """
+    laws = {(each.port.location, each.law.family) for each in effects}
+    wholes = ((each.port.location, each.linear_part_of, each.law.family) for each in effects)
+    found = ((place, whole if (place, whole) in laws else family) for place, whole, family in wholes)
+    return tuple(dict.fromkeys(found))
 
 
 def typical_effect(

@@ -5,21 +5,19 @@ from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
-from matplotlib.colors import LinearSegmentedColormap
-from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 from rich.console import Group, RenderableType
 
 from savgs_ident.core.presentation import package_versions
+from savgs_ident.report.blind_figures import LEVEL_WORDS, confusion_figure, reliability_figure
 from savgs_ident.report.html import embed, render_page
 from savgs_ident.report.text import DASH, decimal, percentage, plain, table
-from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, new_figure, printable, styled
 from savgs_ident.validation.blind_rates import (
     Rate,
     Reliability,
     confusion_of,
     median_closed,
     rates_of,
+    reliability_by_level,
     reliability_of,
 )
 from savgs_ident.validation.blind_score import Score, is_right, said_words, truth_words
@@ -95,7 +93,7 @@ def blind_text(scores: Sequence[Score]) -> RenderableType:
     ]
     parts: list[RenderableType] = [plain(summary(scores), "bold"), plain("")]
     parts.append(table("Blind trials", headers, rates))
-    parts += [plain(""), _reliability_text(reliability_of(scores))]
+    parts += [plain(""), _reliability_text(scores)]
     if wrong:
         heads = ("trial", "truth", "change", "verdict")
         parts.append(table("Wrong verdicts", heads, wrong, texts=(1, 3)))
@@ -107,11 +105,18 @@ def probability_words(probability: float | None) -> str:
     return DASH if probability is None else percentage(probability)
 
 
-def error_words(reliability: Reliability) -> str:
-    """The expected calibration error in a sentence."""
-    if reliability.error is None:
+def error_words(scores: Sequence[Score]) -> str:
+    """The expected calibration error in a sentence, and that on each level of what is said."""
+    whole, levels = reliability_of(scores).error, reliability_by_level(scores)
+    if whole is None:
         return "No verdict states a probability."
-    return f"Expected calibration error of the stated probabilities: {decimal(reliability.error, 3)}."
+    each = [
+        f"of {LEVEL_WORDS[level]} {decimal(found.error, 3)}"
+        for level, found in levels.items()
+        if found.error is not None
+    ]
+    start = f"Expected calibration error of the stated probabilities: {decimal(whole, 3)}"
+    return f"{start}; {', '.join(each)}." if each else f"{start}."
 
 
 def reliability_rows(reliability: Reliability) -> list[tuple[str, str, str, str, str]]:
@@ -129,10 +134,10 @@ def reliability_rows(reliability: Reliability) -> list[tuple[str, str, str, str,
 RELIABILITY_HEADS = ("stated probability", "mean", "true", "share", "95 % interval")
 
 
-def _reliability_text(reliability: Reliability) -> RenderableType:
-    rows = reliability_rows(reliability)
+def _reliability_text(scores: Sequence[Score]) -> RenderableType:
+    rows = reliability_rows(reliability_of(scores))
     return Group(
-        table("Stated probabilities", RELIABILITY_HEADS, rows, texts=(0,)), plain(error_words(reliability))
+        table("Stated probabilities", RELIABILITY_HEADS, rows, texts=(0,)), plain(error_words(scores))
     )
 
 
@@ -160,6 +165,9 @@ def blind_record(
         },
         "median_closed_by_effect": median_closed(scores),
         "reliability": _reliability(reliability_of(scores)),
+        "reliability_by_level": {
+            level: _reliability(each) for level, each in reliability_by_level(scores).items()
+        },
         "code": sorted({score.version for score in scores} - {""}),
         "rates": {name: _rate(rate) for name, rate in rates.items()},
         "confusion": {
@@ -208,81 +216,6 @@ def _rate(rate: Rate) -> dict[str, Any]:
         "most": rate.most,
         "met": rate.met,
     }
-
-
-_RIGHT = LinearSegmentedColormap.from_list("right", ["#dbe8f4", BLUE])
-_WRONG = LinearSegmentedColormap.from_list("wrong", ["#fbe3d3", ORANGE])
-_CELL = 0.27
-"""Size of a cell [inch]."""
-
-
-def confusion_figure(scores: Sequence[Score]) -> Figure:
-    """Truths down, verdicts across; blue is right, orange is not, the number says how many trials."""
-    confusion = confusion_of(scores, TRIAL_EFFECTS)
-    truths, verdicts, counts = confusion.truths, confusion.verdicts, confusion.counts
-    most = max(int(counts.max(initial=1)), 1)
-    with styled():
-        figure = new_figure(2.9 + _CELL * len(verdicts), 2.6 + _CELL * len(truths))
-        axes = figure.subplots()
-        axes.grid(visible=False)
-        for row, truth in enumerate(truths):
-            for column, verdict in enumerate(verdicts):
-                count = int(counts[row, column])
-                if count == 0:
-                    if truth == verdict:
-                        axes.plot(column, row, ".", color=GREY, markersize=3)
-                    continue
-                shade = (_RIGHT if truth == verdict else _WRONG)(count / most)
-                axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, color=shade, linewidth=0.0))
-                dark = count > 0.6 * most and truth == verdict
-                axes.text(column, row, str(count), ha="center", va="center", color="white" if dark else INK)
-        axes.set_xticks(range(len(verdicts)), [printable(name) for name in verdicts], rotation=90)
-        axes.set_yticks(range(len(truths)), [printable(name) for name in truths])
-        axes.set_xlim(-0.5, len(verdicts) - 0.5)
-        axes.set_ylim(len(truths) - 0.5, -0.5)
-        axes.set_aspect("equal")
-        axes.tick_params(length=0)
-        axes.set_xlabel("verdict")
-        axes.set_ylabel("truth")
-        axes.set_title(f"{len(scores)} blind trials", loc="left")
-    return figure
-
-
-def reliability_figure(scores: Sequence[Score]) -> Figure:
-    """Stated probabilities across, how often what was said is true up, with 95 % intervals; the diagonal is ideal."""
-    reliability = reliability_of(scores)
-    with styled():
-        figure = new_figure(4.4, 4.4)
-        axes = figure.subplots()
-        axes.plot([0.0, 1.0], [0.0, 1.0], color=INK, linestyle="--", linewidth=0.8, label="ideal")
-        for place, each in enumerate(reliability.bins):
-            low, share, high = each.rate.low, each.rate.rate, each.rate.high
-            if each.stated is None or share is None:
-                continue
-            ends = [[share - low], [high - share]]
-            axes.errorbar(
-                each.stated, share, yerr=ends, color=BLUE, marker="o", capsize=2.5, linestyle="none"
-            )
-            # Neighbours are near each other where probabilities are high: above and below in turn.
-            end, offset, side = (low, -3.0, "top") if place % 2 else (high, 3.0, "bottom")
-            axes.annotate(
-                str(each.rate.total),
-                (each.stated, end),
-                (0.0, offset),
-                textcoords="offset points",
-                ha="center",
-                va=side,
-            )
-        axes.set_xlim(-0.05, 1.05)
-        axes.set_ylim(0.0, 1.1)
-        axes.set_aspect("equal")
-        axes.set_xlabel("stated probability [1]")
-        axes.set_ylabel("share of verdicts that are true [1]")
-        error = "" if reliability.error is None else f", calibration error {decimal(reliability.error, 3)}"
-        stated = sum(each.rate.total for each in reliability.bins)
-        axes.set_title(f"{stated} verdicts{error}", loc="left")
-        axes.legend(loc="lower right")
-    return figure
 
 
 _FACTS = ("named_right", "located_right", "false_alarms", "unknown_recognised", "both_named")
@@ -337,8 +270,8 @@ def blind_html(
             else "",
             "reliability": reliability_rows(reliability),
             "reliability_heads": [head.capitalize() for head in RELIABILITY_HEADS],
-            "reliability_words": error_words(reliability),
-            "reliability_picture": embed(reliability_figure(scores), error_words(reliability)),
+            "reliability_words": error_words(scores),
+            "reliability_picture": embed(reliability_figure(scores), error_words(scores)),
             "rates": [(RATE_WORDS[name], *rate_words(rate), _met(rate)) for name, rate in rates.items()],
             "moved_heads": ["Constant", "Value", "Verdicts changed", *(RATE_WORDS[name] for name in facts)],
             "moved": [_moved_row(each, facts) for each in moved],

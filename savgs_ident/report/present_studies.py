@@ -77,7 +77,7 @@ class _BlindStudy(AbstractPresenter["BlindStudy"]):
         return blind_html(result.scores, result.settings, result.origin.command, result.moved)
 
     def figures(self, result: "BlindStudy") -> Figures:
-        from savgs_ident.report.blind import confusion_figure, reliability_figure
+        from savgs_ident.report.blind_figures import confusion_figure, reliability_figure
 
         scores = result.scores
         return {

@@ -24,14 +24,16 @@ misses tests that were held out by less than matters beyond their noise.
 The record of the marks is in :mod:`savgs_ident.validation.blind_score`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import exp, isfinite
 from typing import Any
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.effects.effect import families_of
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.validation.blind_answer import Answer
-from savgs_ident.validation.blind_score import FAILED, Interval, Score
+from savgs_ident.validation.blind_score import FAILED, Interval, Score, Statement
 
 
 def port_in_question(answer: Answer, diagnosis: Mapping[str, Any]) -> str | None:
@@ -111,6 +113,7 @@ def score_of(
         meant=tuple(sorted(_meant(answer, diagnosis))),
         law_known=known,
         imitated=instead is not None and (instead in answer.imitators or _does_the_same(elsewhere)),
+        statements=tuple(_statements(answer, diagnosis)),
     )
     unmarked: dict[str, Any] = dict.fromkeys(_OF_WHAT_IS_THERE)
     return replace(score, **unmarked) if score.left_alone or score.imitated else score
@@ -124,6 +127,40 @@ _OF_WHAT_IS_THERE = (
     *("port_right", "port_exactly", "port_listed", "family_right", "family_exactly"),
 )
 """Marks that nobody could earn where what is there cannot be seen, or told from what is named."""
+
+
+def _statements(answer: Answer, diagnosis: Mapping[str, Any]) -> Iterator[Statement]:
+    """What a verdict says of ports, families and laws, with the probabilities of all hypotheses that say the same."""
+    # Diagnoses of earlier versions, and those that failed, state less.
+    verdict = diagnosis["verdict"]
+    which = [each for each in diagnosis["which"] if _number_or_none(each.get("probability")) is not None]
+    named = verdict["kind"] in ("effect", "several")
+    places = {each["port"]: each["probability"] for each in diagnosis.get("where", {}).get("ports", ())}
+    for port in verdict["ports"]:
+        if port in places:
+            yield Statement("port", port, places[port], port in {*answer.accepted, *answer.ports})
+    right = {f"{port}/{family}" for port in answer.accepted for family in answer.families}
+    if answer.kind != "foreign":
+        right = _families(answer.effects)
+    for family in verdict.get("families", ()) if named and which else ():
+        share = sum(each["probability"] for each in which if family in _families_said(each))
+        yield Statement("family", family, share, family in right)
+    stated = _number_or_none(verdict.get("probability"))
+    if named and verdict.get("law_known", True) and stated is not None:
+        yield Statement(
+            "law", " + ".join(verdict["effects"]), stated, {*verdict["effects"]} == {*answer.effects}
+        )
+
+
+def _families_said(candidate: Mapping[str, Any]) -> set[str]:
+    """The families of a hypothesis of ``diagnosis.json``: its own, or those of its effects."""
+    if candidate.get("port") and candidate.get("family"):
+        return {f"{candidate['port']}/{candidate['family']}"}
+    return _families(candidate["effects"])
+
+
+def _families(effects: Sequence[str]) -> set[str]:
+    return {f"{place}/{family.value}" for place, family in families_of([CATALOGUE[name] for name in effects])}
 
 
 def _as_well(answer: Answer, diagnosis: Mapping[str, Any]) -> bool:

@@ -11,11 +11,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import sqrt
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.validation.blind_score import FAILED, Score, said_right
+from savgs_ident.validation.blind_score import FAILED, Level, Score, said_right
 
 Z = 1.959964
 """Standard deviations of a 95 % interval."""
@@ -204,6 +205,19 @@ def reliability_of(scores: Sequence[Score]) -> Reliability:
         for score in scores
         if score.probability is not None and score.verdict != FAILED
     ]
+    return _reliability(stated)
+
+
+def reliability_by_level(scores: Sequence[Score]) -> dict[Level, Reliability]:
+    """The same of what verdicts say of ports, of families and of laws, levels without a statement left out."""
+    said = [each for score in scores for each in score.statements]
+    found: dict[Level, list[tuple[float, bool]]] = {}
+    for each in said:
+        found.setdefault(each.level, []).append((min(each.probability, EDGES[-1]), each.true))
+    return {level: _reliability(found[level]) for level in get_args(Level) if level in found}
+
+
+def _reliability(stated: Sequence[tuple[float, bool]]) -> Reliability:
     bins = tuple(_bin(low, high, stated) for low, high in pairwise(EDGES))
     if not stated:
         return Reliability(bins, None)

@@ -6,6 +6,7 @@ How a diagnosis is marked is in :mod:`savgs_ident.validation.blind_marks`, what 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from savgs_ident.core.files import record_of
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
@@ -30,6 +31,20 @@ class Interval:
     def holds(self) -> bool:
         """Whether the truth lies inside."""
         return self.low <= self.true <= self.high
+
+
+Level = Literal["port", "family", "law"]
+"""Levels of the tree of hypotheses: where something acts, of which kind it is there, by which formula."""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """Something that a verdict says on one level: with which probability [1], and whether it is true."""
+
+    level: Level
+    what: str
+    probability: float
+    true: bool
 
 
 @dataclass(frozen=True)
@@ -78,6 +93,7 @@ class Score:
             names in its place, which does the same; of trials of the catalogue.
         law_known: whether what is named is a formula of the catalogue; if not, ``said`` is the nearest one.
         imitated: whether, instead of an effect that was removed, one is named that does the same.
+        statements: what the verdict says of ports, families and laws; what does the same is not true there.
     """
 
     number: int
@@ -112,6 +128,7 @@ class Score:
     meant: tuple[str, ...] = ()
     law_known: bool = True
     imitated: bool = False
+    statements: tuple[Statement, ...] = ()
 
     @property
     def left_alone(self) -> bool:

@@ -8,12 +8,8 @@ import pytest
 from rich.console import Console
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.report.blind import (
-    blind_html,
-    blind_record,
-    blind_text,
-    confusion_figure,
-)
+from savgs_ident.report.blind import blind_html, blind_record, blind_text
+from savgs_ident.report.blind_figures import confusion_figure
 from savgs_ident.validation.blind_marks import failed, score_of
 from savgs_ident.validation.blind_score import Score
 from savgs_ident.validation.varied_constants import FACTORS, KEY, VARIED, moved_marks

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from savgs_ident.report.blind import blind_html, blind_record, blind_text, reliability_figure
+from savgs_ident.report.blind import blind_html, blind_record, blind_text
+from savgs_ident.report.blind_figures import reliability_figure
 from savgs_ident.validation.blind_answer import Answer, SmallErrors
 from savgs_ident.validation.blind_marks import failed, port_in_question, score_of
 from savgs_ident.validation.blind_rates import (
@@ -14,6 +15,7 @@ from savgs_ident.validation.blind_rates import (
     confusion_of,
     median_closed,
     rates_of,
+    reliability_by_level,
     reliability_of,
 )
 from savgs_ident.validation.blind_score import Score, is_right, said_right, score_from
@@ -267,6 +269,51 @@ def test_every_stated_probability_is_in_one_bin() -> None:
     assert [each.rate.total for each in found.bins] == [3, 2, 1, 2, 2]
 
 
+def _tree(kind: str, *families: str, **shares: float) -> dict[str, Any]:
+    """A diagnosis that states ``shares`` of learned laws at two ports and of a formula."""
+    found = said(kind, *families, p=shares["law"])
+    found["which"] = [
+        {
+            "effects": ["tyre_stiffening"],
+            "port": "tyre_radial",
+            "family": "stiffness",
+            "probability": shares["law"],
+        },
+        {"effects": [], "port": "tyre_radial", "family": "stiffness", "probability": shares["learned"]},
+        {"effects": [], "port": "tyre_radial", "family": "damping", "probability": shares["damping"]},
+        {"effects": [], "port": "road", "family": "compliance", "probability": shares["road"]},
+    ]
+    ports = {"tyre_radial": shares["law"] + shares["learned"] + shares["damping"], "road": shares["road"]}
+    found["where"] = {"ports": [{"port": name, "probability": each} for name, each in ports.items()]}
+    return found
+
+
+def test_ports_families_and_laws_state_what_is_below_them() -> None:
+    verdict = _tree("effect", "tyre_radial/stiffness", law=0.5, learned=0.2, damping=0.1, road=0.2)
+    verdict["verdict"]["effects"] = ["tyre_stiffening"]
+    score = score_of(foreign("tyre_cubic"), verdict)
+    stated = {each.level: (each.probability, each.true) for each in score.statements}
+    assert {level: true for level, (_, true) in stated.items()} == {
+        "port": True,
+        "family": True,
+        "law": False,
+    }
+    assert {level: p for level, (p, _) in stated.items()} == pytest.approx(
+        {"port": 0.8, "family": 0.7, "law": 0.5}
+    )
+    levels = reliability_by_level([score])
+    assert {level: each.error for level, each in levels.items()} == pytest.approx(
+        {"port": 0.2, "family": 0.3, "law": 0.5}
+    )
+    # A learned law is no formula that is known; a wrong port states its probability all the same.
+    verdict["verdict"] |= {"law_known": False, "ports": ["road"], "families": ["road/compliance"]}
+    wrong = score_of(foreign("tyre_cubic"), verdict).statements
+    assert [(each.level, each.true) for each in wrong] == [("port", False), ("family", False)]
+    assert [each.probability for each in wrong] == pytest.approx([0.2, 0.2])
+    panels = reliability_figure([score]).axes
+    assert [each.get_ylabel().split()[2] for each in panels] == ["verdicts", "ports", "families", "laws"]
+
+
 def test_verdicts_without_a_probability_and_failures_are_left_out() -> None:
     assert reliability_of([]).error is None
     left = [score_of(answer("none"), diagnosis("none")), score_of(NOTHING, failed("no good"))]
@@ -283,7 +330,7 @@ def test_what_people_read_has_the_same_numbers() -> None:
     page = blind_html(scores(), {"foreign": True}, ())
     assert "Median share of the recalibrated gap that is closed: 90.0 %" in page
     assert "tyre_cubic (foreign law)" in page
-    (axes,) = reliability_figure(scores()).axes
+    axes, *_ = reliability_figure(scores()).axes
     assert axes.get_xlabel() == "stated probability [1]"
     assert {text.get_text() for text in axes.texts} == {"1", "2"}
     assert blind_text(scores())
