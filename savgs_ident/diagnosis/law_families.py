@@ -6,10 +6,10 @@ fitted on the nonlinear plant, and what that fit does not need is taken away aga
 taken away from all, too, which says how well it can be spared.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from math import log
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -115,9 +115,9 @@ def families_fitted(
     likely = sorted(found, key=lambda family: -weights[family])[: constants.likely_families]
     for family in likely:
         solved = list[FittedFunctions]()
-        for starts in ([found[family]], *_by_themselves(every.term, port, family, alone, start, constants)):
+        for each in (found[family], *_by_themselves(every.term, port, family, alone, start, constants)):
             least = max(fit.weight for fit in (every, *fits, *solved)) - constants.alarm_log_odds
-            fitted = _fitted(search, every, port, family, starts, least, constants)
+            fitted = _fitted(search, every, port, family, each, least, constants)
             solved += [] if fitted is None else [fitted]
         fits += solved
         weights[family] = max((each.weight for each in solved), default=weights[family])
@@ -137,20 +137,18 @@ def _by_themselves(
     alone: Mapping[tuple[str, ...], float],
     start: Mapping[str, float],
     constants: DecisionConstants,
-) -> list[list[FamilyAlone]]:
-    """The starts of those functions of a family that could be all of it, the fewest functions first.
+) -> list[FamilyAlone]:
+    """Those functions of a family that could be all of it, the fewest functions first.
 
     Where their prior is wider or narrower than beside all others, each is a start: the first step from the wider one
     may leave the range in which the plant is solved, and the narrower one may promise too little.
     """
     mine = _seen_of(term, port, family)
     return [
-        [
-            FamilyAlone(group, each, -np.inf, _log_prior(group, mine, port, constants), start)
-            for each in dict.fromkeys((1.0, alone[group]))
-        ]
+        FamilyAlone(group, each, -np.inf, _log_prior(group, mine, port, constants), start)
         for group in sorted(alone, key=len)
         if {*group} <= {*mine}
+        for each in dict.fromkeys((1.0, alone[group]))
     ]
 
 
@@ -159,21 +157,20 @@ def _fitted(
     every: FittedFunctions,
     port: Port,
     family: Family,
-    starts: Sequence[FamilyAlone],
+    found: FamilyAlone,
     least: float,
     constants: DecisionConstants,
 ) -> FittedFunctions | None:
     """The functions of a family by themselves at their best; None where that has no solution.
 
-    From the one of the ``starts``, which differ in the width of the prior, that is the most probable one step on.
     What is needed to first order about all functions together may be more than what is needed about their own fit,
     and their prior another one. What cannot come to a log weight of ``least`` is given up.
     """
     term, mine, best = every.term, _seen_of(every.term, port, family), None
     near = every.mode.prediction.warm_start
     while True:
-        begun = [_one_step(search, term, each, near) for each in starts]
-        term, found, first = max(begun, key=lambda each: each[2].evidence)
+        term = _some_of(term, found)
+        first = find_map(search, (term,), found.start, near, 1)
         steps, bound = constants.learned_steps - 1, least - found.log_prior
         mode = find_map_again(search, (term,), first, steps, bound) if first.solved else first
         fitted = FittedFunctions(term, mode, found.log_prior, family)
@@ -185,18 +182,15 @@ def _fitted(
             return best
         best, near = fitted, mode.prediction.warm_start
         left = tuple(each.name for each in term.amplitudes)
-        starts = [_needed(search, mode, port, mine, left, constants)]
-        if len(starts[0].functions) == len(left) and starts[0].width == 1.0:
+        found = _needed(search, mode, port, mine, left, constants)
+        if len(found.functions) == len(left) and found.width == 1.0:
             return best
 
 
-def _one_step(
-    search: Search, term: Term, found: FamilyAlone, near: Any
-) -> tuple[Term, FamilyAlone, LaplaceFit]:
-    """The term of all functions with those of a family alone, and their fit one step on from their start."""
+def _some_of(term: Term, found: FamilyAlone) -> Term:
+    """The term of all functions with those of a family alone."""
     kept = [each for each in term.amplitudes if each.name in found.functions]
-    some = replace(term, amplitudes=tuple(replace(each, scale=found.width * each.scale) for each in kept))
-    return some, found, find_map(search, (some,), found.start, near, 1)
+    return replace(term, amplitudes=tuple(replace(each, scale=found.width * each.scale) for each in kept))
 
 
 def families_spared(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, float]:
