@@ -173,7 +173,7 @@ def test_a_number_far_off_its_sheet_is_the_effect_that_does_the_same(times: floa
     assert found.shrink.after < 1.3 * found.shrink.floor
 
 
-@pytest.mark.parametrize("tolerances", [-9.0, 12.0])
+@pytest.mark.parametrize("tolerances", [pytest.param(-9.0, marks=pytest.mark.slow), 12.0])
 def test_a_number_that_is_off_beside_an_effect_is_said_with_it(tolerances: float) -> None:
     """The catalogue has no change of the unsprung mass."""
     sheet = PARAMETERS["m_u"]
