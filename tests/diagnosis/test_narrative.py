@@ -10,101 +10,32 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from savgs_ident.core.status import Status
 from savgs_ident.diagnosis import narrative
-from savgs_ident.diagnosis.caveats import write_warnings
 from savgs_ident.diagnosis.conclusion import decide_by_held_out
 from savgs_ident.diagnosis.evidence import (
-    DiagnosisEvidence,
     DiagnosisProblem,
     FlexibleMember,
     is_better_form,
 )
-from savgs_ident.diagnosis.findings import Findings, LostHypothesis
 from savgs_ident.diagnosis.gap import Shrink
 from savgs_ident.diagnosis.narrative import write_verdict
-from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, PortFamily, Verdict
-from savgs_ident.diagnosis.score_test import PriorConflict
+from savgs_ident.diagnosis.result import Hypothesis, PortFamily, Verdict
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.diagnosis.verdict import (
-    BrokenTolerance,
     Change,
     Reason,
-    UnknownEvidence,
     WeighedHypothesis,
     decide,
 )
 from savgs_ident.effects.base import Family, Port
-from savgs_ident.inference.prior import Linear
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
-from savgs_ident.plants.quarter_car.ports import LOCATION_WORDS, STRUT, SUSPENSION
+from savgs_ident.plants.quarter_car.ports import STRUT, SUSPENSION
 
-GAP = Shrink(0.3, 0.04, 0.002, 0.0015, 0.99, (0.98, 1.0))
-RAIL_FRICTION = PortFamily("rail", Family.FRICTION)
-RAIL: Any = SimpleNamespace(name="rail", share=0.9, evidence=50.0)
-PROBLEM: Any = SimpleNamespace(
-    constants=DEFAULTS,
-    plant=SimpleNamespace(catalogue=CATALOGUE),
-    drifts={},
-    location_text=lambda location: LOCATION_WORDS[location],
-    location=lambda name: CATALOGUE[name].port.location,
-    locations=lambda hypothesis: tuple(CATALOGUE[name].port.location for name in hypothesis.effects),
-    families=lambda hypothesis: (
-        tuple(
-            PortFamily(CATALOGUE[name].port.location, CATALOGUE[name].law.family)
-            for name in hypothesis.effects
-        )
-        or (hypothesis.flexible,)
-    ),
-)
-
-
-def _mode(evidence: float, *terms: str, off: float = 0.0) -> Any:
-    """A fit whose only tolerance is ``off`` by so many standard deviations."""
-    coordinates = (Linear("m_u", "kg", 50.0, 1.0),)
-    return SimpleNamespace(
-        terms=terms, evidence=evidence, status=Status.CONVERGED, x=np.array([off]), coordinates=coordinates
-    )
-
-
-def _problem(known: tuple[tuple[str, ...], ...] = (), tests: int = 9) -> Any:
-    plant, data = SimpleNamespace(known=known), SimpleNamespace(tests=tests)
-    return SimpleNamespace(base=_mode(0.0), constants=DEFAULTS, drifts={}, plant=plant, data=data)
-
-
-def _evidence(kind: Any, reason: Reason, weights: dict[str, float], **more: Any) -> DiagnosisEvidence:
-    """Evidence by the weights of "none", "unknown" and single effects."""
-    effects = {name: weight for name, weight in weights.items() if name not in ("none", "unknown")}
-    weighed = [
-        WeighedHypothesis(Hypothesis((name,)), weight, _mode(weight, name))
-        for name, weight in effects.items()
-    ]
-    weighed += [
-        WeighedHypothesis(NONE, weights["none"], _mode(weights["none"])),
-        WeighedHypothesis(UNKNOWN, weights["unknown"], None),
-    ]
-    ranked = tuple(sorted(weighed, key=lambda each: -each.weight))
-    modes = tuple(each.mode for each in weighed if each.mode is not None and each.hypothesis.effects)
-    return DiagnosisEvidence(
-        findings=Findings(_mode(weights["none"], off=more.get("off", 0.0)), (), modes, more.get("lost", ())),
-        localisations=(RAIL,),
-        flexible=more.get("flexible", ()),
-        weighed=ranked,
-        unknown=UnknownEvidence(weights["unknown"], reason),
-        broken=BrokenTolerance(
-            weights["unknown"], PriorConflict(20.0, more.get("broken", {"k_t": -4.2})), NONE, ("tyre_radial",)
-        ),
-        kind=kind,
-        chosen=next(each for each in ranked if str(each.hypothesis) == kind),
-        left=0.08,
-        named_law=more.get("named_law"),
-        refit_failed=more.get("refit_failed", False),
-        off=more.get("off_beside", {}),
-    )
+from .written_evidence import GAP, PROBLEM, RAIL, RAIL_FRICTION, evidence_of, mode_of
 
 
 def test_something_unknown_is_reported_with_how_near_the_catalogue_comes() -> None:
-    evidence = _evidence("unknown", "law", {"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0})
+    evidence = evidence_of("unknown", "law", {"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0})
     verdict = write_verdict(PROBLEM, evidence, (), GAP)
     assert "law learned at the rail accounts for 90 %" in verdict.sentence
     assert verdict.sentence.endswith(
@@ -116,7 +47,7 @@ def test_something_unknown_is_reported_with_how_near_the_catalogue_comes() -> No
 
 def test_what_predicts_no_tests_is_unknown_at_its_port() -> None:
     """A formula that fits all tests and predicts none: what is missing acts there, and follows another law."""
-    evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 500.0, "rail_viscous": 700.0})
+    evidence = evidence_of("rail_viscous", "law", {"none": 0.0, "unknown": 500.0, "rail_viscous": 700.0})
     strut: Any = SimpleNamespace(name="strut", share=0.9, evidence=60.0)
     evidence = replace(evidence, kind="effect", localisations=(strut, RAIL))
     gap = replace(GAP, after=0.05)
@@ -138,7 +69,7 @@ def test_ports_that_do_the_same_are_listed_where_a_prior_decides_between_them() 
         return FlexibleMember(found, evidence + relative, 0.0, relative_prior=relative)
 
     laws = (law(STRUT, 990.0, 0.0), law(SUSPENSION, 992.0, np.log(0.1)))
-    evidence = _evidence("unknown", "law", {"none": 0.0, "unknown": 100.0}, flexible=laws)
+    evidence = evidence_of("unknown", "law", {"none": 0.0, "unknown": 100.0}, flexible=laws)
     named = replace(evidence, kind="effect", named_law=laws[0])
     assert named.indistinguishable_ports() == ("suspension",)
 
@@ -152,7 +83,7 @@ def test_ports_are_listed_where_what_laws_lack_may_decide_between_them() -> None
 
     def listed(sd: float) -> tuple[str, ...]:
         laws = (law(STRUT, 990.0, sd), law(SUSPENSION, 978.0, sd))
-        evidence = _evidence("unknown", "law", {"none": 0.0, "unknown": 100.0}, flexible=laws)
+        evidence = evidence_of("unknown", "law", {"none": 0.0, "unknown": 100.0}, flexible=laws)
         return replace(evidence, kind="effect", named_law=laws[0]).indistinguishable_ports()
 
     assert listed(1.0) == ()
@@ -160,11 +91,11 @@ def test_ports_are_listed_where_what_laws_lack_may_decide_between_them() -> None
 
 
 def test_a_formula_is_not_named_where_a_law_of_its_family_at_its_port_is_certainly_more_probable() -> None:
-    evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 5.0, "rail_viscous": 700.0})
+    evidence = evidence_of("rail_viscous", "law", {"none": 0.0, "unknown": 5.0, "rail_viscous": 700.0})
     evidence = replace(evidence, kind="effect")
 
     def member(weight: float, family: Family, left: float = 0.05) -> FlexibleMember:
-        law: Any = SimpleNamespace(mode=_mode(weight), port=SimpleNamespace(location="rail"), family=family)
+        law: Any = SimpleNamespace(mode=mode_of(weight), port=SimpleNamespace(location="rail"), family=family)
         return FlexibleMember(law, weight, left)
 
     assert is_better_form(PROBLEM, evidence, member(730.0, Family.DAMPING))
@@ -175,7 +106,7 @@ def test_a_formula_is_not_named_where_a_law_of_its_family_at_its_port_is_certain
 
 
 def test_a_port_at_which_another_law_would_do_as_much_is_listed_beside_a_formula() -> None:
-    evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 500.0, "rail_viscous": 700.0})
+    evidence = evidence_of("rail_viscous", "law", {"none": 0.0, "unknown": 500.0, "rail_viscous": 700.0})
     alike: Any = SimpleNamespace(name="strut", share=0.9, evidence=RAIL.evidence - 3.0)
     other: Any = SimpleNamespace(name="suspension", share=0.9, evidence=RAIL.evidence - 30.0)
     evidence = replace(evidence, kind="effect", localisations=(alike, other, RAIL))
@@ -193,7 +124,7 @@ def test_a_port_at_which_another_law_would_do_as_much_is_listed_beside_a_formula
 
 def test_a_port_where_a_learned_law_is_about_as_probable_is_listed_beside_a_formula() -> None:
     """However little a law explains to first order: calibration may have taken up what is missing."""
-    evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 5.0, "rail_viscous": 700.0})
+    evidence = evidence_of("rail_viscous", "law", {"none": 0.0, "unknown": 5.0, "rail_viscous": 700.0})
 
     def listed(weight: float, sd: float, port: str = "suspension") -> tuple[str, ...]:
         learned = Hypothesis(flexible=PortFamily(port, Family.STIFFNESS))
@@ -209,7 +140,9 @@ def test_a_port_where_a_learned_law_is_about_as_probable_is_listed_beside_a_form
 
 
 def test_nothing_that_counts_is_missing_where_what_is_more_probable_does_too_little() -> None:
-    evidence = _evidence("none", "law", {"none": 0.0, "unknown": -5.0, "rail_viscous": 6.0, "accel_lag": 1.0})
+    evidence = evidence_of(
+        "none", "law", {"none": 0.0, "unknown": -5.0, "rail_viscous": 6.0, "accel_lag": 1.0}
+    )
     plain = write_verdict(PROBLEM, evidence, (), GAP)
     assert plain.probability == pytest.approx(1.0 / (1.0 + np.exp(6.0) + np.exp(1.0) + np.exp(-5.0)))
     # Of what was only scored, some sizes that the data leave matter and others do not.
@@ -220,7 +153,7 @@ def test_nothing_that_counts_is_missing_where_what_is_more_probable_does_too_lit
 
 
 def test_what_explains_little_speaks_for_something_unknown() -> None:
-    evidence = _evidence(
+    evidence = evidence_of(
         "unknown", "law", {"none": 0.0, "unknown": 2.0, "rail_viscous": 6.0, "accel_lag": 1.0}
     )
     plain = write_verdict(PROBLEM, evidence, (), GAP)
@@ -261,7 +194,7 @@ def test_a_number_is_one_with_a_law_of_which_it_is_the_linear_part() -> None:
     ],
 )
 def test_tolerances_that_do_not_hold_are_named(off: dict[str, float], start: str, needs: str) -> None:
-    evidence = _evidence("unknown", "tolerance", {"none": 0.0, "unknown": 900.0}, broken=off)
+    evidence = evidence_of("unknown", "tolerance", {"none": 0.0, "unknown": 900.0}, broken=off)
     verdict = write_verdict(PROBLEM, evidence, (), GAP)
     assert verdict.sentence.startswith(start)
     assert needs in verdict.sentence
@@ -271,7 +204,7 @@ def test_tolerances_that_do_not_hold_are_named(off: dict[str, float], start: str
 
 def test_tolerances_that_do_not_hold_beside_an_effect_are_said_with_it() -> None:
     weights = {"none": 0.0, "unknown": 5.0, "rail_viscous": 700.0}
-    evidence = _evidence("rail_viscous", "law", weights, off_beside={"k_t": 5.8, "k_sd": -7.7})
+    evidence = evidence_of("rail_viscous", "law", weights, off_beside={"k_t": 5.8, "k_sd": -7.7})
     verdict = write_verdict(PROBLEM, replace(evidence, kind="effect", left=0.0), (), GAP)
     assert verdict.sentence.endswith(
         "Besides, the model needs `k_t` 5.8 tolerances above its data sheet and `k_sd` 7.7 tolerances below its data "
@@ -280,7 +213,7 @@ def test_tolerances_that_do_not_hold_beside_an_effect_are_said_with_it() -> None
 
 
 def test_an_effect_that_explains_nearly_as_much_as_a_wrong_sheet_is_listed() -> None:
-    evidence = _evidence("unknown", "tolerance", {"none": 0.0, "unknown": 100.0, "rail_viscous": 96.0})
+    evidence = evidence_of("unknown", "tolerance", {"none": 0.0, "unknown": 100.0, "rail_viscous": 96.0})
     verdict = write_verdict(PROBLEM, evidence, (), GAP)
     assert (verdict.confusable_with, verdict.confusable_ports) == (("rail_viscous",), ("rail",))
     assert verdict.sentence.endswith("About as probable: `rail_viscous`.")
@@ -290,10 +223,10 @@ def test_an_effect_that_explains_nearly_as_much_as_a_wrong_sheet_is_listed() -> 
 def _verdict_of_a_learned_law(family: Family) -> Verdict:
     """At the rail, where the catalogue's friction explains 96 %."""
     weights = {"none": 0.0, "unknown": 100.0, "rail_stribeck": 900.0}
-    mode = _mode(990.0, "learned_rail")
+    mode = mode_of(990.0, "learned_rail")
     law: Any = SimpleNamespace(mode=mode, port=CATALOGUE["rail_stribeck"].port, family=family)
     member = FlexibleMember(law, 980.0, 0.004)
-    evidence = _evidence("rail_stribeck", "law", weights, flexible=(member,), named_law=member)
+    evidence = evidence_of("rail_stribeck", "law", weights, flexible=(member,), named_law=member)
     mine = WeighedHypothesis(member.hypothesis, 980.0, mode)
     evidence = replace(evidence, kind="effect", chosen=mine, weighed=(mine, *evidence.weighed))
     problem: Any = SimpleNamespace(**vars(PROBLEM), search=None, base=None)
@@ -333,53 +266,11 @@ def test_of_a_kind_that_the_catalogue_does_not_have_there_no_formula_is_nearest(
     ],
 )
 def test_nothing_missing_is_reported_with_what_speaks_against_it(odds: float, reported: str) -> None:
-    evidence = _evidence("none", "law", {"none": 0.0, "unknown": -20.0, "rail_viscous": odds})
+    evidence = evidence_of("none", "law", {"none": 0.0, "unknown": -20.0, "rail_viscous": odds})
     sentence = write_verdict(PROBLEM, evidence, (), GAP).sentence
     assert sentence.startswith("These data show nothing missing in the model")
     assert reported in sentence
     assert sentence.count(".") >= 2 + bool(reported)
-
-
-def test_what_could_not_be_evaluated_or_refitted_is_a_warning() -> None:
-    evidence = _evidence(
-        "unknown",
-        "law",
-        {"none": 0.0, "unknown": 900.0},
-        lost=(LostHypothesis(Hypothesis(("gear_backlash",)), Status.MAX_ITERATIONS),),
-        refit_failed=True,
-    )
-    problem: Any = _problem()
-    reported = " ".join(write_warnings(problem, evidence, _mode(0.0), 1.0))
-    assert "The fit of gear_backlash found no periodic motion of the plant" in reported
-    assert "not evaluated: stopped at the iteration limit" in reported
-    assert "on twice as many mesh nodes failed" in reported
-
-
-@pytest.mark.parametrize("tests", [2, 3, 4])
-def test_few_tests_are_said_to_make_held_out_figures_rough(tests: int) -> None:
-    evidence = _evidence("none", "law", {"none": 5.0, "unknown": 0.0})
-    rough = any(
-        "held-out tests are rough" in each
-        for each in write_warnings(_problem(tests=tests), evidence, _mode(0.0), 1.0)
-    )
-    assert rough == (tests < 4)
-
-
-def test_what_was_tried_together_from_the_first_is_said_so() -> None:
-    evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 5.0, "rail_viscous": 700.0})
-    both = replace(evidence.chosen, hypothesis=Hypothesis(("tyre_friction", "rail_coulomb")))
-    evidence = replace(evidence, kind="several", chosen=both)
-    given = _problem((("rail_coulomb", "tyre_friction"),))
-    said = "tyre_friction + rail_coulomb were tried together to begin with"
-    assert any(said in each for each in write_warnings(given, evidence, _mode(0.0), 1.0))
-    assert not any(said in each for each in write_warnings(_problem(), evidence, _mode(0.0), 1.0))
-
-
-def test_what_an_effect_does_not_explain_is_a_warning() -> None:
-    evidence = _evidence("rail_viscous", "law", {"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0})
-    evidence = replace(evidence, kind="effect", left=0.0)
-    warnings = write_warnings(_problem(), evidence, _mode(0.0), 1.0)
-    assert any("Something more may be missing" in each for each in warnings)
 
 
 GAPS = st.floats(0.0, 0.3)
@@ -408,7 +299,7 @@ def test_no_verdict_contradicts_its_numbers(
     scatter: float,
     gain: float,
 ) -> None:
-    evidence = replace(_evidence("none", reason, {"none": 0.0} | odds, off=off), left=left)
+    evidence = replace(evidence_of("none", reason, {"none": 0.0} | odds, off=off), left=left)
     kind, chosen = decide(evidence.weighed, Change(change, change), left, unknown_by=reason)
     # Parameters have something to do with the gap: the noise is the least that is left.
     before, recalibrated, after, floor = gaps[0], max(gaps[1], gaps[3]), max(gaps[2], gaps[3]), gaps[3]

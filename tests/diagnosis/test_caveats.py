@@ -1,0 +1,62 @@
+"""What a reader must know before using a verdict."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from savgs_ident.core.status import Status
+from savgs_ident.diagnosis.caveats import write_warnings
+from savgs_ident.diagnosis.findings import LostHypothesis
+from savgs_ident.diagnosis.result import Hypothesis
+from savgs_ident.diagnosis.thresholds import DEFAULTS
+
+from .written_evidence import evidence_of, mode_of
+
+
+def searched(known: tuple[tuple[str, ...], ...] = (), tests: int = 9) -> Any:
+    plant, data = SimpleNamespace(known=known), SimpleNamespace(tests=tests)
+    return SimpleNamespace(base=mode_of(0.0), constants=DEFAULTS, drifts={}, plant=plant, data=data)
+
+
+def test_what_could_not_be_evaluated_or_refitted_is_a_warning() -> None:
+    evidence = evidence_of(
+        "unknown",
+        "law",
+        {"none": 0.0, "unknown": 900.0},
+        lost=(LostHypothesis(Hypothesis(("gear_backlash",)), Status.MAX_ITERATIONS),),
+        refit_failed=True,
+    )
+    problem: Any = searched()
+    reported = " ".join(write_warnings(problem, evidence, mode_of(0.0), 1.0))
+    assert "The fit of gear_backlash found no periodic motion of the plant" in reported
+    assert "not evaluated: stopped at the iteration limit" in reported
+    assert "on twice as many mesh nodes failed" in reported
+
+
+@pytest.mark.parametrize("tests", [2, 3, 4])
+def test_few_tests_are_said_to_make_held_out_figures_rough(tests: int) -> None:
+    evidence = evidence_of("none", "law", {"none": 5.0, "unknown": 0.0})
+    rough = any(
+        "held-out tests are rough" in each
+        for each in write_warnings(searched(tests=tests), evidence, mode_of(0.0), 1.0)
+    )
+    assert rough == (tests < 4)
+
+
+def test_what_was_tried_together_from_the_first_is_said_so() -> None:
+    evidence = evidence_of("rail_viscous", "law", {"none": 0.0, "unknown": 5.0, "rail_viscous": 700.0})
+    both = replace(evidence.chosen, hypothesis=Hypothesis(("tyre_friction", "rail_coulomb")))
+    evidence = replace(evidence, kind="several", chosen=both)
+    given = searched((("rail_coulomb", "tyre_friction"),))
+    said = "tyre_friction + rail_coulomb were tried together to begin with"
+    assert any(said in each for each in write_warnings(given, evidence, mode_of(0.0), 1.0))
+    assert not any(said in each for each in write_warnings(searched(), evidence, mode_of(0.0), 1.0))
+
+
+def test_what_an_effect_does_not_explain_is_a_warning() -> None:
+    evidence = evidence_of("rail_viscous", "law", {"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0})
+    evidence = replace(evidence, kind="effect", left=0.0)
+    warnings = write_warnings(searched(), evidence, mode_of(0.0), 1.0)
+    assert any("Something more may be missing" in each for each in warnings)
