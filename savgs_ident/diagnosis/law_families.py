@@ -44,6 +44,11 @@ class FittedFunctions(NamedTuple):
     only: Family | None = None
 
     @property
+    def functions(self) -> tuple[str, ...]:
+        """Names of their coefficients."""
+        return tuple(each.name for each in self.term.amplitudes)
+
+    @property
     def weight(self) -> float:
         """Their log evidence, with the prior probability of the functions."""
         return self.mode.evidence + self.log_prior
@@ -116,6 +121,8 @@ def families_fitted(
     for family in likely:
         solved = list[FittedFunctions]()
         for each in (found[family], *_by_themselves(every.term, port, family, alone, start, constants)):
+            if {*each.functions} in ({*fit.functions} for fit in solved):
+                continue
             least = max(fit.weight for fit in (every, *fits, *solved)) - constants.alarm_log_odds
             fitted = _fitted(search, every, port, family, each, least, constants)
             solved += [] if fitted is None else [fitted]
@@ -181,9 +188,8 @@ def _fitted(
         ):
             return best
         best, near = fitted, mode.prediction.warm_start
-        left = tuple(each.name for each in term.amplitudes)
-        found = _needed(search, mode, port, mine, left, constants)
-        if len(found.functions) == len(left) and found.width == 1.0:
+        found = _needed(search, mode, port, mine, fitted.functions, constants)
+        if len(found.functions) == len(fitted.functions) and found.width == 1.0:
             return best
 
 

@@ -103,6 +103,7 @@ def widths_alone(
 
     def width(group: tuple[str, ...]) -> float:
         mine = np.stack([columns[name] for name in group], axis=1)
-        return float(widths_of(search, base, mine, constants)[0]) / scale[group[0]]
+        # Rounded, so that the same width is known as such.
+        return round(float(widths_of(search, base, mine, constants)[0]) / scale[group[0]], 6)
 
     return {group: width(group) for group in groups if group}

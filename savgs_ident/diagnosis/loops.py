@@ -118,10 +118,10 @@ def effect_force(
     null = as_values({name: float(value) for name, value in p.items()} | dict(effect.null))
     law, port = effect.law, force_port(model, effect.port.location)
     if isinstance(law, AbstractFrictionLimitLaw):
-        own, without = (marched_contact(model, each, solution, effect.port) for each in (p, null))
-        return own - without
+        return _held(model, p, null, solution, effect.port)
     if isinstance(law, AbstractForceLaw) and effect.states:
-        return marched_effect(model, p, solution, effect)
+        force = marched_effect(model, p, solution, effect)
+        return force + (_held(model, p, null, solution, effect.port) if effect.loads_contact else 0.0)
     forces = _forces(model, p, solution)
     if isinstance(law, AbstractSeriesLaw):
         deflection = marched_effect(model, p, solution, effect)
@@ -132,6 +132,14 @@ def effect_force(
     if isinstance(law, AbstractForceLaw | AbstractNumberLaw) and port is not None:
         return np.asarray(forces[port.name] - _forces(model, null, solution)[port.name])
     return None
+
+
+def _held(
+    model: AbstractPlant, p: Values, null: Values, solution: PeriodicSolution, port: Port
+) -> NDArray[np.float64]:
+    """What the contact at a port holds under limits at ``p`` beyond that at ``null`` along a motion, (P,) [N]."""
+    own, without = (marched_contact(model, each, solution, port) for each in (p, null))
+    return own - without
 
 
 @eqx.filter_jit

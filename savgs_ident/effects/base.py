@@ -256,6 +256,14 @@ class AbstractForceLaw(AbstractLaw):
         """Time derivatives of the internal states, shape (s,) [unit of each per second]; none without states."""
         return jnp.zeros(0)
 
+    def loads_contact(self, port: Port) -> bool:
+        """Whether it adds to what a contact at a port holds before it slides, too (:meth:`limit`)."""
+        return False
+
+    def limit(self, v: Values, signals: PortSignals) -> FrictionLimit:
+        """What it adds there [N], as that of an :class:`AbstractFrictionLimitLaw`."""
+        return FrictionLimit(jnp.zeros_like(signals.load), jnp.zeros_like(signals.load))
+
 
 class AbstractFrictionLimitLaw(AbstractLaw):
     """A share of the friction that a contact holds before it slides.

@@ -14,7 +14,6 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import (
     AbstractForceLaw,
-    AbstractFrictionLimitLaw,
     AbstractInputLaw,
     AbstractNumberLaw,
     AbstractSensorLaw,
@@ -69,9 +68,7 @@ class _Part(NamedTuple):
 
 def sticking_contacts(effects: Sequence[Effect]) -> tuple[Port, ...]:
     """The ports at which a friction limit loads a bristle, in the order of the effects."""
-    return tuple(
-        dict.fromkeys(effect.port for effect in effects if isinstance(effect.law, AbstractFrictionLimitLaw))
-    )
+    return tuple(dict.fromkeys(effect.port for effect in effects if effect.loads_contact))
 
 
 def states_of(effects: Sequence[Effect]) -> tuple[InternalState, ...]:
@@ -115,7 +112,7 @@ def contact_bristle(
     assert port.contact is not None
     up, down = jnp.zeros_like(signals.load), jnp.zeros_like(signals.load)
     for effect in effects:
-        if isinstance(effect.law, AbstractFrictionLimitLaw) and effect.port == port:
+        if effect.loads_contact and effect.port == port:
             share = effect.friction_limit(p, signals)
             up, down = up + share.against_up, down + share.against_down
     return bristle(Presliding(*(p[name] for name in port.contact)), signals, FrictionLimit(up, down), anchor)

@@ -112,6 +112,13 @@ class Effect(eqx.Module):
         return next((each.of for each in self.port.numbers if each.name == self.number), self.law.family)
 
     @property
+    def loads_contact(self) -> bool:
+        """Whether it has a share of what the contact at its port holds."""
+        law = self.law
+        only = isinstance(law, AbstractFrictionLimitLaw)
+        return only or (isinstance(law, AbstractForceLaw) and law.loads_contact(self.port))
+
+    @property
     def states(self) -> tuple[InternalState, ...]:
         """Internal states under the names of this effect."""
         own = self.law.states(self.port)
@@ -136,7 +143,7 @@ class Effect(eqx.Module):
 
     def friction_limit(self, p: Values, signals: PortSignals) -> FrictionLimit:
         """Its share of what a contact holds [N]."""
-        assert isinstance(self.law, AbstractFrictionLimitLaw), self.name
+        assert isinstance(self.law, AbstractFrictionLimitLaw | AbstractForceLaw), self.name
         return self.law.limit(self._values(p), signals)
 
     def balance(

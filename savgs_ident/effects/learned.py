@@ -50,6 +50,7 @@ from savgs_ident.effects.learned_functions import (
     FALL,
     GAP,
     LAG,
+    OF_A_CONTACT,
     OF_A_FALL,
     OF_A_LOADED_FALL,
     OF_CONTACTS,
@@ -98,7 +99,17 @@ class LearnedForce(AbstractForceLaw):
     family: ClassVar[Family] = Family.LEARNED
     roles: ClassVar[tuple[Role, ...]] = _roles(
         ("middle", "stroke", "speed", "carried", "turn", "give", "gap", "fall", "lag"),
-        len((*OF_THE_MOTION, *OF_SLIDERS, *OF_THE_LOAD, *OF_CONTACTS, OF_A_FALL, OF_A_LOADED_FALL)),
+        len(
+            (
+                *OF_THE_MOTION,
+                *OF_SLIDERS,
+                *OF_THE_LOAD,
+                *OF_CONTACTS,
+                OF_A_FALL,
+                OF_A_LOADED_FALL,
+                OF_A_CONTACT,
+            )
+        ),
     )
     port: Port = eqx.field(static=True)
 
@@ -149,6 +160,16 @@ class LearnedForce(AbstractForceLaw):
     def rate(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:
         """Velocities of the anchors [m/s]."""
         return jnp.stack([each.rate for each in self._sliders(v, signals, state)])
+
+    def loads_contact(self, port: Port) -> bool:
+        """Where there is one."""
+        return port.contact is not None
+
+    def limit(self, v: Values, signals: PortSignals) -> FrictionLimit:
+        """What the contact holds beside what it holds already, the same both ways [N]."""
+        number = functions_at(self.port).index(OF_A_CONTACT) + 1
+        held = v[str(number)] * jnp.ones_like(signals.load)
+        return FrictionLimit(held, held)
 
     def _sliders(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> list[Bristle]:
         """Spring-sliders of unit friction: what they carry is a function of the motion alone."""

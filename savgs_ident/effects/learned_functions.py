@@ -234,6 +234,11 @@ OF_A_FALL = Function(_FALLING_SLIDER, Family.FRICTION, lambda m: m.fallen)
 OF_A_LOADED_FALL = Function(f"n {_FALLING_SLIDER}", Family.FRICTION, lambda m: m.n * m.fallen)
 """The same in proportion to a load."""
 
+OF_A_CONTACT = Function(
+    "friction of the contact, of any load", Family.FRICTION, lambda m: jnp.zeros_like(m.v)
+)
+"""What a contact holds before it slides, beside what it holds already: no force of a :class:`RelativeMotion`."""
+
 OF_WHAT_GIVES = (
     Function("n", Family.COMPLIANCE, lambda load: load.n),
     Function("n|n|", Family.COMPLIANCE, lambda load: load.n * jnp.abs(load.n)),
@@ -300,7 +305,8 @@ def functions_at(port: Port) -> tuple[Function, ...]:
     """The functions of the learned law at a port; none where nothing is learned."""
     if port.kind is PortKind.FORCE:
         loads, falls = (OF_THE_LOAD, (OF_A_FALL, OF_A_LOADED_FALL)) if port.loaded else ((), (OF_A_FALL,))
-        return (*OF_THE_MOTION, *OF_SLIDERS, *loads, *OF_CONTACTS, *falls)
+        holds = (OF_A_CONTACT,) if port.contact else ()
+        return (*OF_THE_MOTION, *OF_SLIDERS, *loads, *OF_CONTACTS, *falls, *holds)
     if port.kind is PortKind.SERIES:
         return () if port.resonant else OF_WHAT_GIVES
     return {PortKind.INPUT: OF_THE_ANGLE, PortKind.SENSOR: OF_THE_FREQUENCY}.get(port.kind, ())
@@ -338,12 +344,13 @@ def placed_at(port: Port) -> dict[str, tuple[str, ...]]:
 def alone_at(port: Port) -> tuple[tuple[str, ...], ...]:
     """Coefficients of functions at a port that could be all of a law, with the numbers that are estimated along.
 
-    Contacts, a friction that falls, and one that does not.
+    Contacts, a friction that falls, one that does not, and one that is the contact's.
     """
     if port.kind is not PortKind.FORCE:
         return ()
     both = zip(coefficients_at(port), functions_at(port), strict=True)
-    return (*placed_at(port).values(), tuple(name for name, function in both if function is OF_SLIDERS[0]))
+    single = tuple((name,) for name, function in both if function in (OF_SLIDERS[0], OF_A_CONTACT))
+    return (*placed_at(port).values(), *single)
 
 
 def interactions_at(port: Port) -> tuple[str, ...]:

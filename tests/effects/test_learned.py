@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import Family, Fundamental, InputSignal, Load, PortKind, PortSignals
+from savgs_ident.effects.composition import contact_bristle
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned import LearnedForce
 from savgs_ident.effects.learned_functions import (
@@ -72,6 +73,9 @@ LAWS: dict[str, Callable[[float, float, float], float]] = {
     "max(-x - g, 0)": lambda x, v, n: max(-x - GAP, 0.0),
 }
 """What the words for the functions say."""
+
+CONTACT = "friction of the contact, of any load"
+"""What is no force of the law itself: the contact holds more."""
 
 FACTORS: dict[str, Callable[[float, float], float]] = {
     "": lambda v, n: 1.0,
@@ -142,6 +146,8 @@ def _carried(effect: Effect, words: str, displacement: float, velocity: float) -
 
 def _said(effect: Effect, words: str, x: float, v: float, n: float) -> float:
     """The function of these words at a state relative to :data:`SPANS`."""
+    if words == CONTACT:
+        return 0.0
     factor, slider, _ = words.partition("a spring-slider")
     if not slider:
         return LAWS[words](x, v, n)
@@ -244,7 +250,8 @@ def test_each_of_its_numbers_weighs_the_function_that_its_words_say(effect: Effe
     known = [words for words in LAWS if words[0] != "n" or effect.port.name in loaded]
     sliders = [words for words in _words(effect).values() if "slider" in words]
     assert len(sliders) == 4 + (2 if effect.port.name in loaded else 1)
-    assert sorted(_words(effect).values()) == sorted([*known, *sliders])
+    held = [CONTACT] if effect.port.contact else []
+    assert sorted(_words(effect).values()) == sorted([*known, *sliders, *held])
     x, v, n = 0.7, -0.013, 0.6
     at = (SPANS["middle"] + SPANS["stroke"] * x, SPANS["speed"] * v, SPANS["carried"] * n)
     for name, words in _words(effect).items():
@@ -259,9 +266,32 @@ def test_its_frictions_are_those_that_do_not_grow_once_it_moves(effect: Effect) 
         at_rest, slow, fast = (abs(LAWS[words](0.7, v, 0.6)) for v in (0.0, 0.45, 0.9))
         return at_rest == 0.0 < fast <= 1.001 * slow
 
-    found = [name for name, words in _words(effect).items() if "slider" in words or rubs(words)]
+    found = [
+        name for name, words in _words(effect).items() if "slider" in words or words == CONTACT or rubs(words)
+    ]
     assert list(frictions_at(effect.port)) == found
-    assert len(found) in (13, 17)
+    assert len(found) in (13, 17, 18)
+
+
+@given(force=st.floats(-50.0, 3000.0), load=st.floats(0.0, 1e4), velocity=st.floats(-1.0, 1.0))
+def test_a_contact_holds_more_by_what_is_learned_as_by_a_preload(
+    force: float, load: float, velocity: float
+) -> None:
+    """Both load the bristle of the contact; nothing is held below zero."""
+    learned, preload = LEARNED["learned_rail"], CATALOGUE["rail_preload"]
+    coulomb = CATALOGUE["rail_coulomb"]
+    name = next(name for name, words in _words(learned).items() if words == CONTACT)
+    given_ = {each.name: each.value for each in (*coulomb.parameters, *learned.parameters)}
+    p = as_values({**given_, **learned.null, name: force, "rail_preload_force": force})
+    seen = PortSignals(*(jnp.asarray(each) for each in (0.0, velocity, load, 0.0)))
+    both = (
+        contact_bristle((coulomb, each), learned.port, p, seen, jnp.asarray(-1e-5))
+        for each in (learned, preload)
+    )
+    (mine, my_rate), (its, its_rate) = both
+    assert float(mine) == pytest.approx(float(its), rel=1e-12)
+    assert float(my_rate) == pytest.approx(float(its_rate), rel=1e-12)
+    assert abs(float(mine)) <= max(0.03 * load + force, 0.0) * (1.0 + 1e-12)
 
 
 @each_force
