@@ -38,7 +38,7 @@ from savgs_ident.diagnosis.model_selection import (
     recalibrate,
 )
 from savgs_ident.diagnosis.narrative import write_verdict
-from savgs_ident.diagnosis.problem import AbstractProblem
+from savgs_ident.diagnosis.problem import AbstractProblem, DrawnLaw, drawn_law
 from savgs_ident.diagnosis.result import (
     NONE,
     UNKNOWN,
@@ -49,6 +49,7 @@ from savgs_ident.diagnosis.result import (
     ForceLoop,
     Learned,
     PortShare,
+    Verdict,
 )
 from savgs_ident.diagnosis.verdict import indistinguishable, most_probable
 from savgs_ident.effects.effect import Effect
@@ -239,7 +240,7 @@ def _concluded(
         next_tests=found.next_tests,
         not_judgeable=not_judgeable_of(evidence.findings, problem.constants),
         confusable=confusable_of(evidence.findings, problem.constants),
-        loops=_loops(found.problem, model, evidence, found.law, verdict.ports, progress),
+        loops=_loops(found.problem, model, evidence, found.law, verdict, progress),
         responses=plant.responses(data, problem.given, recalibrated, model.rows),
         measured=measured,
         converged=all(each.status.ok for each in _decisive_fits(problem, selected, evidence, found.law)),
@@ -288,16 +289,27 @@ def _loops(
     model: CorrectedModel,
     evidence: DiagnosisEvidence,
     law: LearnedLaw | None,
-    ports: Sequence[str],
+    verdict: Verdict,
     progress: Progress,
 ) -> tuple[ForceLoop, ...]:
-    """The signal inferred at the first named port, beside the law that is named or learned there."""
-    found = next((each for each in evidence.localisations if each.name in ports[:1]), None)
+    """The signal inferred at the first named port, beside the law that is named or learned there.
+
+    And beside the catalogue's formula that comes nearest to a learned one.
+    """
+    found = next((each for each in evidence.localisations if each.name in verdict.ports[:1]), None)
     if found is None:
         return ()
     progress("inferring the signal at the port")
+    base, nearest = problem.base, None
+    values = base.values | model.fit.values | ({} if law is None else law.values)
     effects = [problem.plant.catalogue[name] for name in model.hypothesis.effects]
     effects += [] if law is None else [law.effect]
-    here = next((each for each in effects if each.port.location == ports[0]), None)
-    values = problem.base.values | model.fit.values | ({} if law is None else law.values)
-    return problem.plant.loops(values, problem.base.prediction.warm_start, found, here)
+    here = next((each for each in effects if each.port.location == found.name), None)
+    drawn = None if here is None else drawn_law(here, values, model.fit)
+    if law is not None:
+        fits = (each for each in evidence.findings.modes if each.terms and each.terms == verdict.effects)
+        formula = next(fits, None)
+        if formula is not None:
+            effect = problem.plant.catalogue[formula.terms[0]]
+            nearest = DrawnLaw(effect, base.values | formula.values)
+    return problem.plant.loops(values, base.prediction.warm_start, found, drawn, nearest)

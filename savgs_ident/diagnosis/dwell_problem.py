@@ -27,7 +27,7 @@ from savgs_ident.diagnosis.localisation import InputLocation, Localisation
 from savgs_ident.diagnosis.location_hypotheses import input_locations
 from savgs_ident.diagnosis.loops import force_loops
 from savgs_ident.diagnosis.next_test import next_tests
-from savgs_ident.diagnosis.problem import AbstractProblem, largest_with_margin, spans_of_force
+from savgs_ident.diagnosis.problem import AbstractProblem, DrawnLaw, largest_with_margin, spans_of_force
 from savgs_ident.diagnosis.regimes import dwell_cycles, find_regimes
 from savgs_ident.diagnosis.result import ForceLoop, NextTest, Regime, Responses
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
@@ -339,10 +339,11 @@ class DwellProblem(AbstractProblem):
         values: Mapping[str, float],
         warm_start: PeriodicSolution,
         found: Localisation,
-        effect: Effect | None,
+        law: DrawnLaw | None,
+        nearest: DrawnLaw | None,
     ) -> tuple[ForceLoop, ...]:
         """Loops at a location for a slow, a middle and a fast test."""
-        return force_loops(self, self.values(values), warm_start, found, effect)
+        return force_loops(self, self.values(values), warm_start, found, law, nearest)
 
     def next_tests(self, search: Search, one: LaplaceFit, other: LaplaceFit) -> tuple[NextTest, ...]:
         """Dwells under other conditions that separate two hypotheses best."""

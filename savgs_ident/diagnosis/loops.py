@@ -5,6 +5,7 @@ named effect is that of the model itself: the force at the port with the effect,
 along the motion of the baseline. Nothing of the rig's laws is written here.
 """
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import equinox as eqx
@@ -21,6 +22,7 @@ from savgs_ident.diagnosis.effect_sensitivities import (
 )
 from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.location_hypotheses import force_port, free_signal, signal_port
+from savgs_ident.diagnosis.problem import DrawnLaw
 from savgs_ident.diagnosis.result import ForceLoop
 from savgs_ident.effects.base import (
     AbstractForceLaw,
@@ -50,11 +52,13 @@ def force_loops(
     p: Values,
     solution: PeriodicSolution,
     found: Localisation,
-    effect: Effect | None,
+    law: DrawnLaw | None,
+    nearest: DrawnLaw | None,
 ) -> tuple[ForceLoop, ...]:
-    """Loops at a port for a slow, a middle and a fast test, with the force of a named ``effect`` beside them.
+    """Loops at a port for a slow, a middle and a fast test.
 
-    ``solution`` is the motion of the baseline; ``p`` are its parameters, SI, and those of the effect.
+    Beside them, the ``law`` that is named with its error, and the ``nearest`` formula. ``solution`` is the motion of
+    the baseline; ``p`` are its parameters, SI.
     """
     port = signal_port(problem.plant, found.name)
     if port is None:
@@ -63,7 +67,7 @@ def force_loops(
     moving = motion_port(problem.plant, port)
     signals = ports[moving]
     motion_unit = next(each.displacement_unit for each in problem.plant.ports if each.name == moving)
-    force = None if effect is None else effect_force(problem.complete(()), p, solution, effect)
+    force, error, near = _drawn(problem, solution, law, nearest)
     order = np.argsort(np.asarray(solution.excitation.frequency))
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
     grid = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
@@ -86,9 +90,32 @@ def force_loops(
                 law=np.zeros(0) if force is None else _without_mean(sample(force)),
                 unit=_unit(problem.plant, port),
                 motion_unit=motion_unit,
+                law_sd=rms([_without_mean(sample(each)) for each in error]),
+                nearest=np.zeros(0) if near is None else _without_mean(sample(near)),
             )
         )
     return tuple(loops)
+
+
+def _drawn(
+    problem: "DwellProblem", solution: PeriodicSolution, law: DrawnLaw | None, nearest: DrawnLaw | None
+) -> tuple[NDArray[np.float64] | None, list[NDArray[np.float64]], NDArray[np.float64] | None]:
+    """The force of a law along a motion (P,), what its errors change in it, and that of the nearest formula."""
+
+    def force_of(each: DrawnLaw, values: Mapping[str, float]) -> NDArray[np.float64] | None:
+        return effect_force(problem.complete(()), problem.values(values), solution, each.effect)
+
+    force = None if law is None else force_of(law, law.values)
+    near = None if nearest is None else force_of(nearest, nearest.values)
+    if law is None or force is None:
+        return None, [], near
+    erring = (force_of(law, values) for values in law.erring)
+    return force, [each - force for each in erring if each is not None], near
+
+
+def rms(errors: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Size of independent errors together, (n,); empty without any."""
+    return np.sqrt(np.sum(np.square(errors), axis=0)) if errors else np.zeros(0)
 
 
 def _unit(plant: AbstractPlant, port: Port) -> str:

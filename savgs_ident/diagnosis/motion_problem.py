@@ -22,13 +22,14 @@ from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, cycle_position
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation
 from savgs_ident.diagnosis.location_hypotheses import force_port, ports_by_location
+from savgs_ident.diagnosis.loops import rms
 from savgs_ident.diagnosis.port_functions import (
     Functions,
     laws_of_functions,
     motion_functions,
     prandtl_element,
 )
-from savgs_ident.diagnosis.problem import AbstractProblem, spans_of_force
+from savgs_ident.diagnosis.problem import AbstractProblem, DrawnLaw, spans_of_force
 from savgs_ident.diagnosis.regimes import Cycles, find_regimes
 from savgs_ident.diagnosis.result import DriveForces, ForceLoop, NextTest, Regime
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
@@ -284,9 +285,14 @@ class MotionProblem(AbstractProblem):
         return find_regimes(cycles, data, fit, self.free, constants=self.constants)
 
     def loops(
-        self, values: Mapping[str, float], warm_start: Any, found: Localisation, effect: Effect | None
+        self,
+        values: Mapping[str, float],
+        warm_start: Any,
+        found: Localisation,
+        law: DrawnLaw | None,
+        nearest: DrawnLaw | None,
     ) -> tuple[ForceLoop, ...]:
-        """The force inferred at a location over one cycle, beside that of a named ``effect``."""
+        """The force inferred at a location over one cycle, beside that of a named law and of the nearest one."""
         port = force_port(self.plant, found.name)
         if port is None:
             return ()
@@ -294,16 +300,8 @@ class MotionProblem(AbstractProblem):
         gain = self._imposed(port, (), values, np.ones((1, self.motion.position.size)))[:, 0]
         signals = self._at_ports((), values).signals[port.name]
         start, end = self._cycle()
-        law = np.zeros(0)
-        if effect is not None and effect.port.kind is PortKind.FORCE:
-            terms = () if effect.name in self.baseline else (effect.name,)
-            # A learned law is none of the catalogue.
-            there = replace(self, catalogue={**self.catalogue, effect.name: effect})
-            forces = [
-                np.asarray(there._at_ports(terms, each).forces[effect.port.name])
-                for each in (values, dict(values) | dict(effect.null))
-            ]
-            law = self.motion.rows(forces[0] - forces[1])[start:end]
+        force = self._force_of(law)
+        errors = [] if law is None else [self._force_of(replace(law, values=each)) for each in law.erring]
         return (
             ForceLoop(
                 port=found.name,
@@ -311,10 +309,26 @@ class MotionProblem(AbstractProblem):
                 displacement=self.motion.rows(np.asarray(signals.displacement))[start:end],
                 velocity=self.motion.rows(np.asarray(signals.velocity))[start:end],
                 inferred=((self.motion.rows(self.motion.drive) - base.rows) / gain)[start:end],
-                law=law,
+                law=force[start:end],
                 unit=port.force_unit,
+                law_sd=rms([each[start:end] - force[start:end] for each in errors if each.size]),
+                nearest=self._force_of(nearest)[start:end],
             ),
         )
+
+    def _force_of(self, law: DrawnLaw | None) -> NDArray[np.float64]:
+        """The force of a law along the motion [the port's unit], (m,); empty where there is none."""
+        if law is None or law.effect.port.kind is not PortKind.FORCE:
+            return np.zeros(0)
+        effect = law.effect
+        terms = () if effect.name in self.baseline else (effect.name,)
+        # A learned law is none of the catalogue.
+        there = replace(self, catalogue={**self.catalogue, effect.name: effect})
+        own, without = (
+            np.asarray(there._at_ports(terms, each).forces[effect.port.name])
+            for each in (law.values, dict(law.values) | dict(effect.null))
+        )
+        return self.motion.rows(own - without)
 
     def _cycle(self) -> tuple[int, int]:
         """First row of the recording's first cycle and that after its last."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import exp, inf
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Verdict
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.diagnosis.verdict import alarm_odds, most_probable, probabilities
 from savgs_ident.effects.base import Family
+from savgs_ident.inference.find_map import LaplaceFit
 
 
 def write_verdict(
@@ -135,10 +137,14 @@ def _law_missing(
         sentence += f" The nearest formula of the catalogue, {_words(problem, nearest)}, "
         if fits:
             left = left_over(problem.search, problem.base, fits[0], problem.constants)
-            sentence += (
-                f"explains {_explained(left)} of the misfit beyond the noise, the learned law "
-                f"{_explained(member.left)}."
-            )
+            mine, its = _explained(member.left), _explained(left)
+            sentence += f"explains {its} of the misfit beyond the noise, "
+            if mine == its:
+                sentence += (
+                    f"as the learned law does, but is {_times_less(evidence, fits[0], member)} probable."
+                )
+            else:
+                sentence += f"the learned law {mine}."
         else:
             sentence += "promised too little for a fit."
     else:
@@ -353,6 +359,17 @@ def _explained(left: float) -> str:
     if share <= 0.0:
         return "nothing"
     return "all" if left < 0.0005 else f"{100.0 * share:.0f} %" if share < 0.985 else f"{100.0 * share:.1f} %"
+
+
+def _times_less(evidence: DiagnosisEvidence, fit: LaplaceFit, member: FlexibleMember) -> str:
+    """By how much a formula is less probable than a learned law."""
+    weights = (
+        each.weight for each in evidence.weighed if each.mode is not None and each.mode.terms == fit.terms
+    )
+    odds = exp(min(max(member.weight - max(weights, default=-inf), 0.0), 700.0))
+    if odds < 1.5:
+        return "no less"
+    return f"{odds:.2g} times less" if odds < 1e3 else "more than a thousand times less"
 
 
 def _percent(share: float) -> str:

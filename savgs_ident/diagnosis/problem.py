@@ -34,7 +34,14 @@ from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned_functions import SMALLEST
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, NumberChange, Prediction, Term
-from savgs_ident.inference.prior import Coordinates, Linear, Logarithmic, sheet_coordinate
+from savgs_ident.inference.prior import (
+    Coordinates,
+    Linear,
+    Logarithmic,
+    bounds_of,
+    sheet_coordinate,
+    values_at,
+)
 from savgs_ident.inference.problem import used_parameters
 from savgs_ident.plants.base import AbstractPlant
 
@@ -86,6 +93,37 @@ def _amplitude(each: Parameter, null: float, width: float) -> Linear:
 
 def _shape(each: Parameter, width: float) -> Logarithmic:
     return Logarithmic(each.name, each.unit, each.value, width, each.lower, each.upper)
+
+
+@dataclass(frozen=True)
+class DrawnLaw:
+    """A law as it is drawn beside the signal that is inferred.
+
+    Attributes:
+        effect: the law at its port.
+        values: all parameters [SI], its own among them.
+        erring: those with an error of the law's own numbers, one standard deviation large; all independent. Empty
+            where errors are not drawn.
+    """
+
+    effect: Effect
+    values: Mapping[str, float]
+    erring: tuple[Mapping[str, float], ...] = ()
+
+
+def drawn_law(effect: Effect, values: Mapping[str, float], fit: LaplaceFit) -> DrawnLaw:
+    """The law of an effect with the errors that a ``fit`` leaves its numbers; ``values`` [SI] are all parameters."""
+    own = {each.name for each in effect.parameters}
+    mine = np.array([each.name in own for each in fit.coordinates], bool)
+    spread = np.linalg.cholesky(fit.covariance()[np.ix_(mine, mine)])
+    lower, upper = bounds_of(fit.coordinates)
+    erring = []
+    for error in spread.T:
+        x = fit.x.copy()
+        x[mine] += error
+        moved = values_at(fit.coordinates, np.clip(x, lower, upper))
+        erring.append({**values, **{name: value for name, value in moved.items() if name in own}})
+    return DrawnLaw(effect, values, tuple(erring))
 
 
 @dataclass(frozen=True)
@@ -279,9 +317,17 @@ class AbstractProblem(ABC):
 
     @abstractmethod
     def loops(
-        self, values: Mapping[str, float], warm_start: Any, found: Localisation, effect: Effect | None
+        self,
+        values: Mapping[str, float],
+        warm_start: Any,
+        found: Localisation,
+        law: DrawnLaw | None,
+        nearest: DrawnLaw | None,
     ) -> tuple[ForceLoop, ...]:
-        """The signal inferred at a location against the motion there, beside the law of a named ``effect``."""
+        """The signal inferred at a location against the motion there, with ``values`` [SI].
+
+        Beside it, the ``law`` that is named, and the ``nearest`` formula where that is a learned one.
+        """
 
     @abstractmethod
     def next_tests(self, search: Search, one: LaplaceFit, other: LaplaceFit) -> tuple[NextTest, ...]:

@@ -261,6 +261,8 @@ class ForceLoop:
         velocity: [``motion_unit``/s], (n,).
         inferred: inferred signal [``unit``], (n,).
         law: the named effect's law along the same motion [``unit``], (n,); empty if none is named.
+        law_sd: its standard deviation [``unit``], (n,); empty if not known.
+        nearest: the same by the nearest formula of the catalogue [``unit``], (n,); empty where the law is that.
         unit: N for a force, m or rad for what gives way, the channel's unit for a sensor.
         motion_unit: of the displacement.
     """
@@ -273,6 +275,8 @@ class ForceLoop:
     law: NDArray[np.float64]
     unit: str
     motion_unit: str = "m"
+    law_sd: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    nearest: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ Of a learned law, and by other constants, where slow.
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import Parameter, ParameterTable
 from savgs_ident.core.values import Values, as_values
+from savgs_ident.diagnosis.candidates import WITHIN
 from savgs_ident.diagnosis.diagnose import Watch, baseline_problem, diagnose_dwells, nobody
 from savgs_ident.diagnosis.evidence import DiagnosisProblem, FittedHypotheses
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings, Verdict
@@ -162,6 +164,12 @@ def test_an_effect_is_named() -> None:
     assert found.shrink.closed_by_effect > 0.98
     (damping,) = found.candidates[0].parameters
     assert damping.lo < ALL["guide_viscous"].parameters[0].value < damping.hi
+    # Its force is in proportion to its coefficient, and so is the error of that.
+    error = 0.5 * (damping.hi - damping.lo) / WITHIN / damping.value
+    assert len(found.loops) == 3
+    for loop in found.loops:
+        np.testing.assert_allclose(loop.law_sd, error * np.abs(loop.law), atol=1e-6 * np.abs(loop.law).max())
+        assert not loop.nearest.size
 
 
 @pytest.mark.parametrize("times", [1.4, 2.3])
@@ -241,8 +249,53 @@ def test_a_law_that_the_catalogue_does_not_have_is_learned_at_its_port() -> None
     assert tuple(map(str, found.verdict.families)) == ("guide/damping",)
     assert found.shrink.closed_by_effect > 0.9
     assert found.learned is not None
+    for loop in found.loops:
+        truth = -3000.0 * loop.velocity**3
+        learned, formula = (np.sqrt(np.mean((each - truth) ** 2)) for each in (loop.law, loop.nearest))
+        print(
+            loop.frequency_hz, learned, formula, np.sqrt(np.mean(truth**2)), np.sqrt(np.mean(loop.law_sd**2))
+        )
     # What a force with the cube of the velocity does not need is not in the law.
     assert 1 <= sum(each.value != 0.0 for each in found.learned.parameters) <= 4
+
+
+SIZES = {
+    **dict.fromkeys(("guide_preload", "guide_stribeck", "guide_saturating_friction"), 1.0),
+    **dict.fromkeys(("guide_oscillator", "guide_stiffness", "guide_stiffening"), 1.0),
+    **dict.fromkeys(("mount_compliance", "mount_massive_compliance", "mount_resonance"), 1.0),
+    **dict.fromkeys(("accelerometer_gain", "accelerometer_lag", "accelerometer_delay"), 1.0),
+    **dict.fromkeys(("guide_coulomb", "guide_asymmetry", "tyre_friction"), 0.3),
+    **dict.fromkeys(("guide_lower_stop", "guide_upper_stop"), 0.05),
+    "mount_backlash": 0.1,
+    "inertia_m_s_offset": 3.0,
+    "road_scale": 1.0,
+    "road_harmonics": 4.0,
+}
+"""An effect of every law that suits the plant, but for those of other tests here, and its typical sizes [1]."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "times"), SIZES.items(), ids=SIZES)
+def test_every_law_of_the_catalogue_is_named_where_it_is_true(name: str, times: float) -> None:
+    """Not a sum of functions, which could do the same at its port or at another one."""
+    effect, null = ALL[name], ALL[name].null
+    sized = [
+        replace(each, value=null[each.name] + times * (each.value - null[each.name]))
+        if each.name in null
+        else each
+        for each in effect.parameters
+    ]
+    recorded = _recorded(replace(effect, parameters=tuple(sized)))
+    found = _diagnosed(recorded, names=tuple(dict.fromkeys((name, *OFFERED))))
+    assert (found.verdict.kind, found.verdict.effects) == ("effect", (name,))
+    assert found.verdict.law_known
+    assert found.verdict.ports == (effect.port.location,)
+
+
+def test_every_law_that_suits_the_plant_is_among_those() -> None:
+    elsewhere = {"guide_viscous", "tyre_stiffness"}
+    laws = {ALL[name].law.name for name in (*SIZES, *elsewhere)}
+    assert laws == {each.law.name for each in ALL.values()}
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from savgs_ident.core.files import to_json
@@ -152,7 +153,18 @@ def test_the_page_says_what_there_is_and_what_there_is_not(by_kind: dict[str, Di
         assert len(page.pictures) == (7 if kind == "none" else 11)
         assert ("No signal was inferred: nothing is missing." in text) is (kind == "none")
         assert ("Sources of the named laws" in text) is (kind == "several")
-        assert ("Dashed: the force of the named effect" in text) is (kind == "several")
+        assert ("Dashed: the named law in the model" in text) is (kind == "several")
+
+
+def test_the_formula_that_comes_nearest_to_a_learned_law_is_explained_where_it_is_drawn(
+    diagnosis: Diagnosis,
+) -> None:
+    loops = tuple(
+        replace(each, law_sd=0.1 * np.abs(each.law), nearest=0.5 * each.law) for each in diagnosis.loops
+    )
+    for given, drawn in ((diagnosis, False), (replace(diagnosis, loops=loops), True)):
+        text = " ".join(Reader(diagnosis_html(given, ORIGIN)).texts)
+        assert ("Dotted: the formula of the catalogue that comes nearest" in text) is drawn
 
 
 def test_a_diagnosis_that_did_not_converge_says_so_first_and_hostile_names_stay_text(

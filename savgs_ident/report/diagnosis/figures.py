@@ -7,7 +7,8 @@ out.
 
 The signal inferred at a port is drawn over velocity and displacement: a friction is a box over displacement and a
 step over velocity, a stiffness a line over displacement, a damper one over velocity, a hysteresis an ellipse. With it
-stands the force of the named effect along the same motion.
+stands the law that is named along the same motion with its 95 % band, and beside a learned law the formula of
+the catalogue that comes nearest.
 
 A regime is a bar as long as the gap there, the most significant on top. Where the misfit is concentrated, the bar is
 coloured and has its p-value beside it, so that it is found in grey too.
@@ -22,11 +23,13 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
+from savgs_ident.diagnosis.candidates import WITHIN
 from savgs_ident.diagnosis.gap import MapCell
 from savgs_ident.diagnosis.result import Diagnosis, ForceLoop
 from savgs_ident.report.diagnosis.text import (
@@ -264,13 +267,17 @@ def spread_loops(loops: tuple[ForceLoop, ...]) -> tuple[ForceLoop, ...]:
 
 
 def force_figure(diagnosis: Diagnosis, loop: ForceLoop) -> Figure:
-    """One loop over velocity (left) and displacement (right), beside the law of the named effects."""
+    """One loop over velocity (left) and displacement (right), beside the law of the named effects.
+
+    The law with its 95 % band; beside a learned one the formula of the catalogue that comes nearest.
+    """
     unit, scale = _SMALL_UNITS.get(loop.unit, (loop.unit, 1.0))
     motion_unit, factor = _SMALL_UNITS.get(loop.motion_unit, (loop.motion_unit, 1.0))
     with styled():
         figure = new_figure(4.5, 3.0)
         figure.set_layout_engine("none")
-        places = {"left": 0.15, "right": 0.97, "bottom": 0.165, "top": 0.79, "wspace": 0.1}
+        top = 0.73 if loop.nearest.size else 0.79
+        places = {"left": 0.15, "right": 0.97, "bottom": 0.165, "top": top, "wspace": 0.1}
         left, right = figure.subplots(1, 2, sharey=True, gridspec_kw=places)
         figure.suptitle(
             printable(f"{port_words(diagnosis, loop.port)} at {loop.frequency_hz:.3g} Hz"),
@@ -281,7 +288,10 @@ def force_figure(diagnosis: Diagnosis, loop: ForceLoop) -> Figure:
         for axes, motion in ((left, loop.velocity), (right, _from_middle(loop.displacement))):
             _draw_diagnosis_force(axes, factor * motion, scale * loop.inferred, "inferred")
             if loop.law.size:
+                _draw_band(axes, factor * motion, scale * loop.law, scale * WITHIN * loop.law_sd)
                 _draw_law(axes, factor * motion, scale * loop.law, law_label(diagnosis, loop.port))
+            if loop.nearest.size:
+                _draw_nearest(axes, factor * motion, scale * loop.nearest, diagnosis.verdict.effects[0])
             axes.xaxis.set_major_locator(MaxNLocator(4))
         left.set_ylabel(printable(f"{_quantity(loop.unit)} [{unit_text(unit)}]"))
         left.set_xlabel(f"velocity [{motion_unit}/s]")
@@ -321,6 +331,29 @@ def _draw_law(axes: Axes, across: NDArray[np.float64], up: NDArray[np.float64], 
         linestyle=(0, (5, 2)),
         linewidth=1.5,
         label=printable(label),
+    )
+
+
+def _draw_band(
+    axes: Axes, across: NDArray[np.float64], up: NDArray[np.float64], half: NDArray[np.float64]
+) -> None:
+    """The band about a closed loop, so wide to either side; none where its width is not known."""
+    if not half.size:
+        return
+    x, low, high = (np.append(each, each[:1]) for each in (across, up - half, up + half))
+    corners = [np.column_stack([x, each]) for each in (low, high)]
+    pieces = np.stack([corners[0][:-1], corners[0][1:], corners[1][1:], corners[1][:-1]], axis=1)
+    axes.add_collection(PolyCollection(list(pieces), facecolor=(ORANGE, 0.25), linewidth=0.0, zorder=1))
+
+
+def _draw_nearest(axes: Axes, across: NDArray[np.float64], up: NDArray[np.float64], name: str) -> None:
+    axes.plot(
+        np.append(across, across[:1]),
+        np.append(up, up[:1]),
+        color=INK,
+        linestyle=":",
+        linewidth=1.2,
+        label=printable(f"nearest: {name}"),
     )
 
 

@@ -233,6 +233,7 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "bode": [bode_picture(diagnosis, c) for c in compared_channels(diagnosis)],
             "loops": [_loop(diagnosis, each) for each in spread_loops(diagnosis.loops)],
             "lawful": any(each.law.size for each in diagnosis.loops),
+            "nearest": any(each.nearest.size for each in diagnosis.loops),
             "tree": nested_bars(diagnosis),
             "shown": [candidate_row(each, diagnosis) for each in shown],
             "rest": [candidate_row(each, diagnosis) for each in rest],
