@@ -15,10 +15,12 @@ used.
 "Misfit" below is the mean square of the residuals in noise variances, less one: what the noise does not explain.
 "Response" is the measured response of a channel, all harmonics and tests together.
 
-Each docstring says where a value comes from, and what is known of the verdict when it is halved or doubled; where it
-says nothing of that, it was not measured. Values "by choice" were chosen by the authors and kept because the labelled
-recordings and blind trials came out right; blind trials had been looked at when some were chosen, so that these
-trials are no evidence for them.
+Each docstring says where a value comes from, and what halving or doubling it does as far as that can be derived. How
+often verdicts of blind trials change stands in ``docs/validation.md``: for constants that judge fits, each by itself
+(:mod:`savgs_ident.validation.varied_constants`); for those that steer the search, in groups (``benchmarks/refits.py``
+lists those that were never varied, with the reason). Values "by choice" were chosen by the authors and kept because
+the labelled recordings and blind trials came out right; blind trials had been looked at when some were chosen, so
+that these trials are no evidence for them.
 """
 
 from dataclasses import dataclass
@@ -72,14 +74,14 @@ class DecisionConstants:
     """Width of the prior of an effect's amplitude, in its typical sizes.
 
     Origin: by choice: an effect of twice its typical size is one standard deviation away. Halved or doubled:
-    Occam's factor moves by 0.7 nat for every amplitude; verdicts are not measured.
+    Occam's factor moves by 0.7 nat for every amplitude; with ``shape_width``, none of 20 verdicts changes.
     """
 
     shape_width: float = 0.7
     """Width of the prior of the logarithm of what shapes an effect [1].
 
     Origin: by choice, a factor of two to either side (log 2 = 0.69). Halved or doubled: Occam's factor moves by up
-    to 0.7 nat for every shape that the campaign identifies; verdicts are not measured.
+    to 0.7 nat for every shape that the campaign identifies; with ``amplitude_width``, none of 20 verdicts changes.
     """
 
     coefficient_uncertainty: float = 2.0
@@ -116,8 +118,7 @@ class DecisionConstants:
 
     Origin: Markov's inequality. Where nothing is missing, and priors and noise are as assumed, the odds reach
     exp(4) in at most exp(-4) = 1.8 % of all campaigns, or 2.7 % where "something" is given the prior odds of 1.5
-    that it has here. Halved: at most 13.5 % (20 %). Doubled: at most 0.03 % (0.05 %). What that does to missed
-    effects is not measured.
+    that it has here. Halved: at most 13.5 % (20 %). Doubled: at most 0.03 % (0.05 %).
     """
 
     indistinguishable_log_odds: float = 5.0
