@@ -93,7 +93,10 @@ def _sum(v: Values, values: list[Array]) -> Array:
 
 
 class LearnedForce(AbstractForceLaw):
-    """A learned force at a ``port``, in the port's own sense: F = sum over k of c_k f_k(x, v, n)."""
+    """A learned force at a ``port``, in the port's own sense: F = sum over k of c_k f_k(x, v, n).
+
+    Where something sticks, the contact holds more by one of the coefficients, whatever it carries.
+    """
 
     name: ClassVar[str] = "learned"
     family: ClassVar[Family] = Family.LEARNED
