@@ -116,16 +116,18 @@ def marched_effect(
 
 
 def marched_contact(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, port: Port
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, effect: Effect
 ) -> NDArray[np.float64]:
-    """Friction [N] of the contact at a port along a motion, (P,), under the friction limits of ``model`` at ``p``.
+    """Friction [N] of the contact at the port of an effect along a motion of ``model``, (P,).
 
-    The bristle's anchor is marched: it is not that of the motion, which has limits of its own.
+    Under the friction limits of the effect and of the model at ``p``. The bristle's anchor is marched: it is not that
+    of the motion, which has limits of its own.
     """
     signals, steps = _evenly(model, p, solution)
-    sliding = signals[port.name]
+    sliding = signals[effect.port.name]
     assert isinstance(sliding, PortSignals)
-    marched = _march_contact(model, port, placed(dict(p)), sliding, jnp.asarray(steps))
+    others = tuple(each for each in model.effects if each.loads_contact and each.name != effect.name)
+    marched = _march_contact((*others, effect), effect.port, placed(dict(p)), sliding, jnp.asarray(steps))
     return _at_nodes(np.asarray(marched), solution)
 
 
@@ -251,10 +253,10 @@ def _march(
 
 @eqx.filter_jit
 def _march_contact(
-    model: AbstractPlant, port: Port, p: Values, signals: PortSignals, steps: Float[Array, " D"]
+    effects: tuple[Effect, ...], port: Port, p: Values, signals: PortSignals, steps: Float[Array, " D"]
 ) -> Float[Array, "D n 1"]:
     def held(now: Array, at: PortSignals) -> Bristle:
-        return contact_bristle(model.effects, port, p, at, now[0])
+        return contact_bristle(effects, port, p, at, now[0])
 
     def defect(now: Array, before: Array, at: PortSignals, step: Array) -> Array:
         return (now - before) / step - held(now, at).rate

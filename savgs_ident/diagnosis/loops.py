@@ -145,10 +145,10 @@ def effect_force(
     null = as_values({name: float(value) for name, value in p.items()} | dict(effect.null))
     law, port = effect.law, force_port(model, effect.port.location)
     if isinstance(law, AbstractFrictionLimitLaw):
-        return _held(model, p, null, solution, effect.port)
+        return _held(model, p, null, solution, effect)
     if isinstance(law, AbstractForceLaw) and effect.states:
         force = marched_effect(model, p, solution, effect)
-        return force + (_held(model, p, null, solution, effect.port) if effect.loads_contact else 0.0)
+        return force + (_held(model, p, null, solution, effect) if effect.loads_contact else 0.0)
     forces = _forces(model, p, solution)
     if isinstance(law, AbstractSeriesLaw):
         deflection = marched_effect(model, p, solution, effect)
@@ -162,10 +162,10 @@ def effect_force(
 
 
 def _held(
-    model: AbstractPlant, p: Values, null: Values, solution: PeriodicSolution, port: Port
+    model: AbstractPlant, p: Values, null: Values, solution: PeriodicSolution, effect: Effect
 ) -> NDArray[np.float64]:
-    """What the contact at a port holds under limits at ``p`` beyond that at ``null`` along a motion, (P,) [N]."""
-    own, without = (marched_contact(model, each, solution, port) for each in (p, null))
+    """What the contact of an effect holds with it at ``p`` beyond that at ``null`` along a motion, (P,) [N]."""
+    own, without = (marched_contact(model, each, solution, effect) for each in (p, null))
     return own - without
 
 

@@ -14,6 +14,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import (
     AbstractForceLaw,
+    AbstractFrictionLimitLaw,
     AbstractInputLaw,
     AbstractNumberLaw,
     AbstractSensorLaw,
@@ -67,8 +68,13 @@ class _Part(NamedTuple):
 
 
 def sticking_contacts(effects: Sequence[Effect]) -> tuple[Port, ...]:
-    """The ports at which a friction limit loads a bristle, in the order of the effects."""
-    return tuple(dict.fromkeys(effect.port for effect in effects if effect.loads_contact))
+    """The ports at which a friction limit loads a bristle, in the order of the effects.
+
+    A force that adds to what a contact holds makes no contact by itself.
+    """
+    return tuple(
+        dict.fromkeys(effect.port for effect in effects if isinstance(effect.law, AbstractFrictionLimitLaw))
+    )
 
 
 def states_of(effects: Sequence[Effect]) -> tuple[InternalState, ...]:

@@ -183,8 +183,8 @@ def test_a_friction_that_calibration_nearly_takes_up_is_learned_as_large_as_it_i
     assert law.mode.status.ok
     assert law.only is Family.FRICTION
     assert gain > 20.0
-    (slider,) = law.term.amplitudes
-    assert law.values[slider.name] == pytest.approx(-force, rel=0.25)
+    (held,) = law.term.amplitudes
+    assert law.values[held.name] == pytest.approx(force, rel=0.25)
 
 
 @pytest.mark.slow

@@ -6,11 +6,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from savgs_ident.core.values import as_values
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.effect_sensitivities import impose, marched_effect
 from savgs_ident.diagnosis.loops import effect_force
+from savgs_ident.effects.learned_functions import OF_A_CONTACT, coefficients_at, functions_at
 from savgs_ident.inference.observations import Data
-from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
+from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, LEARNED
+from savgs_ident.plants.quarter_car.ports import RAIL
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.sensitivity import loads_at_nodes
@@ -52,6 +55,28 @@ def test_the_force_of_the_rails_friction_is_that_of_its_bristle(
     sliding = loads.ports["rail"]
     tanh = -float(p["mu_r"]) * np.asarray(sliding.load * jnp.tanh(sliding.velocity / 1e-3))
     assert np.sqrt(np.mean((tanh - expected) ** 2)) > 0.1 * size, "a tanh would pass for the bristle"
+
+
+@pytest.mark.slow
+def test_what_a_contact_holds_by_a_learned_law_is_drawn_as_by_a_preload(
+    plant_and_data: Case, start: PeriodicSolution
+) -> None:
+    plant, _ = plant_and_data
+    learned, preload = LEARNED["learned_rail"], CATALOGUE["rail_preload"]
+    (held,) = (
+        name
+        for name, function in zip(coefficients_at(RAIL), functions_at(RAIL), strict=True)
+        if function is OF_A_CONTACT
+    )
+    own = {each.name: each.value for each in learned.parameters} | dict(learned.null)
+    p = plant.values(own | {held: 25.0, "rail_preload_force": 25.0})
+    forces = []
+    for effect, other in ((learned, preload), (preload, learned)):
+        alone = as_values({name: float(value) for name, value in p.items()} | dict(other.null))
+        forces.append(effect_force(plant.complete(()), alone, start, effect))
+    assert forces[0] is not None
+    assert np.abs(forces[0]).max() > 20.0
+    np.testing.assert_allclose(forces[0], forces[1], atol=1e-6)
 
 
 @pytest.mark.slow
