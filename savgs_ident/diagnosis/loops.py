@@ -90,7 +90,7 @@ def force_loops(
                 law=np.zeros(0) if force is None else _without_mean(sample(force)),
                 unit=_unit(problem.plant, port),
                 motion_unit=motion_unit,
-                law_sd=rms([_without_mean(sample(each)) for each in error]),
+                law_sd=root_sum_square([_without_mean(sample(each)) for each in error]),
                 nearest=np.zeros(0) if near is None else _without_mean(sample(near)),
             )
         )
@@ -113,7 +113,7 @@ def _drawn(
     return force, [each - force for each in erring if each is not None], near
 
 
-def rms(errors: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+def root_sum_square(errors: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Size of independent errors together, (n,); empty without any."""
     return np.sqrt(np.sum(np.square(errors), axis=0)) if errors else np.zeros(0)
 

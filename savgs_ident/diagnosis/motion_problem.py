@@ -22,7 +22,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, cycle_position
 from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation
 from savgs_ident.diagnosis.location_hypotheses import force_port, ports_by_location
-from savgs_ident.diagnosis.loops import rms
+from savgs_ident.diagnosis.loops import root_sum_square
 from savgs_ident.diagnosis.port_functions import (
     Functions,
     laws_of_functions,
@@ -311,7 +311,7 @@ class MotionProblem(AbstractProblem):
                 inferred=((self.motion.rows(self.motion.drive) - base.rows) / gain)[start:end],
                 law=force[start:end],
                 unit=port.force_unit,
-                law_sd=rms([each[start:end] - force[start:end] for each in errors if each.size]),
+                law_sd=root_sum_square([each[start:end] - force[start:end] for each in errors if each.size]),
                 nearest=self._force_of(nearest)[start:end],
             ),
         )

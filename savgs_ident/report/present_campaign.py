@@ -238,11 +238,11 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
         from savgs_ident.report.by_plant import report_of
         from savgs_ident.report.diagnosis.compared import diagnosis_bode_figure, drive_figure
         from savgs_ident.report.diagnosis.figures import (
-            force_figure,
             gap_map_figure,
             regime_figure,
             shrink_figure,
         )
+        from savgs_ident.report.diagnosis.loop_figures import force_figure
 
         shrink: Figures = {"shrink": lambda: shrink_figure(result)}
         if result.regimes:

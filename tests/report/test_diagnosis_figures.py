@@ -16,10 +16,8 @@ from savgs_ident.diagnosis.result import Diagnosis
 from savgs_ident.report.diagnosis.compared import compared_channels, diagnosis_bode_figure, first_harmonic_gap
 from savgs_ident.report.diagnosis.drawing import rig_figure
 from savgs_ident.report.diagnosis.figures import (
-    MOST_LOOPS,
     NOISE,
     colour_steps,
-    force_figure,
     gap_channels,
     gap_map_figure,
     gap_table,
@@ -27,8 +25,8 @@ from savgs_ident.report.diagnosis.figures import (
     regime_picture,
     shrink_figure,
     shrink_rows,
-    spread_loops,
 )
+from savgs_ident.report.diagnosis.loop_figures import MOST_LOOPS, force_figure, spread_loops
 from savgs_ident.report.diagnosis.text import law_label
 from savgs_ident.report.html import embed
 

@@ -1,14 +1,9 @@
-"""Figures of a diagnosis: the map of the gap, the gap by model and by regime, the signal inferred at a port.
+"""Figures of a diagnosis: the map of the gap, and the gap by model and by regime.
 
 The map has one cell for each dwell and harmonic order of a channel, after recalibration: top in noise standard
 deviations (is it significant?), bottom in per cent of the channel's response (does it matter?). The colour darkens
 steadily, so that it can be read in grey too; what lies within the noise is white, what was not measured is crossed
 out.
-
-The signal inferred at a port is drawn over velocity and displacement: a friction is a box over displacement and a
-step over velocity, a stiffness a line over displacement, a damper one over velocity, a hysteresis an ellipse. With it
-stands the law that is named along the same motion with its 95 % band, and beside a learned law the formula of
-the catalogue that comes nearest.
 
 A regime is a bar as long as the gap there, the most significant on top. Where the misfit is concentrated, the bar is
 coloured and has its p-value beside it, so that it is found in grey too.
@@ -23,25 +18,21 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
-from savgs_ident.diagnosis.candidates import WITHIN
 from savgs_ident.diagnosis.gap import MapCell
-from savgs_ident.diagnosis.result import Diagnosis, ForceLoop
+from savgs_ident.diagnosis.result import Diagnosis
 from savgs_ident.report.diagnosis.text import (
     LEVEL,
-    law_label,
     motion_words,
     p_value_words,
-    port_words,
     regimes_sentence,
 )
 from savgs_ident.report.html import Picture, embed
-from savgs_ident.report.text import channel_label, unit_text
+from savgs_ident.report.text import channel_label
 from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, PALE, new_figure, printable, styled
 
 NOISE = 2.0
@@ -248,113 +239,6 @@ def _scale(axes: Axes) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.set_xlabel("gap, relative rms over held-out tests [%]")
-
-
-MOST_LOOPS = 6
-"""So many loops are drawn at most."""
-
-_SMALL_UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "N": ("N", 1.0)}
-_ARROW_AT = 0.12
-"""Where on the period the arrow is that says which way the loop is run through."""
-
-
-def spread_loops(loops: tuple[ForceLoop, ...]) -> tuple[ForceLoop, ...]:
-    """At most MOST_LOOPS of them, from the first test to the last."""
-    if len(loops) <= MOST_LOOPS:
-        return loops
-    chosen = np.unique(np.linspace(0, len(loops) - 1, MOST_LOOPS).round().astype(int))
-    return tuple(loops[place] for place in chosen)
-
-
-def force_figure(diagnosis: Diagnosis, loop: ForceLoop) -> Figure:
-    """One loop over velocity (left) and displacement (right), beside the law of the named effects.
-
-    The law with its 95 % band; beside a learned one the formula of the catalogue that comes nearest.
-    """
-    unit, scale = _SMALL_UNITS.get(loop.unit, (loop.unit, 1.0))
-    motion_unit, factor = _SMALL_UNITS.get(loop.motion_unit, (loop.motion_unit, 1.0))
-    with styled():
-        figure = new_figure(4.5, 3.0)
-        figure.set_layout_engine("none")
-        top = 0.73 if loop.nearest.size else 0.79
-        places = {"left": 0.15, "right": 0.97, "bottom": 0.165, "top": top, "wspace": 0.1}
-        left, right = figure.subplots(1, 2, sharey=True, gridspec_kw=places)
-        figure.suptitle(
-            printable(f"{port_words(diagnosis, loop.port)} at {loop.frequency_hz:.3g} Hz"),
-            y=0.985,
-            fontsize=10.0,
-            fontweight="bold",
-        )
-        for axes, motion in ((left, loop.velocity), (right, _from_middle(loop.displacement))):
-            _draw_diagnosis_force(axes, factor * motion, scale * loop.inferred, "inferred")
-            if loop.law.size:
-                _draw_band(axes, factor * motion, scale * loop.law, scale * WITHIN * loop.law_sd)
-                _draw_law(axes, factor * motion, scale * loop.law, law_label(diagnosis, loop.port))
-            if loop.nearest.size:
-                _draw_nearest(axes, factor * motion, scale * loop.nearest, diagnosis.verdict.effects[0])
-            axes.xaxis.set_major_locator(MaxNLocator(4))
-        left.set_ylabel(printable(f"{_quantity(loop.unit)} [{unit_text(unit)}]"))
-        left.set_xlabel(f"velocity [{motion_unit}/s]")
-        right.set_xlabel(f"displacement [{motion_unit}]")
-        left.yaxis.set_label_coords(-0.24, 0.5)
-        handles, labels = left.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.55, 0.925), ncols=2)
-        return figure
-
-
-def _quantity(unit: str) -> str:
-    """What a signal in this unit is."""
-    return "force" if unit == "N" else "signal"
-
-
-def _from_middle(displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Displacements count from the middle of their range: a strut is half a metre long."""
-    return displacement - 0.5 * (np.max(displacement) + np.min(displacement))
-
-
-def _draw_diagnosis_force(
-    axes: Axes, across: NDArray[np.float64], up: NDArray[np.float64], label: str
-) -> None:
-    axes.axhline(0.0, color=INK, linewidth=0.6)
-    axes.plot(np.append(across, across[:1]), np.append(up, up[:1]), color=BLUE, linewidth=1.5, label=label)
-    if across.size > 16:
-        at = int(_ARROW_AT * across.size)
-        look = {"arrowstyle": "-|>", "color": BLUE, "mutation_scale": 13, "shrinkA": 0.0, "shrinkB": 0.0}
-        axes.annotate("", (across[at + 2], up[at + 2]), (across[at], up[at]), arrowprops=look, zorder=4)
-
-
-def _draw_law(axes: Axes, across: NDArray[np.float64], up: NDArray[np.float64], label: str) -> None:
-    axes.plot(
-        np.append(across, across[:1]),
-        np.append(up, up[:1]),
-        color=ORANGE,
-        linestyle=(0, (5, 2)),
-        linewidth=1.5,
-        label=printable(label),
-    )
-
-
-def _draw_band(
-    axes: Axes, across: NDArray[np.float64], up: NDArray[np.float64], half: NDArray[np.float64]
-) -> None:
-    """The band about a closed loop, so wide to either side; none where its width is not known."""
-    if not half.size:
-        return
-    x, low, high = (np.append(each, each[:1]) for each in (across, up - half, up + half))
-    corners = [np.column_stack([x, each]) for each in (low, high)]
-    pieces = np.stack([corners[0][:-1], corners[0][1:], corners[1][1:], corners[1][:-1]], axis=1)
-    axes.add_collection(PolyCollection(list(pieces), facecolor=(ORANGE, 0.25), linewidth=0.0, zorder=1))
-
-
-def _draw_nearest(axes: Axes, across: NDArray[np.float64], up: NDArray[np.float64], name: str) -> None:
-    axes.plot(
-        np.append(across, across[:1]),
-        np.append(up, up[:1]),
-        color=INK,
-        linestyle=":",
-        linewidth=1.2,
-        label=printable(f"nearest: {name}"),
-    )
 
 
 _LETTERS = 24

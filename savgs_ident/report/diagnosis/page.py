@@ -18,16 +18,15 @@ from savgs_ident.diagnosis.result import Diagnosis, ForceLoop, PortShare
 from savgs_ident.report.by_plant import report_of
 from savgs_ident.report.diagnosis.compared import bode_picture, compared_channels, drive_picture
 from savgs_ident.report.diagnosis.figures import (
-    force_figure,
     gap_channels,
     gap_map_figure,
     gap_table,
     regime_note,
     regime_picture,
     shrink_figure,
-    spread_loops,
 )
 from savgs_ident.report.diagnosis.hypotheses import candidate_row, named_hypotheses, nested_bars
+from savgs_ident.report.diagnosis.loop_figures import force_figure, spread_loops
 from savgs_ident.report.diagnosis.text import (
     KIND_WORDS,
     alarm,
