@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Progress
-from savgs_ident.diagnosis.background import drifts_of, time_of, with_wider_drifts
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem
 from savgs_ident.diagnosis.result import NONE
 from savgs_ident.diagnosis.thresholds import DecisionConstants
+from savgs_ident.inference.background.shared_errors import drifts_of, time_of, with_wider_drifts
 from savgs_ident.inference.find_map import HOPE, LaplaceFit, Search, find_map, find_map_again, search_of
 from savgs_ident.inference.observations import Data
 

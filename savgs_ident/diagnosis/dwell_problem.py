@@ -10,21 +10,17 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import joint_status
 from savgs_ident.core.values import Values
-from savgs_ident.diagnosis.background import errors_of_curve, with_background, without_drifts
-from savgs_ident.diagnosis.effect_sensitivities import impose, node_loads, rehearse, secants_of_terms
+from savgs_ident.diagnosis.effect_sensitivities import rehearse, secants_of_terms
 from savgs_ident.diagnosis.gap import CyclePosition, MapCell, cycle_positions, gap_map
-from savgs_ident.diagnosis.localisation import InputLocation, Localisation
-from savgs_ident.diagnosis.location_hypotheses import input_locations
+from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.loops import force_loops
 from savgs_ident.diagnosis.next_test import next_tests
 from savgs_ident.diagnosis.problem import AbstractProblem, DrawnLaw, largest_with_margin, spans_of_force
@@ -33,6 +29,10 @@ from savgs_ident.diagnosis.result import ForceLoop, NextTest, Regime, Responses
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Port, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
+from savgs_ident.inference.background.imposed import node_loads, rows_of, slopes_in
+from savgs_ident.inference.background.locations import Linearisation, input_locations
+from savgs_ident.inference.background.port_functions import InputLocation
+from savgs_ident.inference.background.shared_errors import background_about, without_drifts
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of
 from savgs_ident.inference.observations import Data, Prediction, Term
@@ -46,46 +46,10 @@ from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
     adapt,
-    harmonics,
     resolve,
     simulate_periodic,
 )
-from savgs_ident.simulate.program_cache import placed, run_cached
-from savgs_ident.simulate.sensitivity import (
-    Directions,
-    directional,
-    directions_of,
-    unit_tangents,
-)
-
-
-@eqx.filter_jit
-def rows_of(
-    model: AbstractPlant, likelihood: Likelihood, p: Values, solution: PeriodicSolution, orders: int
-) -> Array:
-    """Rows of a motion [unit of the reading], (m,)."""
-    return likelihood.rows(harmonics(model, p, solution, orders))
-
-
-@eqx.filter_jit
-def slopes_of(*args: Any) -> tuple[Array, ...]:
-    """Their slopes along k directions of the parameters, (k, m) [unit of the reading]."""
-    return run_cached(_directional_rows, *args)
-
-
-def _directional_rows(
-    model: AbstractPlant,
-    likelihood: Likelihood,
-    p: Values,
-    solution: PeriodicSolution,
-    directions: Directions,
-    orders: int,
-) -> tuple[Array]:
-    return (directional(model, p, solution, orders, directions, likelihood.rows),)
-
-
-WIDTH = 52
-"""Directions that are solved for at a time: a program for each number would have to be compiled."""
+from savgs_ident.simulate.program_cache import placed
 
 ITERATIONS = 100
 """Most Newton steps from one point of a search to the next."""
@@ -130,9 +94,7 @@ class DwellProblem(AbstractProblem):
     @property
     def channel(self) -> NDArray[np.intp]:
         """The channel of each row, an index of the plant's channels, (m,)."""
-        tests, channels, orders = self.shape
-        every = np.broadcast_to(np.arange(channels)[None, :, None, None], (tests, channels, orders, 2))
-        return np.asarray(every.ravel()[self.likelihood.place])
+        return self.likelihood.channel
 
     def start(self, values: Mapping[str, float]) -> PeriodicSolution:
         """Periodic motions of the baseline from a cold start at ``values`` [SI].
@@ -242,61 +204,30 @@ class DwellProblem(AbstractProblem):
         self, model: AbstractPlant, p: Values, solution: PeriodicSolution, names: Sequence[str]
     ) -> NDArray[np.float64]:
         """Slopes of the rows in the named parameters of ``model`` [units of the rows per SI unit], (m, n)."""
-        parts = [np.zeros((0, self.likelihood.measured.size))]
-        for first in range(0, len(names), WIDTH):
-            some = names[first : first + WIDTH]
-            tangents = unit_tangents(p, some, WIDTH)
-            directions = directions_of(model, p, placed(tangents), len(some))
-            (slopes,) = slopes_of(model, self.likelihood, p, solution, directions, self.orders)
-            parts.append(np.asarray(slopes)[: len(some)])
-        return np.concatenate(parts).T
+        return slopes_in(model, self.likelihood, self.orders, p, solution, names)
 
     def locations(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
     ) -> list[InputLocation]:
         """What an unknown signal at each location could do to the harmonics, about a motion with ``terms``."""
-        return input_locations(self, terms, self.values(values), warm_start)
+        return input_locations(self._about(self.complete(terms), values, warm_start), self.constants)
 
     def with_background(self, data: Data, values: Mapping[str, float], warm_start: PeriodicSolution) -> Data:
         """The data with errors at every location and input, of the dampers' curves, and drifts of what is free."""
-        read = harmonics(self.complete(()), self.values(values), warm_start, self.orders)
-        order = jnp.arange(self.orders + 1)
-        inputs = [np.asarray(self.likelihood.rows(each)) for each in (read, 1j * order * read)]
-        locations = self.locations((), values, warm_start)
-        model, p = self.model(()), placed(self.values(values))
-        drifts = self.slopes(model, p, warm_start, self.free) * [float(p[name]) for name in self.free]
-        return with_background(
-            data,
-            self.channel,
-            locations,
-            inputs=np.stack(inputs, axis=1),
-            curves=self._curves(values, warm_start),
-            drifts=drifts,
-            recorded=self.times,
-            constants=self.constants,
+        about = self._about(self.complete(()), values, warm_start)
+        return background_about(data, about, self.free, self.times, self.constants)
+
+    def _about(
+        self, model: AbstractPlant, values: Mapping[str, float], warm_start: PeriodicSolution
+    ) -> Linearisation:
+        return Linearisation(
+            model, self.complete(()), self.likelihood, self.orders, self.values(values), warm_start
         )
 
     @property
     def times(self) -> NDArray[np.float64]:
         """When each test was recorded, in any unit of time, (d,)."""
         return np.array(self.recorded or range(self.shape[0]), np.float64)
-
-    def _curves(self, values: Mapping[str, float], warm_start: PeriodicSolution) -> NDArray[np.float64]:
-        """What independent relative errors of one of the dampers' curves do to the rows, (m, points)."""
-        model, p = self.complete(()), self.values(values)
-        seen = self.port_signals(values, warm_start)
-        fields = [
-            (port.name, piece)
-            for port in self.plant.ports
-            if port.damped_at is not None
-            for piece in errors_of_curve(
-                np.asarray(seen[port.name].velocity),
-                np.asarray(seen[port.name].load),
-                port.damped_at,
-                self.constants,
-            )
-        ]
-        return impose(model, self.likelihood, self.orders, p, warm_start, fields).T
 
     def port_signals(
         self, values: Mapping[str, float], warm_start: PeriodicSolution
@@ -397,11 +328,10 @@ def dwell_problem(
         constants=constants,
         recorded=() if measured.recorded is None else tuple(measured.recorded.tolist()),
     )
-    test = np.repeat(np.arange(tests), 2 * channels * kept)[likelihood.place]
     data = Data(
         np.asarray(likelihood.measured),
         np.asarray(likelihood.variance),
         np.asarray(likelihood.discrepancy_scale),
-        test,
+        likelihood.test,
     )
     return problem, data

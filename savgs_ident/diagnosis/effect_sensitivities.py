@@ -26,24 +26,21 @@ from savgs_ident.effects.base import (
     PortKind,
     PortSignals,
 )
-from savgs_ident.effects.composition import contact_bristle, nothing_imposed
+from savgs_ident.effects.composition import contact_bristle
 from savgs_ident.effects.effect import Effect
+from savgs_ident.inference.background.imposed import impose, node_loads
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.inference.observations import Term
-from savgs_ident.plants.base import AbstractPlant, AtPorts
+from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.simulate.along_motion import FORWARD, NEWTON_STEPS
 from savgs_ident.simulate.periodic import PeriodicSolution
-from savgs_ident.simulate.program_cache import placed, run_cached
-from savgs_ident.simulate.sensitivity import along_first, answers, ports_at_nodes
+from savgs_ident.simulate.program_cache import placed
 
 SAMPLES = 384
 """Instants of a period along which states are marched."""
 
 PERIODS = 16
 """Periods after which they repeat: what rang at the start has died away even in a slow, slightly damped frame."""
-
-BATCH = 32
-"""Signals that a program has room for: one for each number would have to be compiled."""
 
 
 def sensitivities_with_states(
@@ -131,51 +128,6 @@ def marched_contact(
     return _at_nodes(np.asarray(marched), solution)
 
 
-def impose(
-    model: AbstractPlant,
-    likelihood: Likelihood,
-    orders: int,
-    p: Values,
-    solution: PeriodicSolution,
-    signals: Sequence[tuple[str, NDArray[np.float64]]],
-) -> NDArray[np.float64]:
-    """Change of the rows by signals at the nodes, (P,) or (P, 2) each, imposed one at a time; (signals, m).
-
-    All in SI.
-    """
-    found = []
-    nodes = solution.mesh.layout.total
-    blank = nothing_imposed(model.ports, jnp.zeros(nodes))
-    for first in range(0, len(signals), BATCH):
-        some = signals[first : first + BATCH]
-        stacked = {name: np.zeros((BATCH, *part.shape)) for name, part in blank.items()}
-        for place, (port, values) in enumerate(some):
-            stacked[port][place] = values
-        imposed = placed({name: jnp.asarray(part) for name, part in stacked.items()})
-        wanted = placed(jnp.asarray(len(some)))
-        (rows,) = _answered(model, likelihood, placed(dict(p)), solution, imposed, wanted, orders)
-        found.append(np.asarray(rows)[: len(some)])
-    return np.concatenate([np.zeros((0, likelihood.measured.size)), *found])
-
-
-@eqx.filter_jit
-def _answered(*args: Any) -> tuple[Array, ...]:
-    return run_cached(_answer_rows, *args)
-
-
-def _answer_rows(
-    model: AbstractPlant,
-    likelihood: Likelihood,
-    p: Values,
-    solution: PeriodicSolution,
-    imposed: dict[str, Array],
-    wanted: Array,
-    orders: int,
-) -> tuple[Array]:
-    along = answers(model, p, solution, orders)
-    return (along_first(lambda one: likelihood.rows(along(one)), imposed, wanted),)
-
-
 def _evenly(
     model: AbstractPlant, p: Values, solution: PeriodicSolution
 ) -> tuple[dict[str, PortSignals | Load], NDArray[np.float64]]:
@@ -198,23 +150,6 @@ def _evenly(
     for name, load in carried.items():
         signals[name] = Load(even(load.total), even(load.rest))
     return signals, 1.0 / (SAMPLES * np.asarray(solution.excitation.frequency))
-
-
-def node_loads(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution
-) -> tuple[dict[str, PortSignals], dict[str, Load]]:
-    """What the forces at each port see at the nodes, and the loads in which something may give way; (P,) each."""
-    ports, carried, _ = _at_ports(model, placed(dict(p)), solution)
-    whole = {
-        name: Load(load.total, jnp.broadcast_to(load.rest, load.total.shape))
-        for name, load in carried.items()
-    }
-    return ports, whole
-
-
-@eqx.filter_jit
-def _at_ports(model: AbstractPlant, p: Values, solution: PeriodicSolution) -> AtPorts:
-    return ports_at_nodes(model, p, solution)
 
 
 def _marched(

@@ -20,51 +20,12 @@ from numpy.typing import NDArray
 from savgs_ident.diagnosis.held_out import HeldOut, predict_left_out
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Family
+from savgs_ident.inference.background.port_functions import InputLocation, Matrix
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.laplace import linearised_optimum, log_evidence
 from savgs_ident.inference.likelihood import NoiseScales
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import bounds_of
-
-Matrix = NDArray[np.float64]
-
-
-class Law(NamedTuple):
-    """A law at a location, linear in its coefficients.
-
-    Attributes:
-        columns: change of the rows per function of the law, the same in all tests [unit of the row], (m, q).
-        prior: its prior probability relative to the other laws of the location.
-        whole: whether it may be any sum of a set of functions; a few of them otherwise.
-        family: what kind of thing it is; None where it mixes several.
-        port: name of the port where it acts; empty where that has no learned law.
-    """
-
-    columns: Matrix
-    prior: float = 1.0
-    whole: bool = True
-    family: Family | None = None
-    port: str = ""
-
-
-@dataclass(frozen=True)
-class InputLocation:
-    """What an input at a location can do to the rows.
-
-    Attributes:
-        name: its name.
-        laws: that the input may follow, one of them.
-        free: change of the rows per component of a free input, in each test its own [unit of the row], (m, f).
-    """
-
-    name: str
-    laws: tuple[Law, ...]
-    free: Matrix
-
-    @property
-    def functions(self) -> Matrix:
-        """What all functions do of which its laws consist [unit of the row], (m, q)."""
-        return np.concatenate([law.columns for law in self.laws if law.whole], axis=1)
 
 
 @dataclass(frozen=True)

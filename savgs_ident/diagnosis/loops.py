@@ -15,13 +15,8 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.diagnosis.effect_sensitivities import (
-    marched_contact,
-    marched_effect,
-    node_loads,
-)
+from savgs_ident.diagnosis.effect_sensitivities import marched_contact, marched_effect
 from savgs_ident.diagnosis.localisation import Localisation
-from savgs_ident.diagnosis.location_hypotheses import force_port, free_signal, signal_port
 from savgs_ident.diagnosis.problem import DrawnLaw
 from savgs_ident.diagnosis.result import ForceLoop
 from savgs_ident.effects.base import (
@@ -33,6 +28,8 @@ from savgs_ident.effects.base import (
     PortKind,
 )
 from savgs_ident.effects.effect import Effect
+from savgs_ident.inference.background.imposed import node_loads
+from savgs_ident.inference.background.locations import force_port, free_signal, signal_port
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.sensitivity import ports_at_nodes

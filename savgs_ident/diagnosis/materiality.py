@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.diagnosis.background import relative_change
 from savgs_ident.diagnosis.evidence import DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.findings import Findings, hypothesis_of
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import Amplitudes
 from savgs_ident.diagnosis.verdict import Change, without_immaterial_members
+from savgs_ident.inference.background.shared_errors import relative_change
 from savgs_ident.inference.find_map import LaplaceFit, find_map
 
 

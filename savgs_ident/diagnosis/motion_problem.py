@@ -20,15 +20,8 @@ from numpy.typing import NDArray
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, cycle_position
-from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation
-from savgs_ident.diagnosis.location_hypotheses import force_port, ports_by_location
+from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.loops import root_sum_square
-from savgs_ident.diagnosis.port_functions import (
-    Functions,
-    laws_of_functions,
-    motion_functions,
-    prandtl_element,
-)
 from savgs_ident.diagnosis.problem import AbstractProblem, DrawnLaw, spans_of_force
 from savgs_ident.diagnosis.regimes import Cycles, find_regimes
 from savgs_ident.diagnosis.result import DriveForces, ForceLoop, NextTest, Regime
@@ -36,6 +29,15 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Family, Port, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned_functions import STRETCHES
+from savgs_ident.inference.background.locations import force_port, ports_by_location
+from savgs_ident.inference.background.port_functions import (
+    Functions,
+    InputLocation,
+    Law,
+    laws_of_functions,
+    motion_functions,
+    prandtl_element,
+)
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.plants.base import AbstractPlant, AtPorts

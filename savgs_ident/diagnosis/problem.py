@@ -26,12 +26,13 @@ from savgs_ident.core.parameter import Parameter, ParameterTable, merge_paramete
 from savgs_ident.core.transforms import known_to_tolerance
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.diagnosis.gap import CyclePosition, MapCell
-from savgs_ident.diagnosis.localisation import InputLocation, Localisation
+from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.result import DriveForces, ForceLoop, NextTest, Regime, Responses
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import AbstractFrictionLimitLaw, Port, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned_functions import SMALLEST
+from savgs_ident.inference.background.port_functions import InputLocation
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, NumberChange, Prediction, Term
 from savgs_ident.inference.prior import (

@@ -68,6 +68,19 @@ class Likelihood(eqx.Module):
         return -0.5 * jnp.sum((rows - self.measured) ** 2 / spread + jnp.log(spread / self.variance))
 
     @property
+    def test(self) -> NDArray[np.intp]:
+        """The test of each row, counted from 0, (m,)."""
+        return self._part(0)
+
+    @property
+    def channel(self) -> NDArray[np.intp]:
+        """The channel of each row, counted from 0, (m,)."""
+        return self._part(1)
+
+    def _part(self, axis: int) -> NDArray[np.intp]:
+        return np.unravel_index(self.place, self.axes.shape[:4])[axis]
+
+    @property
     def data(self) -> Data:
         """The measured rows, as of one test."""
         one_test = np.zeros(len(self.place), dtype=np.intp)

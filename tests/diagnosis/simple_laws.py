@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
-from savgs_ident.diagnosis.location_hypotheses import input_locations
 from savgs_ident.inference.observations import Data
 from savgs_ident.simulate.periodic import PeriodicSolution
 
@@ -22,7 +21,7 @@ def assert_a_law_of_one_function(
 
     ``start`` is the baseline's motion at ``values``.
     """
-    places = input_locations(plant, (), plant.values(values), start)
+    places = plant.locations((), values, start)
     (place,) = (each for each in places if each.name == port)
     (term,) = (each for each in plant.candidates if each.name == effect)
     (columns,) = plant.sensitivities((), values, start, [term])

@@ -9,17 +9,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from savgs_ident.core.presentation import no_progress
-from savgs_ident.diagnosis.background import (
+from savgs_ident.diagnosis.evidence import DiagnosisEvidence
+from savgs_ident.diagnosis.model_selection import compare_models, decide_among, recalibrate
+from savgs_ident.diagnosis.public import baseline_of, quarter_car_problem
+from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.inference.background.port_functions import InputLocation, Law
+from savgs_ident.inference.background.shared_errors import (
     errors_of_curve,
     pieces_of_curve,
     relative_change,
     with_background,
 )
-from savgs_ident.diagnosis.evidence import DiagnosisEvidence
-from savgs_ident.diagnosis.localisation import InputLocation, Law
-from savgs_ident.diagnosis.model_selection import compare_models, decide_among, recalibrate
-from savgs_ident.diagnosis.public import baseline_of, quarter_car_problem
-from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig

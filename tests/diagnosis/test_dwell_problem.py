@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
-from savgs_ident.diagnosis.effect_sensitivities import impose, marched_effect, node_loads
-from savgs_ident.diagnosis.location_hypotheses import free_signal, input_locations
-from savgs_ident.diagnosis.port_functions import mesh_points
+from savgs_ident.diagnosis.effect_sensitivities import marched_effect
+from savgs_ident.inference.background.imposed import impose, node_loads
+from savgs_ident.inference.background.locations import free_signal
+from savgs_ident.inference.background.port_functions import mesh_points
 from savgs_ident.inference.observations import MULTIPLES, Data, Term
 from savgs_ident.inference.prior import sheet_coordinate
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
@@ -148,7 +149,7 @@ def test_every_port_is_a_place_and_explains_what_acts_there(
     plant_and_data: Case, start: PeriodicSolution
 ) -> None:
     plant, data = plant_and_data
-    places = {each.name: each for each in input_locations(plant, (), plant.values({}), start)}
+    places = {each.name: each for each in plant.locations((), {}, start)}
     assert set(places) == {
         "rail", "strut", "suspension", "tyre_radial", "tyre_lateral", "link", "road", "frame", "inertia",
         "sensor.sprung_accel", "sensor.susp_deflection",

@@ -15,6 +15,7 @@ from savgs_ident.diagnosis import motion_problem as problems
 from savgs_ident.diagnosis import public
 from savgs_ident.diagnosis.motion_problem import motion_problem
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.inference import background
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.driven_motion import driven_motion
 from savgs_ident.responses.harmonic_response import HarmonicResponse
@@ -70,7 +71,8 @@ def test_constants_reach_the_diagnosis_of_every_plant(
     assert begun.value.args == (constants, constants)
 
 
-FILES = sorted(Path(str(diagnosis.__file__)).parent.glob("*.py"))
+ROOMS = (Path(str(each.__file__)).parent for each in (diagnosis, background))
+FILES = sorted(file for room in ROOMS for file in room.glob("*.py"))
 
 
 TREES = {file.name: ast.parse(file.read_text()) for file in FILES}

@@ -5,10 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from savgs_ident.diagnosis.localisation import InputLocation, Law, localise
-from savgs_ident.diagnosis.port_functions import laws_of_functions, sensor_filters
+from savgs_ident.diagnosis.localisation import localise
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.effects.base import Family
+from savgs_ident.inference.background.port_functions import (
+    InputLocation,
+    Law,
+    laws_of_functions,
+    sensor_filters,
+)
 from savgs_ident.inference.find_map import find_map, search_of
 
 from .toy import ToyPlant, draw

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.values import as_values
-from savgs_ident.diagnosis.dwell_problem import ITERATIONS, DwellProblem, rows_of
+from savgs_ident.diagnosis.dwell_problem import ITERATIONS, DwellProblem
 from savgs_ident.diagnosis.held_out import hold_out
 from savgs_ident.diagnosis.learning import LearnedLaw, learn
 from savgs_ident.effects.base import Family, Port
 from savgs_ident.effects.learned import learned_effect
 from savgs_ident.effects.learned_functions import coefficients_at
+from savgs_ident.inference.background.imposed import rows_of
 from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model

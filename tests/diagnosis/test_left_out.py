@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out, predict_left_out, select_in_folds
-from savgs_ident.diagnosis.localisation import InputLocation, Law, Localisation, anywhere, localise
+from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.inference.background.port_functions import InputLocation, Law
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
 
 from .toy import TERMS, ToyPlant, draw

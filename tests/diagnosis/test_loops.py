@@ -8,9 +8,10 @@ import pytest
 
 from savgs_ident.core.values import as_values
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
-from savgs_ident.diagnosis.effect_sensitivities import impose, marched_effect
+from savgs_ident.diagnosis.effect_sensitivities import marched_effect
 from savgs_ident.diagnosis.loops import effect_force
 from savgs_ident.effects.learned_functions import OF_A_CONTACT, coefficients_at, functions_at
+from savgs_ident.inference.background.imposed import impose
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, LEARNED
 from savgs_ident.plants.quarter_car.ports import RAIL

@@ -8,16 +8,16 @@ import pytest
 
 from savgs_ident.diagnosis import thresholds
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.inference.background import constants
 
 from ..in_one_test import over
 
 
 def _docstrings() -> dict[str, str]:
     """The string after each field."""
-    (record,) = (
-        each for each in ast.parse(inspect.getsource(thresholds)).body if isinstance(each, ast.ClassDef)
-    )
-    pairs = zip(record.body, record.body[1:], strict=False)
+    sources = (inspect.getsource(each) for each in (constants, thresholds))
+    records = [each for text in sources for each in ast.parse(text).body if isinstance(each, ast.ClassDef)]
+    pairs = [pair for each in records for pair in zip(each.body, each.body[1:], strict=False)]
     return {
         field.target.id: text.value.value
         for field, text in pairs

@@ -11,7 +11,6 @@ from savgs_ident.core.values import as_values
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
 from savgs_ident.diagnosis.learning import learn
 from savgs_ident.diagnosis.localisation import localise
-from savgs_ident.diagnosis.location_hypotheses import input_locations
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.diagnosis.verdict import most_probable
 from savgs_ident.effects.base import Family
@@ -117,8 +116,7 @@ def rubbing() -> Case:
 def _found_and_located(case: Case, location: str, alike: set[str]) -> None:
     problem, search, base = case
     assert base.status.ok
-    p = problem.values(base.values)
-    places = input_locations(problem, (), p, base.prediction.warm_start)
+    places = problem.locations((), base.values, base.prediction.warm_start)
     assert {each.name for each in places} == LOCATIONS
     found = localise(search, base, places)
     assert max(found, key=lambda each: each.evidence).name == location

@@ -6,14 +6,13 @@ so can that of the location beside it; so every set also has its simple laws, of
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.diagnosis.localisation import Law
-from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.effects.base import Family, Load, Port, PortSignals
 from savgs_ident.effects.laws.resonance import relative_response
 from savgs_ident.effects.learned_functions import (
@@ -27,9 +26,49 @@ from savgs_ident.effects.learned_functions import (
     values_of,
     what_gives,
 )
+from savgs_ident.inference.background.constants import BackgroundConstants
 from savgs_ident.simulate.periodic import PeriodicSolution
 
 Signal = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+class Law(NamedTuple):
+    """A law at a location, linear in its coefficients.
+
+    Attributes:
+        columns: change of the rows per function of the law, the same in all tests [unit of the row], (m, q).
+        prior: its prior probability relative to the other laws of the location.
+        whole: whether it may be any sum of a set of functions; a few of them otherwise.
+        family: what kind of thing it is; None where it mixes several.
+        port: name of the port where it acts; empty where that has no learned law.
+    """
+
+    columns: Matrix
+    prior: float = 1.0
+    whole: bool = True
+    family: Family | None = None
+    port: str = ""
+
+
+@dataclass(frozen=True)
+class InputLocation:
+    """What an input at a location can do to the rows.
+
+    Attributes:
+        name: its name.
+        laws: that the input may follow, one of them.
+        free: change of the rows per component of a free input, in each test its own [unit of the row], (m, f).
+    """
+
+    name: str
+    laws: tuple[Law, ...]
+    free: Matrix
+
+    @property
+    def functions(self) -> Matrix:
+        """What all functions do of which its laws consist [unit of the row], (m, q)."""
+        return np.concatenate([law.columns for law in self.laws if law.whole], axis=1)
 
 
 class MeshPoints(NamedTuple):
@@ -87,7 +126,7 @@ class Functions(NamedTuple):
 def laws_of_functions(
     columns: NDArray[np.float64],
     families: Sequence[Family],
-    constants: DecisionConstants,
+    constants: BackgroundConstants,
     plain: tuple[int, ...] = (),
     port: str = "",
 ) -> tuple[Law, ...]:
@@ -140,7 +179,7 @@ def damped_functions(beyond: Signal, nodes: MeshPoints, solution: PeriodicSoluti
     return Functions(values, (Family.COMPLIANCE,) * len(values), (0, 1))
 
 
-def resonance_functions(beyond: Signal, nodes: MeshPoints, constants: DecisionConstants) -> Functions:
+def resonance_functions(beyond: Signal, nodes: MeshPoints, constants: BackgroundConstants) -> Functions:
     """What gives under a load [the port's unit of force], (P,), and what slightly damped modes would make of it."""
     damping = constants.resonance_damping
     modes = [resonance(beyond, natural, damping, nodes) for natural in constants.resonances]
@@ -158,7 +197,7 @@ def input_shape(angle: Signal, nodes: MeshPoints) -> Functions:
     return Functions([*shapes, speed * np.cos(angle), speed * np.sin(angle)], families, (0, 1))
 
 
-def input_ripple(angle: Signal, constants: DecisionConstants) -> Functions:
+def input_ripple(angle: Signal, constants: BackgroundConstants) -> Functions:
     """Waves [1] on an input that are shorter than those of a wrong shape; ``angle`` [rad], (P,), is the test's."""
     waves = [wave(order * angle) for order in constants.ripple_orders for wave in (np.cos, np.sin)]
     return Functions(waves, (Family.SHAPE,) * len(waves))

@@ -23,15 +23,56 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.diagnosis.localisation import InputLocation
-from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.inference.background.constants import BACKGROUND, BackgroundConstants
+from savgs_ident.inference.background.imposed import node_loads
+from savgs_ident.inference.background.locations import Linearisation, input_locations
+from savgs_ident.inference.background.port_functions import InputLocation, Matrix
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import Scales
 
-Matrix = NDArray[np.float64]
-
 SINE = 400
 """Instants of half a sine at which power is summed up."""
+
+
+def background_about(
+    data: Data,
+    about: Linearisation,
+    free: Sequence[str],
+    recorded: NDArray[np.float64],
+    constants: BackgroundConstants = BACKGROUND,
+) -> Data:
+    """The data with errors at every location and input, of the dampers' curves, and drifts of what is ``free``.
+
+    ``recorded`` (t,) is when each test was recorded, in any unit of time.
+    """
+    read, order = about.read(), np.arange(about.orders + 1)
+    return with_background(
+        data,
+        about.likelihood.channel,
+        input_locations(about, constants),
+        inputs=np.stack([about.rows(each) for each in (read, 1j * order * read)], axis=1),
+        curves=_curves(about, constants),
+        drifts=about.slopes(free) * [float(about.p[name]) for name in free],
+        recorded=recorded,
+        constants=constants,
+    )
+
+
+def _curves(about: Linearisation, constants: BackgroundConstants) -> Matrix:
+    """What independent relative errors of one of the dampers' curves do to the rows, (m, points)."""
+    seen, _ = node_loads(about.model, about.p, about.solution)
+    fields = [
+        (port.name, piece)
+        for port in about.model.ports
+        if port.damped_at is not None
+        for piece in errors_of_curve(
+            np.asarray(seen[port.name].velocity),
+            np.asarray(seen[port.name].load),
+            port.damped_at,
+            constants,
+        )
+    ]
+    return about.imposed(fields)
 
 
 def with_background(
@@ -42,7 +83,7 @@ def with_background(
     curves: Matrix,
     drifts: Matrix,
     recorded: NDArray[np.float64],
-    constants: DecisionConstants = DEFAULTS,
+    constants: BackgroundConstants = BACKGROUND,
 ) -> Data:
     """The data with the errors that their rows share.
 
@@ -107,7 +148,7 @@ def errors_of_curve(
     velocity: NDArray[np.float64],
     force: NDArray[np.float64],
     reference: float,
-    constants: DecisionConstants = DEFAULTS,
+    constants: BackgroundConstants = BACKGROUND,
 ) -> list[NDArray[np.float64]]:
     """What independent relative errors of one of a damper's curve do to its ``force`` (P,) along a motion.
 
@@ -126,7 +167,10 @@ def errors_of_curve(
 
 
 def _energy_shares(
-    velocity: NDArray[np.float64], force: NDArray[np.float64], reference: float, constants: DecisionConstants
+    velocity: NDArray[np.float64],
+    force: NDArray[np.float64],
+    reference: float,
+    constants: BackgroundConstants,
 ) -> NDArray[np.float64]:
     """The share of each point of a curve in the energy of a sine of the velocity [1], (points,).
 
@@ -145,7 +189,7 @@ def _energy_shares(
 
 
 def pieces_of_curve(
-    velocity: NDArray[np.float64], force: NDArray[np.float64], constants: DecisionConstants = DEFAULTS
+    velocity: NDArray[np.float64], force: NDArray[np.float64], constants: BackgroundConstants = BACKGROUND
 ) -> list[NDArray[np.float64]]:
     """What each point of a damper's curve contributes to its ``force`` (P,) along a motion; they sum up to it.
 
@@ -156,7 +200,7 @@ def pieces_of_curve(
     return [np.interp(relative, points, unit) * force for unit in np.eye(points.size)]
 
 
-def _points(constants: DecisionConstants) -> NDArray[np.float64]:
+def _points(constants: BackgroundConstants) -> NDArray[np.float64]:
     """Of a damper's curve, as shares of the largest velocity, rising."""
     beside = constants.curve_points
     return np.array([*(-share for share in reversed(beside)), 0.0, *beside])

@@ -14,18 +14,21 @@ Each is a set of functions of its own (:mod:`.port_functions`), and an unknown s
 """
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.values import Values
-from savgs_ident.diagnosis.effect_sensitivities import impose, node_loads
-from savgs_ident.diagnosis.localisation import InputLocation, Law
-from savgs_ident.diagnosis.port_functions import (
+from savgs_ident.effects.base import Family, Load, Port, PortKind, PortSignals
+from savgs_ident.inference.background.constants import BackgroundConstants
+from savgs_ident.inference.background.imposed import impose, node_loads, slopes_in
+from savgs_ident.inference.background.port_functions import (
     GAIN_AND_RATE,
     Functions,
+    InputLocation,
+    Law,
     MeshPoints,
     Signal,
     damped_functions,
@@ -41,13 +44,10 @@ from savgs_ident.diagnosis.port_functions import (
     sensor_functions,
     series_functions,
 )
-from savgs_ident.effects.base import Family, Load, Port, PortKind, PortSignals
+from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.simulate.periodic import PeriodicSolution, harmonics
 from savgs_ident.simulate.program_cache import placed
-
-if TYPE_CHECKING:
-    from savgs_ident.diagnosis.dwell_problem import DwellProblem
 
 Fields = list[tuple[str, Signal]]
 """Ports at which something is imposed, and what, at the nodes."""
@@ -75,45 +75,73 @@ def force_port(plant: AbstractPlant | type[AbstractPlant], location: str) -> Por
     return next(ports, None)
 
 
-class _Seen(NamedTuple):
-    """What the hypotheses are made of: the motion of a model, and what its ports see along it."""
+class Linearisation(NamedTuple):
+    """A model about a periodic motion, and the rows that are read there.
 
-    problem: "DwellProblem"
+    Attributes:
+        model: the model that moves.
+        reading: the model whose sensors read.
+        likelihood: what is compared, as rows.
+        orders: highest order of the harmonics.
+        p: the parameters, SI.
+        solution: the motion.
+    """
+
     model: AbstractPlant
+    reading: AbstractPlant
+    likelihood: Likelihood
+    orders: int
     p: Values
     solution: PeriodicSolution
+
+    def read(self) -> NDArray[np.complex128]:
+        """Harmonics of the readings [unit of each], (D, C, K)."""
+        return np.array(harmonics(self.reading, self.p, self.solution, self.orders))
+
+    def rows(self, values: NDArray[np.complex128]) -> Signal:
+        """Harmonics (D, C, K) as rows [unit of the reading], (m,)."""
+        return np.asarray(self.likelihood.rows(jnp.asarray(values)))
+
+    def imposed(self, fields: Fields) -> Signal:
+        """Change of the rows by each of the fields, (m, fields)."""
+        return impose(self.model, self.likelihood, self.orders, self.p, self.solution, fields).T
+
+    def slopes(self, names: Sequence[str]) -> Signal:
+        """Slopes of the rows in the named parameters [units of the rows per SI unit], (m, n)."""
+        p = placed(dict(self.p))
+        return slopes_in(self.model, self.likelihood, self.orders, p, self.solution, names)
+
+
+class _Seen(NamedTuple):
+    """What the hypotheses are made of: a model about a motion, and what its ports see along it."""
+
+    about: Linearisation
     nodes: MeshPoints
     signals: dict[str, PortSignals]
     loads: dict[str, Load]
+    constants: BackgroundConstants
 
     @property
     def angle(self) -> Signal:
         """Angle of the tests at the nodes [rad], (P,): that of the first input's first order."""
-        first = np.asarray(self.solution.excitation.harmonics[self.problem.plant.inputs[0].name])[:, 1]
+        excitation, first_input = self.about.solution.excitation, self.about.model.inputs[0].name
+        first = np.asarray(excitation.harmonics[first_input])[:, 1]
         return np.asarray(self.nodes.phase + np.angle(first)[self.nodes.dwell])
-
-    def imposed(self, fields: Fields) -> Signal:
-        """Change of the rows by each of the fields, (m, fields)."""
-        likelihood, orders = self.problem.likelihood, self.problem.orders
-        return impose(self.model, likelihood, orders, self.p, self.solution, fields).T
 
     def fields(self, port: Port, values: Sequence[Signal]) -> Fields:
         """Signals at the nodes, (P,) each, to be imposed at a port: with their rates where it is no force."""
         if port.kind is PortKind.FORCE:
             return [(port.name, each) for each in values]
-        rates = (rate_of(each, self.nodes, self.solution) for each in values)
+        rates = (rate_of(each, self.nodes, self.about.solution) for each in values)
         return [(port.name, np.stack(pair, axis=1)) for pair in zip(values, rates, strict=True)]
 
 
-def input_locations(
-    problem: "DwellProblem", terms: tuple[str, ...], p: Values, solution: PeriodicSolution
-) -> list[InputLocation]:
-    """All locations about a motion with ``terms`` at the parameters ``p`` [SI]."""
-    model = problem.complete(terms)
-    signals, loads = node_loads(model, p, solution)
-    seen = _Seen(problem, model, p, solution, mesh_points(solution), signals, loads)
+def input_locations(about: Linearisation, constants: BackgroundConstants) -> list[InputLocation]:
+    """All locations of a plant about a motion."""
+    signals, loads = node_loads(about.model, about.p, about.solution)
+    seen = _Seen(about, mesh_points(about.solution), signals, loads, constants)
     locations, sensors = [], []
-    for name, ports in ports_by_location(problem.plant).items():
+    for name, ports in ports_by_location(about.model).items():
         kinds = {port.kind for port in ports}
         if PortKind.SENSOR in kinds:
             sensors.append(name)
@@ -127,18 +155,18 @@ def input_locations(
 def _signals(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
     """A location where something acts, gives way or is imposed."""
     sets = [(port, each) for port in ports for each in _functions(port, seen)]
-    port = signal_port(seen.problem.plant, name)
+    port = signal_port(seen.about.model, name)
     assert port is not None
     fields = [seen.fields(where, each.values) for where, each in sets]
-    free = seen.fields(port, _waves(seen.nodes, seen.problem.constants.free_orders))
-    columns = seen.imposed([*(each for some in fields for each in some), *free])
+    free = seen.fields(port, _waves(seen.nodes, seen.constants.free_orders))
+    columns = seen.about.imposed([*(each for some in fields for each in some), *free])
     laws: list[Law] = []
     start = 0
     for (where, each), some in zip(sets, fields, strict=True):
         laws += laws_of_functions(
             columns[:, start : start + len(some)],
             each.families,
-            seen.problem.constants,
+            seen.constants,
             each.plain,
             where.name,
         )
@@ -149,17 +177,17 @@ def _signals(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
 def _functions(port: Port, seen: _Seen) -> Iterator[Functions]:
     """The sets of functions that an unknown signal at a port may follow."""
     if port.kind is PortKind.FORCE:
-        yield force_functions(port, seen.signals[port.name], seen.solution)
+        yield force_functions(port, seen.signals[port.name], seen.about.solution)
     elif port.kind is PortKind.SERIES:
         beyond = np.asarray(seen.loads[port.name].beyond_rest)
         if port.resonant:
-            yield resonance_functions(beyond, seen.nodes, seen.problem.constants)
+            yield resonance_functions(beyond, seen.nodes, seen.constants)
         else:
             yield series_functions(seen.loads[port.name])
-            yield damped_functions(beyond, seen.nodes, seen.solution)
+            yield damped_functions(beyond, seen.nodes, seen.about.solution)
     elif port.kind is PortKind.INPUT:
         yield input_shape(seen.angle, seen.nodes)
-        yield input_ripple(seen.angle, seen.problem.constants)
+        yield input_ripple(seen.angle, seen.constants)
 
 
 def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
@@ -167,26 +195,24 @@ def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
 
     What hangs on a mass may swing: it pulls as modes make it of the mass's acceleration.
     """
-    constants = seen.problem.constants
+    constants = seen.constants
     inertias = [each for port in ports for each in port.inertias]
     if not inertias:
         numbers = [number for port in ports for number in port.numbers]
-        slopes = seen.problem.slopes(
-            seen.model, placed(dict(seen.p)), seen.solution, [number.name for number in numbers]
-        )
+        slopes = seen.about.slopes([number.name for number in numbers])
         columns = slopes * np.array([number.change for number in numbers])
         laws = laws_of_functions(columns, (Family.NUMBER,) * len(numbers), constants)
         return InputLocation(name, laws, columns)
     fields, swinging = [], []
     for each in inertias:
         velocity = sum(np.asarray(seen.signals[where].velocity) for where in each.velocity)
-        acceleration = rate_of(np.asarray(velocity), seen.nodes, seen.solution)
+        acceleration = rate_of(np.asarray(velocity), seen.nodes, seen.about.solution)
         fields.append((each.force, acceleration))
         swinging += [
             (each.force, resonance(acceleration, natural, constants.resonance_damping, seen.nodes))
             for natural in constants.resonances
         ]
-    columns = seen.imposed([*fields, *swinging])
+    columns = seen.about.imposed([*fields, *swinging])
     still, moving = columns[:, : len(fields)], columns[:, len(fields) :]
     laws = laws_of_functions(still, (Family.NUMBER,) * len(fields), constants)
     count = len(constants.resonances)
@@ -210,35 +236,33 @@ def _waves(nodes: MeshPoints, orders: int) -> list[Signal]:
 
 def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
     """Errors of a sensor: linear filters of its reading, or a law of reading and rate; and free harmonics of it."""
-    problem = seen.problem
-    read = np.array(harmonics(problem.complete(()), seen.p, seen.solution, problem.orders))
-    order = np.arange(problem.orders + 1)
-    omega = 2.0 * np.pi * np.asarray(seen.solution.excitation.frequency)[:, None] * order
+    about, constants = seen.about, seen.constants
+    channels = [each.name for each in about.model.channels]
+    read, order = about.read(), np.arange(about.orders + 1)
+    omega = 2.0 * np.pi * np.asarray(seen.about.solution.excitation.frequency)[:, None] * order
     locations = []
     for name in names:
-        c = problem.channels.index(name.removeprefix("sensor."))
+        c = channels.index(name.removeprefix("sensor."))
 
         def rows(values: NDArray[np.complex128], c: int = c) -> Signal:
             out = np.zeros_like(read)
             out[:, c] = values
-            return np.asarray(problem.likelihood.rows(jnp.asarray(out)))
+            return about.rows(out)
 
         mine = read[:, c]
         dynamic = np.stack([rows(mine * each) for each in sensor_filters(omega)], axis=1)
         static = np.stack([rows(each) for each in sensor_functions(mine, omega)], axis=1)
         unit = [
-            np.where(order == k, 1.0, 0.0) * turn for k in range(1, problem.orders + 1) for turn in (1.0, -1j)
+            np.where(order == k, 1.0, 0.0) * turn for k in range(1, about.orders + 1) for turn in (1.0, -1j)
         ]
         free = np.stack([rows(np.broadcast_to(each, mine.shape)) for each in unit], axis=1)
         port = next(
-            each.name
-            for each in problem.plant.ports
-            if each.location == name and each.kind is PortKind.SENSOR
+            each.name for each in about.model.ports if each.location == name and each.kind is PortKind.SENSOR
         )
         dynamics = (Family.GAIN, *(Family.DYNAMICS,) * (dynamic.shape[1] - 1))
         laws = (
-            *laws_of_functions(dynamic, dynamics, problem.constants, GAIN_AND_RATE, port),
-            *laws_of_functions(static, (Family.SHAPE,) * static.shape[1], problem.constants, (), port),
+            *laws_of_functions(dynamic, dynamics, constants, GAIN_AND_RATE, port),
+            *laws_of_functions(static, (Family.SHAPE,) * static.shape[1], constants, (), port),
         )
         locations.append(InputLocation(name, laws, free))
     return locations

@@ -1,0 +1,1 @@
+"""The background: small errors that every model has, in every hypothesis about it."""

@@ -1,0 +1,145 @@
+"""What a model reads along a periodic motion, and how that changes to first order.
+
+By parameters of the model (:func:`slopes_in`), and by signals that are imposed at its ports (:func:`impose`); along
+the motion the ports see what :func:`node_loads` gives.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+from numpy.typing import NDArray
+
+from savgs_ident.core.values import Values
+from savgs_ident.effects.base import Load, PortSignals
+from savgs_ident.effects.composition import nothing_imposed
+from savgs_ident.inference.likelihood import Likelihood
+from savgs_ident.plants.base import AbstractPlant, AtPorts
+from savgs_ident.simulate.periodic import PeriodicSolution, harmonics
+from savgs_ident.simulate.program_cache import placed, run_cached
+from savgs_ident.simulate.sensitivity import (
+    Directions,
+    along_first,
+    answers,
+    directional,
+    directions_of,
+    ports_at_nodes,
+    unit_tangents,
+)
+
+
+@eqx.filter_jit
+def rows_of(
+    model: AbstractPlant, likelihood: Likelihood, p: Values, solution: PeriodicSolution, orders: int
+) -> Array:
+    """Rows of a motion [unit of the reading], (m,)."""
+    return likelihood.rows(harmonics(model, p, solution, orders))
+
+
+@eqx.filter_jit
+def _slopes_of(*args: Any) -> tuple[Array, ...]:
+    """Their slopes along k directions of the parameters, (k, m) [unit of the reading]."""
+    return run_cached(_directional_rows, *args)
+
+
+def _directional_rows(
+    model: AbstractPlant,
+    likelihood: Likelihood,
+    p: Values,
+    solution: PeriodicSolution,
+    directions: Directions,
+    orders: int,
+) -> tuple[Array]:
+    return (directional(model, p, solution, orders, directions, likelihood.rows),)
+
+
+WIDTH = 52
+"""Directions that are solved for at a time: a program for each number would have to be compiled."""
+
+
+def slopes_in(
+    model: AbstractPlant,
+    likelihood: Likelihood,
+    orders: int,
+    p: Values,
+    solution: PeriodicSolution,
+    names: Sequence[str],
+) -> NDArray[np.float64]:
+    """Slopes of the rows in the named parameters of ``model`` [units of the rows per SI unit], (m, n)."""
+    parts = [np.zeros((0, likelihood.measured.size))]
+    for first in range(0, len(names), WIDTH):
+        some = names[first : first + WIDTH]
+        tangents = unit_tangents(p, some, WIDTH)
+        directions = directions_of(model, p, placed(tangents), len(some))
+        (slopes,) = _slopes_of(model, likelihood, p, solution, directions, orders)
+        parts.append(np.asarray(slopes)[: len(some)])
+    return np.concatenate(parts).T
+
+
+BATCH = 32
+"""Signals that a program has room for: one for each number would have to be compiled."""
+
+
+def impose(
+    model: AbstractPlant,
+    likelihood: Likelihood,
+    orders: int,
+    p: Values,
+    solution: PeriodicSolution,
+    signals: Sequence[tuple[str, NDArray[np.float64]]],
+) -> NDArray[np.float64]:
+    """Change of the rows by signals at the nodes, (P,) or (P, 2) each, imposed one at a time; (signals, m).
+
+    All in SI.
+    """
+    found = []
+    nodes = solution.mesh.layout.total
+    blank = nothing_imposed(model.ports, jnp.zeros(nodes))
+    for first in range(0, len(signals), BATCH):
+        some = signals[first : first + BATCH]
+        stacked = {name: np.zeros((BATCH, *part.shape)) for name, part in blank.items()}
+        for place, (port, values) in enumerate(some):
+            stacked[port][place] = values
+        imposed = placed({name: jnp.asarray(part) for name, part in stacked.items()})
+        wanted = placed(jnp.asarray(len(some)))
+        (rows,) = _answered(model, likelihood, placed(dict(p)), solution, imposed, wanted, orders)
+        found.append(np.asarray(rows)[: len(some)])
+    return np.concatenate([np.zeros((0, likelihood.measured.size)), *found])
+
+
+@eqx.filter_jit
+def _answered(*args: Any) -> tuple[Array, ...]:
+    return run_cached(_answer_rows, *args)
+
+
+def _answer_rows(
+    model: AbstractPlant,
+    likelihood: Likelihood,
+    p: Values,
+    solution: PeriodicSolution,
+    imposed: dict[str, Array],
+    wanted: Array,
+    orders: int,
+) -> tuple[Array]:
+    along = answers(model, p, solution, orders)
+    return (along_first(lambda one: likelihood.rows(along(one)), imposed, wanted),)
+
+
+def node_loads(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution
+) -> tuple[dict[str, PortSignals], dict[str, Load]]:
+    """What the forces at each port see at the nodes, and the loads in which something may give way; (P,) each."""
+    ports, carried, _ = _at_ports(model, placed(dict(p)), solution)
+    whole = {
+        name: Load(load.total, jnp.broadcast_to(load.rest, load.total.shape))
+        for name, load in carried.items()
+    }
+    return ports, whole
+
+
+@eqx.filter_jit
+def _at_ports(model: AbstractPlant, p: Values, solution: PeriodicSolution) -> AtPorts:
+    return ports_at_nodes(model, p, solution)
