@@ -213,7 +213,14 @@ def _result() -> dict[str, bytes]:
     record = {
         "schema": 1,
         "parameters": {
-            name: {"value": value, "stderr": stderr, "unit": unit, "free": name != "m_s", "prior_sd": 1.25}
+            name: {
+                "value": value,
+                "stderr": stderr,
+                "own_stderr": 0.9 * stderr,
+                "unit": unit,
+                "free": name != "m_s",
+                "prior_sd": 1.25,
+            }
             for name, (value, stderr, unit) in numbers.items()
         },
         "correlation": {"mu_r": {"m_s": 0.0}, "c_sd": {"m_s": 0.6}},

@@ -11,7 +11,8 @@ goes on where it was.
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
-from functools import partial
+from functools import partial, reduce
+from operator import add
 from pathlib import Path
 from typing import Any, cast
 
@@ -61,6 +62,7 @@ class FitRequest:
         rig: the rig file.
         channels: the map of the campaign's channels.
         model: "simtr" or "simqc".
+        beside: names of the effects that the model has besides.
         free: parameters to identify; the paper's if empty.
         settings: of the fit.
         max_frequency: leave out faster dwells [Hz].
@@ -71,6 +73,7 @@ class FitRequest:
     rig: Path
     channels: Path | None
     model: str
+    beside: tuple[str, ...]
     free: tuple[str, ...]
     settings: FitSettings
     max_frequency: float | None
@@ -78,7 +81,7 @@ class FitRequest:
 
     def model_of(self, rig: bytes) -> RigModel:
         """The model, with ``rig`` in the rig file; raises :class:`InputError` if that is none."""
-        return RigModel(parse_rig(rig, self.rig), MODELS[self.model])
+        return reduce(add, self.beside, RigModel(parse_rig(rig, self.rig), MODELS[self.model]))
 
 
 @dataclass(frozen=True)
@@ -134,6 +137,7 @@ def run_campaigns(
     *,
     rig: str | Path | None = None,
     model: str = "simtr",
+    beside: Sequence[str] = (),
     free: Sequence[str] = (),
     channels: str | Path | None = None,
     orders: int = 9,
@@ -152,6 +156,7 @@ def run_campaigns(
         out: folder in which each campaign's result is saved; a run that was stopped goes on from there.
         rig: rig file to start from; the shipped one if left out.
         model: "simtr", with rail and tyre friction, or "simqc", without.
+        beside: names of effects that the model has besides, as a diagnosis names them.
         free: names of the parameters to identify; the paper's if empty.
         channels: the map of the channels.
         orders: highest harmonic order to fit.
@@ -170,6 +175,7 @@ def run_campaigns(
         Path(rig) if rig is not None else default_rig_path(),
         None if channels is None else Path(channels),
         model,
+        tuple(beside),
         tuple(free),
         FitSettings(orders=orders, fixed_tolerances=fixed_tolerances),
         max_frequency,
@@ -281,6 +287,7 @@ def _settings(one: FitRequest, content: bytes) -> dict[str, Any]:
     model = one.model_of(content)
     return {
         "model": one.model,
+        "with": list(one.beside),
         "free": list(model.before.free(one.free)),
         "max_frequency_hz": one.max_frequency,
         "fit": asdict(one.settings),

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.campaigns.trends import Trend, common_share, follow
+from savgs_ident.campaigns.trends import Trend, follow
 from savgs_ident.core.presentation import Origin, Result
 
 _HOUR, _DAY = 3600.0, 86400.0
@@ -209,15 +209,9 @@ def study_campaigns(
 
 
 def _identified(name: str, record: Mapping[str, Any]) -> Identified:
-    entry, others = record["parameters"][name], record["parameters"]
-    stderr = np.inf if entry["stderr"] is None else float(entry["stderr"])
-    known = [each for each, other in others.items() if not other["free"] and other["prior_sd"]]
-    share = common_share(
-        [record["correlation"][name][each] or 0.0 for each in known],
-        [others[each]["stderr"] or 0.0 for each in known],
-        [others[each]["prior_sd"] for each in known],
-    )
-    return Identified(float(entry["value"]), stderr, float(np.sqrt(1.0 - share)) * stderr, str(entry["unit"]))
+    entry = record["parameters"][name]
+    stderr, own = (np.inf if entry[key] is None else float(entry[key]) for key in ("stderr", "own_stderr"))
+    return Identified(float(entry["value"]), stderr, own, str(entry["unit"]))
 
 
 def _followed(rows: Sequence[CampaignRow], place: NDArray[np.float64], name: str) -> Trend | None:

@@ -13,19 +13,10 @@ chance in less than 5 % of cases), something else differs from campaign to campa
 the scatter, by sqrt(chi2/dof), and since that is known from these few estimates only, intervals are Student's. The
 line is compared with the scatter about the line: the chi2 about the mean would count the trend itself as scatter.
 
-The errors s_k are those that differ from campaign to campaign. What all campaigns of a rig have in common moves all
-estimates alike: parameters known to a tolerance are estimated along under their priors, and what such a part really
-is differs from its drawing by the same amount in every campaign. To first order, with the covariance C of the
-estimates and the precision P of the priors (zero for identified parameters),
-
-    C = (C - C P C) + C P C
-
-where the first term comes from the noise of the recordings and the second from the priors. Campaigns are compared by
-the first alone. The second (:func:`common_share`) is in the error of the mean in full, however many campaigns there
-are, and in no slope and no scatter.
-
->>> round(common_share([0.6, 0.0], [0.5, 2.0], [1.0, 2.0]), 3)
-0.09
+The errors s_k are those that differ from campaign to campaign: noise and drift. What all campaigns of a rig have in
+common, what its sheet gives wrong and the small errors of its model, moves all estimates alike. Campaigns are
+compared by the first alone (``own_stderr`` of a fit's estimates). The second is in the error of the mean in full,
+however many campaigns there are, and in no slope and no scatter.
 """
 
 from dataclasses import dataclass
@@ -204,17 +195,3 @@ def _scatter(deviations: NDArray[np.float64], adjusted: int) -> Scatter:
     dof = max(deviations.size - adjusted, 0)
     total = float(np.sum(deviations**2))
     return Scatter(total, dof, float(chi2_distribution.sf(total, dof)) if dof else 1.0)
-
-
-_MOST = 1.0 - 1e-9
-"""Largest share: noise is never nothing, and what is left of it is divided by."""
-
-
-def common_share(correlation: ArrayLike, stderr: ArrayLike, prior_sd: ArrayLike) -> float:
-    """The share of an estimate's variance that all campaigns have in common, 0 to 1.
-
-    ``correlation`` (n,) is that of the estimate with the n parameters that are known to a tolerance, ``stderr`` their
-    standard errors after the fit and ``prior_sd`` those before, in the same units.
-    """
-    known, after, before = (np.asarray(each, dtype=np.float64) for each in (correlation, stderr, prior_sd))
-    return float(np.clip(np.sum((known * after / before) ** 2), 0.0, _MOST))

@@ -19,6 +19,7 @@ from savgs_ident.cli.options import (
     QuietOption,
     RigOption,
     SchedulerOption,
+    WithOption,
     command_line,
 )
 
@@ -39,6 +40,7 @@ def campaign(
     scheduler: SchedulerOption = None,
     rig: RigOption = None,
     model: ModelOption = ModelName.simtr,
+    beside: WithOption = None,
     free: FreeOption = None,
     channels: ChannelsOption = None,
     workers: Annotated[
@@ -83,6 +85,7 @@ def campaign(
             out,
             rig=rig,
             model=model.value,
+            beside=beside or (),
             free=free or (),
             channels=channels,
             orders=orders,

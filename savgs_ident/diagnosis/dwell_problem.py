@@ -215,7 +215,8 @@ class DwellProblem(AbstractProblem):
     def with_background(self, data: Data, values: Mapping[str, float], warm_start: PeriodicSolution) -> Data:
         """The data with errors at every location and input, of the dampers' curves, and drifts of what is free."""
         about = self._about(self.complete(()), values, warm_start)
-        return background_about(data, about, self.free, self.times, self.constants)
+        drifts = about.slopes(self.free) * [float(about.p[name]) for name in self.free]
+        return background_about(data, about, drifts, self.times, self.constants)
 
     def _about(
         self, model: AbstractPlant, values: Mapping[str, float], warm_start: PeriodicSolution
@@ -326,12 +327,6 @@ def dwell_problem(
         settings=settings or PeriodicSettings(),
         models=tuple(models),
         constants=constants,
-        recorded=() if measured.recorded is None else tuple(measured.recorded.tolist()),
+        recorded=tuple(measured.times.tolist()),
     )
-    data = Data(
-        np.asarray(likelihood.measured),
-        np.asarray(likelihood.variance),
-        np.asarray(likelihood.discrepancy_scale),
-        likelihood.test,
-    )
-    return problem, data
+    return problem, likelihood.data

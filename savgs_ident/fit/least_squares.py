@@ -5,7 +5,8 @@
 
 The free parameters are asked for; those known to a tolerance are estimated along. All have the transform and the
 prior of :mod:`savgs_ident.core.transforms`, of which only a tolerance is felt. Each start is solved cold and
-minimised on its own time nodes; the best is minimised once more on nodes adapted to it.
+minimised on its own time nodes; the best is minimised once more on nodes adapted to it. From there the fit goes on
+with the small errors that every model has (:mod:`savgs_ident.fit.small_errors`).
 """
 
 import time
@@ -19,11 +20,18 @@ from jaxtyping import Array
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import as_values
-from savgs_ident.fit.identifiability import EXPLAINED, assess, weighed_by_misfit
+from savgs_ident.fit.identifiability import (
+    EXPLAINED,
+    assess,
+    explained_by_noise,
+    misses_little,
+    weighed_by_misfit,
+)
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import Estimate, Fit, Verdict
+from savgs_ident.fit.small_errors import FitWithErrors, fit_with_errors, own_part
 from savgs_ident.inference.laplace import spread_of
-from savgs_ident.inference.problem import ProblemSettings, Quantity, Task, plan_task
+from savgs_ident.inference.problem import Problem, ProblemSettings, Quantity, Task, plan_task
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import PeriodicSettings, adapt, harmonics, simulate_periodic
@@ -59,12 +67,15 @@ class FitSettings:
 class Outcome(NamedTuple):
     """Where a fit ended: the response ``as_given`` before it, every start, the best, what it identifies.
 
-    ``as_given`` are complex harmonics [unit of the reading], (D, C, orders + 1).
+    ``as_given`` are complex harmonics [unit of the reading], (D, C, orders + 1); ``covariance`` (n, n) is that of the
+    unconstrained coordinates [1], ``own`` the part of it that another campaign of the rig does not share.
     """
 
     as_given: np.ndarray
     tried: tuple[Minimum, ...]
     best: Minimum
+    covariance: np.ndarray
+    own: np.ndarray
     verdict: Verdict
     wall_s: float
 
@@ -72,7 +83,7 @@ class Outcome(NamedTuple):
 def assemble_fit(task: Task, outcome: Outcome, origin: Origin) -> Fit:
     """The whole, frozen result."""
     problem, best = task.problem, outcome.best
-    estimates, covariance = _estimates(task, best)
+    estimates, covariance = _estimates(task, outcome)
     rows = best.residual.size - len(problem.free.names)
     p = problem.parameters(best.u)
     values = {each.name: each.value for each in estimates}
@@ -101,22 +112,35 @@ def assemble_fit(task: Task, outcome: Outcome, origin: Origin) -> Fit:
     )
 
 
-def _estimates(task: Task, best: Minimum) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    problem = task.problem
+def _estimates(task: Task, outcome: Outcome) -> tuple[tuple[Estimate, ...], np.ndarray]:
+    problem, best = task.problem, outcome.best
     values = problem.parameters(best.u)
     slope = np.asarray(problem.slopes(best.u))
-    spread = spread_of(weighed_by_misfit(problem, best))
-    covariance = spread.covariance * np.outer(slope, slope)
+    sd, own = (np.sqrt(np.diag(each)) for each in (outcome.covariance, outcome.own))
     widths, estimates = problem.free.widths, []
     for place, name in enumerate(problem.free.names):
-        known = spread.sd[place] < INFORMED * widths[place] or name in problem.free.tolerated
-        stderr = float(np.sqrt(covariance[place, place])) if known else np.inf
-        free = name in problem.free.identified
-        known = task.table[name]
+        known = sd[place] < INFORMED * widths[place] or name in problem.free.tolerated
+        unit = abs(slope[place]) if known else np.inf
+        before = task.table[name]
         estimates.append(
-            Estimate(name, float(values[name]), stderr, known.unit, free, known.value, known.tolerance)
+            Estimate(
+                name=name,
+                value=float(values[name]),
+                stderr=float(unit * sd[place]),
+                own_stderr=float(unit * own[place]),
+                unit=before.unit,
+                free=name in problem.free.identified,
+                prior=before.value,
+                prior_sd=before.tolerance,
+            )
         )
-    return tuple(estimates), covariance
+    return tuple(estimates), outcome.covariance * np.outer(slope, slope)
+
+
+def _prior_sd(problem: Problem) -> np.ndarray:
+    """Standard deviations of the coordinates (n,) before the data [1]; infinite of what is identified."""
+    known = np.isin(problem.free.names, problem.free.tolerated)
+    return np.where(known, np.asarray(problem.free.widths), np.inf)
 
 
 def _frictionless(task: Task, best: Minimum) -> tuple[np.ndarray, tuple[Status, ...]]:
@@ -180,9 +204,18 @@ def fit_least_squares(
     best = min(tried, key=lambda each: (not each.evaluation.ok, np.nan_to_num(each.cost, nan=np.inf)))
     report("refining on nodes adapted to the result")
     best = _refined(task, minimiser, best, settings.steps, report)
-    verdict = assess(task, minimiser, best, report)
-    outcome = Outcome(as_given, tuple(tried), best, verdict, time.perf_counter() - began)
-    return assemble_fit(task, outcome, origin)
+    with_errors = fit_with_errors(task, minimiser, best, report)
+    if isinstance(with_errors, FitWithErrors):
+        best, information, own = with_errors.best, with_errors.information, with_errors.own
+        covariance, explained = with_errors.covariance, True
+    else:
+        information = weighed_by_misfit(problem, best)
+        covariance = spread_of(information).covariance
+        own = own_part(covariance, _prior_sd(problem))
+        explained = explained_by_noise(problem, best) or (with_errors is None and misses_little(task, best))
+    verdict = assess(task, minimiser, best._replace(jacobian=information), explained, report)
+    wall_s = time.perf_counter() - began
+    return assemble_fit(task, Outcome(as_given, tuple(tried), best, covariance, own, verdict, wall_s), origin)
 
 
 def _silent(line: str) -> None:

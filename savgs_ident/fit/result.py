@@ -29,14 +29,16 @@ PACKAGES = ("jax", "optimistix", "numpy", "scipy")
 class Estimate:
     """One estimated parameter in SI.
 
-    ``stderr`` is its standard error, which contains what the model leaves unexplained; ``free`` distinguishes an
-    identified parameter from one that was known to a tolerance and estimated along. For the latter ``prior`` and
-    ``prior_sd`` say what was known before.
+    ``stderr`` is its standard error, which contains what the model leaves unexplained; ``own_stderr`` is the part of
+    it that another campaign of the same rig does not share: noise and drift. ``free`` distinguishes an identified
+    parameter from one that was known to a tolerance and estimated along. For the latter ``prior`` and ``prior_sd``
+    say what was known before.
     """
 
     name: str
     value: float
     stderr: float
+    own_stderr: float
     unit: str
     free: bool
     prior: float

@@ -22,9 +22,10 @@ from savgs_ident.fit.identifiability import (
 )
 from savgs_ident.fit.minimise import Minimiser
 from savgs_ident.fit.result import Fit
+from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.inference.posterior_mode import PosteriorMode
 from savgs_ident.inference.problem import Task
-from savgs_ident.inference.result import MATERIAL_MISFIT, Marginal, Posterior, Sampler
+from savgs_ident.inference.result import Marginal, Posterior, Sampler
 from savgs_ident.inference.sample import Question, sample_posterior
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.plants.model import Model
@@ -186,12 +187,15 @@ def _tied(
 def _discrepancy(marginals: Sequence[Marginal]) -> list[str]:
     scale = next(each for each in marginals if each.name == "discrepancy")
     noise = next(each for each in marginals if each.name == "noise_scale")
-    if not scale.q025 > MATERIAL_MISFIT:
-        miss = f"The model misses by less than {100.0 * scale.q975:.2g} % of the response beyond the noise (95 %)."
+    if not scale.q025 > BACKGROUND.largest_error:
+        miss = (
+            f"The model errs by less than {100.0 * scale.q975:.2g} % of the response at each of its ports (95 %); "
+            "the intervals allow for that, for tolerances of damper curves and for drifts during the campaign."
+        )
     else:
         miss = (
-            f"The model misses by {100.0 * scale.median:.2g} % of the response, more than the noise: something is "
-            "missing in it. The intervals allow for that as for independent errors."
+            f"To explain the data the model would have to err by {100.0 * scale.median:.2g} % of the response at "
+            "each of its ports: something is missing in it."
         )
     return [miss, f"The noise is {noise.median:.3g} times what does not repeat from period to period."]
 

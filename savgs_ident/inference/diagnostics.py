@@ -227,7 +227,7 @@ def profile_of(surrogate: Surrogate, name: str) -> ProfileLine:
 
 _ABOUT = {
     "noise_scale": "factor on the measured noise",
-    "discrepancy": "relative rms by which the model misses, beyond the noise",
+    "discrepancy": "size of the small errors of the model at each of its ports, relative to the response",
 }
 
 _STEP = 1e-5

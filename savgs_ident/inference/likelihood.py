@@ -7,13 +7,13 @@ A harmonic X_k (Re, Im) of a channel in a dwell is taken as normal about the mod
 where C_k is its measured noise covariance, s the noise scale and d the model discrepancy: the relative rms
 error of the model's first harmonic. Higher orders err less, with a power m that the plant declares for each channel:
 m = 1 for an acceleration, which follows a force that jumps, and m = 2 for a deflection, which lies between following
-it and being moved by it. Errors of different orders, channels and dwells count as independent: a discrepancy that
-many dwells share is not covered by the intervals, it is what a diagnosis looks for. With d = 0 the intervals are
-those of the noise alone, which for a model that misses by more than the noise are absurdly narrow.
+it and being moved by it.
 
 In the principal axes of C_k every real part is a row of its own, independent of all others: row i is normal about the
 model with variance s^2 v_i + (d a_i)^2, where v_i is its noise and a_i what a relative discrepancy of one would do to
-it.
+it. Errors that many rows share, the background of small errors of :mod:`savgs_ident.inference.background`, are no
+diagonal in these axes. In those of noise and background together (:func:`sharing_errors`) rows are independent again,
+and all that is said of rows holds for them.
 
 Both scales are estimated, under the priors of :class:`savgs_ident.inference.prior.Scales`: in :class:`Likelihood` as
 coordinates of a point that a sampler moves, in :func:`noise_scales` at their best values for given residuals. A model
@@ -42,7 +42,8 @@ class Likelihood(eqx.Module):
     ``axes`` (D, C, K, 2, 2) turns (Re, Im) of every harmonic into its principal axes, ``place`` (m,) picks
     the rows that are compared; ``measured`` (m,) is what they are, ``variance`` (m,) their noise,
     ``discrepancy_scale`` (m,) their a_k. ``scales`` says what a point's last two coordinates mean. Rows are in the
-    unit of their reading, ``variance`` in its square, ``axes`` and ``place`` without dimension.
+    unit of their reading, ``variance`` in its square, ``axes`` and ``place`` without dimension. Where they share
+    errors, ``turning`` (m, m) makes rows without unit of them that do not.
     """
 
     axes: Float[Array, "D C K 2 2"]
@@ -51,11 +52,19 @@ class Likelihood(eqx.Module):
     variance: Float[Array, " m"]
     discrepancy_scale: Float[Array, " m"]
     scales: Scales
+    turning: Float[Array, "m m"] | None = None
 
     def rows(self, harmonics: Complex[Array, "D C K"]) -> Float[Array, " m"]:
-        """Predicted harmonics as rows [units of the channels], (m,)."""
+        """Predicted harmonics as rows [units of the channels, or 1 where they are turned], (m,)."""
         parts = jnp.stack([harmonics.real, harmonics.imag], axis=-1)
-        return jnp.einsum("dckij,dckj->dcki", self.axes, parts).ravel()[self.place]
+        rows = jnp.einsum("dckij,dckj->dcki", self.axes, parts).ravel()[self.place]
+        return rows if self.turning is None else self.turning @ rows
+
+    def rows_of_one(self, harmonics: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """The same of harmonics (D, C, K) outside any program: to dispatch one would take longer."""
+        parts = np.stack([harmonics.real, harmonics.imag], axis=-1)
+        rows = np.einsum("dckij,dckj->dcki", np.asarray(self.axes), parts).ravel()[self.place]
+        return rows if self.turning is None else np.asarray(self.turning) @ rows
 
     def spread(self, point: Float[Array, " n+2"]) -> Float[Array, " m"]:
         """Variance of the rows [unit^2] about the model's, noise and discrepancy together."""
@@ -69,12 +78,12 @@ class Likelihood(eqx.Module):
 
     @property
     def test(self) -> NDArray[np.intp]:
-        """The test of each row, counted from 0, (m,)."""
+        """The test of each row that is not turned, counted from 0, (m,)."""
         return self._part(0)
 
     @property
     def channel(self) -> NDArray[np.intp]:
-        """The channel of each row, counted from 0, (m,)."""
+        """The channel of each row that is not turned, counted from 0, (m,)."""
         return self._part(1)
 
     def _part(self, axis: int) -> NDArray[np.intp]:
@@ -82,19 +91,19 @@ class Likelihood(eqx.Module):
 
     @property
     def data(self) -> Data:
-        """The measured rows, as of one test."""
-        one_test = np.zeros(len(self.place), dtype=np.intp)
+        """The measured rows; those that are turned are of all tests and count as of one."""
+        tests = self.test if self.turning is None else np.zeros(len(self.place), dtype=np.intp)
         measured, variance, discrepancy_scale = (
             np.asarray(each) for each in (self.measured, self.variance, self.discrepancy_scale)
         )
-        return Data(measured, variance, discrepancy_scale, one_test, self.scales)
+        return Data(measured, variance, discrepancy_scale, tests, self.scales)
 
     def harmonics(
         self, rows: Float[np.ndarray, "S m"], shape: tuple[int, ...]
     ) -> Complex[np.ndarray, "S D C K"]:
         """Rows [unit of the reading] as complex harmonics ``(S, *shape)``; zero where nothing is compared."""
         parts = np.zeros((rows.shape[0], 2 * int(np.prod(shape))))
-        parts[:, self.place] = rows
+        parts[:, self.place] = rows if self.turning is None else np.linalg.solve(self.turning, rows.T).T
         turned = np.einsum("dckij,sdcki->sdckj", np.asarray(self.axes), parts.reshape(-1, *shape, 2))
         return np.asarray(turned[..., 0] + 1j * turned[..., 1])
 
@@ -121,6 +130,20 @@ def likelihood_of(target: HarmonicTarget, scales: Scales | None = None) -> Likel
         variance=jnp.asarray(variance),
         discrepancy_scale=jnp.asarray(discrepancy_scale),
         scales=scales or Scales(),
+    )
+
+
+def sharing_errors(likelihood: Likelihood, data: Data) -> Likelihood:
+    """The likelihood of the same harmonics where their rows share the errors that ``data`` says, of the same rows."""
+    alone = data.independent
+    return Likelihood(
+        axes=likelihood.axes,
+        place=likelihood.place,
+        measured=jnp.asarray(alone.measured),
+        variance=jnp.asarray(alone.variance),
+        discrepancy_scale=jnp.asarray(alone.discrepancy_scale),
+        scales=data.scales,
+        turning=jnp.asarray(data.turned(np.eye(alone.measured.size))),
     )
 
 

@@ -19,9 +19,11 @@ from numpy.typing import NDArray
 from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status, joint_status
+from savgs_ident.inference.background.locations import Linearisation
+from savgs_ident.inference.background.shared_errors import background_about
 from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
 from savgs_ident.inference.laplace import principal_axes
-from savgs_ident.inference.likelihood import Likelihood
+from savgs_ident.inference.likelihood import Likelihood, sharing_errors
 from savgs_ident.inference.near_mode import (
     Anchor,
     ExactModel,
@@ -33,7 +35,7 @@ from savgs_ident.inference.near_mode import (
     rows_and_slopes,
     triangular_map_of,
 )
-from savgs_ident.inference.observations import Prediction, Term
+from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.inference.prior import Coordinates, Prior, sheet_coordinate
 from savgs_ident.inference.problem import Problem
 from savgs_ident.simulate.periodic import PeriodicSolution, adapt
@@ -177,13 +179,48 @@ def find_mode(
     Its nodes are adapted there.
     """
     search = search_of(PosteriorPlant(posterior), posterior.likelihood.data)
-    values = posterior.problem.parameters(u)
-    start = {name: float(values[name]) for name in posterior.problem.free.names}
+    start = _values_at(posterior, u)
     found = find_map(search, (), start, warm_start, level=LEVEL, progress=report)
     if found.status.ok:
         finer = search.plant.refined((), found.values, found.prediction.warm_start)
         found = find_map(search, (), found.values, finer, level=LEVEL, progress=report)
     return PosteriorMode(_linearisation_point(posterior, found), found.status, found.solved)
+
+
+def with_background(
+    posterior: PosteriorDensity,
+    at: LinearisationPoint,
+    recorded: NDArray[np.float64],
+    drifting: Sequence[str],
+) -> tuple[PosteriorDensity, Data]:
+    """The density whose rows share the small errors that any model has about a point, and the data that say which.
+
+    ``recorded`` (D,) is when each dwell was recorded, in any unit of time; ``drifting`` are free parameters that may
+    change in the meantime.
+    """
+    problem, likelihood, u = posterior.problem, posterior.likelihood, jnp.asarray(at.point[:-2])
+    p = problem.parameters(u)
+    about = Linearisation(problem.model, problem.model, likelihood, problem.orders, p, at.solution)
+    columns = [problem.free.names.index(name) for name in drifting]
+    per_unit = (at.slopes / np.asarray(problem.slopes(u)))[:, columns]
+    data = background_about(
+        likelihood.data, about, per_unit * [float(p[name]) for name in drifting], recorded
+    )
+    return posterior._replace(likelihood=sharing_errors(likelihood, data)), data
+
+
+def find_mode_again(posterior: PosteriorDensity, known: PosteriorMode, report: Progress) -> PosteriorMode:
+    """The mode from that of another density of the same model, on its nodes."""
+    at = known.linearisation_point
+    search = search_of(PosteriorPlant(posterior), posterior.likelihood.data)
+    start = _values_at(posterior, jnp.asarray(at.point[:-2]))
+    found = find_map(search, (), start, at.solution, level=LEVEL, progress=report)
+    return PosteriorMode(_linearisation_point(posterior, found), found.status, found.solved)
+
+
+def _values_at(posterior: PosteriorDensity, u: Float[Array, " n"]) -> dict[str, float]:
+    values = posterior.problem.parameters(u)
+    return {name: float(values[name]) for name in posterior.problem.free.names}
 
 
 def _linearisation_point(posterior: PosteriorDensity, found: LaplaceFit) -> LinearisationPoint:
@@ -193,6 +230,15 @@ def _linearisation_point(posterior: PosteriorDensity, found: LaplaceFit) -> Line
     rows = found.prediction.rows
     value = posterior.density(rows, point) if found.solved else -np.inf
     return LinearisationPoint(point, rows, found.slopes / widths, found.prediction.warm_start, value)
+
+
+def linearisation_point(
+    posterior: PosteriorDensity, u: Float[Array, " n"], warm_start: PeriodicSolution
+) -> LinearisationPoint:
+    """The model at free coordinates ``u`` (n,), on the nodes of ``warm_start``; noise as measured, no discrepancy."""
+    rows, slopes, solution = rows_and_slopes(posterior.problem, posterior.likelihood, u, warm_start)
+    point = np.append(np.asarray(u), [0.0, 0.0])
+    return LinearisationPoint(point, rows, slopes, solution, posterior.density(rows, point))
 
 
 def linear_surrogate(posterior: PosteriorDensity, at: LinearisationPoint) -> Surrogate:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import scratch_folder, write_bytes
 from savgs_ident.core.presentation import Result
+from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 
@@ -140,13 +141,6 @@ class Predictive:
 UNEXPLAINED = "the model does not explain the data"
 """Why a fit or a posterior is not to be trusted."""
 
-MATERIAL_MISFIT = 0.005
-"""Share of the response, beyond the noise, by which a model may miss and still be the right one [1].
-
-Origin: by choice. Small errors that every model has add up to so much: 0.2 % at each of the ports of a plant, a
-damper's table that is 2 % off point by point. Halved or doubled: not measured.
-"""
-
 
 @dataclass(frozen=True)
 class Posterior(Result):
@@ -199,8 +193,8 @@ class Posterior(Result):
 
     @property
     def explained(self) -> bool:
-        """Whether the model may miss by no more than small errors of any model, to 97.5 %."""
-        return not self["discrepancy"].q025 > MATERIAL_MISFIT
+        """Whether the model may have no more than small errors of any model, to 97.5 %."""
+        return not self["discrepancy"].q025 > BACKGROUND.largest_error
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -209,8 +203,9 @@ class Posterior(Result):
             return self.convergence.reasons
         missed = 100.0 * self["discrepancy"].median
         what = (
-            f"{UNEXPLAINED}: it misses by {missed:.2g} % of the response beyond the noise; look for what is missing "
-            "with `diagnose`, until then the parameters make up for it by more than their intervals say"
+            f"{UNEXPLAINED}: for that it would have to err by {missed:.2g} % of the response at each of its ports; "
+            "look for what is missing with `diagnose`, until then the parameters make up for it by more than their "
+            "intervals say"
         )
         return (what, *self.convergence.reasons)
 

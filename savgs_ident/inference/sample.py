@@ -3,8 +3,9 @@
     posterior = sample_posterior(Question(measured, model, values, free), SamplingSettings("nuts"))
     posterior.by_name["mu_r"].q025, posterior.convergence.converged
 
-The mode is found, the surrogate expanded about it, a sampler draws until the draws suffice or time is up, and the
-draws are summed up: marginals, convergence, and what they predict for a repetition of the campaign.
+The mode is found, with the background of small errors that every model has; the surrogate is expanded about it, a
+sampler draws until the draws suffice or time is up, and the draws are summed up: marginals, convergence, and what
+they predict for a repetition of the campaign.
 """
 
 import time
@@ -35,7 +36,15 @@ from savgs_ident.inference.diagnostics import (
 )
 from savgs_ident.inference.likelihood import likelihood_of, values_of
 from savgs_ident.inference.near_mode import ExactModel, Surrogate
-from savgs_ident.inference.posterior_mode import Expansion, PosteriorDensity, PosteriorMode, expand, find_mode
+from savgs_ident.inference.posterior_mode import (
+    Expansion,
+    PosteriorDensity,
+    PosteriorMode,
+    expand,
+    find_mode,
+    find_mode_again,
+    with_background,
+)
 from savgs_ident.inference.prior import Prior
 from savgs_ident.inference.problem import ProblemSettings, Task, harmonic_target, plan_task
 from savgs_ident.inference.result import Marginal, Posterior, Predictive, Sampler
@@ -154,6 +163,10 @@ def sample_posterior(
     posterior = density_of(task)
     checkpoint = _checkpoint(question, settings, chain, resume)
     mode = locate(posterior, task, question, report)
+    report("looking for the mode with a background of small errors")
+    at, drifting = mode.linearisation_point, task.problem.free.identified
+    posterior, _ = with_background(posterior, at, question.measured.times, drifting)
+    mode = find_mode_again(posterior, mode, report)
     expansion = expand(posterior, mode.linearisation_point, report)
     chains = _run(expansion, settings, checkpoint, began, report)
     wall_s = time.perf_counter() - began

@@ -41,6 +41,7 @@ def fit_record(fit: Fit) -> dict[str, object]:
             each.name: {
                 "value": each.value,
                 "stderr": each.stderr,
+                "own_stderr": each.own_stderr,
                 "unit": each.unit,
                 "free": each.free,
                 "prior": each.prior,

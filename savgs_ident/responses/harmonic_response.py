@@ -69,6 +69,11 @@ class HarmonicResponse:
         """The highest order held, n."""
         return int(self.harmonics.shape[2]) - 1
 
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """When each dwell was recorded, in any unit of time; their order where that is not known, (D,)."""
+        return np.arange(float(len(self.tests))) if self.recorded is None else self.recorded
+
     def channel(self, name: str) -> int:
         """The index of a channel on the second axis; raises ``ValueError`` if it is absent."""
         return self.channels.index(name)

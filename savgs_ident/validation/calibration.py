@@ -6,8 +6,8 @@ of every true value among its posterior's draws is uniform, and 95 % intervals h
 (Talts, Betancourt, Simpson, Vehtari and Gelman, 2018).
 
 The priors are narrower than those of an identification, which reach to where the rig does not move at all:
-identified parameters are normal about the given values, with :data:`SPREAD`, and the discrepancy is about as
-large as the noise. What the solver's own nodes leave open counts as discrepancy too.
+identified parameters are normal about the given values, with :data:`SPREAD`. Errors are drawn as the likelihood has
+them: noise, tolerances of curves, drifts, and a background of small errors about the middle of the priors.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,8 +29,15 @@ from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.sampling import question_about
 from savgs_ident.inference.diagnostics import least_ess, mixing_of, names_by_role
 from savgs_ident.inference.likelihood import likelihood_of, values_of
-from savgs_ident.inference.posterior_mode import Expansion, PosteriorDensity, expand, find_mode
-from savgs_ident.inference.prior import Prior, Scales
+from savgs_ident.inference.posterior_mode import (
+    Expansion,
+    PosteriorDensity,
+    expand,
+    find_mode,
+    linearisation_point,
+    with_background,
+)
+from savgs_ident.inference.prior import Prior
 from savgs_ident.inference.problem import Task, harmonic_target
 from savgs_ident.inference.result import Sampler
 from savgs_ident.inference.sample import SAMPLERS, Question, plan
@@ -44,8 +51,6 @@ from savgs_ident.validation.trials import TrialFile, marks_of, once_a_process, r
 
 SPREAD = 0.15
 """Relative standard deviation of the identified parameters."""
-
-SCALES = Scales(discrepancy=0.002)
 
 INTERVAL = 0.95
 
@@ -150,10 +155,12 @@ def calibrator(question: Question, settings: SamplingSettings) -> Calibrator:
     narrow = replace(question, model=known, values={}, free=())
     task = plan(narrow, settings)
     problem = task.problem
-    likelihood = likelihood_of(harmonic_target(question.measured, known.channels, settings.orders), SCALES)
-    case = PosteriorDensity(problem, likelihood, Prior(problem.free))
-    values = problem.parameters(jnp.zeros(len(problem.free.names)))
-    middle = simulate_periodic(problem.model, values, task.excitation, settings.periodic)
+    likelihood = likelihood_of(harmonic_target(question.measured, known.channels, settings.orders))
+    plain = PosteriorDensity(problem, likelihood, Prior(problem.free))
+    u = jnp.zeros(len(problem.free.names))
+    middle = simulate_periodic(problem.model, problem.parameters(u), task.excitation, settings.periodic)
+    at = linearisation_point(plain, u, middle)
+    case, _ = with_background(plain, at, question.measured.times, question.free)
     return Calibrator(task, case, settings, middle, question.free)
 
 

@@ -12,7 +12,7 @@ from savgs_ident.plants.quarter_car.model import FREE
 
 
 def _estimate(name: str, value: float, stderr: float) -> Estimate:
-    return Estimate(name, value, stderr, "1", True, 0.0, 0.0)
+    return Estimate(name, value, stderr, stderr, "1", True, 0.0, 0.0)
 
 
 def test_distances_count_in_standard_errors_of_the_fit() -> None:

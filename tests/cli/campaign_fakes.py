@@ -32,6 +32,10 @@ from savgs_ident.fit.least_squares import FitSettings
 from savgs_ident.plants.quarter_car.rig import default_rig_path
 
 STDERR = 0.1
+
+OWN = 0.9
+"""Share of the standard error of c_sd that each campaign has for itself."""
+
 DAY = 86400.0
 MONDAY = datetime(2026, 3, 2, 8, 0, tzinfo=UTC).timestamp()
 SILENT, TALKING = Reporter(False, True), Reporter(False, False)
@@ -51,6 +55,7 @@ def request(*arguments: Path, **changes: Any) -> CampaignRun:
         "rig": default_rig_path(),
         "channels": None,
         "model": "simtr",
+        "beside": (),
         "free": ("mu_r", "c_sd"),
         "settings": FitSettings(),
         "max_frequency": None,
@@ -77,13 +82,13 @@ def read_number(task: CampaignTask) -> Outcome:
             name: {
                 "value": value,
                 "stderr": stderr,
+                "own_stderr": OWN * stderr if name == "c_sd" else stderr,
                 "unit": unit,
                 "free": name != "m_s",
                 "prior_sd": 1.25 if name == "m_s" else 0.0,
             }
             for name, (value, stderr, unit) in numbers.items()
         },
-        "correlation": {"mu_r": {"m_s": 0.0}, "c_sd": {"m_s": 0.6}},
         "chi2_per_dof": 1.05,
         "trusted": reported.get("trusted", True),
         "converged": True,

@@ -16,7 +16,7 @@ from savgs_ident.cli.console import BAD_INPUT, NOT_TRUSTED, OK
 from savgs_ident.core import executor
 from savgs_ident.core.errors import InputError
 
-from .campaign_fakes import MONDAY, STDERR, TALKING, campaign_file, never, record_of, rows_of, run
+from .campaign_fakes import MONDAY, OWN, STDERR, TALKING, campaign_file, never, record_of, rows_of, run
 
 
 def test_every_campaign_has_its_row_in_the_order_of_time(week: Path, tmp_path: Path) -> None:
@@ -55,8 +55,8 @@ def test_the_trend_is_the_one_that_is_in_the_data(week: Path, tmp_path: Path) ->
     spread = np.sum((np.arange(8) - 3.5) ** 2)
     assert slope["stderr"] == pytest.approx(STDERR / np.sqrt(spread))
     assert record["trends"]["c_sd"]["slope"]["changes"] is False
-    # The tolerance of m_s has a share of (0.6 / 1.25)^2 in the variance of c_sd, in all campaigns alike.
-    mean, share = record["trends"]["c_sd"]["mean"], (0.6 / 1.25) ** 2
+    # What the sheet gives wrong is in the variance of c_sd in all campaigns alike.
+    mean, share = record["trends"]["c_sd"]["mean"], 1.0 - OWN**2
     assert mean["own_stderr"] == pytest.approx(12.0 * np.sqrt((1.0 - share) / 8.0))
     assert mean["stderr"] == pytest.approx(12.0 * np.sqrt((1.0 - share) / 8.0 + share))
     assert "mu_r changes with time" in record["sentence"]

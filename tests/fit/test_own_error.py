@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from savgs_ident.campaigns.trends import common_share, follow
+from savgs_ident.campaigns.trends import follow
+from savgs_ident.fit.small_errors import own_part
 
 PRIOR = np.array([0.5, 2.0])
 SLOPES = 3.0 * np.array([[1.0, 0.9, 0.8], [0.4, 0.5, 0.3], [1.2, 1.0, 0.9], [0.3, 0.2, 0.4]])
@@ -22,9 +23,9 @@ def _estimates(random: np.random.Generator, rigs: int, campaigns: int) -> np.nda
 
 
 def _share() -> float:
+    """The share of the variance that campaigns have in common."""
     covariance = _covariance()
-    sd = np.sqrt(np.diag(covariance))
-    return common_share(covariance[0, 1:] / (sd[0] * sd[1:]), sd[1:], PRIOR)
+    return float(1.0 - own_part(covariance, np.array([np.inf, *PRIOR]))[0, 0] / covariance[0, 0])
 
 
 def test_campaigns_of_a_rig_scatter_by_their_own_error_and_share_the_other() -> None:
@@ -50,6 +51,5 @@ def test_mean_scatter_and_trend_are_right_with_the_two_parts_distinguished() -> 
 
 
 def test_without_tolerances_all_error_is_the_campaigns_own() -> None:
-    assert common_share([], [], []) == 0.0
-    assert common_share([0.0], [1.0], [1.0]) == 0.0
-    assert common_share([1.0], [1.0], [1.0]) < 1.0
+    covariance = _covariance()
+    np.testing.assert_array_equal(own_part(covariance, np.full(3, np.inf)), covariance)

@@ -84,9 +84,12 @@ def test_two_that_cannot_be_distinguished_are_named_once() -> None:
 
 
 def test_the_discrepancy_of_a_model_is_reported() -> None:
-    assert any("misses by 3 % of the response" in each for each in _sentences(_log_normal(0.0), miss=0.03))
+    assert any(
+        "err by 3 % of the response at each of its ports" in each
+        for each in _sentences(_log_normal(0.0), miss=0.03)
+    )
     small = _sentences(_log_normal(0.0), miss=0.001)
-    assert any("misses by less than 0.12 %" in each for each in small)
+    assert any("errs by less than 0.12 % of the response" in each for each in small)
     assert any("noise is 1.3 times" in each for each in _sentences(_log_normal(0.0), noise=1.3))
 
 

@@ -70,9 +70,9 @@ def measured() -> HarmonicResponse:
 def fit(measured: HarmonicResponse, rig: Rig) -> Fit:
     """A converged fit that predicts the truth behind ``measured``."""
     estimates = (
-        Estimate("mu_r", 0.03002, 0.00012, "1", True, 0.03, 0.0),
-        Estimate("c_sd", 5386.0, 9.7, "N s/m", True, 5792.0, 463.36),
-        Estimate("k_t", 264100.0, 1300.0, "N/m", False, 275000.0, 13750.0),
+        Estimate("mu_r", 0.03002, 0.00012, 0.00008, "1", True, 0.03, 0.0),
+        Estimate("c_sd", 5386.0, 9.7, 6.1, "N s/m", True, 5792.0, 463.36),
+        Estimate("k_t", 264100.0, 1300.0, 900.0, "N/m", False, 275000.0, 13750.0),
     )
     covariance = np.diag([each.stderr**2 for each in estimates])
     covariance[0, 1] = covariance[1, 0] = -0.5 * 0.00012 * 9.7

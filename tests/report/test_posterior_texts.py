@@ -120,7 +120,7 @@ def test_that_the_model_does_not_explain_the_data_is_said_first(posterior: Poste
     first = "The model does not explain the data: look for what is missing with `diagnose`."
     for each in (unexplained, unconverged(unexplained, "the chains do not agree")):
         assert not each.trusted
-        assert "does not explain the data: it misses by 3 %" in each.doubts[0]
+        assert "does not explain the data: for that it would have to err by 3 %" in each.doubts[0]
         page = Reader(posterior_html(each, ORIGIN))
         assert page.texts[0] == first
         assert rendered(each, width=200).splitlines()[0] == first

@@ -223,10 +223,16 @@ def _estimates(task: Task, u: Array, stderr: NDArray[np.float64]) -> tuple[Estim
     estimates = []
     for name, sd in zip(free.names, stderr, strict=True):
         known = task.table[name]
-        identified = name in free.identified
         estimates.append(
             Estimate(
-                name, float(values[name]), float(sd), known.unit, identified, known.value, known.tolerance
+                name=name,
+                value=float(values[name]),
+                stderr=float(sd),
+                own_stderr=float(sd),
+                unit=known.unit,
+                free=name in free.identified,
+                prior=known.value,
+                prior_sd=known.tolerance,
             )
         )
     return tuple(estimates)

@@ -80,6 +80,11 @@ class BackgroundConstants:
     free_orders: int = 9
     """Highest order of an input that is free in every dwell. Origin: the orders compared. It changes no verdict."""
 
+    @property
+    def largest_error(self) -> float:
+        """Errors at each port, as a share of the response, from which on they are no small ones [1]."""
+        return self.small_discrepancy * self.material_error
+
 
 BACKGROUND = BackgroundConstants()
 """The constants unless others are given."""

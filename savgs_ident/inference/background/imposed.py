@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Array
 from numpy.typing import NDArray
 
+from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import Load, PortSignals
 from savgs_ident.effects.composition import nothing_imposed
@@ -95,10 +96,9 @@ def impose(
 
     All in SI.
     """
-    found = []
-    nodes = solution.mesh.layout.total
-    blank = nothing_imposed(model.ports, jnp.zeros(nodes))
-    for first in range(0, len(signals), BATCH):
+    blank = nothing_imposed(model.ports, jnp.zeros(solution.mesh.layout.total))
+
+    def rows_of_some(first: int) -> NDArray[np.float64]:
         some = signals[first : first + BATCH]
         stacked = {name: np.zeros((BATCH, *part.shape)) for name, part in blank.items()}
         for place, (port, values) in enumerate(some):
@@ -106,7 +106,11 @@ def impose(
         imposed = placed({name: jnp.asarray(part) for name, part in stacked.items()})
         wanted = placed(jnp.asarray(len(some)))
         (rows,) = _answered(model, likelihood, placed(dict(p)), solution, imposed, wanted, orders)
-        found.append(np.asarray(rows)[: len(some)])
+        return np.asarray(rows)[: len(some)]
+
+    # The first alone: two at a time would compile the same program twice.
+    first, others = range(0, len(signals), BATCH)[:1], range(BATCH, len(signals), BATCH)
+    found = [*map(rows_of_some, first), *in_parallel(rows_of_some, others)]
     return np.concatenate([np.zeros((0, likelihood.measured.size)), *found])
 
 

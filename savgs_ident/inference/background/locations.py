@@ -13,10 +13,9 @@ A location is where the ports of one name are. What may be unknown there follows
 Each is a set of functions of its own (:mod:`.port_functions`), and an unknown signal follows one law of one set.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -100,7 +99,7 @@ class Linearisation(NamedTuple):
 
     def rows(self, values: NDArray[np.complex128]) -> Signal:
         """Harmonics (D, C, K) as rows [unit of the reading], (m,)."""
-        return np.asarray(self.likelihood.rows(jnp.asarray(values)))
+        return self.likelihood.rows_of_one(values)
 
     def imposed(self, fields: Fields) -> Signal:
         """Change of the rows by each of the fields, (m, fields)."""
@@ -140,38 +139,52 @@ def input_locations(about: Linearisation, constants: BackgroundConstants) -> lis
     """All locations of a plant about a motion."""
     signals, loads = node_loads(about.model, about.p, about.solution)
     seen = _Seen(about, mesh_points(about.solution), signals, loads, constants)
-    locations, sensors = [], []
+    asked, sensors = [], []
     for name, ports in ports_by_location(about.model).items():
         kinds = {port.kind for port in ports}
         if PortKind.SENSOR in kinds:
             sensors.append(name)
         elif kinds == {PortKind.NUMBER}:
-            locations.append(_numbers(name, ports, seen))
+            asked.append(_numbers(name, ports, seen))
         else:
-            locations.append(_signals(name, ports, seen))
+            asked.append(_signals(name, ports, seen))
+    columns = about.imposed([field for each in asked for field in each.fields])
+    ends = np.cumsum([len(each.fields) for each in asked], dtype=int)
+    parts = np.split(columns, ends[:-1], axis=1)
+    locations = [each.location(part) for each, part in zip(asked, parts, strict=True)]
     return locations + _sensors(sensors, seen)
 
 
-def _signals(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
+class _Asked(NamedTuple):
+    """Fields whose effect on the rows is asked for, and what location the answer (m, fields) makes."""
+
+    fields: Fields
+    location: Callable[[Signal], InputLocation]
+
+
+def _signals(name: str, ports: Sequence[Port], seen: _Seen) -> _Asked:
     """A location where something acts, gives way or is imposed."""
     sets = [(port, each) for port in ports for each in _functions(port, seen)]
     port = signal_port(seen.about.model, name)
     assert port is not None
     fields = [seen.fields(where, each.values) for where, each in sets]
     free = seen.fields(port, _waves(seen.nodes, seen.constants.free_orders))
-    columns = seen.about.imposed([*(each for some in fields for each in some), *free])
-    laws: list[Law] = []
-    start = 0
-    for (where, each), some in zip(sets, fields, strict=True):
-        laws += laws_of_functions(
-            columns[:, start : start + len(some)],
-            each.families,
-            seen.constants,
-            each.plain,
-            where.name,
-        )
-        start += len(some)
-    return InputLocation(name, tuple(laws), columns[:, start:])
+
+    def location(columns: Signal) -> InputLocation:
+        laws: list[Law] = []
+        start = 0
+        for (where, each), some in zip(sets, fields, strict=True):
+            laws += laws_of_functions(
+                columns[:, start : start + len(some)],
+                each.families,
+                seen.constants,
+                each.plain,
+                where.name,
+            )
+            start += len(some)
+        return InputLocation(name, tuple(laws), columns[:, start:])
+
+    return _Asked([*(each for some in fields for each in some), *free], location)
 
 
 def _functions(port: Port, seen: _Seen) -> Iterator[Functions]:
@@ -190,7 +203,7 @@ def _functions(port: Port, seen: _Seen) -> Iterator[Functions]:
         yield input_ripple(seen.angle, seen.constants)
 
 
-def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
+def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> _Asked:
     """A location of numbers alone: forces of masses where they are declared, slopes in the numbers otherwise.
 
     What hangs on a mass may swing: it pulls as modes make it of the mass's acceleration.
@@ -200,9 +213,9 @@ def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
     if not inertias:
         numbers = [number for port in ports for number in port.numbers]
         slopes = seen.about.slopes([number.name for number in numbers])
-        columns = slopes * np.array([number.change for number in numbers])
-        laws = laws_of_functions(columns, (Family.NUMBER,) * len(numbers), constants)
-        return InputLocation(name, laws, columns)
+        changes = slopes * np.array([number.change for number in numbers])
+        laws = laws_of_functions(changes, (Family.NUMBER,) * len(numbers), constants)
+        return _Asked([], lambda _: InputLocation(name, laws, changes))
     fields, swinging = [], []
     for each in inertias:
         velocity = sum(np.asarray(seen.signals[where].velocity) for where in each.velocity)
@@ -212,13 +225,18 @@ def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> InputLocation:
             (each.force, resonance(acceleration, natural, constants.resonance_damping, seen.nodes))
             for natural in constants.resonances
         ]
-    columns = seen.about.imposed([*fields, *swinging])
-    still, moving = columns[:, : len(fields)], columns[:, len(fields) :]
-    laws = laws_of_functions(still, (Family.NUMBER,) * len(fields), constants)
-    count = len(constants.resonances)
-    for first in range(0, moving.shape[1], count):
-        laws += laws_of_functions(moving[:, first : first + count], (Family.OSCILLATOR,) * count, constants)
-    return InputLocation(name, laws, still)
+
+    def location(columns: Signal) -> InputLocation:
+        still, moving = columns[:, : len(fields)], columns[:, len(fields) :]
+        laws = laws_of_functions(still, (Family.NUMBER,) * len(fields), constants)
+        count = len(constants.resonances)
+        for first in range(0, moving.shape[1], count):
+            laws += laws_of_functions(
+                moving[:, first : first + count], (Family.OSCILLATOR,) * count, constants
+            )
+        return InputLocation(name, laws, still)
+
+    return _Asked([*fields, *swinging], location)
 
 
 def free_signal(coefficients: Signal, phase: Signal) -> Signal:

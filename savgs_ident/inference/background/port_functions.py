@@ -7,8 +7,9 @@ so can that of the location beside it; so every set also has its simple laws, of
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
@@ -167,7 +168,7 @@ def series_functions(load: Load) -> Functions:
     n, whole, rest = (
         jnp.asarray(np.broadcast_to(each, beyond.shape) / largest) for each in (beyond, load.total, load.rest)
     )
-    values = [np.asarray(each) for each in what_gives(n, whole, rest)]
+    values = [np.asarray(each) for each in _what_gives(n, whole, rest)]
     return Functions(values, tuple(each.family for each in OF_WHAT_GIVES), (0,))
 
 
@@ -233,11 +234,21 @@ def motion_functions(
     x, d, v, n = (jnp.asarray(each / max(float(np.abs(each).max()), np.finfo(float).tiny)) for each in seen)
     without = (*OF_THE_MOTION, *(OF_THE_LOAD if loaded else ()))
     functions = (*without, *OF_SLIDERS[: len(held)])
-    motion = RelativeMotion(x, d, v, n, held=[jnp.asarray(each) for each in held])
-    values = [np.asarray(each) for each in values_of(functions, motion)]
+    values = [np.asarray(each) for each in _values_of(functions, x, d, v, n, held)]
     plain = (*PLAIN_FORCES, *([_LOADED_FRICTION] if loaded else []))
     sliders = range(len(without), len(functions))
     return Functions(values, tuple(each.family for each in functions), (*plain, *sliders))
+
+
+# Compiled as a whole: a program for each operation would take seconds to load.
+@eqx.filter_jit
+def _values_of(functions: Any, x: Any, d: Any, v: Any, n: Any, held: Any) -> Any:
+    return values_of(functions, RelativeMotion(x, d, v, n, held=[jnp.asarray(each) for each in held]))
+
+
+@eqx.filter_jit
+def _what_gives(*load: Any) -> Any:
+    return what_gives(*load)
 
 
 def _slider(displacement: Signal, width: float, solution: PeriodicSolution) -> Signal:

@@ -37,22 +37,24 @@ SINE = 400
 def background_about(
     data: Data,
     about: Linearisation,
-    free: Sequence[str],
+    drifts: Matrix,
     recorded: NDArray[np.float64],
     constants: BackgroundConstants = BACKGROUND,
 ) -> Data:
-    """The data with errors at every location and input, of the dampers' curves, and drifts of what is ``free``.
+    """The data with errors at every location and input, of the dampers' curves, and drifts of what is identified.
 
+    ``drifts`` (m, n) is what relative changes of one of what is identified do to the rows [unit of the row];
     ``recorded`` (t,) is when each test was recorded, in any unit of time.
     """
     read, order = about.read(), np.arange(about.orders + 1)
     return with_background(
         data,
         about.likelihood.channel,
-        input_locations(about, constants),
+        # What is free in every test is no part of it.
+        input_locations(about, replace(constants, free_orders=0)),
         inputs=np.stack([about.rows(each) for each in (read, 1j * order * read)], axis=1),
         curves=_curves(about, constants),
-        drifts=about.slopes(free) * [float(about.p[name]) for name in free],
+        drifts=drifts,
         recorded=recorded,
         constants=constants,
     )

@@ -23,10 +23,8 @@ NUISANCE_WORDS: Mapping[str, str] = MappingProxyType(
             " 1 if that estimate is right."
         ),
         "discrepancy": (
-            "Relative rms by which the model is allowed to miss the first harmonic of each channel beyond noise"
-            " (order k by 1/k of it in the acceleration, by 1/k² in the deflection); 0 for a perfect model."
-            " It keeps intervals from becoming absurdly narrow"
-            " where the model is not perfect."
+            "Size of the small errors that the model may have at each of its ports and inputs, as a share of the"
+            " response; 0 for a perfect model. They keep intervals from becoming absurdly narrow."
         ),
     }
 )
