@@ -244,11 +244,14 @@ def linearisation_point(
 def linear_surrogate(posterior: PosteriorDensity, at: LinearisationPoint) -> Surrogate:
     """The surrogate about a linearisation point, without second derivatives."""
     point = jnp.asarray(at.point)
-    means, spreads = nuisance_scale(posterior.likelihood, posterior.prior, point, at.rows)
     scale = np.zeros((point.size, point.size))
     scale[:-2, :-2] = parameter_scale(posterior.likelihood, posterior.prior, point, at.slopes)
-    scale[[-2, -1], [-2, -1]] = spreads
     slope = at.slopes @ scale[:-2, :-2]
+    # At the mode rows miss least: with parameters anywhere else in the posterior there is room for larger scales.
+    measured = np.asarray(posterior.likelihood.measured)
+    typical = measured + np.hypot(at.rows - measured, np.linalg.norm(slope, axis=1))
+    means, spreads = nuisance_scale(posterior.likelihood, posterior.prior, point, typical)
+    scale[[-2, -1], [-2, -1]] = spreads
     return Surrogate(
         likelihood=posterior.likelihood,
         prior=posterior.prior,
