@@ -63,17 +63,23 @@ def parameter_scale(
 
 
 def nuisance_scale(
-    likelihood: Likelihood, prior: Prior, point: Float[Array, " n+2"], rows: Float[np.ndarray, " m"]
+    likelihood: Likelihood,
+    prior: Prior,
+    point: Float[Array, " n+2"],
+    rows: Float[np.ndarray, " m"],
+    scatter: Float[np.ndarray, " m"],
 ) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]:
     """Means and standard deviations of the noise's and the discrepancy's coordinate, given all others.
 
     The discrepancy's density is even in its coordinate. Where it stands clear of zero one of its two halves
-    is taken, elsewhere both together.
+    is taken, elsewhere both together, as wide as they are where ``rows`` of the mode miss by their ``scatter`` (m,)
+    over the posterior besides: at the mode they miss least, and leave the least room for it.
     """
-    modelled = jnp.asarray(rows)
+    measured = np.asarray(likelihood.measured)
 
-    def moments(place: int, grid: np.ndarray) -> tuple[float, float]:
-        logs = np.asarray(_log_densities(likelihood, prior, modelled, _along(point, place, grid)))
+    def moments(place: int, grid: np.ndarray, modelled: np.ndarray = rows) -> tuple[float, float]:
+        along = _along(point, place, grid)
+        logs = np.asarray(_log_densities(likelihood, prior, jnp.asarray(modelled), along))
         mass = np.exp(logs - logs.max()) * np.gradient(grid)
         mass /= mass.sum()
         mean = float(mass @ grid)
@@ -82,7 +88,8 @@ def nuisance_scale(
 
     noise, miss = moments(-2, _NOISE_GRID), moments(-1, _MISS_GRID)
     if miss[0] < 3.0 * miss[1]:
-        miss = (0.0, float(np.hypot(*miss)))
+        anywhere = measured + np.hypot(rows - measured, scatter)
+        miss = (0.0, float(np.hypot(*moments(-1, _MISS_GRID, anywhere))))
     return np.array([noise[0], miss[0]]), np.array([noise[1], miss[1]])
 
 
@@ -247,10 +254,8 @@ def linear_surrogate(posterior: PosteriorDensity, at: LinearisationPoint) -> Sur
     scale = np.zeros((point.size, point.size))
     scale[:-2, :-2] = parameter_scale(posterior.likelihood, posterior.prior, point, at.slopes)
     slope = at.slopes @ scale[:-2, :-2]
-    # At the mode rows miss least: with parameters anywhere else in the posterior there is room for larger scales.
-    measured = np.asarray(posterior.likelihood.measured)
-    typical = measured + np.hypot(at.rows - measured, np.linalg.norm(slope, axis=1))
-    means, spreads = nuisance_scale(posterior.likelihood, posterior.prior, point, typical)
+    scatter = np.linalg.norm(slope, axis=1)
+    means, spreads = nuisance_scale(posterior.likelihood, posterior.prior, point, at.rows, scatter)
     scale[[-2, -1], [-2, -1]] = spreads
     return Surrogate(
         likelihood=posterior.likelihood,

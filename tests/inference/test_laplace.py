@@ -37,7 +37,8 @@ def test_scales_of_the_noise_and_of_the_discrepancy(miss: float) -> None:
     toy = straight_toy(miss=miss)
     mode = mode_of(toy)
     rows = toy.rows(mode[None, :-2])[0][0]
-    means, deviations = nuisance_scale(toy.likelihood, Prior(FREE), jnp.asarray(mode), rows)
+    nothing = np.zeros_like(rows)
+    means, deviations = nuisance_scale(toy.likelihood, Prior(FREE), jnp.asarray(mode), rows, nothing)
     reference = reference_of(toy, mode)
     if miss:
         assert means[1] == pytest.approx(reference.weight @ reference.points[:, 4], rel=0.1)
@@ -51,8 +52,21 @@ def test_scales_of_the_noise_and_of_the_discrepancy(miss: float) -> None:
     assert deviations[0] == pytest.approx(reference.sd(3), rel=0.15)
 
 
+def test_a_discrepancy_near_zero_has_more_room_where_parameters_are_not_at_their_best() -> None:
+    """As wide as rows scatter besides: with twice the misfit, a discrepancy is as large as the misfit."""
+    toy = straight_toy(miss=0.0)
+    mode = mode_of(toy)
+    rows = toy.rows(mode[None, :-2])[0][0]
+    missed = np.abs(rows - np.asarray(toy.likelihood.measured))
+    args = toy.likelihood, Prior(FREE), jnp.asarray(mode), rows
+    (_, still), (_, anywhere) = (nuisance_scale(*args, scatter) for scatter in (np.zeros_like(rows), missed))
+    assert anywhere[1] > 1.2 * still[1]
+    assert anywhere[0] == still[0]
+
+
 def test_scales_without_data_keep_their_prior() -> None:
     toy = straight_toy(scales=Scales(noise_trust=1e-9, discrepancy=1e-12))
-    means, deviations = nuisance_scale(toy.likelihood, Prior(FREE), jnp.zeros(5), toy.base)
+    nothing = np.zeros_like(toy.base)
+    means, deviations = nuisance_scale(toy.likelihood, Prior(FREE), jnp.zeros(5), toy.base, nothing)
     np.testing.assert_allclose(means, 0.0, atol=1e-6)
     np.testing.assert_allclose(deviations, 1.0, rtol=0.02)
