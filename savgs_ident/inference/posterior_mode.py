@@ -48,7 +48,9 @@ LEAST = 1e-4
 """Least standard deviation of a scale's coordinate."""
 
 _NOISE_GRID = np.linspace(-4.0, 4.0, 161)
+"""Coordinates of the noise's scale about that of the mode, which lies far off where the model misses by far."""
 _MISS_GRID = np.concatenate([[0.0], np.geomspace(1e-5, 30.0, 300)])
+"""Coordinates of the discrepancy, or multiples of that of the mode where it is above one."""
 
 
 def parameter_scale(
@@ -86,10 +88,12 @@ def nuisance_scale(
         # A density narrower than the grid still has a width.
         return mean, max(float(np.sqrt(mass @ (grid - mean) ** 2)), LEAST)
 
-    noise, miss = moments(-2, _NOISE_GRID), moments(-1, _MISS_GRID)
+    level, size = (float(each) for each in np.asarray(point)[-2:])
+    missing = _MISS_GRID * max(1.0, abs(size))
+    noise, miss = moments(-2, level + _NOISE_GRID), moments(-1, missing)
     if miss[0] < 3.0 * miss[1]:
         anywhere = measured + np.hypot(rows - measured, scatter)
-        miss = (0.0, float(np.hypot(*moments(-1, _MISS_GRID, anywhere))))
+        miss = (0.0, float(np.hypot(*moments(-1, missing, anywhere))))
     return np.array([noise[0], miss[0]]), np.array([noise[1], miss[1]])
 
 
