@@ -39,7 +39,7 @@ from savgs_ident.recordings.recording import classify_test, unix_time
 LONGEST_NAME = 80
 """Most bytes of a name, so that there is room for what makes it unique, and for the names of its files."""
 
-_RECORD, _TABLE = "campaign.json", "campaigns.csv"
+_RECORD, _TABLES = "campaign.json", ("campaigns.csv", "campaigns.parquet")
 """What an earlier run has left together."""
 
 _RESERVED = ("con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(10)))
@@ -126,7 +126,7 @@ def _campaigns_at(argument: Path) -> list[Path]:
         raise InputError(
             "the folder holds no campaign",
             source=argument,
-            remedy="put CSV or MCAP files into it, or into a folder for each campaign in it",
+            remedy="put recordings into it, or into a folder for each campaign in it",
         )
     return found
 
@@ -140,12 +140,12 @@ def _campaigns_in(folder: Path) -> list[Path]:
 
 
 def _files(folder: Path) -> list[Path]:
-    """The recordings right in a folder; the table that an earlier run wrote is none."""
-    own = _TABLE if (folder / _RECORD).is_file() else None
+    """The recordings right in a folder; the tables that an earlier run wrote are none."""
+    own = _TABLES if (folder / _RECORD).is_file() else ()
     return sorted(
         each
         for each in folder.iterdir()
-        if each.name != own and not each.name.startswith(".") and is_campaign_file(each)
+        if each.name not in own and not each.name.startswith(".") and is_campaign_file(each)
     )
 
 

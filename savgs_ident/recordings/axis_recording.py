@@ -82,6 +82,22 @@ def read_arrays(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float6
     return found
 
 
+def array_names(path: Path) -> list[str]:
+    """Names of the real numeric arrays of a MATLAB file, each once; raises :class:`InputError` for no such file."""
+    raw, order = _content(path)
+    try:
+        headers = [_header(array, order) for array in _arrays(path, raw, order)]
+    except _MalformedError as error:
+        raise InputError(f"its contents cannot be read ({error})", source=path, remedy=_SAVE) from error
+    return list(
+        dict.fromkeys(
+            name
+            for name, parts in headers
+            if name and _FIRST_NUMERIC <= parts.flags & 0xFF <= max(_CLASSES) and not parts.flags & _COMPLEX
+        )
+    )
+
+
 def _content(path: Path) -> tuple[bytes, str]:
     """The bytes of a file and their order."""
     if not path.is_file():

@@ -17,11 +17,9 @@ from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.channels import (
     Binding,
     ChannelMap,
-    ChannelRule,
     Progress,
     Reader,
     Reading,
-    SignalCandidate,
     bind,
     unit_factor_or_si,
 )
@@ -34,6 +32,7 @@ from savgs_ident.recordings.recording import (
     normalise,
     unix_time,
 )
+from savgs_ident.recordings.signals import rules_for
 
 TEST_COLUMNS = ("test", "test_name", "run", "condition")
 """Usual names of the column with the test's name."""
@@ -54,13 +53,23 @@ def read_csv(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading
     warnings: list[DataWarning] = []
     candidates = head.candidates()
     time_position, time_factor = _time_column(head, channel_map, source, warnings)
-    rules = _rules(candidates, channel_map, source)
+    if head.skipped:
+        warnings.append(
+            DataWarning(
+                "lines_skipped",
+                f"{head.skipped} lines above the names of the columns are not read",
+                source=source,
+                remedy="none needed, if these are titles and remarks",
+            )
+        )
+    rules = rules_for(candidates, channel_map, source)
     bindings, notes = bind(candidates, rules, channel_map, source)
     warnings.extend(notes)
     if not bindings:
         raise _no_channel(head, layout, source)
     positions = {int(binding.key) for binding in bindings} | {time_position}
-    table = CsvTable(head, tuple(sorted(positions)), _test_column(head, channel_map, source), source)
+    dates = _dates(head, time_position)
+    table = CsvTable(head, tuple(sorted(positions)), _test_column(head, channel_map, source), source, dates)
     for block in _chain(head.body, blocks):
         table.append(block)
     if table.rows == 0:
@@ -127,27 +136,6 @@ def _position(head: CsvHead, wanted: str, channel: str, layout: RecordingLayout,
     )
 
 
-def _rules(
-    candidates: tuple[SignalCandidate, ...], channel_map: ChannelMap, source: str
-) -> list[tuple[ChannelRule, str]]:
-    layout, found = channel_map.layout, []
-    for rule in channel_map.rules:
-        if rule.column is None:
-            continue
-        exact = [c.key for c in candidates if c.text == rule.column]
-        wanted = normalise(rule.column)
-        loose = [c.key for c in candidates if normalise(layout.split_header(c.text).label) == wanted]
-        if not exact and not loose:
-            raise InputError(
-                f"channels.toml names column '{rule.column}', the file does not have it",
-                source=source,
-                channel=rule.channel,
-                remedy="the columns are " + ", ".join(c.text for c in candidates[:20]),
-            )
-        found.append((rule, (exact or loose)[0]))
-    return found
-
-
 def _time_column(
     head: CsvHead, channel_map: ChannelMap, source: str, warnings: list[DataWarning]
 ) -> tuple[int, float]:
@@ -166,8 +154,17 @@ def _time_column(
             )
         exact = [i for i in found if normalise(labels[i]) == "time"]
         position = (exact or found)[0]
+    if _dates(head, position):
+        return position, 1.0
     unit = channel_map.time_unit or layout.split_header(head.columns[position]).unit or head.units[position]
     return position, unit_factor_or_si(unit, "time", layout, head.columns[position], source, warnings)
+
+
+def _dates(head: CsvHead, time_position: int) -> frozenset[int]:
+    """The column of the time, where it holds dates and not numbers."""
+    cell = head.first[time_position] if time_position < len(head.first) else ""
+    looks = sum(cell.count(mark) for mark in ":-/T") >= 2 and not cell.startswith("-")
+    return frozenset({time_position}) if looks else frozenset()
 
 
 def _test_column(head: CsvHead, channel_map: ChannelMap, source: str) -> int | None:

@@ -1,18 +1,21 @@
 """A CSV file as float columns in bounded memory: text blocks, the head, the body.
 
-:class:`TextBlocks` reads a text file, plain or gzipped, as blocks of whole lines. gzip is decompressed with
-``zlib`` itself, because Python's ``gzip`` discards the last part of a file that ends too early, and that part is
-good data. :func:`read_head` finds delimiter, decimal mark, encoding, column names and a row of units if there is
-one. :class:`CsvTable` parses the body with pandas (fast, correctly rounded); the cells of a row are counted here,
-because pandas fills a short row with missing values silently. Errors name the line of a bad cell or row.
+:class:`TextBlocks` reads a text file, plain or gzipped, in UTF-8, UTF-16 or Latin-1, as blocks of whole lines. gzip
+is decompressed with ``zlib`` itself, because Python's ``gzip`` discards the last part of a file that ends too early,
+and that part is good data. :func:`read_head` finds delimiter, decimal mark, encoding, column names and a row of units
+if there is one, below whatever title lines stand above them. :class:`CsvTable` parses the body with pandas (fast,
+correctly rounded); the cells of a row are counted here, because pandas fills a short row with missing values
+silently. Errors name the line of a bad cell or row.
 """
 
+import codecs
 import csv
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -50,7 +53,7 @@ class TextBlocks:
         with self.path.open("rb") as stream:
             zipped = stream.read(2) == GZIP_MAGIC
             stream.seek(0)
-            parts = self._inflated(stream) if zipped else self._raw(stream)
+            parts = _as_utf_8(self._inflated(stream) if zipped else self._raw(stream))
             waiting, size = [], 0
             for part in parts:
                 waiting.append(part)
@@ -103,14 +106,41 @@ class TextBlocks:
                 self.cut = "its compressed data ends too early"
 
 
-_DELIMITERS = (",", ";", "\t")
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+
+
+def _as_utf_8(parts: Iterable[bytes]) -> Iterator[bytes]:
+    """The parts of a text, in UTF-8 where they begin as UTF-16 does."""
+    decoder: codecs.IncrementalDecoder | None = None
+    for number, part in enumerate(parts):
+        if number == 0 and part.startswith(_UTF_16):
+            decoder = codecs.getincrementaldecoder("utf-16")(errors="replace")
+        yield part if decoder is None else decoder.decode(part).encode()
+
+
+_SPACE = " "
+"""Stands for any white space between cells; such cells are read as if tabs were between them."""
+_DELIMITERS = (",", ";", "\t", "|")
+_SPACES = re.compile(rb"[ \t]+")
 _CONTENT = re.compile(rb"^[ \t\r\v\f]*[^\s#][^\n]*", re.MULTILINE)
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
 @dataclass(frozen=True)
 class CsvHead:
-    """How the table is written; ``body``: what of the first block follows the head, ``lines``: its length."""
+    """How the table is written.
+
+    Attributes:
+        delimiter: between cells.
+        decimal: mark of a number.
+        encoding: of the text.
+        columns: names, with units as they are written there.
+        units: those of a row of units.
+        body: what of the first block follows the head.
+        lines: its length.
+        skipped: lines of words above the names.
+        first: cells of the first row of data; empty where there is none.
+    """
 
     delimiter: str
     decimal: str
@@ -119,6 +149,8 @@ class CsvHead:
     units: tuple[str | None, ...]
     body: bytes
     lines: int
+    skipped: int
+    first: tuple[str, ...]
 
     def candidates(self) -> tuple[SignalCandidate, ...]:
         """The columns as signals; the key is the position."""
@@ -136,22 +168,69 @@ def read_head(block: bytes, layout: RecordingLayout, source: str) -> CsvHead:
     if b"\x00" in block[:4096]:
         raise InputError("is not a text file", source=source, remedy="give a CSV or MCAP file")
     encoding = _encoding(block)
-    lines = _content_lines(block.removeprefix(_BYTE_ORDER_MARK))
-    head, rest, count = next(lines, (b"", b"", 0))
-    if not head:
+    block = block.removeprefix(_BYTE_ORDER_MARK)
+    lines = list(islice(_content_lines(block), _MOST_LINES))
+    if not lines:
         raise InputError("is empty", source=source, remedy="record again, or give another file")
-    text = head.decode(encoding)
-    delimiter = max(_DELIMITERS, key=text.count)
-    columns = _cells(text, delimiter)
+    texts = [line.decode(encoding) for line, _, _ in lines]
+    place, delimiter = _header_line(texts, layout)
+    columns = _cells(texts[place], delimiter)
     _check_columns(columns, layout, source)
     units: tuple[str | None, ...] = (None,) * len(columns)
-    second, rest_after, count_after = next(lines, (b"", b"", count))
-    row = _cells(second.decode(encoding), delimiter)
-    if _is_unit_row(row, columns, layout):
-        units, rest, count = tuple(cell.strip("[]() ") or None for cell in row), rest_after, count_after
-        row = _cells(next(lines, (b"", b"", count))[0].decode(encoding), delimiter)
-    decimal = "," if delimiter != "," and any("," in cell for cell in row) else "."
-    return CsvHead(delimiter, decimal, encoding, columns, units, rest, count)
+    last, data = place, place + 1
+    while data < len(lines) and not _is_data(_cells(texts[data], delimiter), len(columns)):
+        row = _cells(texts[data], delimiter)
+        if _is_unit_row(row, columns, layout):
+            units = tuple(cell.strip("[]() ") or None for cell in row)
+        elif place == 0 and data == 1:
+            # What may be a broken row of data is for the table to judge.
+            break
+        last, data = data, data + 1
+    _, end, count = lines[last if data < len(lines) else place]
+    first = _cells(texts[data], delimiter) if data < len(lines) else ()
+    decimal = "," if any(_WITH_COMMA.fullmatch(cell) for cell in first) else "."
+    return CsvHead(delimiter, decimal, encoding, columns, units, block[end:], count, place, first)
+
+
+_MOST_LINES = 400
+"""Lines among which the names of the columns are looked for."""
+_WITH_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+_FEW_WORDS = 4
+"""Lines of words that may stand between the names of the columns and the data."""
+
+
+def _header_line(texts: list[str], layout: RecordingLayout) -> tuple[int, str]:
+    """Where the names of the columns stand, and what delimits them: above data of as many cells.
+
+    Of several such lines the one with most names that are known. The first line where there is no data below any.
+    """
+    best, known = (0, max(_DELIMITERS, key=texts[0].count)), -1
+    for place, text in enumerate(texts):
+        if known >= 0 and place > best[0] + _FEW_WORDS:
+            break
+        for delimiter in _possible_delimiters(text):
+            cells = _cells(text, delimiter)
+            below = texts[place + 1 : place + 2 + _FEW_WORDS]
+            if len(cells) < 2 or all(_is_number(cell) for cell in cells if cell):
+                continue
+            if not any(_is_data(_cells(each, delimiter), len(cells)) for each in below):
+                continue
+            names = sum(layout.canonical_name(layout.split_header(each).label) is not None for each in cells)
+            if names > known:
+                best, known = (place, delimiter), names
+    return best
+
+
+def _possible_delimiters(text: str) -> list[str]:
+    """What may stand between the cells of a line: what is there most often; white space where nothing else is."""
+    found = sorted((each for each in _DELIMITERS if each in text), key=text.count, reverse=True)
+    return found[:1] or [_SPACE]
+
+
+def _is_data(cells: tuple[str, ...], count: int) -> bool:
+    """Whether a row of so many cells holds numbers, in half of the cells that are not empty at least."""
+    filled = [cell for cell in cells if cell]
+    return len(cells) == count and 0 < len(filled) <= 2 * sum(_is_number(cell) for cell in filled)
 
 
 def _encoding(block: bytes) -> str:
@@ -162,13 +241,15 @@ def _encoding(block: bytes) -> str:
     return "utf-8"
 
 
-def _content_lines(block: bytes) -> Iterator[tuple[bytes, bytes, int]]:
-    """Lines that are neither blank nor comments: the line, what follows it, and its number from 1."""
+def _content_lines(block: bytes) -> Iterator[tuple[bytes, int, int]]:
+    """Lines that are neither blank nor comments: the line, where the next one begins, and its number from 1."""
     for found in _CONTENT.finditer(block):
-        yield found[0].strip(), block[found.end() + 1 :], block.count(b"\n", 0, found.start()) + 1
+        yield found[0].strip(), found.end() + 1, block.count(b"\n", 0, found.start()) + 1
 
 
 def _cells(line: str, delimiter: str) -> tuple[str, ...]:
+    if delimiter == _SPACE:
+        return tuple(line.split())
     try:
         row = next(csv.reader([line], delimiter=delimiter), [])
     except csv.Error:
@@ -211,14 +292,39 @@ def _is_number(text: str) -> bool:
     return True
 
 
+_COMMA_SECONDS = r",(?=\d+$)"
+"""The decimal comma of seconds."""
+
+
+def _since_1970(cells: "pd.Series[str]") -> "pd.Series[float]":
+    """Dates as seconds since 1970, hours without a date as seconds of that day; NaN for what is neither.
+
+    With dots between its parts a date begins with the day, as it does where people write it so.
+    """
+    import pandas as pd
+
+    first = str(cells.iloc[0]) if len(cells) else ""
+    if "-" not in first and "/" not in first and "." not in first.partition(":")[0]:
+        return pd.to_timedelta(cells, errors="coerce").dt.total_seconds()
+    day_first = "." in first.partition(":")[0]
+    dates = pd.to_datetime(cells, utc=True, errors="coerce", format="mixed", dayfirst=day_first)
+    return (dates - pd.Timestamp(0, tz="UTC")).dt.total_seconds()
+
+
 _QUOTED = re.compile(rb'"[^"\n]*"')
 
 
 class CsvTable:
-    """Columns ``wanted`` (positions) as float64 and the column ``test`` as runs of equal names."""
+    """Columns ``wanted`` (positions) as float64 and the column ``test`` as runs of equal names.
 
-    def __init__(self, head: CsvHead, wanted: tuple[int, ...], test: int | None, source: str) -> None:
+    Of columns of ``dates`` the numbers are seconds since 1970, as if clocks without a zone showed UTC.
+    """
+
+    def __init__(
+        self, head: CsvHead, wanted: tuple[int, ...], test: int | None, source: str, dates: frozenset[int]
+    ) -> None:
         self._head = head
+        self._dates = dates
         self._wanted = wanted
         self._test = test
         self._source = source
@@ -231,14 +337,20 @@ class CsvTable:
         """Parse a block of whole lines; raises :class:`InputError` at the first bad line."""
         if b"\x00" in block:
             raise InputError("is not a text file", source=self._source, remedy="give a CSV or MCAP file")
+        if self._head.delimiter == _SPACE:
+            block = b"".join(_SPACES.sub(b"\t", line.strip()) + b"\n" for line in block.splitlines())
         self._check_ragged(block)
         if block.strip():
             frame = self._parse(block)
             for position in self._wanted:
-                self._blocks[position].append(frame[position].to_numpy(dtype=np.float64))
+                self._blocks[position].append(self._numbers(frame, position))
             self._append_runs(frame)
             self.rows += len(frame)
         self._line += block.count(b"\n")
+
+    @property
+    def _delimiter(self) -> str:
+        return "\t" if self._head.delimiter == _SPACE else self._head.delimiter
 
     def take(self, position: int) -> NDArray[np.float64]:
         """The whole column (rows,) in the unit of its header; it is removed from the table."""
@@ -249,7 +361,7 @@ class CsvTable:
         text = _QUOTED.sub(b"", block) if b'"' in block else block
         raw = np.frombuffer(text, dtype=np.uint8)
         ends = np.flatnonzero(raw == ord("\n"))
-        marks = np.flatnonzero(raw == ord(self._head.delimiter))
+        marks = np.flatnonzero(raw == ord(self._delimiter))
         cells = np.diff(np.searchsorted(marks, ends), prepend=0) + 1
         lengths = np.diff(ends, prepend=-1)
         bad = np.flatnonzero((cells != len(self._head.columns)) & (lengths > 2))
@@ -266,11 +378,14 @@ class CsvTable:
     def _parse(self, block: bytes) -> "pd.DataFrame":
         import pandas as pd
 
-        numbers: dict[int, type | str] = dict.fromkeys(self._wanted, np.float64)
+        numbers: dict[int, type | str] = {
+            position: str if position in self._dates or self._quoted else np.float64
+            for position in self._wanted
+        }
         types = numbers if self._test is None else {**numbers, self._test: "category"}
         options = {
-            "sep": self._head.delimiter,
-            "decimal": self._head.decimal,
+            "sep": self._delimiter,
+            "decimal": "." if self._quoted else self._head.decimal,
             "encoding": self._head.encoding,
             "encoding_errors": "replace",
             "header": None,
@@ -289,6 +404,27 @@ class CsvTable:
             ) from error
         except (ValueError, OverflowError) as error:
             raise self._bad_cell(pd.read_csv(BytesIO(block), dtype=str, **options), error) from error
+
+    @property
+    def _quoted(self) -> bool:
+        """Whether numbers with a decimal comma stand in quotes, for commas are between the cells, too."""
+        return self._head.decimal == self._delimiter
+
+    def _numbers(self, frame: "pd.DataFrame", position: int) -> NDArray[np.float64]:
+        import pandas as pd
+
+        column = frame[position]
+        if position in self._dates:
+            found = _since_1970(column.str.replace(_COMMA_SECONDS, ".", regex=True))
+            if (found.isna() & column.notna()).any():
+                raise self._bad_cell(frame, ValueError("no date"))
+            return np.asarray(found, dtype=np.float64)
+        if self._quoted:
+            numbers = pd.to_numeric(column.str.replace(",", ".", regex=False), errors="coerce")
+            if (numbers.isna() & column.notna()).any():
+                raise self._bad_cell(frame, ValueError("no number"))
+            return np.asarray(numbers, dtype=np.float64)
+        return np.asarray(column.to_numpy(dtype=np.float64))
 
     def _bad_cell(self, frame: "pd.DataFrame", error: Exception) -> InputError:
         import pandas as pd

@@ -20,12 +20,20 @@ from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.channels import FILE_NAME, ChannelMap, Progress, Reader, Reading, read_channel_map
 from savgs_ident.recordings.checks import screen
 from savgs_ident.recordings.csv import CSV
+from savgs_ident.recordings.mat import MAT
 from savgs_ident.recordings.mcap import MCAP
+from savgs_ident.recordings.mdf import MDF_FILE
+from savgs_ident.recordings.parquet import PARQUET
 from savgs_ident.recordings.recording import Campaign, Recording, RecordingLayout
+from savgs_ident.recordings.tdms import TDMS
 
 READERS: tuple[Reader, ...] = (
     CSV,
     MCAP,
+    PARQUET,
+    MAT,
+    TDMS,
+    MDF_FILE,
 )
 
 

@@ -67,7 +67,18 @@ _TABLE: dict[str, dict[str, float]] = {
               "rev": 2 * pi, "turn": 2 * pi},
     "angular velocity": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": pi / 180, "degrees/s": pi / 180,
                          "rpm": pi / 30, "rev/min": pi / 30, "1/min": pi / 30, "rev/s": 2 * pi},
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704,
+                 "in/s": 0.0254, "ft/s": 0.3048},
+    "angular acceleration": {"rad/s^2": 1.0, "rad/s2": 1.0, "deg/s^2": pi / 180, "deg/s2": pi / 180},
+    "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "daN": 10.0, "kgf": STANDARD_GRAVITY, "lbf": 4.4482216152605},
+    "torque": {"Nm": 1.0, "kNm": 1e3, "mNm": 1e-3, "Nmm": 1e-3, "Ncm": 1e-2, "lbfft": 1.3558179483314,
+               "lbfin": 0.1129848290276},
+    "pressure": {"Pa": 1.0, "hPa": 1e2, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "mbar": 1e2, "psi": 6894.757293168},
+    "mass": {"kg": 1.0, "gram": 1e-3, "lb": 0.45359237},
     "current": {"A": 1.0, "amp": 1.0, "ampere": 1.0, "mA": 1e-3},
+    "voltage": {"V": 1.0, "mV": 1e-3, "kV": 1e3, "volt": 1.0},
+    "power": {"W": 1.0, "kW": 1e3, "mW": 1e-3, "hp": 745.69987158227},
+    "frequency": {"Hz": 1.0, "kHz": 1e3},
 }  # fmt: skip
 
 UNITS: Mapping[str, Unit] = MappingProxyType(
@@ -219,8 +230,18 @@ class RecordingLayout:
 
         Raises :class:`InputError` for a unit that is not in the table or measures something else.
         """
-        dimension = UNITS[self.si_unit(channel)].dimension
-        usual = ", ".join(_TABLE[dimension])
+        si = self.si_unit(channel)
+        if text.strip() == si:
+            return 1.0
+        expected = find_unit(si)
+        if expected is None:
+            raise InputError(
+                f"unit '{text}' cannot be converted to '{si}'",
+                source=source,
+                channel=channel,
+                remedy=f"write it in '{si}', or give that unit and a scale in channels.toml",
+            )
+        dimension, usual = expected.dimension, ", ".join(_TABLE[expected.dimension])
         unit = find_unit(text)
         if unit is None:
             raise InputError(
