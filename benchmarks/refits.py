@@ -22,7 +22,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig, rig_content
+from savgs_ident.plants.parameter_toml import file_content
+from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig
 from savgs_ident.validation.blind_answer import Answer, envelope_of
 from savgs_ident.validation.blind_marks import score_of
 from savgs_ident.validation.blind_rates import rates_of
@@ -136,7 +137,7 @@ class Task(NamedTuple):
 def refit(tasks: Sequence[Task], number: int) -> Refit:
     """The trial diagnosed anew."""
     folder, variation = tasks[number]
-    rig = parse_rig(rig_content(default_rig_path()), default_rig_path())
+    rig = parse_rig(file_content(default_rig_path()), default_rig_path())
     found = diagnose_folder(folder / "campaign", rig, _answer(folder).without, constants=variation.applied())
     said = {name: found[name] for name in ("verdict", "which", "shrink", "wall_s")}
     return Refit(number, folder.name, variation.name, variation.factor, said)

@@ -23,11 +23,13 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
 from savgs_ident.diagnosis.model_selection import recalibrate
-from savgs_ident.diagnosis.public import SIMTR, quarter_car_problem
+from savgs_ident.diagnosis.public import SIMTR, problem_of_dwells
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import bounds_of
+from savgs_ident.plants.parameter_toml import file_content
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, parse_rig, rig_content
+from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, parse_rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_response
@@ -129,7 +131,7 @@ def read_trial(folder: Path) -> Trial:
     )
     campaign = load_campaign(folder / "campaign")
     answer = opened(Seal(**seal["seal"]), envelope_of(record), campaign.sha256)
-    sheet = rig_content(default_rig_path())
+    sheet = file_content(default_rig_path())
     if record["settings"].get("rig_sha256") not in (None, rig_marks(sheet)["rig_sha256"]):
         raise InputError("is a trial of another rig", source=folder, remedy="name trials of the shipped rig")
     measured = measured_response(campaign, QuarterCar, SIMTR.orders)
@@ -139,7 +141,7 @@ def read_trial(folder: Path) -> Trial:
 
 def regressions_of(measured: HarmonicResponse, rig: Rig) -> dict[Variant, Regression]:
     """The regressions of a measured response."""
-    plant, data = quarter_car_problem(measured, rig, SIMTR)
+    plant, data = problem_of_dwells(measured, RigModel(rig, SIMTR.baseline), SIMTR)
     problem = recalibrate(plant, data, {}, lambda line: None)
     base, terms = problem.base, problem.plant.candidates
     changes = problem.plant.sensitivities((), base.values, base.prediction.warm_start, terms)

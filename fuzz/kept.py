@@ -21,7 +21,8 @@ from savgs_ident.core.files import to_json
 from savgs_ident.core.presentation import NO_ORIGIN
 from savgs_ident.inference.samplers import nuts as nuts_sampler
 from savgs_ident.inference.samplers.chains import new_checkpoint, open_checkpoint
-from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, rig_content
+from savgs_ident.plants.parameter_toml import file_content
+from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.report.blind import blind_record
 from savgs_ident.report.campaigns.record import campaigns_columns, campaigns_record
@@ -40,7 +41,7 @@ CASE = "case"
 MARKS: dict[str, object] = {"seed": 4, "campaign": "campaign.csv.gz", "every": 1}
 _MADE_FROM = MadeFrom("ab" * 32, ("campaign.csv.gz",), None, "cd" * 32, {"effects": ["rail_coulomb"]})
 _BLIND = BlindRequest(3, None, 1, None, (20.0, 50.0, 15.0, 15.0), 1, False, False, ("savgs-ident", "blind"))
-_PLAN = Plan(default_rig_path(), rig_content(default_rig_path()), 4, _BLIND.shares, 1, False)
+_PLAN = Plan(default_rig_path(), file_content(default_rig_path()), 4, _BLIND.shares, 1, False)
 _NUMBER = 1
 
 

@@ -52,11 +52,13 @@ if TYPE_CHECKING:
     from savgs_ident.inference.result import Convergence, Marginal, Posterior
     from savgs_ident.plants.axis import Axis
     from savgs_ident.plants.base import AbstractPlant, Channel, Coordinate, Input
+    from savgs_ident.plants.from_file import load_plant
     from savgs_ident.plants.model import Model, PlantModel
     from savgs_ident.plants.quarter_car.model import RigModel as QuarterCar
     from savgs_ident.plants.quarter_car.model import load_baseline, load_model, load_rig
     from savgs_ident.plants.quarter_car.rig import Rig, default_campaign_path
     from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
+    from savgs_ident.plants.state_space import State, StateSpacePlant
     from savgs_ident.plants.two_mass import TwoMass
     from savgs_ident.recordings.channels import ChannelMap
     from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording, RecordingLayout
@@ -74,7 +76,9 @@ if TYPE_CHECKING:
     )
     from savgs_ident.validation.blind import BlindStudy, blind
     from savgs_ident.validation.calibration import CalibrationStudy, calibrate
+    from savgs_ident.validation.check_plant import PlantCheck, check_plant
     from savgs_ident.validation.false_alarms import AlarmStudy, false_alarms
+    from savgs_ident.validation.plant_declaration import Finding
     from savgs_ident.validation.virtual_campaign import draw_truth, simulate_campaign, write_campaign
 
 _PLACES = {
@@ -103,9 +107,13 @@ _PLACES = {
     "Port": "effects.base",
     "PortKind": "effects.base",
     "PortSignals": "effects.base",
+    "State": "plants.state_space",
+    "StateSpacePlant": "plants.state_space",
     "TwoMass": "plants.two_mass",
     "generic_effects": "effects.effect",
+    "load_plant": "plants.from_file",
     # What is done with it, a command each.
+    "check_plant": "validation.check_plant",
     "demo": "fit.public",
     "inspect": "responses.summary",
     "fit": "fit.public",
@@ -154,6 +162,7 @@ _PLACES = {
     "InputError": "core.errors",
     "LinearStudy": "control.linear_study",
     "LoopStudy": "control.closed_loop.study",
+    "PlantCheck": "validation.check_plant",
     "Posterior": "inference.result",
     "Rig": "plants.quarter_car.rig",
     "SimulatedResponse": "simulate.public",
@@ -164,6 +173,7 @@ _PLACES = {
     "Convergence": "inference.result",
     "DataWarning": "core.errors",
     "Estimate": "fit.result",
+    "Finding": "validation.plant_declaration",
     "Hypothesis": "diagnosis.result",
     "Identifiability": "fit.result:Verdict",
     "Marginal": "inference.result",
@@ -210,6 +220,7 @@ __all__ = [
     "Estimate",
     "Exported",
     "ExportedModel",
+    "Finding",
     "Fit",
     "HarmonicResponse",
     "Hypothesis",
@@ -227,6 +238,7 @@ __all__ = [
     "Parameter",
     "ParameterInterval",
     "ParameterTable",
+    "PlantCheck",
     "PlantModel",
     "Port",
     "PortKind",
@@ -244,12 +256,15 @@ __all__ = [
     "Shrink",
     "SimulatedResponse",
     "SimulatedSweep",
+    "State",
+    "StateSpacePlant",
     "Status",
     "Trend",
     "TwoMass",
     "Verdict",
     "blind",
     "calibrate",
+    "check_plant",
     "close_loop",
     "compare",
     "default_campaign_path",
@@ -267,6 +282,7 @@ __all__ = [
     "load_campaign",
     "load_model",
     "load_motion",
+    "load_plant",
     "load_python_control",
     "load_rig",
     "plot_bode",

@@ -109,7 +109,10 @@ def test_a_model_is_compared_and_what_is_saved_is_read_back(
     record = json.loads(compared.to_json())
     assert len(record["channels"]["susp_deflection"]["identified"]["per_metre_of_road"]) == len(DWELLS)
     paths = fit.save(tmp_path / "fit")
-    assert {path.name for path in paths} == {"fit.json", "bode.png", "bode.pdf"}
+    assert {path.name for path in paths} == {"fit.json", "model.toml", "bode.png", "bode.pdf"}
+    again = si.load_plant(si.TwoMass, tmp_path / "fit/model.toml")
+    assert again.table == fit.model.table
+    assert again.identified == fit.model.identified
 
 
 @pytest.mark.slow

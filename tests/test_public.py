@@ -42,6 +42,7 @@ CALLS = {
     "closed-loop": "close_loop",
     "export": "export",
     "campaign": "run_campaigns",
+    "check-plant": "check_plant",
 }
 """Each command and its public call."""
 
@@ -129,7 +130,7 @@ def test_every_result_has_a_presenter(name: str) -> None:
     if issubclass(kind, presentation.Result) and kind is not presentation.Result:
         assert is_dataclass(kind)
         shown = getattr(presenters, kind.presenter)
-        for method in ("record", "text", "page", "doubts", "figures", "write"):
+        for method in ("record", "shown", "page", "doubts", "figures", "write"):
             assert callable(getattr(shown, method))
 
 

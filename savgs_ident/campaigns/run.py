@@ -39,13 +39,20 @@ from savgs_ident.core.files import prepare_folder, spelled_out
 from savgs_ident.core.presentation import Origin, Progress, no_progress
 from savgs_ident.fit.least_squares import FitSettings
 from savgs_ident.fit.public import fit_with
+from savgs_ident.plants.from_file import load_plant
+from savgs_ident.plants.model import Model, PlantModel
+from savgs_ident.plants.model_toml import model_text, parse_model
+from savgs_ident.plants.parameter_toml import file_content
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import RigModel
-from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig, rig_content, rig_text
-from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
+from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig, rig_text
+from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.channels import read_channel_map
 from savgs_ident.recordings.read import map_digest
 from savgs_ident.simulate.program_cache import make_room_for_programs, use_persistent_cache
+
+QUARTER_CAR = "quarter_car"
+"""The plant that a run is about where none is named."""
 
 FILE_NAMES = (
     "campaign.json", "campaigns.csv", "campaigns.parquet", "campaign.png", "campaign.pdf", "campaign.html"
@@ -59,9 +66,10 @@ class FitRequest:
 
     Attributes:
         campaign: its file or folder.
-        rig: the rig file.
+        plant: "quarter_car", or what :func:`savgs_ident.load_plant` takes.
+        rig: the rig file, or another plant's file of numbers; None for what the plant declares.
         channels: the map of the campaign's channels.
-        model: "simtr" or "simqc".
+        model: "simtr" or "simqc", of the quarter car.
         beside: names of the effects that the model has besides.
         free: parameters to identify; the paper's if empty.
         settings: of the fit.
@@ -70,7 +78,8 @@ class FitRequest:
     """
 
     campaign: Path
-    rig: Path
+    plant: str
+    rig: Path | None
     channels: Path | None
     model: str
     beside: tuple[str, ...]
@@ -79,9 +88,13 @@ class FitRequest:
     max_frequency: float | None
     command: tuple[str, ...]
 
-    def model_of(self, rig: bytes) -> RigModel:
-        """The model, with ``rig`` in the rig file; raises :class:`InputError` if that is none."""
-        return reduce(add, self.beside, RigModel(parse_rig(rig, self.rig), MODELS[self.model]))
+    def model_of(self, rig: bytes) -> Model:
+        """The model, with ``rig`` in the file of its numbers; raises :class:`InputError` if that is none."""
+        if self.plant == QUARTER_CAR:
+            return reduce(add, self.beside, RigModel(parse_rig(rig, self.rig), MODELS[self.model]))
+        declared = load_plant(self.plant)
+        start = declared if self.rig is None else parse_model(rig, self.rig, declared)
+        return reduce(add, self.beside, start)
 
 
 @dataclass(frozen=True)
@@ -135,6 +148,7 @@ def run_campaigns(
     folders: str | Path | Sequence[str | Path],
     out: str | Path,
     *,
+    plant: str = QUARTER_CAR,
     rig: str | Path | None = None,
     model: str = "simtr",
     beside: Sequence[str] = (),
@@ -154,8 +168,9 @@ def run_campaigns(
         folders: campaigns as :func:`~savgs_ident.plants.quarter_car.rig_recordings.load_campaign` takes them, and
             folders of several: one in each file or subfolder.
         out: folder in which each campaign's result is saved; a run that was stopped goes on from there.
-        rig: rig file to start from; the shipped one if left out.
-        model: "simtr", with rail and tyre friction, or "simqc", without.
+        plant: "quarter_car", or a plant as :func:`savgs_ident.load_plant` takes it: "FILE.py:CLASS".
+        rig: rig file to start from, the shipped one if left out; a ``model.toml`` of another plant.
+        model: "simtr", with rail and tyre friction, or "simqc", without: of the quarter car.
         beside: names of effects that the model has besides, as a diagnosis names them.
         free: names of the parameters to identify; the paper's if empty.
         channels: the map of the channels.
@@ -170,9 +185,11 @@ def run_campaigns(
     A campaign that fails is a row that says why, the others go on. Raises :class:`InputError` for what concerns all:
     an argument, the rig, the settings, the folder, the cluster.
     """
+    numbers = None if rig is None else Path(rig)
     one = FitRequest(
         Path(),
-        Path(rig) if rig is not None else default_rig_path(),
+        plant,
+        numbers or (default_rig_path() if plant == QUARTER_CAR else None),
         None if channels is None else Path(channels),
         model,
         tuple(beside),
@@ -200,7 +217,7 @@ def identify_all(
     :func:`run_campaigns` does.
     """
     # As it is now: a change during the run concerns no campaign.
-    rig = rig_content(run.one.rig)
+    rig = b"" if run.one.rig is None else file_content(run.one.rig)
     settings = _settings(run.one, rig)
     found = find_campaigns(run.arguments, FILE_NAMES)
     check_apart(out, run.arguments, found, FILE_NAMES)
@@ -246,7 +263,8 @@ def _identified(task: CampaignTask) -> StoredResult:
             remedy="install the same version for every worker",
         )
     request = task.request
-    campaign = load_campaign(request.campaign, request.channels)
+    model = request.model_of(task.rig)
+    campaign = load_campaign(request.campaign, request.channels, layout=model.layout)
     if campaign.sha256 != task.data_sha256:
         raise InputError(
             "is not what it was when the run began",
@@ -260,7 +278,7 @@ def _identified(task: CampaignTask) -> StoredResult:
             remedy="run again",
         )
     found = fit_with(
-        request.model_of(task.rig),
+        model,
         # The worker of a cluster has it under another path.
         replace(campaign, source=task.source),
         request.free,
@@ -268,8 +286,13 @@ def _identified(task: CampaignTask) -> StoredResult:
         request.max_frequency,
         request.command,
     )
-    # A fit gives a model of the kind that it was given.
-    return StoredResult(found.to_json(), rig_text(cast(RigModel, found.model).rig), campaign.start)
+    identified = found.model
+    text = (
+        rig_text(identified.rig)
+        if isinstance(identified, RigModel)
+        else model_text(cast(PlantModel, identified))
+    )
+    return StoredResult(found.to_json(), text, campaign.start)
 
 
 @dataclass(frozen=True)
@@ -282,11 +305,16 @@ class _Pending:
 
 def _settings(one: FitRequest, content: bytes) -> dict[str, Any]:
     """What a result depends on besides data and rig, this program's version among it; checks them, too."""
-    if one.channels is not None:
-        read_channel_map(one.channels, RIG_LAYOUT)
     model = one.model_of(content)
+    if one.channels is not None:
+        read_channel_map(one.channels, model.layout)
+    of = (
+        {"model": one.model}
+        if one.plant == QUARTER_CAR
+        else {"plant": one.plant, "plant_sha256": model.sha256}
+    )
     return {
-        "model": one.model,
+        **of,
         "with": list(one.beside),
         "free": list(model.before.free(one.free)),
         "max_frequency_hz": one.max_frequency,

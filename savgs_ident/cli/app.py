@@ -18,6 +18,7 @@ from savgs_ident.cli.blind import blind
 from savgs_ident.cli.bode import bode
 from savgs_ident.cli.calibrate import calibrate
 from savgs_ident.cli.campaign import campaign
+from savgs_ident.cli.check_plant import check_plant
 from savgs_ident.cli.closed_loop import closed_loop
 from savgs_ident.cli.console import mend_streams, print_error, refused
 from savgs_ident.cli.demo import demo
@@ -97,7 +98,7 @@ def _root(
 
 for _command in (
     demo, inspect, fit, bode, simulate, posterior, calibrate, diagnose, false_alarms, blind, linearise, design,
-    closed_loop, export, campaign,
+    closed_loop, export, campaign, check_plant,
 ):  # fmt: skip
     app.command()(_command)
 

@@ -4,13 +4,16 @@ from pathlib import Path
 
 from savgs_ident.cli.console import Reporter, ends_with_code
 from savgs_ident.cli.options import (
+    QUARTER_CAR,
     CampaignArgument,
     ChannelsOption,
     JsonOption,
     ModelArgument,
     OrdersOption,
     OutOption,
+    PlantOption,
     QuietOption,
+    identified_model,
     read_campaign,
 )
 
@@ -19,6 +22,7 @@ from savgs_ident.cli.options import (
 def bode(
     model: ModelArgument,
     campaign: CampaignArgument,
+    plant: PlantOption = QUARTER_CAR,
     channels: ChannelsOption = None,
     orders: OrdersOption = 9,
     out: OutOption = Path("out/bode"),
@@ -38,8 +42,8 @@ def bode(
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    shown = si.load_model(model)
+    shown = identified_model(plant, model)
     with reporter.working() as progress:
-        compared = si.compare(shown, read_campaign(campaign, channels, progress), orders, progress)
+        compared = si.compare(shown, read_campaign(campaign, channels, progress, shown), orders, progress)
         files = compared.save(out, progress)
     return reporter.conclude(compared, files)

@@ -7,6 +7,7 @@ import typer
 
 from savgs_ident.cli.console import BAD_INPUT, NOT_TRUSTED, OK, Reporter, ends_with_code, print_error
 from savgs_ident.cli.options import (
+    QUARTER_CAR,
     ChannelsOption,
     FitOrdersOption,
     FixedTolerancesOption,
@@ -16,10 +17,12 @@ from savgs_ident.cli.options import (
     ModelName,
     ModelOption,
     OutOption,
+    PlantOption,
     QuietOption,
     RigOption,
     SchedulerOption,
     WithOption,
+    check_model,
     command_line,
 )
 
@@ -38,8 +41,9 @@ def campaign(
         ),
     ],
     scheduler: SchedulerOption = None,
+    plant: PlantOption = QUARTER_CAR,
     rig: RigOption = None,
-    model: ModelOption = ModelName.simtr,
+    model: ModelOption = None,
     beside: WithOption = None,
     free: FreeOption = None,
     channels: ChannelsOption = None,
@@ -78,13 +82,15 @@ def campaign(
     """
     import savgs_ident as si
 
+    check_model(plant, model)
     reporter = Reporter(json, quiet)
     with reporter.working() as progress:
         study = si.run_campaigns(
             folders,
             out,
+            plant=plant,
             rig=rig,
-            model=model.value,
+            model=(model or ModelName.simtr).value,
             beside=beside or (),
             free=free or (),
             channels=channels,

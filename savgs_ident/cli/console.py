@@ -205,6 +205,14 @@ def _code_of(work: Callable[[], int]) -> int:
         return BAD_INPUT
     except OSError as error:
         return refused(error)
+    except Exception as error:
+        from savgs_ident.plants.from_file import fault_of_a_plant
+
+        fault = fault_of_a_plant(error)
+        if fault is None:
+            raise
+        print_error(f"Error: {fault}")
+        return BAD_INPUT
 
 
 def _line(message: str) -> RenderableType:

@@ -1,8 +1,5 @@
 """``savgs-ident diagnose``: where the gap between rig and model lies, what causes it, how far it shrinks."""
 
-from collections.abc import Sequence
-from functools import reduce
-from operator import add
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,23 +7,23 @@ import typer
 
 from savgs_ident.cli.console import Progress, Reporter, ends_with_code
 from savgs_ident.cli.options import (
+    QUARTER_CAR,
     BaselineOption,
     ChannelsOption,
     JsonOption,
     MaxFrequencyOption,
-    ModelName,
     OrdersOption,
     OutOption,
-    PlantName,
+    PlantOption,
     QuietOption,
     WithOption,
+    baseline_model,
     command_line,
-    effects_of,
     read_campaign,
 )
 
 if TYPE_CHECKING:
-    from savgs_ident import Campaign, DrivenMotion, PlantModel, QuarterCar
+    from savgs_ident import Campaign, DrivenMotion, Model
 
 
 @ends_with_code
@@ -39,14 +36,7 @@ def diagnose(
             show_default=False,
         ),
     ],
-    plant: Annotated[
-        PlantName,
-        typer.Option(
-            "--plant",
-            help="quarter_car: the rig, in dwells. axis: a servo axis, by the force of its drive along the "
-            "recorded motion.",
-        ),
-    ] = PlantName.quarter_car,
+    plant: PlantOption = QUARTER_CAR,
     rig: Annotated[
         Path | None,
         typer.Option("--rig", metavar="FILE", help="Rig file, or model.toml of an earlier fit."),
@@ -60,7 +50,9 @@ def diagnose(
     held_out: Annotated[
         Path | None,
         typer.Option(
-            "--held-out", metavar="FILE", help="Another motion of the axis, which is predicted and compared."
+            "--held-out",
+            metavar="FILE",
+            help="Another motion along the drive, which is predicted and compared.",
         ),
     ] = None,
     max_frequency: MaxFrequencyOption = None,
@@ -81,6 +73,7 @@ def diagnose(
     Exit code 1 if a search that the verdict stands on did not converge.
 
     Example: savgs-ident diagnose campaign.csv.gz --model simqc
+    Example: savgs-ident diagnose tests.csv --plant pendulum.py:Pendulum
     Example: savgs-ident diagnose axis.mat --plant axis --held-out axis_again.mat
     """
     import savgs_ident as si
@@ -88,11 +81,12 @@ def diagnose(
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
+    baseline = baseline_model(plant, rig, model, beside or ())
     with reporter.working() as progress:
         found = si.diagnose(
-            _baseline(plant, rig, model, beside or ()),
-            _recorded(plant, campaign, channels, progress),
-            held_out=None if held_out is None else si.load_motion(held_out),
+            baseline,
+            _recorded(baseline, campaign, channels, progress),
+            held_out=None if held_out is None else _recorded(baseline, held_out, channels, progress),
             without=without or (),
             orders=orders,
             max_frequency=max_frequency,
@@ -103,26 +97,13 @@ def diagnose(
     return reporter.conclude(found, files)
 
 
-def _baseline(
-    plant: PlantName, rig: Path | None, model: ModelName | None, beside: Sequence[str]
-) -> "QuarterCar | PlantModel":
-    """The baseline with the effects ``beside`` it; raises :class:`InputError` for options that do not go together."""
-    import savgs_ident as si
-
-    if plant is PlantName.quarter_car:
-        return reduce(add, beside, si.load_baseline(rig, effects_of(model)))
-    if rig is not None or model is not None:
-        raise si.InputError(f"--rig and --model are no options of the {plant.value}", remedy="leave them out")
-    return reduce(add, beside, si.PlantModel(si.Axis(), si.Axis.parameters))
-
-
 def _recorded(
-    plant: PlantName, path: Path, channels: Path | None, progress: Progress
+    baseline: "Model", path: Path, channels: Path | None, progress: Progress
 ) -> "Campaign | DrivenMotion":
     """What was recorded; raises :class:`InputError` if it cannot be read."""
     import savgs_ident as si
 
-    if plant is PlantName.quarter_car:
-        return read_campaign(path, channels, progress)
+    if path.suffix != ".mat":
+        return read_campaign(path, channels, progress, baseline)
     progress(f"reading {path}")
     return si.load_motion(path)

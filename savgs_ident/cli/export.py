@@ -7,19 +7,24 @@ import typer
 
 from savgs_ident.cli.console import Reporter, ends_with_code
 from savgs_ident.cli.options import (
+    QUARTER_CAR,
     EffectsOption,
     JsonOption,
     ModelArgument,
     OutOption,
+    PlantOption,
     QuietOption,
     command_line,
     effects_of,
+    identified_model,
 )
 
 
 @ends_with_code
 def export(
     model_file: ModelArgument,
+    *,
+    plant: PlantOption = QUARTER_CAR,
     to: Annotated[
         list[str],
         typer.Option(
@@ -67,9 +72,11 @@ def export(
     import savgs_ident as si
 
     reporter = Reporter(json, quiet)
+    # A rig file is taken with the effects of the diagnosis, so it goes there as it is.
+    exported_model = model_file if plant == QUARTER_CAR else identified_model(plant, model_file, model)
     with reporter.working() as progress:
         exported = si.export(
-            model_file,
+            exported_model,
             to,
             out,
             effects=effects_of(model),

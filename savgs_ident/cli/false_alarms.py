@@ -7,6 +7,7 @@ import typer
 
 from savgs_ident.cli.console import Reporter, ends_with_code
 from savgs_ident.cli.options import (
+    QUARTER_CAR,
     BaselineOption,
     CampaignArgument,
     ChannelsOption,
@@ -15,11 +16,12 @@ from savgs_ident.cli.options import (
     MaxFrequencyOption,
     OrdersOption,
     OutOption,
+    PlantOption,
     QuietOption,
     SchedulerOption,
     SeedOption,
+    baseline_model,
     command_line,
-    effects_of,
     read_campaign,
 )
 
@@ -27,6 +29,7 @@ from savgs_ident.cli.options import (
 @ends_with_code
 def false_alarms(
     campaign: CampaignArgument,
+    plant: PlantOption = QUARTER_CAR,
     draws: Annotated[int, typer.Option("--draws", min=1, help="Synthetic campaigns.")] = 100,
     rig: Annotated[
         Path | None,
@@ -63,11 +66,11 @@ def false_alarms(
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    baseline = si.load_baseline(rig, effects_of(model))
+    baseline = baseline_model(plant, rig, model, ())
     with reporter.working() as progress:
         study = si.false_alarms(
             baseline,
-            read_campaign(campaign, channels, progress),
+            read_campaign(campaign, channels, progress, baseline),
             draws,
             orders=orders,
             max_frequency=max_frequency,

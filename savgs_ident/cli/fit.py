@@ -1,7 +1,5 @@
-"""``savgs-ident fit``: identify the rig."""
+"""``savgs-ident fit``: identify the rig, or another plant."""
 
-from functools import reduce
-from operator import add
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +7,7 @@ import typer
 
 from savgs_ident.cli.console import Reporter, ends_with_code
 from savgs_ident.cli.options import (
+    QUARTER_CAR,
     CampaignArgument,
     ChannelsOption,
     FitOrdersOption,
@@ -16,14 +15,14 @@ from savgs_ident.cli.options import (
     FreeOption,
     JsonOption,
     MaxFrequencyOption,
-    ModelName,
     ModelOption,
     OutOption,
+    PlantOption,
     QuietOption,
     RigOption,
     WithOption,
     command_line,
-    effects_of,
+    model_to_fit,
     read_campaign,
 )
 
@@ -31,8 +30,9 @@ from savgs_ident.cli.options import (
 @ends_with_code
 def fit(
     campaign: CampaignArgument,
+    plant: PlantOption = QUARTER_CAR,
     rig: RigOption = None,
-    model: ModelOption = ModelName.simtr,
+    model: ModelOption = None,
     beside: WithOption = None,
     free: FreeOption = None,
     channels: ChannelsOption = None,
@@ -48,7 +48,7 @@ def fit(
 ) -> int:
     """Identify the rig from a campaign: parameters with errors, how well they fit, what the data identify.
 
-    Writes fit.json, model.toml (the identified rig), bode.png and bode.pdf.
+    Writes fit.json, model.toml (the identified model), bode.png and bode.pdf.
 
     Effects that a diagnosis names are put into the model by --with, and their parameters are identified, too.
 
@@ -58,17 +58,19 @@ def fit(
     Example: savgs-ident fit campaign.csv.gz --free mu_r c_sd --max-frequency 4
 
     Example: savgs-ident fit campaign.csv.gz --with rail_stribeck
+
+    Example: savgs-ident fit tests.csv --plant pendulum.py:Pendulum
     """
     import savgs_ident as si
     from savgs_ident.core.files import prepare_folder
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    start = reduce(add, beside or (), si.load_model(rig, effects_of(model)))
+    start = model_to_fit(plant, rig, model, beside or ())
     with reporter.working() as progress:
         found = si.fit(
             start,
-            read_campaign(campaign, channels, progress),
+            read_campaign(campaign, channels, progress, start),
             free or (),
             orders=orders,
             peak_to_peak=peak_to_peak,

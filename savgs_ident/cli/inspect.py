@@ -4,11 +4,14 @@ from pathlib import Path
 
 from savgs_ident.cli.console import Reporter, ends_with_code
 from savgs_ident.cli.options import (
+    QUARTER_CAR,
     CampaignArgument,
     ChannelsOption,
     JsonOption,
     OutOption,
+    PlantOption,
     QuietOption,
+    model_to_fit,
     read_campaign,
 )
 
@@ -16,6 +19,7 @@ from savgs_ident.cli.options import (
 @ends_with_code
 def inspect(
     campaign: CampaignArgument,
+    plant: PlantOption = QUARTER_CAR,
     channels: ChannelsOption = None,
     out: OutOption = Path("out/inspect"),
     json: JsonOption = False,
@@ -32,7 +36,8 @@ def inspect(
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
+    of = None if plant == QUARTER_CAR else model_to_fit(plant, None, None, ())
     with reporter.working() as progress:
-        summary = si.inspect(read_campaign(campaign, channels, progress), progress=progress)
+        summary = si.inspect(read_campaign(campaign, channels, progress, of), progress=progress)
         files = summary.save(out, progress)
     return reporter.conclude(summary, files)

@@ -6,6 +6,8 @@ Options that take several values at once are written ``--free mu_r c_sd`` for ``
 import sys
 from collections.abc import Callable, Sequence
 from enum import StrEnum
+from functools import reduce
+from operator import add
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -14,7 +16,7 @@ import typer
 from savgs_ident.cli.console import Progress
 
 if TYPE_CHECKING:
-    from savgs_ident import Campaign
+    from savgs_ident import Campaign, Model, PlantModel
 
 
 class ModelName(StrEnum):
@@ -22,13 +24,6 @@ class ModelName(StrEnum):
 
     simqc = "simqc"
     simtr = "simtr"
-
-
-class PlantName(StrEnum):
-    """The plants that can be named."""
-
-    quarter_car = "quarter_car"
-    axis = "axis"
 
 
 class SamplerName(StrEnum):
@@ -50,16 +45,33 @@ ModelArgument = Annotated[
         metavar="MODEL", help="Rig file: a model.toml that `fit` wrote, or a drawing.", show_default=False
     ),
 ]
+PlantOption = Annotated[
+    str,
+    typer.Option(
+        "--plant",
+        metavar="PLANT",
+        help="quarter_car: the rig. axis: a servo axis. two_mass: the linear quarter car. FILE.py:CLASS: a plant of "
+        "your own, see `savgs-ident check-plant`.",
+    ),
+]
 ChannelsOption = Annotated[
     Path | None,
     typer.Option("--channels", metavar="FILE", help="channels.toml that says which column or topic is what."),
 ]
 RigOption = Annotated[
     Path | None,
-    typer.Option("--rig", metavar="RIG", help="Rig file to start from; the shipped one by default."),
+    typer.Option(
+        "--rig",
+        metavar="FILE",
+        help="Rig file to start from, the shipped one by default; for another plant a model.toml with its numbers.",
+    ),
 ]
 ModelOption = Annotated[
-    ModelName, typer.Option("--model", help="simtr: with rail and tyre friction; simqc: without.")
+    ModelName | None,
+    typer.Option(
+        "--model",
+        help="simtr: with rail and tyre friction, the default; simqc: without. Of the quarter car alone.",
+    ),
 ]
 WithOption = Annotated[
     list[str] | None,
@@ -72,7 +84,7 @@ BaselineOption = Annotated[
     typer.Option(
         "--model",
         help="simtr: with rail and tyre friction, the default for a drawing; simqc: without. "
-        "A model.toml brings its own.",
+        "A model.toml brings its own. Of the quarter car alone.",
     ),
 ]
 EffectsOption = Annotated[
@@ -112,12 +124,74 @@ def command_line() -> tuple[str, ...]:
     return ("savgs-ident", *sys.argv[1:])
 
 
-def read_campaign(path: Path, channels: Path | None, progress: Progress) -> "Campaign":
-    """The campaign of a file or folder; raises :class:`InputError` for one that cannot be read."""
+QUARTER_CAR = "quarter_car"
+"""The plant that commands are about where none is named."""
+
+
+def model_to_fit(plant: str, rig: Path | None, model: ModelName | None, beside: Sequence[str]) -> "Model":
+    """The model that a fit starts from, with the effects ``beside`` its own.
+
+    Raises :class:`InputError` for a plant or a file that cannot be read, and for options that do not go together.
+    """
+    import savgs_ident as si
+
+    if plant == QUARTER_CAR:
+        return reduce(add, beside, si.load_model(rig, effects_of(model or ModelName.simtr)))
+    return reduce(add, beside, _of_other_plant(plant, rig, model))
+
+
+def baseline_model(plant: str, rig: Path | None, model: ModelName | None, beside: Sequence[str]) -> "Model":
+    """The baseline of a diagnosis, with the effects ``beside`` its own; raises as :func:`model_to_fit` does."""
+    import savgs_ident as si
+
+    if plant == QUARTER_CAR:
+        return reduce(add, beside, si.load_baseline(rig, effects_of(model)))
+    return reduce(add, beside, _of_other_plant(plant, rig, model))
+
+
+def identified_model(plant: str, path: Path, model: ModelName | None = None) -> "Model":
+    """The model of a file that a fit wrote; raises :class:`InputError` as :func:`model_to_fit` does."""
+    import savgs_ident as si
+
+    return (
+        si.load_model(path, effects_of(model))
+        if plant == QUARTER_CAR
+        else _of_other_plant(plant, path, model)
+    )
+
+
+def _of_other_plant(plant: str, rig: Path | None, model: ModelName | None) -> "PlantModel":
+    import savgs_ident as si
+
+    check_model(plant, model)
+    return si.load_plant(plant, rig)
+
+
+def check_model(plant: str, model: ModelName | None) -> None:
+    """Raise :class:`InputError` for one of the paper's models of another plant than the quarter car."""
+    import savgs_ident as si
+
+    if model is not None and plant != QUARTER_CAR:
+        raise si.InputError(
+            f"--model {model.value} is of the quarter car, not of {plant}",
+            remedy="leave it out; --with adds effects",
+        )
+
+
+def read_campaign(
+    path: Path, channels: Path | None, progress: Progress, model: "Model | None" = None
+) -> "Campaign":
+    """The campaign of a file or folder, in the channels of the model's plant, or of the rig where none is given.
+
+    Raises :class:`InputError` for one that cannot be read.
+    """
     import savgs_ident as si
 
     progress(f"reading {path}")
-    return si.load_campaign(path, channels, progress=progress.fraction(f"reading {path}"))
+    told = progress.fraction(f"reading {path}")
+    if model is None:
+        return si.load_campaign(path, channels, progress=told)
+    return si.load_campaign(path, channels, layout=model.layout, progress=told)
 
 
 def effects_of(model: ModelName | None) -> Literal["simqc", "simtr"] | None:

@@ -7,6 +7,7 @@ import typer
 
 from savgs_ident.cli.console import Reporter, ends_with_code, print_error
 from savgs_ident.cli.options import (
+    QUARTER_CAR,
     CampaignArgument,
     ChannelsOption,
     FixedTolerancesOption,
@@ -15,10 +16,12 @@ from savgs_ident.cli.options import (
     ModelArgument,
     OrdersOption,
     OutOption,
+    PlantOption,
     QuietOption,
     SamplerName,
     SeedOption,
     command_line,
+    identified_model,
     read_campaign,
 )
 
@@ -27,6 +30,7 @@ from savgs_ident.cli.options import (
 def posterior(
     model: ModelArgument,
     campaign: CampaignArgument,
+    plant: PlantOption = QUARTER_CAR,
     sampler: Annotated[
         SamplerName,
         typer.Option("--sampler", help="emcee: an ensemble of walkers; nuts: gradient-based trajectories."),
@@ -75,13 +79,13 @@ def posterior(
 
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    identified = si.load_model(model)
+    identified = identified_model(plant, model)
     chain = out / f"chain-{sampler.value}.h5"
     try:
         with reporter.working() as progress:
             found = si.sample(
                 identified,
-                read_campaign(campaign, channels, progress),
+                read_campaign(campaign, channels, progress, identified),
                 sampler.value,
                 target_ess=target_ess,
                 time_limit=time_limit,

@@ -1,4 +1,4 @@
-"""``savgs-ident simulate``: what a model does on a cam, at frequencies or along a sweep."""
+"""``savgs-ident simulate``: what a model does under its input, at frequencies or along a sweep."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,12 +7,14 @@ import typer
 
 from savgs_ident.cli.console import Reporter, ends_with_code
 from savgs_ident.cli.options import (
+    QUARTER_CAR,
     EffectsOption,
     JsonOption,
     ModelArgument,
     OutOption,
+    PlantOption,
     QuietOption,
-    effects_of,
+    identified_model,
     read_campaign,
 )
 
@@ -20,10 +22,11 @@ from savgs_ident.cli.options import (
 @ends_with_code
 def simulate(
     model_file: ModelArgument,
+    plant: PlantOption = QUARTER_CAR,
     frequency: Annotated[
         list[float] | None,
         typer.Option(
-            "--frequency", metavar="HZ ...", help="Frequencies of the cam; 28 from 0.5 to 6 by default."
+            "--frequency", metavar="HZ ...", help="Frequencies of the input; 28 from 0.5 to 6 by default."
         ),
     ] = None,
     sweep: Annotated[
@@ -31,7 +34,7 @@ def simulate(
     ] = False,
     campaign: Annotated[
         Path | None,
-        typer.Option("--campaign", metavar="CAMPAIGN", help="Road and link as in the dwells of a campaign."),
+        typer.Option("--campaign", metavar="CAMPAIGN", help="Inputs as in the dwells of a campaign."),
     ] = None,
     model: EffectsOption = None,
     orders: Annotated[int, typer.Option("--orders", min=1, help="Highest harmonic order.")] = 15,
@@ -39,7 +42,7 @@ def simulate(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> int:
-    """Simulate a model on the cam: its periodic responses at given frequencies, or one sweep.
+    """Simulate a model, the rig's on its cam: its periodic responses at given frequencies, or one sweep.
 
     Writes simulate.json, simulate.csv, simulate.png and simulate.pdf.
 
@@ -55,13 +58,13 @@ def simulate(
         raise typer.BadParameter("choose one of --frequency, --sweep and --campaign")
     reporter = Reporter(json, quiet)
     prepare_folder(out)
-    shown = si.load_model(model_file, effects_of(model))
+    shown = identified_model(plant, model_file, model)
     with reporter.working() as progress:
         found: si.SimulatedResponse | si.SimulatedSweep
         if sweep:
             found = si.simulate_sweep(shown, progress)
         else:
-            recorded = None if campaign is None else read_campaign(campaign, None, progress)
+            recorded = None if campaign is None else read_campaign(campaign, None, progress, shown)
             found = si.simulate(shown, frequency or (), recorded, orders, progress)
         files = found.save(out, progress)
     return reporter.conclude(found, files)

@@ -107,8 +107,8 @@ class Presenter(Protocol):
     def record(self, result: Any, /) -> Mapping[str, Any]:
         """The JSON object of the result."""
 
-    def text(self, result: Any, /) -> "RenderableType":
-        """Tables and sentences for a terminal."""
+    def shown(self, result: Any, /) -> "RenderableType":
+        """Tables and sentences for a terminal, and what the checks of the data found."""
 
     def page(self, result: Any, /) -> str | None:
         """The report as HTML; None where there is none."""
@@ -140,7 +140,7 @@ class Result:
 
     def rendered(self) -> "RenderableType":
         """Tables and sentences for a terminal that rich prints to."""
-        return self._presenter().text(self)
+        return self._presenter().shown(self)
 
     def __str__(self) -> str:
         from rich.console import Console

@@ -84,7 +84,9 @@ def change_without(problem: DiagnosisProblem, mode: LaplaceFit, gone: Sequence[s
 def change_by_law(problem: DiagnosisProblem, law: LearnedLaw) -> Change:
     """What a learned law does to the response, all other parameters as they are beside it; infinite as above."""
     plant = problem.plant
-    values = {each.name: law.mode.values[each.name] for each in plant.nuisances}
+    # What a contact is given, the model with the law may not have: it stays as on the sheet.
+    known = law.mode.values
+    values = {each.name: known[each.name] for each in plant.nuisances if each.name in known}
     without = plant.predict((), values, (), problem.base.prediction.warm_start)
     if not without.solved:
         return Change(np.inf, np.inf)

@@ -7,7 +7,7 @@ The model says which effects may be missing in its plant, and which such plants 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from savgs_ident.core.errors import InputError
+from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progress
 from savgs_ident.diagnosis.diagnose import (
     Watch,
@@ -24,11 +24,13 @@ from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.observations import Data
+from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.responses.driven_motion import DrivenMotion
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.responses.driven_motion import DrivenMotion, recorded_motion
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
 from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep, measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
@@ -38,7 +40,7 @@ def diagnose(
     model: Model,
     measured: Measurements | DrivenMotion,
     *,
-    held_out: DrivenMotion | None = None,
+    held_out: Campaign | DrivenMotion | None = None,
     without: Sequence[str] = (),
     orders: int = 9,
     max_frequency: float | None = None,
@@ -55,7 +57,7 @@ def diagnose(
     Args:
         model: the baseline, of the rig or of another plant.
         measured: the recordings, or the response of their dwells; or a measured motion, along which a plant with one
-            coordinate is held against the force of its drive.
+            coordinate is held against the force of its drive, as it is where recordings have no dwell.
         held_out: another motion, that nothing is fitted to: it is predicted, and compared.
         without: effects to leave out of the catalogue.
         orders: highest harmonic order to compare.
@@ -68,7 +70,10 @@ def diagnose(
     do not exist, and for a model without periodic motion.
     """
     use_persistent_cache()
+    if isinstance(measured, Campaign) and _is_driven(model.plant) and not measured.of_kind("dwell"):
+        measured = longest_motion(measured, model)
     if isinstance(measured, DrivenMotion):
+        held_out = longest_motion(held_out, model) if isinstance(held_out, Campaign) else held_out
         return _diagnose_motion(model, measured, held_out, without, constants, command, progress)
     if held_out is not None:
         raise InputError(
@@ -76,17 +81,56 @@ def diagnose(
         )
     response = measured_response(measured, model.plant, orders, max_frequency, progress)
     campaign, warnings = campaign_of(measured), response.warnings
-    given, settings, values = model.before, *_asked(model, orders, without, constants)
+    given, settings, values = baseline_of(model, orders, without, constants)
     sweep, found_in_sweep = (None, ()) if campaign is None else first_sweep(campaign, model.plant)
-    plant, data = _dwell_problem(given, response, settings)
+    plant, data = problem_of_dwells(response, given, settings)
     origin = model.origin(campaign, (*warnings, *found_in_sweep)).with_command(command)
     return diagnose_dwells(plant, data, response, given, settings, values, progress, sweep, origin=origin)
 
 
-def _dwell_problem(
-    given: Model, measured: HarmonicResponse, settings: DiagnosisSettings
+def _is_driven(plant: AbstractPlant | type[AbstractPlant]) -> bool:
+    """Whether a plant can be held against the force of its drive along a measured motion."""
+    return len(plant.coordinates) == 1 and len(plant.inputs) == 1
+
+
+def longest_motion(campaign: Campaign, model: Model) -> DrivenMotion:
+    """The longest test of a campaign that is not at rest, as a motion of a plant with one coordinate and its drive.
+
+    Raises :class:`InputError` where no channel reads the coordinate, or the test cannot be used.
+    """
+    plant = model.plant
+    (coordinate,), (drive,) = plant.coordinates, plant.inputs
+    reading = next((each.name for each in plant.channels if each.unit == coordinate.unit), None)
+    if reading is None:
+        raise InputError(
+            f"no channel of {model.plant_name} reads '{coordinate.name}' in {coordinate.unit}",
+            source=campaign.source,
+            remedy="record harmonic dwells, or declare the channel of the measured motion",
+        )
+    moving = [each for each in campaign.recordings if each.kind != "standstill"]
+    if not moving:
+        raise InputError("nothing moves in it", source=campaign.source, remedy="record a motion")
+    test = max(moving, key=lambda each: each.duration_s)
+    motion = recorded_motion(test, reading, drive.name, campaign.source)
+    if len(moving) == 1:
+        return motion
+    others = DataWarning(
+        "tests_not_used",
+        f"of {len(moving)} motions only the longest is diagnosed, '{test.name}'",
+        source=campaign.source,
+        remedy="give another as a file of its own by --held-out: it is predicted, and compared",
+    )
+    return replace(motion, warnings=(*motion.warnings, others))
+
+
+def problem_of_dwells(
+    measured: HarmonicResponse, given: Model, settings: DiagnosisSettings
 ) -> tuple[DwellProblem, Data]:
-    """A plant as known before any fit, with the effects that may be missing in it, and the response as data."""
+    """A plant as known before any fit, with the effects that may be missing in it, and the response as data.
+
+    Raises :class:`InputError` for effects that do not exist, for effects of the baseline that are to be left out, and
+    for a response that cannot be used.
+    """
     bare = replace(given.build(), effects=())
     return baseline_problem(measured, bare, given.table, given.candidates, settings, given.known_models)
 
@@ -120,18 +164,18 @@ def _diagnose_motion(
         return further_motion(there, held_out, points)
 
     further = None if held_out is None else predict
-    origin = replace(model.origin(), data=motion.source, command=tuple(command))
+    origin = replace(model.origin(warnings=motion.warnings), data=motion.source, command=tuple(command))
     return diagnose_problem(problem, data, given, settings, values, progress, further, origin=origin)
 
 
 def baseline_of(
-    model: RigModel,
+    model: Model,
     orders: int = 9,
     without: Sequence[str] = (),
     constants: DecisionConstants = DEFAULTS,
-) -> tuple[Rig, DiagnosisSettings, Mapping[str, float]]:
-    """The rig as known before its own fit, what the baseline is, and the values that it is given with [SI]."""
-    return model.before.rig, *_asked(model, orders, without, constants)
+) -> tuple[Model, DiagnosisSettings, Mapping[str, float]]:
+    """The model as known before its own fit, what the baseline is, and the values that it is given with [SI]."""
+    return model.before, *_asked(model, orders, without, constants)
 
 
 def _asked(
@@ -168,18 +212,7 @@ def diagnose_response(
     """
     settings = settings or SIMTR
     given = RigModel(rig, settings.baseline)
-    plant, data = _dwell_problem(given, measured, settings)
+    plant, data = problem_of_dwells(measured, given, settings)
     return diagnose_dwells(
         plant, data, measured, given, settings, values or {}, progress, sweep, watch, origin
     )
-
-
-def quarter_car_problem(
-    measured: HarmonicResponse, rig: Rig, settings: DiagnosisSettings
-) -> tuple[DwellProblem, Data]:
-    """The rig with its catalogue, less the effects that are left out, and the response as data.
-
-    Raises :class:`InputError` for effects that do not exist, for effects of the baseline that are to be left out, and
-    for a response that cannot be used.
-    """
-    return _dwell_problem(RigModel(rig, settings.baseline), measured, settings)

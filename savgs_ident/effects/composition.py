@@ -127,10 +127,12 @@ def contact_bristle(
 class EffectsAtInstant:
     """The effects of a plant at one instant, with parameters ``p``.
 
-    ``s`` and ``sd`` are the states and their rates, (s,), in the order of :func:`states_of` [unit of each];
+    ``s`` and ``sd`` are the states and their rates, (s,) [unit of each]: first ``own`` ones of the plant itself, then
+    those of the effects, in the order of :func:`states_of`;
     ``imposed`` are signals imposed from outside, as :func:`nothing_imposed` arranges them.
 
     Attributes:
+        own: internal states of the plant itself, (o,), which are none of the effects'; ``own_rates`` their rates.
         signals: what the forces at each port see, by the port's name.
         loads: the load in which something may give way, by the port's name.
         forces: the force at each force port, by its name; where the plant has an element of its own there and
@@ -144,8 +146,11 @@ class EffectsAtInstant:
         s: Array,
         sd: Array,
         imposed: Mapping[str, Array] | None = None,
+        own: int = 0,
     ) -> None:
         self.p = p
+        self.own, self.own_rates = s[:own], sd[:own]
+        s, sd = s[own:], sd[own:]
         self._imposed = imposed or {}
         self.signals: dict[str, PortSignals] = {}
         self.loads: dict[str, Load] = {}

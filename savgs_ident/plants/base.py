@@ -199,6 +199,7 @@ class AbstractPlant(eqx.Module):
     A plant declares its coordinates, inputs, channels and ports, and implements :meth:`evaluate` and :meth:`read`.
     ``conditions`` are those among which the next test is chosen; ``location_words`` say what reports call the
     locations of ports, where not by their names.
+    ``own_states`` are internal states of the plant itself, as the current of a motor.
     ``coordinate_type`` makes n scalars a tuple with names. :meth:`prepare`, :meth:`drive` and :meth:`cold_start` have
     defaults that serve a plant without costly kinematics; one that has them may replace these three. What exports
     offer beside the readings are its :attr:`outputs`.
@@ -211,6 +212,7 @@ class AbstractPlant(eqx.Module):
     inputs: eqx.AbstractClassVar[tuple[Input, ...]]
     channels: eqx.AbstractClassVar[tuple[Channel, ...]]
     ports: eqx.AbstractClassVar[tuple[Port, ...]]
+    own_states: ClassVar[tuple[InternalState, ...]] = ()
     outputs: ClassVar[tuple[Output, ...]] = ()
     conditions: ClassVar[tuple[OperatingCondition, ...]] = SAME_OR_SCALED
     location_words: ClassVar[Mapping[str, str]] = MappingProxyType({})
@@ -221,6 +223,9 @@ class AbstractPlant(eqx.Module):
         self, p: Values, motion: Motion, u: Any, acting: EffectsAtInstant, prepared: Any = None
     ) -> tuple[Float[Array, " n"], Any]:
         """The equations of motion out of balance, (n,) [SI], and a record of the forces on the way to them.
+
+        A plant with o states of its own (:attr:`own_states`, which are ``acting.own``) gives (n + o,): what vanishes
+        for their right rates comes after the equations of motion.
 
         ``p`` are the parameters with all changes by effects made. ``acting`` is asked for the effects' forces at
         every force port, for the deflections at every series port, and given the load that each of these carries.
@@ -264,8 +269,8 @@ class AbstractPlant(eqx.Module):
 
     @property
     def states(self) -> tuple[InternalState, ...]:
-        """Internal states: anchors of contacts that stick, then those of all effects in their order."""
-        return states_of(self.effects)
+        """Internal states: the plant's own, anchors of contacts that stick, then those of all effects in order."""
+        return (*self.own_states, *states_of(self.effects))
 
     @property
     def sensors_have_dynamics(self) -> bool:
@@ -307,7 +312,7 @@ class AbstractPlant(eqx.Module):
         self, p: Values, motion: Motion, s: Array, sd: Array, u: Any, prepared: Any
     ) -> tuple[EffectsAtInstant, Array, Any]:
         p = self.effective(p)
-        at = EffectsAtInstant(self.effects, p, s, sd, u.imposed)
+        at = EffectsAtInstant(self.effects, p, s, sd, u.imposed, len(self.own_states))
         balance, loads = self.evaluate(p, motion, u, at, prepared)
         return at, balance, loads
 

@@ -8,6 +8,7 @@
 the quarter car has its own, with a rig file (:mod:`savgs_ident.plants.quarter_car.model`).
 """
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
@@ -18,7 +19,7 @@ from savgs_ident.core.parameter import Parameter, ParameterTable, merge_paramete
 from savgs_ident.core.presentation import Origin
 from savgs_ident.effects.effect import Effect, generic_effects
 from savgs_ident.plants.base import AbstractPlant, Channel
-from savgs_ident.recordings.recording import Campaign
+from savgs_ident.recordings.recording import Campaign, ChannelSpec, RecordingLayout
 
 
 class Model(Protocol):
@@ -65,6 +66,14 @@ class Model(Protocol):
         """Where its numbers come from; empty for a drawing."""
 
     @property
+    def source(self) -> str:
+        """The file that its numbers come from; empty without one."""
+
+    @property
+    def sha256(self) -> str:
+        """A digest of its numbers, by which an earlier run on the same is recognised."""
+
+    @property
     def is_drawing(self) -> bool:
         """Whether it comes from no fit."""
 
@@ -82,6 +91,10 @@ class Model(Protocol):
     @property
     def before(self) -> Self:
         """The model with the values that were known before its fit, the centres of their priors."""
+
+    @property
+    def layout(self) -> RecordingLayout:
+        """The channels that its recordings have, for :func:`savgs_ident.load_campaign`."""
 
     def build(self) -> AbstractPlant:
         """The plant that solvers take, with its effects."""
@@ -111,6 +124,7 @@ class PlantModel:
         parameters: its parameters, SI, with bounds and tolerances.
         catalogue: the effects, by name, that it may have; every law at every port that it suits, if left out.
         provenance: what a fit did: the parameters left ``free``, and the values ``before`` of all that it moved.
+        source: the file that its numbers come from; empty without one.
 
     ``model + "guide_coulomb"`` is the model with one more effect of the catalogue, ``model + effect`` with one of
     your own. Raises :class:`InputError` for an effect that is not in the catalogue, or whose parameters do not go
@@ -121,10 +135,12 @@ class PlantModel:
     parameters: ParameterTable
     catalogue: Mapping[str, Effect] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         if not self.catalogue:
-            object.__setattr__(self, "catalogue", generic_effects(self.plant.ports))
+            # As a dictionary, for a view of one cannot be sent to another process.
+            object.__setattr__(self, "catalogue", dict(generic_effects(self.plant.ports)))
         _ = self.table
 
     def __add__(self, effect: str | Effect) -> "PlantModel":
@@ -188,7 +204,18 @@ class PlantModel:
     @property
     def doubts(self) -> tuple[str, ...]:
         """Why its values are not to be trusted, a sentence each; empty if they are."""
-        return doubts_of_fit(self.name, self.provenance)
+        return doubts_of_fit(self.source or self.name, self.provenance)
+
+    @property
+    def sha256(self) -> str:
+        """A digest of the plant's class and of all numbers."""
+        what = f"{type(self.plant).__qualname__}\n{self.table.entries}\n{dict(self.provenance)}"
+        return hashlib.sha256(what.encode()).hexdigest()
+
+    @property
+    def layout(self) -> RecordingLayout:
+        """The channels that recordings of the plant have: its inputs, then what its sensors read."""
+        return layout_of(self.plant)
 
     def build(self) -> AbstractPlant:
         """The plant that solvers take, with its effects."""
@@ -243,11 +270,18 @@ class PlantModel:
 
     def origin(self, campaign: Campaign | None = None, warnings: Sequence[DataWarning] = ()) -> Origin:
         """Where results on this model come from; ``warnings`` are those beyond the campaign's own."""
-        origin = Origin(rig=self.name, effects=self.effects, warnings=tuple(warnings))
+        origin = Origin(model=self.source, rig=self.name, effects=self.effects, warnings=tuple(warnings))
         if campaign is None:
             return origin
         every = (*campaign.warnings, *warnings)
         return replace(origin, data=campaign.source, data_sha256=campaign.sha256, warnings=every)
+
+
+def layout_of(plant: AbstractPlant | type[AbstractPlant]) -> RecordingLayout:
+    """The channels of recordings of a plant, as it declares them; a dwell or a sweep moves its first input."""
+    driving = tuple(ChannelSpec(each.name, each.unit, each.about) for each in plant.inputs)
+    read = tuple(ChannelSpec(each.name, each.unit, each.about) for each in plant.channels)
+    return RecordingLayout((*driving, *read), driving[0].name, tuple(each.name for each in read))
 
 
 def doubts_of_fit(name: str, provenance: Mapping[str, Any]) -> tuple[str, ...]:

@@ -104,7 +104,7 @@ NUMBERS = (
     ),
 )
 SENSORS = (
-    Port("accelerometer", PortKind.SENSOR, "sensor.body_accel"),
+    Port("accelerometer", PortKind.SENSOR, "sensor.body_accel", displacement_unit="m/s^2", displacement=1.0),
     Port("potentiometer", PortKind.SENSOR, "sensor.susp_deflection"),
 )
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from savgs_ident.diagnosis.result import Diagnosis
     from savgs_ident.fit.result import Fit
+    from savgs_ident.plants.model import PlantModel
     from savgs_ident.plants.quarter_car.model import RigModel
 
 
@@ -34,9 +35,9 @@ class PlantReport:
         write_model: writes the identified plant into a folder; the files.
     """
 
+    write_model: Callable[["Fit", Path], Iterator[Path]]
     ports_figure: Callable[["Diagnosis"], "Figure"] | None = None
     scale: str = ""
-    write_model: Callable[["Fit", Path], Iterator[Path]] | None = None
 
 
 def _rig_figure(diagnosis: "Diagnosis") -> "Figure":
@@ -52,13 +53,20 @@ def _write_rig(fit: "Fit", folder: Path) -> Iterator[Path]:
     yield folder / "model.toml"
 
 
+def _write_plant_model(fit: "Fit", folder: Path) -> Iterator[Path]:
+    from savgs_ident.plants.model_toml import write_model
+
+    yield write_model(cast("PlantModel", fit.model), folder / "model.toml")
+
+
 PLANT_REPORTS: Mapping[type[AbstractPlant], PlantReport] = {
-    QuarterCar: PlantReport(_rig_figure, "Linkage, wheel and carriages to scale.", _write_rig),
+    QuarterCar: PlantReport(_write_rig, _rig_figure, "Linkage, wheel and carriages to scale."),
 }
 """By the plant's class."""
 
 
 def report_of(model: Model) -> PlantReport:
-    """What reports have of the plant of a model; nothing of a plant that declares nothing."""
+    """What reports have of the plant of a model; of one that is not listed the file of its numbers alone."""
     plant = model.plant
-    return PLANT_REPORTS.get(plant if isinstance(plant, type) else type(plant), PlantReport())
+    found = PLANT_REPORTS.get(plant if isinstance(plant, type) else type(plant))
+    return found or PlantReport(write_model=_write_plant_model)

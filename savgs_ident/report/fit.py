@@ -26,7 +26,7 @@ from savgs_ident.fit.result import (
     whitened,
 )
 from savgs_ident.plants.model import Model
-from savgs_ident.report.text import channel_label, data_warnings, fixed, per_input_key, plain, table
+from savgs_ident.report.text import channel_label, fixed, per_input_key, plain, table
 
 
 def fit_record(fit: Fit) -> dict[str, object]:
@@ -201,7 +201,6 @@ def fit_text(fit: Fit) -> RenderableType:
         *_far_dwells(fit),
         plain("Verdict", "bold"),
         *(plain(f"- {sentence}") for sentence in _verdict(fit)),
-        *data_warnings(fit.origin.warnings),
     ]
     return Group(*parts)
 

@@ -97,8 +97,7 @@ class _Fit(_Identified["Fit"]):
     def more(self, result: "Fit", folder: Path) -> Iterator[Path]:
         from savgs_ident.report.by_plant import report_of
 
-        write = report_of(result.estimated).write_model
-        yield from write(result, folder) if write is not None else ()
+        yield from report_of(result.estimated).write_model(result, folder)
 
 
 class _Comparison(_Identified["Comparison"]):

@@ -1,9 +1,10 @@
-"""Reports of studies of rigs with nothing missing: false alarms, and the calibration of the posterior.
+"""Reports of checks: of a plant of one's own, of false alarms and of the posterior where nothing is missing.
 
 What draws is loaded when something is drawn.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.report.presenters import AbstractPresenter, Figures
 from savgs_ident.report.text import decimal, percentage, plain, table
 from savgs_ident.validation.calibration import BINS, INTERVAL, RANKED, CalibrationStudy
+from savgs_ident.validation.check_plant import PlantCheck
 from savgs_ident.validation.false_alarms import CONFIDENCE, AlarmStudy
 
 if TYPE_CHECKING:
@@ -189,3 +191,79 @@ class _CalibrationStudy(AbstractPresenter[CalibrationStudy]):
 
 
 CALIBRATION_STUDY = _CalibrationStudy()
+
+
+def plant_check_record(check: PlantCheck) -> dict[str, Any]:
+    """What was found, what the plant declares, and at which frequencies it was looked at [Hz]."""
+    plant, free, tolerant, exact = check.model.plant, *_known(check)
+    return {
+        "schema": 1,
+        "plant": check.model.plant_name,
+        "no_faults": check.trusted,
+        "findings": [
+            {"severity": each.severity, "what": each.what, "remedy": each.remedy} for each in check.findings
+        ],
+        "natural_frequencies_hz": check.natural_frequencies,
+        "frequencies_hz": check.frequencies,
+        "inputs": [each.name for each in plant.inputs],
+        "channels": [each.name for each in plant.channels],
+        "ports": [each.name for each in plant.ports],
+        "effects": list(check.model.catalogue),
+        "identified": free,
+        "known_to_tolerance": tolerant,
+        "exact": exact,
+        "command": check.origin.command_line,
+    }
+
+
+def plant_check_text(check: PlantCheck) -> RenderableType:
+    """The same as sentences and a table of findings."""
+    plant, free, tolerant, exact = check.model.plant, *_known(check)
+    natural = ", ".join(f"{each:.3g}" for each in check.natural_frequencies)
+    parts = [
+        f"{check.model.plant_name}: coordinates {_names(each.name for each in plant.coordinates)}; inputs "
+        f"{_names(each.name for each in plant.inputs)}; channels {_names(each.name for each in plant.channels)}.",
+        f"Ports: {_names(each.name for each in plant.ports)}; {len(check.model.catalogue)} effects can be looked "
+        "for there.",
+        f"A fit identifies {_names(free)}; known to a tolerance: {_names(tolerant)}; taken as exact: "
+        f"{_names(exact)}.",
+        *([f"Natural frequencies near its rest: {natural} Hz."] if natural else []),
+    ]
+    found: RenderableType = plain("No faults, and nothing else to say.")
+    if check.findings:
+        rows = [(each.severity, each.what, each.remedy) for each in check.findings]
+        found = table("Findings", ("", "what", "what to do"), rows, texts=(0, 1, 2))
+    return Group(*(plain(each) for each in parts), plain(""), found)
+
+
+def _known(check: PlantCheck) -> tuple[list[str], list[str], list[str]]:
+    """Names of parameters that a fit identifies, that are known to a tolerance, and that it takes as exact."""
+    entries = check.model.table.entries
+    open_ones = [
+        each.name
+        for each in entries
+        if each.tolerance == 0.0 and isfinite(each.lower) and isfinite(each.upper)
+    ]
+    tolerant = [each.name for each in entries if each.tolerance > 0.0]
+    exact = [each.name for each in entries if each.name not in (*open_ones, *tolerant)]
+    return open_ones, tolerant, exact
+
+
+def _names(names: Iterable[str]) -> str:
+    return ", ".join(names) or "none"
+
+
+class _PlantCheck(AbstractPresenter[PlantCheck]):
+    stem = "check-plant"
+
+    def record(self, result: PlantCheck) -> Mapping[str, Any]:
+        return plant_check_record(result)
+
+    def text(self, result: PlantCheck) -> RenderableType:
+        return plant_check_text(result)
+
+    def doubts(self, result: PlantCheck) -> tuple[str, ...]:
+        return tuple(f"{each.what}." for each in result.findings if each.severity == "fault")
+
+
+PLANT_CHECK = _PlantCheck()

@@ -4,7 +4,7 @@ A result names its presenter (:mod:`savgs_ident.core.presentation`); the command
 same one. Presenters are in files that are loaded when something is to be shown, and load what draws when something
 is drawn:
 
-    presenters.FIT.text(fit)
+    presenters.FIT.shown(fit)
 
 :func:`plot_bode` is what ``import savgs_ident`` offers of pictures besides: the frequency response of whatever has
 one.
@@ -16,11 +16,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from rich.console import RenderableType
+from rich.console import Group, RenderableType
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import write_bytes, write_json
 from savgs_ident.core.presentation import Progress, Result
+from savgs_ident.report.text import data_warnings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,6 +49,10 @@ class AbstractPresenter(ABC, Generic[Shown]):
     @abstractmethod
     def doubts(self, result: Shown) -> tuple[str, ...]:
         """Why the result is not to be trusted, a sentence each; empty if it is."""
+
+    def shown(self, result: Shown) -> RenderableType:
+        """The same, and what the checks of the data found."""
+        return Group(self.text(result), *data_warnings(result.origin.warnings))
 
     def page(self, result: Shown) -> str | None:
         """The report as HTML; None where there is none."""
@@ -99,6 +104,7 @@ _FILES = {
     "DESIGN": "present_models",
     "LOOP_STUDY": "present_models",
     "EXPORTED": "present_models",
+    "PLANT_CHECK": "present_validation",
 }
 
 

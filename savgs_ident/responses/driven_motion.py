@@ -12,6 +12,10 @@ The noise of the force comes from the cycles of the reference, which goes throug
 left of the force once inertia and a viscous friction have explained their part holds whatever such a model lacks;
 between one cycle and the next that is the same, and the difference is noise, that of the differentiated position
 included. Its median size is taken, so that a few instants (reversals, a pulse in one cycle) do not count as noise.
+
+A motion that does not repeat, a drive along a road or a random signal, shows its noise by what changes from row to
+row more roughly than a force does that a motion so slow makes: the median size of third differences, in which all
+that is smooth over some rows is gone. That the noise is white is then assumed, and a warning says so.
 """
 
 from dataclasses import dataclass
@@ -22,11 +26,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from savgs_ident.core.errors import InputError
+from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.axis_recording import AxisRecording, read_axis
+from savgs_ident.recordings.recording import RecordedChannel, Recording
 
 CUTOFF_HZ = 100.0
 """The position passes up to here [Hz]."""
+
+SHARE_OF_RATE = 0.4
+"""Or up to this share of the sampling rate, where that is less."""
 
 ROWS_HZ = 100.0
 """Rows per second [Hz]."""
@@ -42,6 +50,12 @@ CUT_S = 0.2
 
 SAME = 1e-6
 """Mean square difference between two cycles of the reference, in its variance, up to which they are the same."""
+
+SAME_AS_MEASURED = 1e-4
+"""The same of a measured motion, which has noise and is not led the same way twice."""
+
+UNEVEN = 0.01
+"""Largest departure of a time from an even grid, in steps, up to which samples are taken as they are."""
 
 _ORDER = 4
 _FEWEST = 100
@@ -59,8 +73,11 @@ class DrivenMotion:
         velocity: [m/s], (n,).
         acceleration: [m/s^2], (n,).
         drive: force of the drive [N], (n,).
-        period: time in which the reference repeats [s].
+        period: time in which the reference repeats [s]; the whole recording where it does not.
         noise: standard deviation of the noise of a row of force [N].
+        warnings: what is to be known of it.
+
+    Position and force of a plant that turns are an angle [rad] and a torque [N m].
     """
 
     source: str
@@ -71,6 +88,7 @@ class DrivenMotion:
     drive: NDArray[np.float64]
     period: float
     noise: float
+    warnings: tuple[DataWarning, ...] = ()
 
     @property
     def every(self) -> int:
@@ -91,7 +109,8 @@ class DrivenMotion:
     @property
     def blocks(self) -> NDArray[np.intp]:
         """The block of time that each row belongs to, (m,)."""
-        return (np.arange(self.row_times.size) / (BLOCK_S * ROWS_HZ)).astype(np.intp)
+        every = self.every * self.step
+        return (np.arange(self.row_times.size) / round(BLOCK_S / every)).astype(np.intp)
 
 
 def load_motion(path: Path | str) -> DrivenMotion:
@@ -100,8 +119,8 @@ def load_motion(path: Path | str) -> DrivenMotion:
     The file has the column vectors ``t`` [s], ``qm`` (position [m]), ``qg`` (its reference [m]) and ``vir``
     (controller output [V]), and the scalar ``gtau`` (force of the drive per volt [N/V]).
 
-    Raises :class:`InputError` for a file that cannot be read or that lacks one of them, for a recording that is
-    sampled too slowly or is too short, and where the reference does not repeat.
+    Raises :class:`InputError` for a file that cannot be read or that lacks one of them, for a recording that is too
+    short, and where the reference does not repeat.
     """
     return driven_motion(read_axis(Path(path)))
 
@@ -109,35 +128,81 @@ def load_motion(path: Path | str) -> DrivenMotion:
 def driven_motion(recording: AxisRecording) -> DrivenMotion:
     """The motion in a recording.
 
-    Raises :class:`InputError` for one that is sampled too slowly or is too short, and where the reference does not
-    repeat.
+    Raises :class:`InputError` for one that is too short, and where the reference does not repeat.
     """
-    step = recording.step
-    if step * CUTOFF_HZ > 0.4:
+    period = period_of(recording.reference, SAME)
+    if period is None:
         raise InputError(
-            f"is sampled at {1.0 / step:.4g} Hz",
+            "the reference does not repeat, so that the noise is not known",
             source=recording.source,
-            remedy=f"record at {2.5 * CUTOFF_HZ:.4g} Hz or more",
+            remedy="record two cycles or more",
         )
-    if recording.time.size * step < 2.0 * CUT_S + _FEWEST / ROWS_HZ:
-        raise InputError("is too short", source=recording.source, remedy="record some seconds at least")
-    low_pass = butter(_ORDER, 2.0 * CUTOFF_HZ * step, output="sos")
-    position = np.asarray(sosfiltfilt(low_pass, recording.position))
-    velocity = np.gradient(position, step)
-    acceleration = np.gradient(velocity, step)
-    period = period_of(recording)
-    noise = _repeatability(recording.force, np.stack([acceleration, velocity], axis=1), period, step)
-    return DrivenMotion(
-        recording.source, step, position, velocity, acceleration, recording.force, period * step, noise
+    return _driven(recording.source, recording.step, recording.position, recording.force, period)
+
+
+def recorded_motion(recording: Recording, motion: str, drive: str, source: str) -> DrivenMotion:
+    """The motion in a test of any plant with one coordinate: the channel ``motion``, driven by the channel ``drive``.
+
+    Samples that are not even in time are interpolated. Raises :class:`InputError` for a test that lacks a channel or
+    is too short.
+    """
+    for name in (motion, drive):
+        if name not in recording.channels:
+            raise InputError(
+                "was not recorded",
+                source=source,
+                test=recording.name,
+                channel=name,
+                remedy="map its channel in channels.toml",
+            )
+    led, driven = recording.channels[motion], recording.channels[drive]
+    start, end = max(led.time[0], driven.time[0]), min(led.time[-1], driven.time[-1])
+    step = float(led.time[-1] - led.time[0]) / max(led.time.size - 1, 1)
+    time = start + step * np.arange(int((end - start) / step + 1e-6) + 1)
+    position, force = _at(time, led), _at(time, driven)
+    return _driven(
+        f"{source}, {recording.name}", step, position, force, period_of(position, SAME_AS_MEASURED)
     )
 
 
-def period_of(recording: AxisRecording) -> int:
-    """Samples in a cycle of the reference.
+def _at(time: NDArray[np.float64], channel: RecordedChannel) -> NDArray[np.float64]:
+    """A channel at even times [s]; as it was sampled where that is even enough."""
+    step = time[1] - time[0] if time.size > 1 else 1.0
+    same = channel.values.size == time.size and np.max(np.abs(channel.time - time)) <= UNEVEN * step
+    return channel.values if same else np.interp(time, channel.time, channel.values)
 
-    Raises :class:`InputError` if it does not repeat.
+
+def _driven(
+    source: str, step: float, measured: NDArray[np.float64], force: NDArray[np.float64], period: int | None
+) -> DrivenMotion:
+    """The motion of even samples, whose noise comes from cycles of ``period`` samples where it has any."""
+    if measured.size * step < 2.0 * CUT_S + _FEWEST * _samples_to_a_row(step) * step:
+        raise InputError("is too short", source=source, remedy="record some seconds at least")
+    cutoff = min(2.0 * CUTOFF_HZ * step, 2.0 * SHARE_OF_RATE)
+    position = np.asarray(sosfiltfilt(butter(_ORDER, cutoff, output="sos"), measured))
+    velocity = np.gradient(position, step)
+    acceleration = np.gradient(velocity, step)
+    left = _beyond(force, np.stack([acceleration, velocity], axis=1))
+    if period is not None:
+        noise = _repeatability(left, period, step)
+        return DrivenMotion(source, step, position, velocity, acceleration, force, period * step, noise)
+    noise = _roughness(_thinned(left, step))
+    warning = DataWarning(
+        "noise_assumed",
+        "the motion does not repeat: its noise is taken from what is rough in the force, as if it were white",
+        source=source,
+        remedy="record the same motion twice, so that the noise is measured",
+    )
+    whole = measured.size * step
+    return DrivenMotion(source, step, position, velocity, acceleration, force, whole, noise, (warning,))
+
+
+def period_of(reference: NDArray[np.float64], same: float) -> int | None:
+    """Samples in a cycle of a reference (n,) of any unit, two of which differ by no more than ``same``; None if none.
+
+    ``same`` is a mean square in the variance of the reference.
     """
-    x = recording.reference - recording.reference.mean()
+    x = reference - reference.mean()
     count, variance = x.size, float(np.mean(x**2))
     lags = np.arange(1, count // 2)
     spectrum = np.fft.rfft(x, 2 * count)
@@ -145,26 +210,30 @@ def period_of(recording: AxisRecording) -> int:
     squares = np.concatenate([[0.0], np.cumsum(x**2)])
     apart = (squares[count - lags] + squares[count] - squares[lags] - 2.0 * products) / (count - lags)
     left = np.flatnonzero(apart > variance)
-    again = np.flatnonzero(apart[left[0] :] < SAME * variance) if left.size else left
+    again = np.flatnonzero(apart[left[0] :] < same * variance) if left.size else left
     if again.size == 0:
-        raise InputError(
-            "the reference does not repeat, so that the noise is not known",
-            source=recording.source,
-            remedy="record two cycles or more",
-        )
-    near = left[0] + again[0] + np.arange(recording.time.size // 1000 + 2)
+        return None
+    near = left[0] + again[0] + np.arange(count // 1000 + 2)
     near = near[near < lags.size]
     return int(lags[near[np.argmin(apart[near])]])
 
 
-def _repeatability(
-    force: NDArray[np.float64], inertial: NDArray[np.float64], period: int, step: float
-) -> float:
-    """Standard deviation of a row's noise [N], from what does not repeat after ``period`` samples."""
+def _beyond(force: NDArray[np.float64], inertial: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What an inertia and a viscous friction leave of the force [N], (n,)."""
     explained, *_ = np.linalg.lstsq(inertial, force, rcond=None)
-    left: NDArray[np.float64] = force - inertial @ explained
+    return np.asarray(force - inertial @ explained)
+
+
+def _repeatability(left: NDArray[np.float64], period: int, step: float) -> float:
+    """Standard deviation of a row's noise [N], from what does not repeat after ``period`` samples."""
     apart = _thinned(left[period:] - left[:-period], step)
     return float(_NORMAL * np.median(np.abs(apart)) / np.sqrt(2.0))
+
+
+def _roughness(rows: NDArray[np.float64]) -> float:
+    """Standard deviation of white noise in rows [N] that are smooth but for that."""
+    # The squares of the binomial coefficients 1, 3, 3, 1 add up to 20.
+    return float(_NORMAL * np.median(np.abs(np.diff(rows, 3))) / np.sqrt(20.0))
 
 
 def _samples_to_a_row(step: float) -> int:

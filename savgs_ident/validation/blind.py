@@ -19,7 +19,8 @@ from typing import Any, ClassVar
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import prepare_folder
 from savgs_ident.core.presentation import Origin, Progress, Result, no_progress
-from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig, rig_content
+from savgs_ident.plants.parameter_toml import file_content
+from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.validation.blind_draw import Shares
 from savgs_ident.validation.blind_rates import rates_of
@@ -143,7 +144,7 @@ def run_blind(
     """Run the trials that are not in the folder ``out`` yet; ``draw`` makes their rigs, ``diagnose`` is tried."""
     check_shares(request)
     rig = request.rig or default_rig_path()
-    sheet = rig_content(rig)
+    sheet = file_content(rig)
     parse_rig(sheet, rig)
     prepare_folder(out)
     use_persistent_cache()

@@ -24,13 +24,12 @@ from savgs_ident.diagnosis.conclusion import conclude, leave_tests_out
 from savgs_ident.diagnosis.diagnose import fit_hypotheses
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FittedHypotheses
 from savgs_ident.diagnosis.model_selection import decide_among, recalibrate
-from savgs_ident.diagnosis.public import baseline_of, quarter_car_problem
+from savgs_ident.diagnosis.public import baseline_of, problem_of_dwells
 from savgs_ident.diagnosis.result import DiagnosisSettings
 from savgs_ident.diagnosis.verdict import alarm_odds
 from savgs_ident.inference.find_map import find_map, refine, search_of
 from savgs_ident.inference.prior import bounds_of, values_at
-from savgs_ident.plants.quarter_car.model import RigModel
-from savgs_ident.plants.quarter_car.rig import Rig
+from savgs_ident.plants.model import Model
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_response
@@ -86,9 +85,11 @@ class AlarmBench:
             if problem is None:
                 return NullDraw(number, None, False, ())
             evidence = _concluded(*fit_hypotheses(problem, no_progress))
-        alarm = evidence.kind != "none"
+        odds, alarm = alarm_odds(evidence.weighed), evidence.kind != "none"
+        if not np.isfinite(odds):
+            return NullDraw(number, None, False, ())
         named = evidence.chosen.hypothesis.effects or (evidence.kind,) * alarm
-        return NullDraw(number, alarm_odds(evidence.weighed), alarm, named)
+        return NullDraw(number, odds, alarm, named)
 
     def _null_problem(self, random: np.random.Generator) -> DiagnosisProblem | None:
         base, plant = self.problem.base, self.problem.plant
@@ -138,7 +139,7 @@ def _concluded(problem: DiagnosisProblem, fitted: FittedHypotheses) -> Diagnosis
 
 def alarm_bench(
     measured: HarmonicResponse,
-    rig: Rig,
+    given: Model,
     settings: DiagnosisSettings,
     values: Mapping[str, float],
     seed: int,
@@ -146,11 +147,10 @@ def alarm_bench(
 ) -> AlarmBench:
     """Recalibrate the baseline on a measured response, and weigh hypotheses against it.
 
-    Raises :class:`InputError` as :func:`savgs_ident.diagnosis.public.diagnose_response` does. ``values``
-    are parameters in SI.
+    Raises :class:`InputError` as :func:`savgs_ident.diagnosis.public.problem_of_dwells` does. ``values`` are in SI.
     """
     with threadpool_limits(1, "blas"):
-        plant, data = quarter_car_problem(measured, rig, settings)
+        plant, data = problem_of_dwells(measured, given, settings)
         problem = recalibrate(plant, data, values, progress, settings.constants)
         problem, fitted = fit_hypotheses(problem, progress)
         odds = alarm_odds(decide_among(problem, fitted).weighed)
@@ -203,7 +203,7 @@ class AlarmStudy(Result):
 
 
 def false_alarms(
-    model: RigModel,
+    model: Model,
     campaign: Campaign,
     draws: int = 100,
     *,
@@ -241,7 +241,7 @@ def false_alarms(
     Raises :class:`InputError` as :func:`diagnose` does, and for draws of something else in the folder.
     """
     use_persistent_cache()
-    rig, settings, values = baseline_of(model, orders)
+    given, settings, values = baseline_of(model, orders)
     file = None
     if folder is not None:
         marks = marks_of(model, campaign.source, channels)
@@ -249,7 +249,7 @@ def false_alarms(
         file = TrialFile(prepare_folder(Path(folder)) / FILE, marks, resume)
     done = [] if file is None else file.earlier(read_draw)
     measured = measured_response(campaign, model.plant, orders, max_frequency, progress)
-    asked = _Asked(measured, rig, settings, values, seed)
+    asked = _Asked(measured, given, settings, values, seed)
     bench = asked.bench(progress)
     found = run_trials(
         partial(_draw, asked), draws, file, done, jobs=jobs, scheduler=scheduler, progress=progress
@@ -263,7 +263,7 @@ class _Asked:
     """What draws follow from; ``key`` is the same in all processes."""
 
     measured: HarmonicResponse
-    rig: Rig
+    model: Model
     settings: DiagnosisSettings
     values: Mapping[str, float]
     seed: int
@@ -271,7 +271,7 @@ class _Asked:
 
     def bench(self, progress: Progress = no_progress) -> AlarmBench:
         """What they are drawn from."""
-        given = (self.measured, self.rig, self.settings, self.values, self.seed)
+        given = (self.measured, self.model, self.settings, self.values, self.seed)
         return once_a_process(self.key, lambda: alarm_bench(*given, progress))
 
 

@@ -20,7 +20,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import Lost, cores, run_tasks
 from savgs_ident.core.files import write_bytes
 from savgs_ident.core.presentation import Progress, no_progress
-from savgs_ident.plants.quarter_car.model import RigModel
+from savgs_ident.plants.model import Model
 from savgs_ident.recordings.read import campaign_files, digest_files, map_digest
 from savgs_ident.simulate.program_cache import make_room_for_programs, use_persistent_cache
 
@@ -43,14 +43,14 @@ _STATES = {
 """Marks of what is read, in words."""
 
 
-def marks_of(model: RigModel, campaign: str | Path, channels: str | Path | None) -> dict[str, object]:
+def marks_of(model: Model, campaign: str | Path, channels: str | Path | None) -> dict[str, object]:
     """What marks trials on a model and a campaign, with the map of its channels.
 
     Raises :class:`InputError` where they cannot be read.
     """
     return {
-        "rig": model.rig.source,
-        "rig_sha256": model.rig.sha256,
+        "rig": model.source,
+        "rig_sha256": model.sha256,
         "effects": list(model.effects),
         "campaign": str(campaign),
         "channels": str(channels),

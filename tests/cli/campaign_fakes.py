@@ -52,6 +52,7 @@ def request(*arguments: Path, **changes: Any) -> CampaignRun:
     """Identify mu_r and c_sd of the campaigns in ``arguments``; changes are of the single fit."""
     given: dict[str, Any] = {
         "campaign": Path(),
+        "plant": "quarter_car",
         "rig": default_rig_path(),
         "channels": None,
         "model": "simtr",

@@ -20,10 +20,11 @@ ROWS: dict[str, tuple[str, ...]] = {
     "closed-loop": ("{rig}",),
     "export": ("{rig}", "--to", "json"),
     "campaign": ("{campaign}",),
+    "check-plant": ("two_mass",),
 }
 """The words of each; ``{campaign}`` and ``{rig}`` stand for files."""
 
-READING = tuple(name for name, words in ROWS.items() if words)
+READING = tuple(name for name, words in ROWS.items() if any("{" in word for word in words))
 """The commands that read a file."""
 
 ASKING = tuple(name for name, words in ROWS.items() if words and words[0][0] == "{")

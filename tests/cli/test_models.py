@@ -12,6 +12,7 @@ from savgs_ident.cli.options import ModelName, effects_of
 from savgs_ident.core.errors import InputError
 from savgs_ident.diagnosis.public import baseline_of
 from savgs_ident.plants.quarter_car.catalogue import MODELS
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig, rig_text
 
 IDENTIFIED = {"effects": ["rail_coulomb"], "status": "stalled", "trusted": False}
@@ -54,17 +55,18 @@ def _identified(effects: list[str], folder: Path) -> Path:
     ("asked", "name"), [(None, "simtr"), (ModelName.simtr, "simtr"), (ModelName.simqc, "simqc")]
 )
 def test_a_drawing_takes_the_model_asked_for(asked: ModelName | None, name: str) -> None:
-    rig, settings, values = baseline_of(si.load_baseline(None, effects_of(asked)))
-    assert rig == DRAWING
+    given, settings, values = baseline_of(si.load_baseline(None, effects_of(asked)))
+    assert isinstance(given, RigModel)
+    assert given.rig == DRAWING
     assert (settings.model, settings.baseline, values) == (name, MODELS[name], {})
     assert settings.free == (("mu_r", "mu_t", "ydot_Hth", "c_sd") if name == "simtr" else ("c_sd",))
 
 
 @pytest.mark.parametrize("asked", [None, ModelName.simqc])
 def test_an_identified_rig_brings_its_own_model(asked: ModelName | None, tmp_path: Path) -> None:
-    rig, settings, values = baseline_of(si.load_baseline(_identified([], tmp_path), effects_of(asked)))
+    given, settings, values = baseline_of(si.load_baseline(_identified([], tmp_path), effects_of(asked)))
     assert (settings.model, settings.baseline, settings.free) == ("mine", (), ("c_sd",))
-    assert rig.parameters["k_sd"].value == 157614.0
+    assert given.table["k_sd"].value == 157614.0
     assert values == {"c_sd": 5000.0, "k_sd": 1.5e5}
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from savgs_ident.core.presentation import no_progress
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence
 from savgs_ident.diagnosis.model_selection import compare_models, decide_among, recalibrate
-from savgs_ident.diagnosis.public import baseline_of, quarter_car_problem
+from savgs_ident.diagnosis.public import baseline_of, problem_of_dwells
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.background.port_functions import InputLocation, Law
 from savgs_ident.inference.background.shared_errors import (
@@ -110,7 +110,7 @@ def _selected(rig: Rig, campaign: Path) -> DiagnosisEvidence:
     model = RigModel(rig, ("rail_coulomb", "tyre_friction"))
     response = measured_response(load_campaign(campaign), model.plant, 9)
     response = only(response, np.isin(np.round(response.frequency, 2), DWELLS))
-    plant, data = quarter_car_problem(response, *baseline_of(model)[:2])
+    plant, data = problem_of_dwells(response, *baseline_of(model)[:2])
     problem = recalibrate(plant, data, {}, no_progress)
     return decide_among(problem, compare_models(problem, no_progress))
 

@@ -9,10 +9,11 @@ from scipy.stats import chi2
 from savgs_ident.diagnosis.candidates import WITHIN
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
 from savgs_ident.diagnosis.model_selection import recalibrate
-from savgs_ident.diagnosis.public import SIMTR, quarter_car_problem
+from savgs_ident.diagnosis.public import SIMTR, problem_of_dwells
 from savgs_ident.inference.find_map import LaplaceFit, find_map, refine
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import AbstractCoordinate
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 
 from .conftest import Measure
@@ -67,7 +68,9 @@ def _drop(problem: DiagnosisProblem, mode: LaplaceFit, term: Term, place: int, x
 def test_the_profile_falls_at_the_ends_of_an_interval_as_it_should(
     measure_few: Measure, rig: Rig, recording: str, effect: str
 ) -> None:
-    problem = recalibrate(*quarter_car_problem(measure_few(recording), rig, SIMTR), {}, lambda _: None)
+    problem = recalibrate(
+        *problem_of_dwells(measure_few(recording), RigModel(rig, SIMTR.baseline), SIMTR), {}, lambda _: None
+    )
     (term,) = (each for each in problem.plant.candidates if each.name == effect)
     own = {each.name for each in term.coordinates}
     start = problem.base.values | {each.name: each.centre + 0.5 * each.scale for each in term.amplitudes}

@@ -14,7 +14,7 @@ from savgs_ident.effects.base import PortKind
 from savgs_ident.inference.find_map import find_map, search_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.recordings.axis_recording import AxisRecording
-from savgs_ident.responses.driven_motion import driven_motion, period_of
+from savgs_ident.responses.driven_motion import SAME, driven_motion, period_of
 
 from ..relaxed import with_kept_programs
 from .recorded_axis import BASE, PERIOD_S, RATE_HZ, recorded_axis
@@ -57,7 +57,7 @@ def _held(laws: Mapping[str, float], seed: int) -> AxisRecording:
 def test_the_period_and_the_noise_of_a_recording_are_found() -> None:
     recording = recorded_axis({"coulomb": 12.0}, 0)
     motion = driven_motion(recording)
-    assert period_of(recording) == round(PERIOD_S * RATE_HZ)
+    assert period_of(recording.reference, SAME) == round(PERIOD_S * RATE_HZ)
     assert motion.period == pytest.approx(PERIOD_S, rel=1e-9)
     # White noise of the same size after the same low-pass, and correlation on top of that.
     assert 0.2 < motion.noise < 0.3

@@ -16,10 +16,10 @@ from savgs_ident.effects.base import (
     AbstractSensorLaw,
 )
 from savgs_ident.effects.effect import LAWS, Effect
+from savgs_ident.plants.parameter_toml import KNOWN_UNITS
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, build_model, model_parameters
 from savgs_ident.plants.quarter_car.ports import PORTS
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.rig_toml import KNOWN_UNITS
 
 from ..in_one_test import over
 from ..plants.quarter_car.instants import as_values

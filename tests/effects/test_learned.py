@@ -23,9 +23,9 @@ from savgs_ident.effects.learned_functions import (
     frictions_at,
     functions_at,
 )
+from savgs_ident.plants.parameter_toml import KNOWN_UNITS
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, EFFECTS, LEARNED
 from savgs_ident.plants.quarter_car.ports import PORTS
-from savgs_ident.plants.quarter_car.rig_toml import KNOWN_UNITS
 from savgs_ident.symbolic.translate import to_casadi
 
 LAWS: dict[str, Callable[[float, float, float], float]] = {

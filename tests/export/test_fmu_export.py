@@ -14,11 +14,11 @@ from savgs_ident.export import fmu_export
 from savgs_ident.export.exported_model import ExportedModel, resting_state
 from savgs_ident.export.fmu_export import base_units, write_fmu
 from savgs_ident.export.json_export import read_model_json
+from savgs_ident.plants.parameter_toml import KNOWN_UNITS
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.inputs import RigSource, flat_road, held_link
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.plants.quarter_car.rig_toml import KNOWN_UNITS
 from savgs_ident.simulate.transient import TransientSolution, simulate_transient, unpack_state
 
 from ..in_one_test import over

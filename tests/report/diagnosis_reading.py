@@ -11,7 +11,6 @@ from savgs_ident.core.files import to_json
 from savgs_ident.core.presentation import Origin
 from savgs_ident.diagnosis.result import Diagnosis
 from savgs_ident.report.diagnosis.record import diagnosis_record
-from savgs_ident.report.diagnosis.text import diagnosis_text
 
 from .page_reader import HOSTILE
 
@@ -24,7 +23,7 @@ ORIGIN = Origin(
 
 def rendered(diagnosis: Diagnosis, width: int = 100) -> str:
     stream = io.StringIO()
-    Console(file=stream, width=width, highlight=False).print(diagnosis_text(diagnosis))
+    Console(file=stream, width=width, highlight=False).print(diagnosis.rendered())
     return stream.getvalue()
 
 

@@ -85,18 +85,44 @@ def test_dwells_that_were_not_solved_are_named(fit: Fit) -> None:
 
 
 def test_the_text_of_a_fit_shows_the_warnings_about_the_data(fit: Fit) -> None:
-    assert "Warnings about the data" not in rendered(fit_text(replace(fit, origin=Origin())))
+    assert "Warnings about the data" not in rendered(replace(fit, origin=Origin()).rendered())
     tests = [
         DataWarning("outlying_samples", "9 of 800 samples", "a.csv", f"dwell_{i}Hz", "accel")
         for i in (1, 2, 3)
     ]
     other = DataWarning("clipped_sensor", "stands at its end", "a.csv", "dwell_2Hz", "road")
-    text = " ".join(rendered(fit_text(replace(fit, origin=Origin(warnings=(*tests, other))))).split())
+    text = " ".join(rendered(replace(fit, origin=Origin(warnings=(*tests, other))).rendered()).split())
     assert text.index("Verdict") < text.index("Warnings about the data")
     assert "[outlying_samples] a.csv, test 'dwell_1Hz', channel 'accel'" in text
     assert "(2 more of this kind in this channel)" in text
     assert "dwell_3Hz" not in text
     assert "[clipped_sensor]" in text
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [
+        (1.0 / 9.80665, "tolerances off: as if g was taken for m/s^2"),
+        (1000.0, "as if a unit was taken for another one a thousand times as large"),
+        (1.7, "tolerances off: look at the units and signs of the channels"),
+    ],
+)
+def test_a_fit_with_a_number_far_off_its_sheet_is_not_trusted(fit: Fit, factor: float, said: str) -> None:
+    """The reason leads, also where so far a number explains the data; four tolerances are believed."""
+    (place,) = [k for k, each in enumerate(fit.estimates) if each.name == "k_t"]
+    known = fit.estimates[place]
+
+    def with_value(value: float) -> Fit:
+        moved = (*fit.estimates[:place], replace(known, value=value), *fit.estimates[place + 1 :])
+        return replace(fit, estimates=moved)
+
+    near, far = with_value(known.prior + 4.0 * known.prior_sd), with_value(factor * known.prior)
+    assert (near.far_off, near.trusted) == ((), fit.trusted)
+    assert [each.name for each in far.far_off] == ["k_t"]
+    assert not far.trusted
+    assert far.doubts[0].startswith("k_t would have to be ")
+    assert said in far.doubts[0]
+    assert far.model.provenance["trusted"] is False
 
 
 def test_the_record_of_a_fit_has_the_keys_of_the_contract(fit: Fit) -> None:

@@ -9,9 +9,10 @@ import pytest
 
 import savgs_ident as si
 from savgs_ident.core.errors import InputError
+from savgs_ident.plants.parameter_toml import file_content
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS
 from savgs_ident.plants.quarter_car.model import FREE
-from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, rig_content
+from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path
 from savgs_ident.validation.blind import FILE, FOREIGN_SHARES, BlindRequest, check_shares, plan_of
 from savgs_ident.validation.blind_answer import Answer
 from savgs_ident.validation.blind_draw import LARGEST, SMALLEST, Shares
@@ -108,7 +109,7 @@ def test_foreign_trials_have_nothing_or_one_effect() -> None:
 
 def test_only_foreign_trials_are_marked_as_such() -> None:
     rig = default_rig_path()
-    plan = Plan(rig, rig_content(rig), 4, FOREIGN_SHARES, 1, False)
+    plan = Plan(rig, file_content(rig), 4, FOREIGN_SHARES, 1, False)
     assert "foreign" not in plan.marks()
     assert replace(plan, foreign=True).marks() == plan.marks() | {"foreign": True}
 
@@ -155,7 +156,7 @@ def test_a_whole_foreign_trial(tmp_path: Path) -> None:
     """Of a rig with small errors, recorded first, then diagnosed: sealed, opened, marked, and no alarm."""
     with with_kept_programs():
         request = BlindRequest(1, 7, 0, None, (1.0, 0.0, 0.0, 0.0), 9, False, False, foreign=True)
-        plan = plan_of(request, rig_content(default_rig_path()), tmp_path / FILE)
+        plan = plan_of(request, file_content(default_rig_path()), tmp_path / FILE)
         folder = record_trial(plan, draw_and_record, tmp_path, 1)
         answer = json.loads((folder / "answer.json").read_text())["answer"]
         recorded = (folder / "campaign" / "campaign.csv.gz").read_bytes()

@@ -22,7 +22,8 @@ from savgs_ident.plants.model import doubts_of_fit
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, EFFECTS, MODELS, build_model, model_parameters
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig
-from savgs_ident.recordings.recording import Campaign
+from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
+from savgs_ident.recordings.recording import Campaign, RecordingLayout
 
 FREE = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
 """The parameters that the paper identifies."""
@@ -116,6 +117,21 @@ class RigModel:
     def plant_name(self) -> str:
         """The rig's name."""
         return self.rig.name
+
+    @property
+    def source(self) -> str:
+        """The rig file; empty without one."""
+        return self.rig.source
+
+    @property
+    def sha256(self) -> str:
+        """Digest of the rig file's content; empty without one."""
+        return self.rig.sha256
+
+    @property
+    def layout(self) -> RecordingLayout:
+        """The channels that its recordings have."""
+        return RIG_LAYOUT
 
     def build(self) -> QuarterCar:
         """The plant that solvers take."""

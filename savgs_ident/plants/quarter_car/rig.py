@@ -15,22 +15,28 @@ more table, ``[provenance]``.
 """
 
 import hashlib
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import partial
 from itertools import pairwise
-from math import inf, isfinite
+from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
 
 import tomlkit
-from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import InlineTable, Table
+from tomlkit.items import Table
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import write_bytes
 from savgs_ident.core.parameter import Parameter, ParameterTable
+from savgs_ident.plants.parameter_toml import (
+    compose_inline,
+    compose_provenance,
+    compose_section,
+    file_content,
+    new_document,
+    parse_document,
+)
 from savgs_ident.plants.quarter_car.rig_toml import (
     DAMPER_SECTION,
     DAMPER_TITLE,
@@ -42,7 +48,6 @@ from savgs_ident.plants.quarter_car.rig_toml import (
     SECTION_OF,
     SECTIONS,
     UNIT_OF,
-    check_unit,
     parse_damper,
     parse_name,
     parse_parameters,
@@ -50,12 +55,6 @@ from savgs_ident.plants.quarter_car.rig_toml import (
 )
 
 _PACKAGE = Path(__file__).resolve().parents[2]
-
-_HEAD = (
-    "SI units; tolerance is one standard deviation of what is known beforehand, 0 (left out) means exact",
-    "or, for a parameter that is to be identified, that only its bounds are known.",
-)
-_DEFAULTS = {"tolerance": 0.0, "lower": -inf, "upper": inf, "about": "", "source": ""}
 
 
 @dataclass(frozen=True)
@@ -108,22 +107,12 @@ def read_rig(path: str | Path) -> Rig:
     Raises :class:`InputError`, with file, key, what is wrong and the remedy, for anything that is not a
     complete rig file of the known form.
     """
-    return parse_rig(rig_content(path), path)
-
-
-def rig_content(path: str | Path) -> bytes:
-    """What is in a rig file now, for :func:`parse_rig`; raises :class:`InputError` if it cannot be read."""
-    try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"cannot be read: {error.strerror}", source=path, remedy="name an existing rig file"
-        ) from error
+    return parse_rig(file_content(path), path)
 
 
 def parse_rig(content: bytes, source: object) -> Rig:
     """The rig in the ``content`` of a rig file that errors call ``source``; raises as :func:`read_rig` does."""
-    document = _load(content, source)
+    document = parse_document(content, source)
     try:
         return Rig(
             parse_name(document),
@@ -152,58 +141,30 @@ def rig_text(rig: Rig) -> str:
     missing = [entry for entry in SECTION_OF if entry not in rig.parameters]
     if missing:
         raise InputError(f"the rig has no parameter '{missing[0]}'", remedy="write a whole rig")
-    document = tomlkit.document()
-    for line in _HEAD:
-        document.add(tomlkit.comment(line))
+    document = new_document()
     document.add("schema", tomlkit.item(SCHEMA))
     document.add("name", tomlkit.item(rig.name))
     for key, section in SECTIONS.items():
-        document.add(key, _compose_section(section.title, [rig.parameters[entry] for entry in section.units]))
+        document.add(key, _section(section.title, [rig.parameters[entry] for entry in section.units]))
     document.add(DAMPER_SECTION, _compose_damper(rig.damper_velocity, rig.damper_force))
     extra = [entry for entry in rig.parameters.entries if entry.name not in SECTION_OF]
     if extra:
-        document.add(EXTRA_SECTION, _compose_section(EXTRA_TITLE, extra))
+        document.add(EXTRA_SECTION, _section(EXTRA_TITLE, extra))
     if rig.provenance:
-        document.add(PROVENANCE_SECTION, _compose_provenance(rig.provenance))
+        document.add(PROVENANCE_SECTION, compose_provenance(rig.provenance))
     return tomlkit.dumps(document)
 
 
-def _compose_section(title: str, entries: list[Parameter]) -> Table:
-    table = tomlkit.table()
-    table.add(tomlkit.comment(title))
-    for entry in entries:
-        unit = check_unit(entry.unit, f"parameter '{entry.name}'", UNIT_OF.get(entry.name))
-        optional = {key: getattr(entry, key) for key in _DEFAULTS if getattr(entry, key) != _DEFAULTS[key]}
-        table.add(entry.name, _inline({"value": entry.value, "unit": unit} | optional))
-    table.add(tomlkit.nl())
-    return table
+def _section(title: str, entries: list[Parameter]) -> Table:
+    return compose_section(title, [(each, UNIT_OF.get(each.name)) for each in entries])
 
 
 def _compose_damper(velocity: tuple[float, ...], force: tuple[float, ...]) -> Table:
     table = tomlkit.table()
     table.add(tomlkit.comment(DAMPER_TITLE))
-    table.add("velocity", _inline({"values": list(velocity), "unit": DAMPER_UNITS["velocity"]}))
-    table.add("force", _inline({"values": list(force), "unit": DAMPER_UNITS["force"]}))
+    table.add("velocity", compose_inline({"values": list(velocity), "unit": DAMPER_UNITS["velocity"]}))
+    table.add("force", compose_inline({"values": list(force), "unit": DAMPER_UNITS["force"]}))
     table.add(tomlkit.nl())
-    return table
-
-
-def _compose_provenance(provenance: Mapping[str, object]) -> Table:
-    table = tomlkit.table()
-    for key, value in provenance.items():
-        try:
-            table.add(key, tomlkit.item(value))
-        except (TOMLKitError, TypeError, ValueError) as error:
-            raise InputError(
-                f"provenance.{key} cannot be written as TOML: {error}",
-                remedy="give texts, numbers, lists and tables of these",
-            ) from error
-    return table
-
-
-def _inline(fields: Mapping[str, object]) -> InlineTable:
-    table = tomlkit.inline_table()
-    table.update(fields)
     return table
 
 
@@ -213,15 +174,6 @@ def _shipped(relative: str) -> Path:
         if (root / relative).is_file():
             return root / relative
     raise InputError(f"the shipped file data/{relative} is missing", remedy="install the package again")
-
-
-def _load(content: bytes, source: object) -> dict[str, object]:
-    try:
-        return tomllib.loads(content.decode("utf-8"))
-    except UnicodeDecodeError as error:
-        raise InputError("is not text in UTF-8", source=source, remedy="save the file as UTF-8") from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"is not valid TOML: {error}", source=source, remedy="mend it there") from error
 
 
 def _check_damper_table(velocity: tuple[float, ...], force: tuple[float, ...]) -> None:

@@ -15,7 +15,6 @@ from savgs_ident.effects.base import PortKind
 from savgs_ident.report.text import (
     DASH,
     channel_label,
-    data_warnings,
     decimal,
     interval,
     numeral,
@@ -233,7 +232,6 @@ def diagnosis_text(diagnosis: Diagnosis) -> RenderableType:
         *_next_tests(diagnosis),
         *_not_judgeable(diagnosis),
         *_warnings(diagnosis),
-        *data_warnings(diagnosis.origin.warnings),
     )
 
 

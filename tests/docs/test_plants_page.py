@@ -1,0 +1,24 @@
+"""docs/plants.md: the file that it shows is the one that is shipped, and its commands are those of the program."""
+
+import re
+from pathlib import Path
+
+from ..cli.command_rows import COMMANDS
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+PAGE = (REPOSITORY / "docs/plants.md").read_text("utf-8")
+
+
+def test_the_file_on_the_page_is_the_one_that_is_shipped_and_has_forty_lines() -> None:
+    (shown,) = re.findall(r"^```python\n(.*?)^```$", PAGE, re.M | re.S)
+    assert shown == (REPOSITORY / "examples/servo/servo.py").read_text("utf-8")
+    assert len([line for line in shown.splitlines() if line.strip()]) <= 40
+
+
+def test_its_commands_are_those_of_the_program() -> None:
+    (block,) = re.findall(r"^```sh\n(.*?)^```$", PAGE, re.M | re.S)
+    typed = [line.split() for line in block.splitlines() if line.startswith("savgs-ident ")]
+    assert {words[1] for words in typed} == {"check-plant", "inspect", "fit", "diagnose", "posterior"}
+    for words in typed:
+        known = {name for each in COMMANDS[words[1]].params for name in each.opts}
+        assert {word for word in words if word.startswith("--")} <= known

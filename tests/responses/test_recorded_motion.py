@@ -1,0 +1,71 @@
+"""A motion in any recording, and the force of its drive: at any rate, from any clock, and without a second cycle."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.recordings.recording import RecordedChannel, Recording
+from savgs_ident.responses.driven_motion import recorded_motion
+
+SEED = 3
+
+
+def _recording(
+    time: NDArray[np.float64], repeats: bool, noise: float, lag: float = 0.0, stretched: float = 0.0
+) -> Recording:
+    """A mass of 3 kg with a friction of 2 N, led on a sum of sines of 4 s, or of none that repeat."""
+    rates = (0.25, 0.75, 1.5) if repeats else (0.2371, 0.7093, 1.4177)
+    random = np.random.default_rng(SEED)
+    stamps = time + stretched * random.uniform(-1.0, 1.0, time.size) * (time[1] - time[0])
+
+    def led(t: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        w = 2.0 * np.pi * np.array(rates)[:, None]
+        sizes = np.array([0.1, 0.04, 0.02])[:, None]
+        x, v, a = sizes * np.sin(w * t), sizes * w * np.cos(w * t), -sizes * w**2 * np.sin(w * t)
+        return x.sum(0), v.sum(0), a.sum(0)
+
+    x, _, _ = led(stamps)
+    _, v, a = led(time + lag)
+    force = 3.0 * a + 2.0 * np.sign(v) + noise * random.standard_normal(time.size)
+    channels = {
+        "x": RecordedChannel("x", "m", stamps, x),
+        "drive": RecordedChannel("drive", "N", time + lag, force),
+    }
+    return Recording("run", "other", None, channels)
+
+
+@pytest.mark.parametrize("rate", [80.0, 250.0, 1000.0])
+@pytest.mark.parametrize("repeats", [True, False])
+def test_its_noise_is_that_of_the_force_at_any_rate(rate: float, repeats: bool) -> None:
+    """White noise of one sample, after the low-pass and thinning of the rows."""
+    time, noise = np.arange(round(40.0 * rate)) / rate, 0.05
+    motion = recorded_motion(_recording(time, repeats, noise), "x", "drive", "here")
+    white = noise * np.random.default_rng(1).standard_normal(time.size)
+    wanted = float(np.std(motion.rows(white)))
+    assert motion.noise == pytest.approx(wanted, rel=0.25)
+    assert motion.period == pytest.approx(4.0 if repeats else time.size / rate, rel=1e-9)
+    assert [each.code for each in motion.warnings] == ([] if repeats else ["noise_assumed"])
+
+
+def test_clocks_that_are_uneven_or_apart_are_brought_together() -> None:
+    """By a third of a step of jitter, and a drive whose clock begins later: the same motion to a thousandth."""
+    time = np.arange(8000) / 200.0
+    plain = recorded_motion(_recording(time, True, 0.0), "x", "drive", "here")
+    moved = recorded_motion(_recording(time, True, 0.0, lag=0.0125, stretched=0.3), "x", "drive", "here")
+    shift = 0.0125
+    there = np.interp(
+        plain.step * np.arange(plain.position.size),
+        shift + moved.step * np.arange(moved.position.size),
+        moved.position,
+    )
+    inner = slice(400, -400)
+    assert np.max(np.abs(there - plain.position)[inner]) < 1e-3 * np.max(np.abs(plain.position))
+
+
+def test_what_cannot_be_used_is_refused_with_its_place() -> None:
+    time = np.arange(400) / 200.0
+    with pytest.raises(InputError, match=r"here.*channel 'velocity': was not recorded"):
+        recorded_motion(_recording(time, True, 0.1), "velocity", "drive", "here")
+    with pytest.raises(InputError, match="is too short"):
+        recorded_motion(_recording(time[:100], True, 0.1), "x", "drive", "here")
