@@ -17,6 +17,7 @@ class Form(StrEnum):
     mcap = "MCAP"
     hdf5 = "HDF5"
     matlab = "MATLAB"
+    parquet = "Parquet"
 
 
 @dataclass(frozen=True)

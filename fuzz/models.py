@@ -29,6 +29,8 @@ from savgs_ident.export.json_export import model_record, read_model_json, write_
 from savgs_ident.export.linear_models import EQUATION_8, EXACT
 from savgs_ident.export.public import gathered, model_to_export
 from savgs_ident.export.python_control_export import KIND, SCHEMA, load_python_control, resting_point
+from savgs_ident.plants.from_file import load_plant
+from savgs_ident.plants.model_toml import model_text
 from savgs_ident.plants.quarter_car.catalogue import MODELS, model_parameters
 from savgs_ident.plants.quarter_car.model import RigModel, load_model
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig, rig_text
@@ -103,6 +105,19 @@ def diagnosis() -> Original:
     """Diagnoses that name an effect, nothing, and something unknown."""
     kinds = {"effect": (["mount_compliance"], ["strut"]), "none": ([], []), "unknown": ([], ["frame"])}
     return Original(tuple(json.dumps(_diagnosis(kind, *named)).encode() for kind, named in kinds.items()))
+
+
+def plant_model() -> Original:
+    """The identified model of another plant than the quarter car."""
+    model = (load_plant("two_mass") + "guide_coulomb").with_values({"k": 5.4e4})
+    remembered = {"effects": ["guide_coulomb"], "free": ["k", "c"], "before": {"k": 6e4}, "trusted": True}
+    return Original((model_text(model.with_provenance(remembered)).encode(),))
+
+
+def read_plant_model(path: Path) -> object:
+    """The model of a file with all that commands take from its provenance."""
+    model = load_plant("two_mass", path)
+    return model.table, model.effects, model.before.table, model.identified, model.doubts
 
 
 def read_drawing(path: Path) -> object:

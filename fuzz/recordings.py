@@ -1,11 +1,14 @@
-"""Files of measurements: campaigns as CSV and MCAP, their channel map, a road, an axis' motion."""
+"""Files of measurements: campaigns in each format, their channel map, a road, an axis' motion."""
 
 import gzip
 import json
 from io import BytesIO
 from pathlib import Path
 
+import h5py
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 from mcap.writer import CompressionType
 from numpy.typing import NDArray
 from scipy.io import savemat
@@ -137,6 +140,28 @@ def axis() -> Original:
         savemat(stream, arrays, do_compression=packed)
         contents.append(stream.getvalue())
     return Original(tuple(contents))
+
+
+def parquet() -> Original:
+    """Two tests in a table with a column of their names."""
+    signals = np.tile(_signals(), (2, 1))
+    names = ["test", *_COLUMNS.split(",")]
+    tests = ["dwell_2.00Hz"] * SAMPLES + ["standstill"] * SAMPLES
+    stream = BytesIO()
+    pq.write_table(pa.table(dict(zip(names, [tests, *signals.T], strict=True))), stream)
+    return Original((stream.getvalue(),))
+
+
+def matlab_7_3() -> Original:
+    """A test as MATLAB writes it today: HDF5, vectors as columns, units in the map beside it."""
+    stream = BytesIO()
+    with h5py.File(stream, "w") as file:
+        for name, signal in zip(("time", *_UNITS), _signals().T, strict=True):
+            file[name] = signal[None, :]
+    maps = "".join(
+        f'[channels.{name}]\ncolumn = "{name}"\nunit = "{unit}"\n' for name, unit in _UNITS.items()
+    )
+    return Original((stream.getvalue(),), {"channels.toml": f'{maps}[time]\nunit = "s"\n'.encode()})
 
 
 def read_table(path: Path) -> object:

@@ -8,6 +8,7 @@ from fuzz.loader import Form
 from fuzz.mutators.arrays import damage_hdf5
 from fuzz.mutators.container import damage_mcap
 from fuzz.mutators.matlab import damage_matlab
+from fuzz.mutators.parquet import damage_parquet
 from fuzz.mutators.raw import RAW, Mutator
 from fuzz.mutators.table import damage_packed, damage_table
 from fuzz.mutators.tree import damage_json, damage_lines, damage_toml
@@ -21,6 +22,7 @@ OF_FORM: Mapping[Form, Mutator] = {
     Form.mcap: damage_mcap,
     Form.hdf5: damage_hdf5,
     Form.matlab: damage_matlab,
+    Form.parquet: damage_parquet,
 }
 """Damage that knows the form."""
 

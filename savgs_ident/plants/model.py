@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import Any, Protocol, Self
 
-from savgs_ident.core.errors import DataWarning, InputError
+from savgs_ident.core.errors import DataWarning, InputError, blamed_on
 from savgs_ident.core.parameter import Parameter, ParameterTable, merge_parameters
 from savgs_ident.core.presentation import Origin
 from savgs_ident.effects.effect import Effect, generic_effects
@@ -251,7 +251,8 @@ class PlantModel:
     @property
     def before(self) -> "PlantModel":
         """The model with the values that were known before its fit, the centres of their priors."""
-        return self.with_values(self.provenance.get("before", {}))
+        with blamed_on(self.source):
+            return self.with_values(self.provenance.get("before", {}))
 
     def with_parameters(self, table: ParameterTable) -> "PlantModel":
         """The same model with another table."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.recordings.axis_recording import array_names, read_arrays
+from savgs_ident.recordings.axis_recording import LARGEST, array_names, read_arrays
 from savgs_ident.recordings.channels import ChannelMap, Progress, Reader, Reading
 from savgs_ident.recordings.signals import Signal, reading_of
 
@@ -49,10 +49,21 @@ def _of_hdf5(path: Path) -> dict[str, NDArray[np.float64]]:
     try:
         with h5py.File(path, "r") as file:
             for name, item in file.items():
-                if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiub" and item.ndim <= 2:
-                    # MATLAB writes by columns.
-                    found[name] = np.asarray(item, dtype=np.float64).T
-    except OSError as error:
+                numeric = isinstance(item, h5py.Dataset) and item.dtype.kind in "fiub"
+                # An empty one has no shape, and a name that is no text comes as bytes.
+                if not numeric or item.shape is None or item.ndim > 2 or not isinstance(name, str):
+                    continue
+                if 8 * item.size > LARGEST:
+                    raise InputError(
+                        f"has the shape {item.shape}",
+                        source=path,
+                        channel=name,
+                        remedy="record a shorter test",
+                    )
+                # MATLAB writes by columns.
+                found[name] = np.asarray(item, dtype=np.float64).T
+    except (OSError, RuntimeError, KeyError, ValueError) as error:
+        # What h5py raises of a damaged file.
         raise InputError(f"cannot be read: {error}", source=path, remedy="copy the file again") from error
     return found
 

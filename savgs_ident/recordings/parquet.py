@@ -16,6 +16,9 @@ from savgs_ident.recordings.csv import TEST_COLUMNS
 from savgs_ident.recordings.recording import normalise
 from savgs_ident.recordings.signals import Signal, reading_of
 
+MOST_NUMBERS = 2**28
+"""Most numbers that are unpacked: two gigabytes."""
+
 
 def read_parquet(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading:
     """Read one Parquet file; raises :class:`InputError` where it is no table of measurements."""
@@ -24,13 +27,28 @@ def read_parquet(path: Path, channel_map: ChannelMap, progress: Progress) -> Rea
 
     source = str(path)
     try:
-        table = pq.read_table(path)
-    except (pa.ArrowException, OSError) as error:
+        about = pq.read_metadata(path)
+        if about.num_rows * about.num_columns > MOST_NUMBERS:
+            raise InputError(
+                f"holds {about.num_rows} rows of {about.num_columns} columns",
+                source=source,
+                remedy="give one test a file, and only the columns that are needed",
+            )
+        # What is in the columns is looked at here only.
+        return _reading(pq.read_table(path), path, channel_map, progress)
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"cannot be read as Parquet: {str(error).splitlines()[0]}",
             source=source,
             remedy="copy the file again",
         ) from error
+
+
+def _reading(table: Any, path: Path, channel_map: ChannelMap, progress: Progress) -> Reading:
+    """The recordings of a table; raises what pyarrow does where its columns are damaged."""
+    import pyarrow as pa
+
+    source = str(path)
     if table.num_rows == 0:
         raise InputError(
             "has columns but no data", source=source, remedy="record again, or give another file"

@@ -158,10 +158,8 @@ def _channel(
 ) -> RecordedChannel:
     assert time is not None
     with np.errstate(over="ignore", invalid="ignore"):
-        values = signal.values * binding.gain + binding.bias
-    return RecordedChannel(
-        binding.channel, layout.si_unit(binding.channel), time - begin, values, binding.label
-    )
+        values, since = signal.values * binding.gain + binding.bias, time - begin
+    return RecordedChannel(binding.channel, layout.si_unit(binding.channel), since, values, binding.label)
 
 
 def rules_for(

@@ -144,7 +144,7 @@ def _called(work: Callable[[], object]) -> set[str]:
 def test_a_good_file_is_read_by_the_functions_that_it_is_to_cover(name: str, tmp_path: Path) -> None:
     loader, called = LOADERS[name], set()
     for number, content in enumerate(original_of(loader).contents):
-        folder = tmp_path / str(number)
+        folder = tmp_path / name / str(number)
         path = place(loader, content, folder)
         assert classify(loader, path) == (Kind.read, "", "")
         called |= _called(lambda path=path: loader.read(path))
