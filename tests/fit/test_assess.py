@@ -1,6 +1,7 @@
 """What is said of a fit whose model lacks something."""
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from savgs_ident.fit.identifiability import (
@@ -17,6 +18,7 @@ from savgs_ident.plants.quarter_car.model import FREE
 from .bench import TRUTH, Bench, silent
 
 
+@pytest.mark.slow
 def test_a_model_that_explains_the_data_is_not_complained_of(bench: Bench) -> None:
     found = bench.fit(bench.predicted(TRUTH) + bench.noise(4))
     assert explained_by_noise(bench.task.problem, found)

@@ -26,6 +26,7 @@ def _true(bench: Bench) -> NDArray[np.float64]:
     return np.asarray(bench.u(values))
 
 
+@pytest.mark.slow
 def test_where_there_is_noise_alone_the_errors_are_larger_than_it_and_hold_the_truth(bench: Bench) -> None:
     sd, found = _fitted(bench, bench.predicted(TRUTH) + bench.noise(4))
     assert isinstance(found, FitWithErrors)
@@ -36,6 +37,7 @@ def test_where_there_is_noise_alone_the_errors_are_larger_than_it_and_hold_the_t
     np.testing.assert_allclose(np.linalg.inv(found.information.T @ found.information), found.covariance)
 
 
+@pytest.mark.slow
 def test_a_friction_that_drifts_is_found_in_the_middle_of_its_drift(bench: Bench) -> None:
     """Rail friction falls by 6 % while dwells are recorded from slow to fast: least squares takes it for a bend."""
     time = time_of(bench.task.measured.times)
