@@ -66,7 +66,7 @@ class FitRequest:
 
     Attributes:
         campaign: its file or folder.
-        plant: "quarter_car", or what :func:`savgs_ident.load_plant` takes.
+        plant: "quarter_car", or what :func:`~savgs_ident.plants.from_file.load_plant` takes.
         rig: the rig file, or another plant's file of numbers; None for what the plant declares.
         channels: the map of the campaign's channels.
         model: "simtr" or "simqc", of the quarter car.
@@ -168,7 +168,7 @@ def run_campaigns(
         folders: campaigns as :func:`~savgs_ident.plants.quarter_car.rig_recordings.load_campaign` takes them, and
             folders of several: one in each file or subfolder.
         out: folder in which each campaign's result is saved; a run that was stopped goes on from there.
-        plant: "quarter_car", or a plant as :func:`savgs_ident.load_plant` takes it: "FILE.py:CLASS".
+        plant: "quarter_car", or what :func:`~savgs_ident.plants.from_file.load_plant` takes: "FILE.py:CLASS".
         rig: rig file to start from, the shipped one if left out; a ``model.toml`` of another plant.
         model: "simtr", with rail and tyre friction, or "simqc", without: of the quarter car.
         beside: names of effects that the model has besides, as a diagnosis names them.

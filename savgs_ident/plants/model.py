@@ -94,7 +94,7 @@ class Model(Protocol):
 
     @property
     def layout(self) -> RecordingLayout:
-        """The channels that its recordings have, for :func:`savgs_ident.load_campaign`."""
+        """The channels that its recordings have, for ``savgs_ident.load_campaign``."""
 
     def build(self) -> AbstractPlant:
         """The plant that solvers take, with its effects."""

@@ -42,7 +42,7 @@ def test_every_public_module_has_its_page_and_no_other_has(built: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "page", ["index", "guide", "how-it-works", "validation", "performance", "formats", "reference"]
+    "page", ["index", "guide", "plants", "how-it-works", "validation", "performance", "formats", "reference"]
 )
 def test_the_pages_by_hand_are_there(built: Path, page: str) -> None:
     assert (built / f"{page}.html").is_file()
