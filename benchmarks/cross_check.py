@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from benchmarks.campaign import read_dwells, response_of
 from benchmarks.outcome import Outcome, Progress
 from savgs_ident.fit.collocation.crosscheck import fit_by_collocation
+from savgs_ident.fit.estimate import Estimate
 from savgs_ident.fit.least_squares import fit_least_squares
-from savgs_ident.fit.result import Estimate
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig

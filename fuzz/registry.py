@@ -7,7 +7,7 @@ from fuzz import kept, models, recordings
 from fuzz.loader import Form, Loader
 
 _CSV = (
-    "recordings.csv.read_csv", "recordings.csv_table.CsvTable._parse", "recordings.csv_table._cells",
+    "recordings.csv.read_csv", "recordings.csv_table.CsvTable._parse", "recordings.csv_head._cells",
 )  # fmt: skip
 _JSON_MCAP = (
     "recordings.mcap_records.JsonDecoder._parse", "recordings.mcap_records._schema_units",

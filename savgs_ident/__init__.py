@@ -45,8 +45,9 @@ if TYPE_CHECKING:
     from savgs_ident.export.json_export import read_model_json
     from savgs_ident.export.public import Exported, export
     from savgs_ident.export.python_control_export import load_python_control, resting_point
+    from savgs_ident.fit.estimate import Estimate
     from savgs_ident.fit.public import Comparison, compare, demo, fit
-    from savgs_ident.fit.result import Estimate, Fit
+    from savgs_ident.fit.result import Fit
     from savgs_ident.fit.result import Verdict as Identifiability
     from savgs_ident.fit.sampling import sample
     from savgs_ident.inference.result import Convergence, Marginal, Posterior
@@ -172,7 +173,7 @@ _PLACES = {
     "Candidate": "diagnosis.result",
     "Convergence": "inference.result",
     "DataWarning": "core.errors",
-    "Estimate": "fit.result",
+    "Estimate": "fit.estimate",
     "Finding": "validation.plant_declaration",
     "Hypothesis": "diagnosis.result",
     "Identifiability": "fit.result:Verdict",

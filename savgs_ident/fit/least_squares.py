@@ -20,6 +20,7 @@ from jaxtyping import Array
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import as_values
+from savgs_ident.fit.estimate import Estimate
 from savgs_ident.fit.identifiability import (
     EXPLAINED,
     assess,
@@ -28,7 +29,7 @@ from savgs_ident.fit.identifiability import (
     weighed_by_misfit,
 )
 from savgs_ident.fit.minimise import Minimiser, Minimum
-from savgs_ident.fit.result import Estimate, Fit, Verdict
+from savgs_ident.fit.result import Fit, Verdict
 from savgs_ident.fit.small_errors import FitWithErrors, fit_with_errors, own_part
 from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import Problem, ProblemSettings, Quantity, Task, plan_task

@@ -23,7 +23,8 @@ from savgs_ident.recordings.channels import (
     bind,
     unit_factor_or_si,
 )
-from savgs_ident.recordings.csv_table import GZIP_MAGIC, CsvHead, CsvTable, TextBlocks, read_head
+from savgs_ident.recordings.csv_head import CsvHead, read_head
+from savgs_ident.recordings.csv_table import GZIP_MAGIC, CsvTable, TextBlocks
 from savgs_ident.recordings.recording import (
     RecordedChannel,
     Recording,

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from rich.console import Group, RenderableType
 
 from savgs_ident.core.files import warning_record
+from savgs_ident.fit.estimate import Estimate
 from savgs_ident.fit.public import Comparison
 from savgs_ident.fit.result import (
-    Estimate,
     Fit,
     Gap,
     MeasuredPoints,

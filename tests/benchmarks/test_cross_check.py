@@ -7,7 +7,7 @@ import pytest
 from benchmarks import cross_check
 from benchmarks.cross_check import distances
 from savgs_ident.core.status import Status
-from savgs_ident.fit.result import Estimate
+from savgs_ident.fit.estimate import Estimate
 from savgs_ident.plants.quarter_car.model import FREE
 
 

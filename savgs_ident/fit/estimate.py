@@ -1,0 +1,68 @@
+"""One estimated parameter: its value with errors, and whether it can be believed beside its sheet."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+FAR_OFF = 5.0
+"""Standard deviations from its sheet at which a number is not believed: by chance it is there once in two million."""
+
+_UNITS_TAKEN = (
+    (9.80665, "g was taken for m/s^2, or the other way round"),
+    (1000.0, "a unit was taken for another one a thousand times as large"),
+    (180.0 / np.pi, "degrees were taken for radians"),
+    (25.4, "inches were taken for millimetres"),
+    (0.0254, "inches were taken for metres"),
+    (100.0, "a unit was taken for another one a hundred times as large"),
+)
+_NEARLY = 0.08
+"""Difference in the logarithm up to which a ratio is that of two units: about what parts and sensors differ by."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One estimated parameter in SI.
+
+    ``stderr`` is its standard error, which contains what the model leaves unexplained; ``own_stderr`` is the part of
+    it that another campaign of the same rig does not share: noise and drift. ``free`` distinguishes an identified
+    parameter from one that was known to a tolerance and estimated along. For the latter ``prior`` and ``prior_sd``
+    say what was known before.
+    """
+
+    name: str
+    value: float
+    stderr: float
+    own_stderr: float
+    unit: str
+    free: bool
+    prior: float
+    prior_sd: float
+
+    @property
+    def tolerances_off(self) -> float:
+        """By how many of its tolerances it is off its sheet [1]; 0 for what has none."""
+        return abs(self.value - self.prior) / self.prior_sd if self.prior_sd > 0.0 else 0.0
+
+    @property
+    def unit_taken(self) -> str:
+        """Which unit was taken for which, where the value is off its sheet by as much; empty where it is not."""
+        ratio = self.value / self.prior if self.prior else 0.0
+        if ratio <= 0.0:
+            return ""
+        found = (
+            words for factor, words in _UNITS_TAKEN if abs(abs(np.log(ratio)) - abs(np.log(factor))) < _NEARLY
+        )
+        return next(found, "")
+
+
+def far_off_sentence(each: Estimate) -> str:
+    """Why a value that is far off its sheet is not to be believed, and what it may come from."""
+    cause = (
+        each.unit_taken
+        or "look at the units and signs of the channels and at the sheet, or for what is missing"
+    )
+    start = "as if " if each.unit_taken else ""
+    return (
+        f"{each.name} would have to be {each.value:.4g} {each.unit} where the sheet has {each.prior:.4g}, "
+        f"{each.tolerances_off:.0f} tolerances off: {start}{cause}"
+    )
