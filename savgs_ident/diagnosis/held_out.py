@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.inference.find_map import LaplaceFit, Search, find_map_again
+from savgs_ident.inference.find_map import LaplaceFit, Search, find_map_near
 from savgs_ident.inference.likelihood import NoiseScales
 from savgs_ident.inference.observations import Data, Term
 
@@ -52,7 +52,7 @@ def hold_out(
 
     def without(out: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         part = Search(search.plant, data, ~out)
-        found = find_map_again(part, terms, mode, constants.held_out_steps)
+        found = find_map_near(part, terms, mode, constants.held_out_steps)
         if not found.solved:
             # What has no solution predicts nothing.
             count = int(out.sum())

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from savgs_ident.core.status import Status
 from savgs_ident.inference.prior import Coordinates, EffectCoordinates, Scales
@@ -139,9 +140,19 @@ class Data:
     tolerated: NDArray[np.float64] | None = None
 
     def part(self, mask: NDArray[np.bool_]) -> "Data":
-        """The numbers that ``mask`` (m,) picks."""
+        """The numbers that ``mask`` (m,) picks: the same object each time, for its axes take long to find."""
         if mask.all():
             return self
+        which = np.packbits(mask).tobytes()
+        if which not in self._parts:
+            self._parts[which] = self._picked(mask)
+        return self._parts[which]
+
+    @cached_property
+    def _parts(self) -> dict[bytes, "Data"]:
+        return {}
+
+    def _picked(self, mask: NDArray[np.bool_]) -> "Data":
         return Data(
             self.measured[mask],
             self.variance[mask],
@@ -206,7 +217,7 @@ class Data:
         noise, alone = np.diag(self.variance), np.diag(self.discrepancy_scale)
         if self.tolerated is not None:
             noise += self.tolerated @ self.tolerated.T
-        whiten = np.linalg.inv(np.linalg.cholesky(noise))
+        whiten = solve_triangular(np.linalg.cholesky(noise), np.eye(noise.shape[0]), lower=True)
         errors = whiten @ (alone if self.shared is None else np.concatenate([alone, self.shared], axis=1))
         squares, axes = np.linalg.eigh(errors @ errors.T)
         return np.sqrt(np.maximum(squares, 0.0)), axes.T @ whiten

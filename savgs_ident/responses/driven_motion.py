@@ -19,12 +19,10 @@ that is smooth over some rows is gone. That the noise is white is then assumed, 
 """
 
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.axis_recording import AxisRecording, read_axis
@@ -178,8 +176,7 @@ def _driven(
     """The motion of even samples, whose noise comes from cycles of ``period`` samples where it has any."""
     if measured.size * step < 2.0 * CUT_S + _FEWEST * _samples_to_a_row(step) * step:
         raise InputError("is too short", source=source, remedy="record some seconds at least")
-    cutoff = min(2.0 * CUTOFF_HZ * step, 2.0 * SHARE_OF_RATE)
-    position = np.asarray(sosfiltfilt(butter(_ORDER, cutoff, output="sos"), measured))
+    position = _low_passed(min(2.0 * CUTOFF_HZ * step, 2.0 * SHARE_OF_RATE), measured)
     velocity = np.gradient(position, step)
     acceleration = np.gradient(velocity, step)
     left = _beyond(force, np.stack([acceleration, velocity], axis=1))
@@ -243,12 +240,14 @@ def _samples_to_a_row(step: float) -> int:
 def _thinned(signals: NDArray[np.float64], step: float) -> NDArray[np.float64]:
     every = _samples_to_a_row(step)
     if every > 1:
-        signals = np.asarray(sosfiltfilt(_low_pass(PASSED / every), signals, axis=-1))
+        signals = _low_passed(PASSED / every, signals)
     edge = round(CUT_S / step)
     return signals[..., edge : signals.shape[-1] - edge : every]
 
 
-@cache
-def _low_pass(cutoff: float) -> NDArray[np.float64]:
-    """Second-order sections of a low-pass; ``cutoff`` is a share of half the sampling rate."""
-    return np.asarray(butter(_ORDER, cutoff, output="sos"))
+def _low_passed(cutoff: float, signals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Signals (..., n) without what is faster than ``cutoff``, a share of half the sampling rate, and no later."""
+    # Takes a second to import, which a diagnosis on dwells would wait for.
+    from scipy.signal import butter, sosfiltfilt
+
+    return np.asarray(sosfiltfilt(butter(_ORDER, cutoff, output="sos"), signals, axis=-1))

@@ -36,7 +36,6 @@ from savgs_ident.simulate.excitation import (
 from savgs_ident.simulate.mesh import Layout, layout_for
 from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
-from savgs_ident.simulate.transient import simulate_transient
 
 
 @dataclass(frozen=True)
@@ -243,6 +242,9 @@ def simulate_sweep(
 
     ``amplitude`` as in :func:`simulate`. Raises :class:`InputError` for one that is not above zero.
     """
+    # Its integrator takes a second to import, which no other command waits for.
+    from savgs_ident.simulate.transient import simulate_transient
+
     use_persistent_cache()
     progress("integrating a sweep of 60 s")
     table, size = model.table, _amplitude(model, amplitude)

@@ -1,6 +1,7 @@
 """The search for the mode from two starts: from where calibration ended and from the parameters as given."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +9,15 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.status import Status
-from savgs_ident.inference.find_map import Start, find_map, find_map_from_both, search_of
+from savgs_ident.inference.find_map import (
+    Search,
+    Start,
+    find_map,
+    find_map_from_both,
+    find_map_near,
+    search_of,
+)
+from savgs_ident.inference.observations import Prediction
 from savgs_ident.inference.prior import Coordinates, sheet_coordinate
 
 from ..diagnosis.toy import TERMS, ToyPlant, draw
@@ -74,3 +83,33 @@ def test_only_a_search_that_cannot_come_near_another_hypothesis_is_given_up(seed
     kept = find_map_from_both(search, (BEND,), {"w": 5.0}, None, least=least)
     assert kept.status is best.status
     np.testing.assert_array_equal(kept.x, best.x)
+
+
+class CountingPlant(WavyPlant):
+    """Counts how often its slopes are asked for."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def predict(
+        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
+    ) -> Prediction:
+        self.asked += bool(names)
+        return super().predict(terms, values, names, warm_start)
+
+
+def test_near_a_fit_its_slopes_lead_to_the_mode_of_some_tests_to_a_tenth_of_its_standard_deviations() -> None:
+    plant, moved = CountingPlant(), 0.0
+    data = draw(plant, TRUTH, 0.02, 5)
+    whole = find_map(search_of(plant, data), (BEND,), {"w": 6.0}, None)
+    for fold in range(3):
+        part, asked = Search(plant, data, data.test % 3 != fold), plant.asked
+        near = find_map_near(part, (BEND,), whole)
+        assert plant.asked == asked
+        assert near.status.ok
+        anew = find_map(part, (BEND,), whole.values, None)
+        sd = np.sqrt(np.diag(anew.covariance()))
+        moved = max(moved, float(np.max(np.abs(anew.x - whole.x) / sd)))
+        np.testing.assert_allclose(near.x / sd, anew.x / sd, atol=0.1)
+        assert near.evidence == pytest.approx(anew.evidence, abs=0.1)
+    assert moved > 0.5
