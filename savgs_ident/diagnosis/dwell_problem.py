@@ -41,11 +41,12 @@ from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.excitation import measured_excitation
-from savgs_ident.simulate.mesh import Layout, layout_for
+from savgs_ident.simulate.mesh import Layout
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
     adapt,
+    layout_of,
     resolve,
     simulate_periodic,
 )
@@ -84,7 +85,7 @@ class DwellProblem(AbstractProblem):
     @cached_property
     def layout(self) -> Layout:
         """How nodes share arrays."""
-        return layout_for(np.asarray(self.excitation.frequency), self.settings.nodes, self.settings.slow)
+        return layout_of(self.excitation, self.settings)
 
     @property
     def orders(self) -> int:
@@ -296,6 +297,45 @@ class DwellProblem(AbstractProblem):
         return Trajectory(jnp.concatenate([x, rest]), jnp.concatenate([y, rest]))
 
 
+@dataclass(frozen=True)
+class WindowProblem(DwellProblem):
+    """A plant in windows of tests that do not repeat: these have no cycle, no harmonics and no frequency."""
+
+    def locations(
+        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
+    ) -> list[InputLocation]:
+        """What laws at each location could do to the readings; a signal that is free has too many numbers."""
+        about = self._about(self.complete(terms), values, warm_start)
+        return input_locations(about, replace(self.constants, free_orders=0))
+
+    def gap_map(self, data: Data, rows: NDArray[np.float64]) -> tuple[MapCell, ...]:
+        """Nothing: that is by dwell and harmonic."""
+        return ()
+
+    def cycle_positions(self, data: Data, rows: NDArray[np.float64]) -> tuple[CyclePosition, ...]:
+        """Nothing: there is no cycle."""
+        return ()
+
+    def regimes(self, data: Data, fit: LaplaceFit) -> tuple[Regime, ...]:
+        """Nothing: regimes are of a cycle."""
+        return ()
+
+    def loops(
+        self,
+        values: Mapping[str, float],
+        warm_start: PeriodicSolution,
+        found: Localisation,
+        law: DrawnLaw | None,
+        nearest: DrawnLaw | None,
+    ) -> tuple[ForceLoop, ...]:
+        """Nothing: they are drawn over a period."""
+        return ()
+
+    def next_tests(self, search: Search, one: LaplaceFit, other: LaplaceFit) -> tuple[NextTest, ...]:
+        """Nothing: further dwells are proposed beside dwells."""
+        return ()
+
+
 def dwell_problem(
     measured: HarmonicResponse,
     plant: AbstractPlant,
@@ -308,14 +348,15 @@ def dwell_problem(
     models: Iterable[tuple[str, ...]] = (),
     constants: DecisionConstants = DEFAULTS,
 ) -> tuple[DwellProblem, Data]:
-    """The problem of a measured response, and the response as data.
+    """The problem of a measured response, of dwells or in windows, and the response as data.
 
     Raises :class:`InputError` for a response that cannot be used.
     """
     target = harmonic_target(measured, plant.channels, orders)
     likelihood = likelihood_of(target)
     tests, channels, kept = (int(count) for count in target.used.shape)
-    problem = DwellProblem(
+    kind = DwellProblem if measured.part is None else WindowProblem
+    problem = kind(
         plant=plant,
         parameters=parameters,
         catalogue=catalogue,

@@ -32,7 +32,7 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion, recorded_motion
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
-from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep, measured_response
+from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep, response_of_tests
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
@@ -57,7 +57,8 @@ def diagnose(
     Args:
         model: the baseline, of the rig or of another plant.
         measured: the recordings, or the response of their dwells; or a measured motion, along which a plant with one
-            coordinate is held against the force of its drive, as it is where recordings have no dwell.
+            coordinate is held against the force of its drive, as it is where recordings have no dwell. Of other plants
+            a road or a sweep is cut into windows then.
         held_out: another motion, that nothing is fitted to: it is predicted, and compared.
         without: effects to leave out of the catalogue.
         orders: highest harmonic order to compare.
@@ -79,10 +80,12 @@ def diagnose(
         raise InputError(
             "a held-out motion goes with a measured motion alone", remedy="diagnose each campaign by itself"
         )
-    response = measured_response(measured, model.plant, orders, max_frequency, progress)
+    response = response_of_tests(measured, model.plant, orders, max_frequency, progress)
     campaign, warnings = campaign_of(measured), response.warnings
     given, settings, values = baseline_of(model, orders, without, constants)
-    sweep, found_in_sweep = (None, ()) if campaign is None else first_sweep(campaign, model.plant)
+    # A sweep in windows is what the model is fitted to, and no test that was left out.
+    apart = None if response.part is not None else campaign
+    sweep, found_in_sweep = (None, ()) if apart is None else first_sweep(apart, model.plant)
     plant, data = problem_of_dwells(response, given, settings)
     origin = model.origin(campaign, (*warnings, *found_in_sweep)).with_command(command)
     return diagnose_dwells(plant, data, response, given, settings, values, progress, sweep, origin=origin)

@@ -203,13 +203,17 @@ def _sine_in(driven: str, excitation: Excitation, frequency: NDArray[np.float64]
 
 def propose_dwells(minimiser: Minimiser, best: Minimum, settings: PeriodicSettings) -> tuple[Proposal, ...]:
     """The best dwell of every family that would identify all free parameters; empty if none would."""
+    excitation = best.solution.excitation
+    if excitation.part is not None:
+        # Tests that do not repeat have no amplitude and no frequency to go by.
+        return ()
     free = len(minimiser.problem.free.identified)
 
     def worst(jacobian: NDArray[np.float64]) -> float:
         return float(spread_of(jacobian).sd[:free].max())
 
     leaders = []
-    for candidate in candidates(best.solution.excitation, minimiser.problem.model.inputs[0].name):
+    for candidate in candidates(excitation, minimiser.problem.model.inputs[0].name):
         proposals = _proposals(minimiser, best, candidate, settings, worst)
         leader = min(proposals, key=lambda each: each.worst_sd, default=None)
         if leader is not None and leader.worst_sd <= LARGEST_SD:

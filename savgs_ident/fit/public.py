@@ -20,7 +20,13 @@ from savgs_ident.plants.quarter_car.model import load_model
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.excitation import Measurements, campaign_of, measured_excitation, measured_response
+from savgs_ident.simulate.excitation import (
+    Measurements,
+    campaign_of,
+    measured_excitation,
+    measured_response,
+    response_of_tests,
+)
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.simulate.public import (
     SimulatedResponse,
@@ -47,7 +53,8 @@ def fit(
     Args:
         model: the rig, or another plant, with its effects; one that was identified before starts from what was known
             then, for its values would count the data twice.
-        measured: the recordings, or the response of their dwells.
+        measured: the recordings, or the response of their dwells. Where there are no dwells, a road or a sweep is cut
+            into windows.
         free: names of the parameters to identify; if empty the paper's four, as far as the rig has them, and what its
             further effects bring along; or those of another plant of which nothing is known but two bounds.
         orders: highest harmonic order to fit.
@@ -81,7 +88,7 @@ def fit_with(
     use_persistent_cache()
     drawing = model.before
     names = drawing.free(free)
-    response = measured_response(measured, model.plant, settings.orders, max_frequency, progress)
+    response = response_of_tests(measured, model.plant, settings.orders, max_frequency, progress)
     origin = model.origin(campaign_of(measured), response.warnings).with_command(command)
     return fit_least_squares(
         response, drawing, free=names, settings=settings, origin=origin, progress=progress

@@ -147,13 +147,29 @@ def sharing_errors(likelihood: Likelihood, data: Data) -> Likelihood:
     )
 
 
-def _discrepancy_scales(harmonics: np.ndarray, used: np.ndarray, decay: tuple[int, ...]) -> np.ndarray:
+NEAR = 1.0 / 4.0
+"""Harmonics of a window to that share of the order to either side say how large a discrepancy of one is there."""
+
+
+def _discrepancy_scales(harmonics: np.ndarray, used: np.ndarray, decay: tuple[int, ...] | None) -> np.ndarray:
     """a_k of every harmonic; the largest compared one stands in for a first one that is not compared."""
     sizes = np.abs(harmonics) * used
+    if decay is None:
+        return _near_sizes(sizes, used)
     first = np.where(used[..., 1], sizes[..., 1], sizes.max(axis=-1))
     order = np.maximum(np.arange(harmonics.shape[-1]), 1)
     power = np.array(decay)[:, None]
     return np.asarray(first[..., None] / (np.sqrt(2.0) * order**power))
+
+
+def _near_sizes(sizes: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """Root mean square of either part of the harmonics about each order, over all tests, (D, C, K)."""
+    squares, count = np.sum(sizes**2, axis=0), np.sum(used, axis=0)
+    found = np.zeros(squares.shape)
+    for order in range(1, squares.shape[-1]):
+        near = slice(max(1, round(order * (1.0 - NEAR))), round(order * (1.0 + NEAR)) + 2)
+        found[:, order] = np.sqrt(squares[:, near].sum(axis=-1) / np.maximum(count[:, near].sum(axis=-1), 1))
+    return np.broadcast_to(found / np.sqrt(2.0), sizes.shape)
 
 
 def values_of(

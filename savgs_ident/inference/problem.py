@@ -38,13 +38,14 @@ class HarmonicTarget(eqx.Module):
 
     ``whitening`` (D, C, n + 1, 2, 2) is the inverse Cholesky factor of the covariance, 0 where not
     ``used``. Harmonics are in the unit of their reading, ``whitening`` in one over it. ``decay`` (C,) is the power
-    of the order with which a discrepancy of the model falls in each channel.
+    of the order with which a discrepancy of the model falls in each channel; None for windows, where it is a share of
+    what is near it.
     """
 
     measured: Complex[Array, "D C K"]
     whitening: Float[Array, "D C K 2 2"]
     used: np.ndarray = eqx.field(static=False)
-    decay: tuple[int, ...] = eqx.field(static=True)
+    decay: tuple[int, ...] | None = eqx.field(static=True)
 
     def __call__(self, predicted: Complex[Array, "D C K"]) -> Float[Array, " m"]:
         """Residuals in standard deviations, (D * C * (n + 1) * 2,)."""
@@ -110,12 +111,12 @@ def response_channels(
 
 
 def harmonic_target(measured: HarmonicResponse, channels: Sequence[Channel], orders: int) -> HarmonicTarget:
-    """Orders 1..``orders`` of those of a plant's channels that were recorded.
+    """Orders 1..``orders`` of those of a plant's channels that were recorded; of windows those that they compare.
 
     Raises :class:`InputError` if none can be used.
     """
     present, places = response_channels(measured, channels)
-    count = min(orders, measured.orders) + 1
+    count = 1 + (min(orders, measured.orders) if measured.part is None else _last_compared(measured, places))
     covariance = measured.covariance[:, places, :count]
     used = measured.valid[:, places, :count] & present[None, :, None]
     used[:, :, 0] = False
@@ -126,8 +127,16 @@ def harmonic_target(measured: HarmonicResponse, channels: Sequence[Channel], ord
     whitening = np.linalg.inv(np.linalg.cholesky(safe)) * used[..., None, None]
     harmonics = np.where(used, measured.harmonics[:, places, :count], 0.0)
     return HarmonicTarget(
-        jnp.asarray(harmonics), jnp.asarray(whitening), used, tuple(each.decay for each in channels)
+        jnp.asarray(harmonics),
+        jnp.asarray(whitening),
+        used,
+        None if measured.part is not None else tuple(each.decay for each in channels),
     )
+
+
+def _last_compared(measured: HarmonicResponse, places: Sequence[int]) -> int:
+    """The highest order of windows that is compared; ``orders`` of dwells says nothing of them."""
+    return int(np.flatnonzero(measured.valid[:, places].any(axis=(0, 1)))[-1])
 
 
 def peak_to_peak_target(measured: HarmonicResponse, channels: Sequence[Channel]) -> PeakToPeakTarget:

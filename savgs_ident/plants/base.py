@@ -43,6 +43,7 @@ from savgs_ident.effects.composition import (
     states_of,
 )
 from savgs_ident.effects.effect import Effect
+from savgs_ident.responses.harmonic_response import ComparedPart
 
 Scalar = Float[Array, ""]
 
@@ -323,10 +324,17 @@ class Excitation(NamedTuple):
     Attributes:
         frequency: fundamental [Hz], (D,).
         harmonics: of each input by its name [its unit], (D, K + 1), with as many orders as each needs.
+        part: of each period that is compared of what sensors read; None where all of it is, at all orders.
     """
 
     frequency: Float[Array, " D"]
     harmonics: Mapping[str, Complex[Array, "D K"]]
+    part: ComparedPart | None = None
+
+    @property
+    def spacing(self) -> Float[Array, " D"]:
+        """From one order of what sensors read to the next [Hz]."""
+        return self.frequency if self.part is None else self.frequency * self.part.every
 
 
 class AbstractSource(eqx.Module):

@@ -23,6 +23,8 @@ same rate. The kind of a test and its frequency are read from its name:
 ('dwell', 2.35)
 >>> classify_test("sweep_0_3Hz_60s")
 ('sweep', None)
+>>> classify_test("road_class_c")
+('road', None)
 
 A clock that counts from 1970 gives the date of a test; a clock that starts with the recorder does not:
 
@@ -264,7 +266,7 @@ UNKNOWN_LAYOUT = RecordingLayout()
 """Of recordings about which nothing is known."""
 
 
-TestKind = Literal["dwell", "sweep", "standstill", "other"]
+TestKind = Literal["dwell", "sweep", "road", "standstill", "other"]
 
 
 @dataclass(frozen=True)
@@ -350,6 +352,7 @@ class Campaign:
 
 _FREQUENCY = re.compile(r"(?<![\d.])(\d+(?:[.,p]\d+)?)\s*_?hz", re.IGNORECASE)
 _SWEEP = re.compile(r"sweep|chirp", re.IGNORECASE)
+_ROAD = re.compile(r"road|random|track|ride|drive|8608|broad_?band", re.IGNORECASE)
 _STANDSTILL = re.compile(r"stand_?still|at_?rest|idle", re.IGNORECASE)
 _DWELL = re.compile(r"dwell|harmonic|sine|sinus", re.IGNORECASE)
 
@@ -360,6 +363,8 @@ def classify_test(name: str) -> tuple[TestKind, float | None]:
         return "sweep", None
     if _STANDSTILL.search(name):
         return "standstill", None
+    if _ROAD.search(name) and not _DWELL.search(name):
+        return "road", None
     found = _FREQUENCY.search(name)
     frequency = float(re.sub("[,p]", ".", found[1])) if found else None
     if frequency is not None and not (isfinite(frequency) and frequency > 0.0):

@@ -69,8 +69,7 @@ def bode_figure(
                 lowest, highest = float(measured.frequency[0]), float(measured.frequency[-1])
                 frequency_axis(axes, lowest, highest, labelled=axes is column[-1])
                 fix_labels(axes)
-        _share_legend(figure, title)
-        _explain_residuals(figure, grid[-1, 0])
+        share_legends(figure, title, grid[-1, 0])
         return figure
 
 
@@ -108,7 +107,9 @@ def _share_legend(figure: Figure, title: str) -> None:
     legend.get_title().set(fontsize=11, fontweight="bold")
 
 
-def _explain_residuals(figure: Figure, panel: Axes) -> None:
+def share_legends(figure: Figure, title: str, panel: Axes) -> None:
+    """The same, and one below for the ``panel`` of residuals."""
+    _share_legend(figure, title)
     handles, labels = panel.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
 
@@ -177,14 +178,18 @@ def draw_peak_to_peak(
 def draw_residuals(axes: Axes, frequency: NDArray[np.float64], residuals: NDArray[np.float64]) -> None:
     """Whitened residuals (D, K, 2): both parts of every order, the first harmonic on top; labelled.
 
-    ``frequency`` [Hz].
+    ``frequency`` [Hz] is that of each test, (D,), or of each order, (D, K), none of which is the first harmonic then.
     """
     axes.set_ylabel("residual [noise sd]")
     axes.axhspan(-_SIGMAS, _SIGMAS, color=PALE, alpha=0.6, linewidth=0.0, zorder=0)
     axes.axhline(0.0, color=INK, linewidth=0.8)
-    first, others = residuals[:, 1:2], np.delete(residuals, 1, axis=1)
-    _draw_parts(axes, frequency, others, "other orders", s=9, linewidths=0.6, color=GREY)
-    _draw_parts(axes, frequency, first, "residual of the first harmonic", s=26, linewidths=1.1, color=BLUE)
+    if frequency.ndim == 2:
+        _draw_parts(axes, frequency, residuals, "residual", s=9, linewidths=0.6, color=BLUE)
+    else:
+        first, others = residuals[:, 1:2], np.delete(residuals, 1, axis=1)
+        _draw_parts(axes, frequency[:, None], others, "other orders", s=9, linewidths=0.6, color=GREY)
+        label = "residual of the first harmonic"
+        _draw_parts(axes, frequency[:, None], first, label, s=26, linewidths=1.1, color=BLUE)
     finite = np.abs(residuals[np.isfinite(residuals)])
     largest = max(float(np.max(finite, initial=0.0)), 4.0)
     axes.set_ylim(-1.1 * largest, 1.1 * largest)
@@ -194,7 +199,7 @@ def _draw_parts(
     axes: Axes, frequency: NDArray[np.float64], residuals: NDArray[np.float64], label: str, **look: Any
 ) -> None:
     """Residuals (D, K, 2): the real part as a plus, the imaginary part as a cross."""
-    spread = np.broadcast_to(frequency[:, None], residuals.shape[:2])
+    spread = np.broadcast_to(frequency, residuals.shape[:2])
     axes.scatter(spread, residuals[..., 0], marker="+", label=f"{label}, Re", **look)
     axes.scatter(spread, residuals[..., 1], marker="x", label=f"{label}, Im", **look)
 

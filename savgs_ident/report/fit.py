@@ -110,12 +110,13 @@ def _dwell_records(fit: Fit) -> list[dict[str, object]]:
         {
             "test": test,
             "frequency_hz": fit.measured.frequency[d],
+            "spacing_hz": fit.measured.spacing[d],
             "status": fit.dwell_status[d].name.lower(),
             "chi2": chi2[d],
             "entries": entries[d],
             "channels": {
                 name: _dwell_channel(fit, d, c, sigma[d, c])
-                | {"peak_to_peak_identified": identified[d, c], "peak_to_peak_simqc": frictionless[d, c]}
+                | _predicted_peaks(fit, identified[d, c], frictionless[d, c])
                 for c, name in enumerate(fit.channels)
                 if np.any(fit.used[d, c])
             },
@@ -125,15 +126,25 @@ def _dwell_records(fit: Fit) -> list[dict[str, object]]:
 
 
 def _dwell_channel(fit: Fit, d: int, c: int, sigma: NDArray[np.float64]) -> dict[str, object]:
-    """Peak to peak as measured, and the whitened residuals of the orders used."""
+    """The whitened residuals of the orders used, and peak to peak as measured in a dwell."""
     channel = fit.measured.channel(fit.channels[c])
     orders = np.flatnonzero(fit.used[d, c])
-    return {
+    peaks = {
         "peak_to_peak": fit.measured.peak_to_peak[d, channel],
         "peak_to_peak_sd": fit.measured.peak_to_peak_sd[d, channel],
+    }
+    return {
+        **(peaks if fit.measured.part is None else {}),
         "residual_rms_sigma": np.sqrt(np.mean(sigma[orders] ** 2)),
         "residual_sigma": {"order": orders, "re": sigma[orders, 0], "im": sigma[orders, 1]},
     }
+
+
+def _predicted_peaks(fit: Fit, identified: float, frictionless: float) -> dict[str, float]:
+    """Peak to peak of the model with its effects and without; nothing for windows, of which a part is compared."""
+    if fit.measured.part is not None:
+        return {}
+    return {"peak_to_peak_identified": identified, "peak_to_peak_simqc": frictionless}
 
 
 def bode_record(compared: Comparison) -> dict[str, object]:
@@ -236,13 +247,17 @@ def _identified(fit: Fit) -> RenderableType:
 
 def _quality(fit: Fit) -> RenderableType:
     ratio = f" = {fit.chi2 / fit.dof:.3f}" if fit.dof > 0 else ""
-    what = (
-        "peak-to-peak values" if fit.quantity == "peak_to_peak" else f"harmonics of orders 1 to {fit.orders}"
-    )
-    return plain(
-        f"chi2/dof = {fit.chi2:.1f}/{fit.dof}{ratio} on {what} of {len(fit.measured.tests)} dwells"
-        f" ({fit.wall_s:.1f} s)"
-    )
+    return plain(f"chi2/dof = {fit.chi2:.1f}/{fit.dof}{ratio} on {_compared(fit)} ({fit.wall_s:.1f} s)")
+
+
+def _compared(fit: Fit) -> str:
+    tests = len(fit.measured.tests)
+    if fit.measured.part is not None:
+        hertz = np.flatnonzero(fit.used.any(axis=(0, 1))) * float(fit.measured.spacing[0])
+        return f"{hertz.size} frequencies from {hertz[0]:.2g} to {hertz[-1]:.3g} Hz of {tests} windows"
+    if fit.quantity == "peak_to_peak":
+        return f"peak-to-peak values of {tests} dwells"
+    return f"harmonics of orders 1 to {fit.orders} of {tests} dwells"
 
 
 def _about(fit: Fit, name: str) -> str:

@@ -60,7 +60,8 @@ class _Identified(AbstractPresenter[Shown]):
         """The model against the measurement."""
 
     def figures(self, result: Shown) -> Figures:
-        return {"bode": lambda: comparison_figure(self.comparison(result))}
+        compared = self.comparison(result)
+        return {figure_name(compared): lambda: comparison_figure(compared)}
 
     def write(self, result: Shown, folder: Path, progress: Progress) -> Iterator[Path]:
         yield write_json(folder / f"{self.stem}.json", self.record(result))
@@ -121,15 +122,26 @@ class _Comparison(_Identified["Comparison"]):
 
 
 def draw_comparison(comparison: "Comparison", folder: Path, progress: Progress) -> tuple[Path, ...]:
-    """Write bode.png and bode.pdf of a model against a measurement."""
+    """Write bode.png and bode.pdf of a model against a measurement; of one in windows spectra.png and spectra.pdf."""
     figure = comparison_figure(comparison, progress)
     from savgs_ident.report.theme import write_figure
 
-    return write_figure(folder, "bode", figure)
+    return write_figure(folder, figure_name(comparison), figure)
+
+
+def figure_name(comparison: "Comparison") -> str:
+    """The name of the figure of a model against a measurement."""
+    return "bode" if comparison.measured.part is None else "spectra"
 
 
 def comparison_figure(comparison: "Comparison", progress: Progress = no_progress) -> "Figure":
-    """The Bode figure of a model against a measurement, with the model solved between the dwells."""
+    """The Bode figure of a model against a measurement, with the model solved between the dwells; or its spectra."""
+    title = f"Model and measurement: {Path(comparison.origin.data).name or comparison.given.plant_name}"
+    if comparison.measured.part is not None:
+        progress("drawing")
+        from savgs_ident.report.spectra import spectra_figure
+
+        return spectra_figure(title, comparison)
     progress("solving the model between the dwells")
     # Loading what draws takes as long as solving, which leaves Python free.
     with ThreadPoolExecutor(1) as pool:
@@ -146,7 +158,6 @@ def comparison_figure(comparison: "Comparison", progress: Progress = no_progress
     labels, driven = channel_labels(given), given.plant.inputs[0].name
     points = measured_points(measured, tuple(labels), driven)
     residuals = whitened(measured, tuple(labels), comparison.model.harmonics, comparison.used)
-    title = f"Model and measurement: {Path(comparison.origin.data).name or given.plant_name}"
     return bode_figure(title, points, curves, residuals, tuple(labels.values()))
 
 
@@ -251,6 +262,16 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
         }
         if result.measured is None:
             return {"drive": lambda: drive_figure(result), **shrink, **loops}
+        if result.measured.part is not None:
+            from savgs_ident.report.diagnosis.gap_spectra import gap_spectrum_figure
+
+            known = enumerate(each.name for each in result.given.channels)
+            spectra = {
+                f"gap {name}": partial(gap_spectrum_figure, result, c)
+                for c, name in known
+                if name in result.measured.channels
+            }
+            return {**spectra, **shrink}
         names = [each.name for each in result.given.channels]
         draw = report_of(result.given).ports_figure
         drawing: Figures = {} if draw is None else {"ports": partial(draw, result)}

@@ -12,11 +12,26 @@ Noise in the harmonics biases a measured peak-to-peak upwards; :func:`unbiased_p
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning
+
+
+class ComparedPart(NamedTuple):
+    """The part of each of D windows in which readings are compared, and at which frequencies.
+
+    Attributes:
+        begin: phase at which it begins [rad], (D,).
+        end: phase at which it ends [rad], (D,).
+        every: from one order of the readings to the next, in orders of the window [1], (D,).
+    """
+
+    begin: NDArray[np.float64]
+    end: NDArray[np.float64]
+    every: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -42,6 +57,8 @@ class HarmonicResponse:
             dof / (dof - 2) on average.
         recorded: when each dwell was recorded, (D,): its start [s since 1970] where all dwells have one, otherwise
             its place among them in the campaign [1]; None where neither is known.
+        part: of each test that is compared: there the ``harmonics`` of readings are those of :func:`compared_share`
+            times the reading, at every so many-th order; those of inputs are not. None for dwells, which repeat.
     """
 
     tests: tuple[str, ...]
@@ -58,6 +75,7 @@ class HarmonicResponse:
     warnings: tuple[DataWarning, ...] = ()
     covariance_dof: NDArray[np.float64] | None = None
     recorded: NDArray[np.float64] | None = None
+    part: ComparedPart | None = None
 
     def __post_init__(self) -> None:
         for value in vars(self).values():
@@ -73,6 +91,11 @@ class HarmonicResponse:
     def times(self) -> NDArray[np.float64]:
         """When each dwell was recorded, in any unit of time; their order where that is not known, (D,)."""
         return np.arange(float(len(self.tests))) if self.recorded is None else self.recorded
+
+    @property
+    def spacing(self) -> NDArray[np.float64]:
+        """From one order of the readings to the next [Hz], (D,)."""
+        return self.frequency if self.part is None else self.frequency * self.part.every
 
     def channel(self, name: str) -> int:
         """The index of a channel on the second axis; raises ``ValueError`` if it is absent."""
@@ -134,6 +157,23 @@ def signal_to_noise(response: HarmonicResponse) -> NDArray[np.float64]:
     return np.where(response.valid & (size > 0.0), ratio, 0.0)
 
 
+TAPER = 0.05
+"""Share of the part of a window that is compared in which its weight rises, and in which it falls."""
+
+
+def compared_share(
+    phase: NDArray[np.float64], begin: NDArray[np.float64] | float, end: NDArray[np.float64] | float
+) -> NDArray[np.float64]:
+    """With what share an instant counts [1] where readings are compared between two phases [rad]; smooth.
+
+    All of one shape, (n,), or numbers. Written against the array API, as :func:`peak_to_peak` is.
+    """
+    xp = phase.__array_namespace__()
+    rise = xp.minimum(phase - begin, end - phase) / (TAPER * (end - begin))
+    share: NDArray[np.float64] = 0.5 - 0.5 * xp.cos(xp.pi * xp.clip(rise, 0.0, 1.0))
+    return share
+
+
 DEFAULT_SAMPLES = 512
 """Points in a period: the extreme of a component of order k is found to within (pi k / 512)^2 / 2 of its own
 amplitude."""
@@ -145,7 +185,7 @@ def peak_to_peak(
     """Largest less smallest value of Re sum_k X_k exp(2 pi i k s), 0 <= s < 1, over orders 1..n.
 
     ``harmonics`` and ``valid`` have shape (..., n + 1), the mean first, n < ``samples`` / 2; orders that are
-    not ``valid`` are left out. Returns shape (...), in the unit of ``harmonics``. Written noisy_peaksst the array
+    not ``valid`` are left out. Returns shape (...), in the unit of ``harmonics``. Written against the array
     API: arrays of another library that follows it pass through, and stay differentiable there.
     """
     xp = harmonics.__array_namespace__()

@@ -6,7 +6,8 @@ A model is held against the response of the campaign's dwells, or of those of th
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from math import ceil, log2
+from typing import Any, cast
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,9 +21,13 @@ from savgs_ident.effects.base import Fundamental, InputSignal
 from savgs_ident.plants.base import AbstractPlant, Excitation, Input
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
-from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
+from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, SweepResponse
 from savgs_ident.responses.sweeps import estimate_sweep_response
+from savgs_ident.responses.windows import KINDS, estimate_windows
 from savgs_ident.simulate.mesh import Mesh, turns
+
+SUMMED = 64
+"""Most harmonics that are summed one by one at every node."""
 
 SIGNIFICANT = 4.0
 """Harmonics below this many standard deviations are taken as noise and not imposed."""
@@ -38,7 +43,13 @@ def signals_at(
     first = harmonics[0]
     offset = jnp.angle(first[:, 1]) if first.shape[1] > 1 else jnp.zeros(())
     fundamental = Fundamental(phase + jnp.broadcast_to(offset, excitation.frequency.shape)[dwell], omega)
-    return tuple(InputSignal(*_synthesise(each[dwell], omega, phase)) for each in harmonics), fundamental
+    signals = [
+        _synthesise(each[dwell], omega, phase)
+        if each.shape[1] <= SUMMED
+        else _interpolate(each, dwell, omega, phase)
+        for each in harmonics
+    ]
+    return tuple(InputSignal(*each) for each in signals), fundamental
 
 
 def inputs_at(plant: AbstractPlant, excitation: Excitation, mesh: Mesh) -> Any:
@@ -51,6 +62,32 @@ def _synthesise(harmonics: Array, omega: Array, phase: Array) -> tuple[Array, Ar
     order = jnp.arange(harmonics.shape[1])
     terms = harmonics * turns(phase, harmonics.shape[1] - 1)
     return jnp.sum(terms.real, axis=1), jnp.sum((1j * order * terms).real, axis=1) * omega
+
+
+def _interpolate(
+    harmonics: Array, dwell: NDArray[np.intp], omega: Array, phase: Array
+) -> tuple[Array, Array]:
+    """The same from the harmonics (D, K) of each test, by cubics through a table of a period and its slopes.
+
+    With eight instants to the shortest wave they are off by 1e-3 of it, and by 1e-5 of one three times as long.
+    """
+    count = 2 ** ceil(log2(8 * harmonics.shape[1]))
+    spectrum = 0.5 * count * harmonics.at[:, 0].multiply(2.0)
+    turned = 1j * jnp.arange(harmonics.shape[1])
+    value, rate, second = (jnp.fft.irfft(spectrum * turned**power, count) for power in range(3))
+    place = phase * (count / (2.0 * np.pi))
+    before = jnp.floor(place).astype(jnp.int64)
+    share, width = place - before, 2.0 * np.pi / count
+
+    def between(level: Array, slope: Array) -> Array:
+        (y0, y1), (d0, d1) = (
+            [each[dwell, (before + further) % count] for further in (0, 1)] for each in (level, slope)
+        )
+        rise = y1 - y0 - width * d0
+        bend = width * (d1 - d0)
+        return y0 + share * (width * d0 + share * (3.0 * rise - bend + share * (bend - 2.0 * rise)))
+
+    return between(value, rate), between(rate, second) * omega
 
 
 def typical_amplitude(plant: AbstractPlant | type[AbstractPlant], table: ParameterTable) -> float:
@@ -130,7 +167,8 @@ def measured_excitation(
     :class:`InputError` if an input that is required was not recorded.
     """
     harmonics = {each.name: jnp.asarray(_recorded(each, measured, table)) for each in plant.inputs}
-    return Excitation(jnp.asarray(measured.frequency), harmonics)
+    part = None if measured.part is None else cast(Any, ComparedPart)(*map(jnp.asarray, measured.part))
+    return Excitation(jnp.asarray(measured.frequency), harmonics, part)
 
 
 def _recorded(given: Input, measured: HarmonicResponse, table: ParameterTable) -> NDArray[np.complex128]:
@@ -154,7 +192,9 @@ def _recorded(given: Input, measured: HarmonicResponse, table: ParameterTable) -
         harmonics[~valid[:, 0], 0] = rest
     else:
         harmonics[:, 0] = 0.0
-    return harmonics if given.orders is None else harmonics[:, : given.orders + 1]
+    # A window is long: its orders are a few tenths of a hertz apart.
+    highest = given.orders if measured.part is None else None
+    return harmonics if highest is None else harmonics[:, : highest + 1]
 
 
 _FIELDS = (
@@ -193,6 +233,7 @@ def _only(response: HarmonicResponse, kept: NDArray[np.int64]) -> HarmonicRespon
         tests=tuple(response.tests[d] for d in kept),
         covariance_dof=None if dof is None else dof[kept],
         recorded=None if recorded is None else recorded[kept],
+        part=None if response.part is None else ComparedPart(*(each[kept] for each in response.part)),
         **{name: getattr(response, name)[kept] for name in _FIELDS},
     )
 
@@ -223,6 +264,33 @@ def measured_response(
     progress("estimating responses")
     only = measured.only(recorded_names(plant))
     return up_to_frequency(estimate_response(only, orders, plant.inputs[0].name), max_frequency)
+
+
+def response_of_tests(
+    measured: Measurements,
+    plant: AbstractPlant | type[AbstractPlant],
+    orders: int,
+    max_frequency: float | None = None,
+    progress: Progress = no_progress,
+) -> HarmonicResponse:
+    """The same; of a campaign without dwells that of its other tests, a road or a sweep, in windows.
+
+    With a warning ``tests_not_used`` for roads beside dwells.
+    """
+    if isinstance(measured, HarmonicResponse):
+        return measured_response(measured, plant, orders, max_frequency, progress)
+    if measured.of_kind("dwell") or not any(measured.of_kind(kind) for kind in KINDS):
+        response = measured_response(measured, plant, orders, max_frequency, progress)
+        beside = tuple(_not_used(measured.source, each.name) for each in measured.of_kind("road"))
+        return replace(response, warnings=(*response.warnings, *beside))
+    progress("cutting windows")
+    inputs, readings = ([each.name for each in listed] for listed in (plant.inputs, plant.channels))
+    return estimate_windows(measured.only(recorded_names(plant)), inputs, readings)
+
+
+def _not_used(source: str, test: str) -> DataWarning:
+    what = "is not used beside dwells"
+    return DataWarning("tests_not_used", what, source, test, "", None, "give it as a campaign of its own")
 
 
 def first_sweep(

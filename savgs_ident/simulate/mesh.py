@@ -101,6 +101,10 @@ class Mesh(NamedTuple):
     weight: Float[Array | np.ndarray, " P"]
 
 
+MULTIPLIED = 15
+"""Up to this order powers are multiplied one by one."""
+
+
 def turns(phase: Float[Array | np.ndarray, " P"], orders: int) -> Complex[Array, "P K"]:
     """exp(i k phase) [1] of phases [rad] and orders k = 0..``orders``, by multiplication.
 
@@ -108,9 +112,13 @@ def turns(phase: Float[Array | np.ndarray, " P"], orders: int) -> Complex[Array,
     """
     once = jnp.exp(1j * jnp.asarray(phase))
     powers = [jnp.ones_like(once)]
-    for _ in range(orders):
+    for _ in range(min(orders, MULTIPLIED)):
         powers.append(powers[-1] * once)
-    return jnp.stack(powers, axis=1)
+    found = jnp.stack(powers, axis=1)
+    while found.shape[1] <= orders:
+        # As many again, all at once: a program of hundreds of products would take long to compile.
+        found = jnp.concatenate([found, found * (found[:, -1] * once)[:, None]], axis=1)
+    return found[:, : orders + 1]
 
 
 def uniform_mesh(layout: Layout) -> Mesh:

@@ -18,7 +18,7 @@ rule is of second order. How the response changes with the parameters is in :mod
 
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import equinox as eqx
 import jax
@@ -32,6 +32,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import InputSignal
 from savgs_ident.plants.base import AbstractPlant, Excitation
+from savgs_ident.responses.harmonic_response import ComparedPart, compared_share
 from savgs_ident.simulate.collocation import (
     CyclicFactors,
     Linearised,
@@ -44,6 +45,7 @@ from savgs_ident.simulate.collocation import (
     step_defects,
 )
 from savgs_ident.simulate.excitation import inputs_at, signals_at
+from savgs_ident.simulate.march import march
 from savgs_ident.simulate.mesh import CHUNK, Layout, Mesh, adapted_mesh, layout_for, turns, uniform_mesh
 from savgs_ident.simulate.program_cache import placed, run_cached
 
@@ -83,12 +85,17 @@ def motion_scale(
     model: AbstractPlant, signals: tuple[InputSignal, ...], frequency: Float[Array, " D"], layout: Layout
 ) -> Float[Array, "m P"]:
     """A typical size of every state [its unit] at the dwells' frequencies [Hz], from the amplitudes of the inputs."""
-    amplitudes = [_amplitude(each.value, layout) for each in signals]
+    amplitudes, speeds = (
+        [_amplitude(each, layout) for each in listed] for listed in zip(*signals, strict=True)
+    )
     sizes = [
         sum(given.moves[i] * amplitude for given, amplitude in zip(model.inputs, amplitudes, strict=True))
         for i in range(len(model.coordinates))
     ]
-    rates = [2.0 * jnp.pi * frequency * size for size in sizes]
+    rates = [
+        sum(given.moves[i] * amplitude for given, amplitude in zip(model.inputs, speeds, strict=True))
+        for i in range(len(model.coordinates))
+    ]
     states = [jnp.full_like(frequency, state.scale) for state in model.states]
     return jnp.stack([*sizes, *rates, *states])[:, layout.dwell]
 
@@ -164,14 +171,24 @@ COARSE = 10
 class PeriodicSettings:
     """How finely to solve.
 
-    ``nodes`` per period, more in proportion to the period of dwells below ``slow`` [Hz]; ``adaptations`` of the
-    nodes to the solution; at most ``iterations`` of Newton's method on the last nodes.
+    ``nodes`` per period, more in proportion to the period of dwells below ``slow`` [Hz]; in windows of tests that do
+    not repeat ``window_rate`` a second [Hz]; ``adaptations`` of the nodes to the solution; at most ``iterations`` of
+    Newton's method on the last nodes.
     """
 
     nodes: int = 256
+    window_rate: float = 540.0
     slow: float = 1.4
     adaptations: int = 2
     iterations: int = 60
+
+
+def layout_of(excitation: Excitation, settings: PeriodicSettings) -> Layout:
+    """How many nodes each test has."""
+    frequency = np.asarray(excitation.frequency)
+    if excitation.part is None:
+        return layout_for(frequency, settings.nodes, settings.slow)
+    return Layout(tuple(int(count) for count in CHUNK * np.ceil(settings.window_rate / frequency / CHUNK)))
 
 
 class PeriodicSolution(eqx.Module):
@@ -308,9 +325,11 @@ def simulate_periodic(
     """
     p, settings = as_values(p), settings or PeriodicSettings()
     if layout is None:
-        layout = layout_for(np.asarray(excitation.frequency), settings.nodes, settings.slow)
+        layout = layout_of(excitation, settings)
     mesh = uniform_mesh(layout)
     start = _cold_start(model, excitation, mesh)
+    if excitation.part is not None:
+        start = march(model, p, model.prepare(p), excitation, mesh, start.x[:, layout.starts])
     first, *later = [COARSE] * settings.adaptations + [settings.iterations]
     solution = solve_on_mesh(model, p, excitation, mesh, start, first)
     for limit in later:
@@ -341,14 +360,24 @@ def _readings(
     return jnp.stack(jax.vmap(one)(u, *trajectory.x, *trajectory.y), axis=-1)
 
 
-def analyse(signals: Float[Array, "P C"], mesh: Mesh, orders: int) -> Complex[Array, "D C K"]:
+def analyse(
+    signals: Float[Array, "P C"], mesh: Mesh, orders: int, part: ComparedPart | None = None
+) -> Complex[Array, "D C K"]:
     """Complex harmonics 0..orders of C signals at the nodes of a mesh, in their own units.
+
+    Where only a ``part`` of each period is compared, those of the signals times :func:`compared_share`, every so
+    many-th of them.
 
     Summed over the nodes of all chunks at a time, then over the chunks of a dwell, so that every operation is a long
     vector.
     """
     twice = jnp.full(orders + 1, 2.0).at[0].set(1.0)
-    kernel = twice * jnp.conj(turns(mesh.phase, orders)) * jnp.asarray(mesh.weight)[:, None]
+    phase, weight = jnp.asarray(mesh.phase), jnp.asarray(mesh.weight)
+    if part is not None:
+        begin, end, every = (jnp.asarray(each)[mesh.layout.dwell] for each in part)
+        weight = weight * cast(Any, compared_share)(phase, begin, end)
+        phase = phase * every
+    kernel = twice * jnp.conj(turns(phase, orders)) * weight[:, None]
     real = by_chunks(jnp.concatenate([kernel.real, kernel.imag], axis=1).T)
     given = by_chunks(signals.T)
     chunks = reduce(jnp.add, [given[i][:, None] * real[i] for i in range(CHUNK)])
@@ -377,13 +406,13 @@ def harmonics_of(
 
     Each is in the unit of its reading.
     """
-    seen = analyse(_readings(model, p, motions, known), known.mesh, orders)
-    return seen * _sensors(model, p, known.excitation.frequency, orders)
+    seen = analyse(_readings(model, p, motions, known), known.mesh, orders, known.excitation.part)
+    return seen * _sensors(model, p, known.excitation.spacing, orders)
 
 
 def _sensors(
-    model: AbstractPlant, p: Values, frequency: Float[Array, " D"], orders: int
+    model: AbstractPlant, p: Values, spacing: Float[Array, " D"], orders: int
 ) -> Complex[Array, "D C K"]:
     """What the sensors make of each order."""
-    order = jnp.arange(orders + 1, dtype=frequency.dtype)
-    return jnp.moveaxis(model.transfers(p, frequency[:, None] * order), 0, 1)
+    order = jnp.arange(orders + 1, dtype=spacing.dtype)
+    return jnp.moveaxis(model.transfers(p, spacing[:, None] * order), 0, 1)

@@ -22,6 +22,7 @@ from savgs_ident.plants.base import AbstractPlant, AtPorts
 from savgs_ident.simulate.periodic import PeriodicSolution, harmonics
 from savgs_ident.simulate.program_cache import placed, run_cached
 from savgs_ident.simulate.sensitivity import (
+    TOGETHER,
     Directions,
     along_first,
     answers,
@@ -83,6 +84,13 @@ def slopes_in(
 BATCH = 32
 """Signals that a program has room for: one for each number would have to be compiled."""
 
+BATCHED_NODES = 2**18
+"""Most values of a signal in such a program. Origin: memory; four signals along a minute of road."""
+
+
+def _batch(nodes: int) -> int:
+    return max(TOGETHER, min(BATCH, BATCHED_NODES // nodes // TOGETHER * TOGETHER))
+
 
 def impose(
     model: AbstractPlant,
@@ -97,10 +105,11 @@ def impose(
     All in SI.
     """
     blank = nothing_imposed(model.ports, jnp.zeros(solution.mesh.layout.total))
+    batch = _batch(solution.mesh.layout.total)
 
     def rows_of_some(first: int) -> NDArray[np.float64]:
-        some = signals[first : first + BATCH]
-        stacked = {name: np.zeros((BATCH, *part.shape)) for name, part in blank.items()}
+        some = signals[first : first + batch]
+        stacked = {name: np.zeros((batch, *part.shape)) for name, part in blank.items()}
         for place, (port, values) in enumerate(some):
             stacked[port][place] = values
         imposed = placed({name: jnp.asarray(part) for name, part in stacked.items()})
@@ -109,7 +118,7 @@ def impose(
         return np.asarray(rows)[: len(some)]
 
     # The first alone: two at a time would compile the same program twice.
-    first, others = range(0, len(signals), BATCH)[:1], range(BATCH, len(signals), BATCH)
+    first, others = range(0, len(signals), batch)[:1], range(batch, len(signals), batch)
     found = [*map(rows_of_some, first), *in_parallel(rows_of_some, others)]
     return np.concatenate([np.zeros((0, likelihood.measured.size)), *found])
 

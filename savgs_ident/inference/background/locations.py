@@ -257,7 +257,7 @@ def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
     about, constants = seen.about, seen.constants
     channels = [each.name for each in about.model.channels]
     read, order = about.read(), np.arange(about.orders + 1)
-    omega = 2.0 * np.pi * np.asarray(seen.about.solution.excitation.frequency)[:, None] * order
+    omega = 2.0 * np.pi * np.asarray(seen.about.solution.excitation.spacing)[:, None] * order
     locations = []
     for name in names:
         c = channels.index(name.removeprefix("sensor."))

@@ -7,6 +7,7 @@ so can that of the location beside it; so every set also has its simple laws, of
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil, log2
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -219,10 +220,11 @@ def sensor_functions(reading: NDArray[np.complex128], omega: Signal) -> list[NDA
     (dwells, orders) each.
     """
     orders = reading.shape[1]
-    turn = np.exp(2j * np.pi * np.outer(np.arange(orders), np.arange(INSTANTS)) / INSTANTS)
+    instants = max(INSTANTS, 2 ** ceil(log2(4 * orders)))
+    turn = np.exp(2j * np.pi * np.outer(np.arange(orders), np.arange(instants)) / instants)
     along, rate = (np.real(each[:, 1:] @ turn[1:]) for each in (reading, 1j * omega * reading))
     found = motion_functions(along.ravel(), rate.ravel(), np.zeros(along.size))
-    return [np.fft.rfft(each.reshape(along.shape))[:, :orders] * 2.0 / INSTANTS for each in found.values]
+    return [np.fft.rfft(each.reshape(along.shape))[:, :orders] * 2.0 / instants for each in found.values]
 
 
 def motion_functions(

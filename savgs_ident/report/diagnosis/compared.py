@@ -41,8 +41,8 @@ class FirstHarmonicGap:
     noise: NDArray[np.float64]
 
 
-def compared_dwells(diagnosis: Diagnosis) -> tuple[HarmonicResponse, Responses]:
-    """The dwells of a diagnosis, measured and predicted; it must be one of dwells."""
+def compared_tests(diagnosis: Diagnosis) -> tuple[HarmonicResponse, Responses]:
+    """The dwells or windows of a diagnosis, measured and predicted; it must not be one along a drive's motion."""
     assert diagnosis.measured is not None
     assert isinstance(diagnosis.responses, Responses)
     return diagnosis.measured, diagnosis.responses
@@ -50,7 +50,7 @@ def compared_dwells(diagnosis: Diagnosis) -> tuple[HarmonicResponse, Responses]:
 
 def first_harmonic_gap(diagnosis: Diagnosis, c: int) -> FirstHarmonicGap:
     """The gap of the plant's channel ``c`` dwell by dwell."""
-    (measured, answers), name = compared_dwells(diagnosis), diagnosis.given.channels[c].name
+    (measured, answers), name = compared_tests(diagnosis), diagnosis.given.channels[c].name
     if name not in measured.channels:
         nothing = np.full(len(measured.tests), np.nan)
         return FirstHarmonicGap(nothing, nothing, nothing, nothing)
@@ -68,7 +68,7 @@ def first_harmonic_gap(diagnosis: Diagnosis, c: int) -> FirstHarmonicGap:
 
 def compared_channels(diagnosis: Diagnosis) -> tuple[int, ...]:
     """The places of the channels whose first harmonic is compared anywhere."""
-    if diagnosis.measured is None:
+    if diagnosis.measured is None or diagnosis.measured.part is not None:
         return ()
     return tuple(
         c
@@ -80,7 +80,7 @@ def compared_channels(diagnosis: Diagnosis) -> tuple[int, ...]:
 def diagnosis_bode_figure(diagnosis: Diagnosis, c: int) -> Figure:
     """Magnitude, phase and gap of the first harmonic of the plant's channel ``c``."""
     labels, driven = channel_labels(diagnosis.given), diagnosis.given.plant.inputs[0].name
-    shown, measured = tuple(labels.values())[c], compared_dwells(diagnosis)[0]
+    shown, measured = tuple(labels.values())[c], compared_tests(diagnosis)[0]
     points, curves = measured_points(measured, tuple(labels), driven), _curves(diagnosis)
     frequency = measured.frequency
     with styled():
@@ -132,7 +132,7 @@ def _explain_models(figure: Figure, axes: Axes) -> None:
 
 def _curves(diagnosis: Diagnosis) -> list[ModelCurve]:
     """The models, the last one first: it has the strongest line."""
-    measured, answers = compared_dwells(diagnosis)
+    measured, answers = compared_tests(diagnosis)
     driven = measured.harmonics[:, measured.channel(diagnosis.given.plant.inputs[0].name), 1]
     # Responses are those of fits, which are solved in all dwells together.
     solved = np.ones(measured.frequency.size, dtype=np.bool_)

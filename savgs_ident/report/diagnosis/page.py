@@ -25,6 +25,7 @@ from savgs_ident.report.diagnosis.figures import (
     regime_picture,
     shrink_figure,
 )
+from savgs_ident.report.diagnosis.gap_spectra import gap_spectrum_pictures
 from savgs_ident.report.diagnosis.hypotheses import candidate_row, named_hypotheses, nested_bars
 from savgs_ident.report.diagnosis.loop_figures import force_figure, spread_loops
 from savgs_ident.report.diagnosis.text import (
@@ -33,6 +34,7 @@ from savgs_ident.report.diagnosis.text import (
     baseline_sentence,
     closed_words,
     gap_percentage,
+    in_windows,
     port_words,
     probability_words,
     references,
@@ -119,7 +121,7 @@ def port_row(each: PortShare, diagnosis: Diagnosis) -> PortRow:
         named,
         percentage(each.share),
         _bar(each.share),
-        percentage(each.free_input_share),
+        DASH if in_windows(diagnosis) else percentage(each.free_input_share),
     )
 
 
@@ -229,6 +231,8 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "rig_scale": report_of(diagnosis.given).scale,
             "ports": [port_row(each, diagnosis) for each in diagnosis.ports],
             "drive": drive_picture(diagnosis),
+            "windows": in_windows(diagnosis),
+            "spectra": gap_spectrum_pictures(diagnosis) if in_windows(diagnosis) else [],
             "bode": [bode_picture(diagnosis, c) for c in compared_channels(diagnosis)],
             "loops": [_loop(diagnosis, each) for each in spread_loops(diagnosis.loops)],
             "lawful": any(each.law.size for each in diagnosis.loops),

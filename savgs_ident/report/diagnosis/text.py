@@ -108,6 +108,11 @@ def law_label(diagnosis: Diagnosis, port: str) -> str:
     return f"law of {' + '.join(there or named)}"
 
 
+def in_windows(diagnosis: Diagnosis) -> bool:
+    """Whether it is one of tests that do not repeat."""
+    return diagnosis.measured is not None and diagnosis.measured.part is not None
+
+
 def baseline_sentence(diagnosis: Diagnosis) -> str:
     """What was compared with what."""
     measured, forces = diagnosis.measured, diagnosis.responses
@@ -120,6 +125,11 @@ def baseline_sentence(diagnosis: Diagnosis) -> str:
         )
     assert measured is not None
     number = len(measured.tests)
+    if measured.part is not None:
+        return (
+            f"Baseline {diagnosis.model} with {effects}, compared with {number} windows of tests that do not repeat; "
+            f"computed in {diagnosis.wall_s:.0f} s."
+        )
     span = f" between {measured.frequency[0]:.2f} and {measured.frequency[-1]:.2f} Hz" if number else ""
     return (
         f"Baseline {diagnosis.model} with {effects}, compared with {number}"

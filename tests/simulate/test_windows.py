@@ -1,0 +1,232 @@
+"""Tests that do not repeat, cut into windows: a road in simulation, against an independent integration of it."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import StateSpace, lsim
+
+import savgs_ident as si
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.values import as_values
+from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
+from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
+from savgs_ident.responses.harmonic_response import TAPER, HarmonicResponse, compared_share
+from savgs_ident.responses.windows import CLOSING_S, HIGHEST_HZ, LEAD_S, estimate_windows
+from savgs_ident.simulate.excitation import SUMMED, measured_excitation, signals_at
+from savgs_ident.simulate.mesh import turns, uniform_mesh
+from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, layout_of, simulate_periodic
+
+RATE = 500.0
+NOISE = {"body_accel": 0.02, "susp_deflection": 5e-5}
+INPUTS, READINGS = ("road_height",), ("body_accel", "susp_deflection")
+
+
+def road(seconds: float, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Time [s] and height [m] of a road up to 30 Hz that begins level."""
+    time, random = np.arange(round(seconds * RATE)) / RATE, np.random.default_rng(seed)
+    frequency = np.arange(0.25, 30.0, 0.13)
+    size, phase = 2e-3 / frequency, random.uniform(0.0, 2.0 * np.pi, frequency.size)
+    height = (size * np.sin(2.0 * np.pi * frequency * time[:, None] + phase)).sum(axis=1)
+    return time, height * np.minimum(time, 1.0) ** 2
+
+
+def linear_readings(time: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Acceleration of the body [m/s^2] and deflection [m], (2, n), by the exponential of the state matrix."""
+    p = PARAMETERS.as_dict()
+    k, c, kt, ct, ms, mu = (p[name] for name in ("k", "c", "k_t", "c_t", "m_s", "m_u"))
+    # States: height and speed of the body, height of the wheel, its speed less what the tyre's damper gives it.
+    a = np.array(
+        [
+            [0.0, 1.0, 0.0, 0.0],
+            [-k / ms, -c / ms, k / ms, c / ms],
+            [0.0, 0.0, 0.0, 1.0],
+            [k / mu, c / mu, -(k + kt) / mu, -(c + ct) / mu],
+        ]
+    )
+    damped = np.array([0.0, c / ms * ct / mu, ct / mu, -(c + ct) / mu * ct / mu + kt / mu])
+    accel = a[1], c / ms * ct / mu
+    deflection = np.array([-1.0, 0.0, 1.0, 0.0]), 0.0
+    rows = np.stack([accel[0], deflection[0]])
+    direct = np.array([[accel[1]], [deflection[1]]])
+    _, seen, _ = lsim(StateSpace(a, damped[:, None], rows, direct), height, time)
+    return np.asarray(seen).T
+
+
+def _channel(name: str, time: NDArray[np.float64], values: NDArray[np.float64]) -> RecordedChannel:
+    return RecordedChannel(name, "m/s^2" if name == "body_accel" else "m", time, values)
+
+
+def campaign(
+    seconds: float = 27.0, seed: int = 0, standstill: bool = True, noise: float = 1.0, name: str = "road_c"
+) -> Campaign:
+    time, height = road(seconds, seed)
+    random = np.random.default_rng(seed + 100)
+    clean = dict(zip(READINGS, linear_readings(time, height), strict=True))
+    seen = {
+        each: values + noise * NOISE[each] * random.standard_normal(time.size)
+        for each, values in clean.items()
+    }
+    tests = [_test(name, "road", time, {"road_height": height} | seen)]
+    if standstill:
+        still = {each: max(noise, 1.0) * sd * random.standard_normal(2000) for each, sd in NOISE.items()}
+        tests.append(_test("standstill", "standstill", time[:2000], still))
+    return Campaign("made", tuple(tests), (), "")
+
+
+def _test(
+    name: str, kind: str, time: NDArray[np.float64], values: dict[str, NDArray[np.float64]]
+) -> Recording:
+    channels = {each: _channel(each, time, signal) for each, signal in values.items()}
+    return Recording(name, kind, None, channels)  # type: ignore[arg-type]
+
+
+def predicted(measured: HarmonicResponse) -> NDArray[np.complex128]:
+    plant, p = TwoMass(), as_values(PARAMETERS.as_dict())
+    excitation = measured_excitation(plant, measured, PARAMETERS)
+    solution = simulate_periodic(plant, p, excitation)
+    assert all(status.ok for status in solution.status())
+    return np.asarray(harmonics(plant, p, solution, measured.orders))
+
+
+def used(measured: HarmonicResponse) -> NDArray[np.bool_]:
+    return measured.valid[:, [measured.channel(name) for name in READINGS]]
+
+
+def test_a_linear_plant_answers_in_windows_as_its_state_matrix_says() -> None:
+    measured = estimate_windows(campaign(noise=0.0), INPUTS, READINGS)
+    found, kept = predicted(measured), used(measured)
+    recorded = measured.harmonics[:, [measured.channel(name) for name in READINGS]]
+    for c in range(2):
+        miss = np.abs(found[:, c] - recorded[:, c])[kept[:, c]]
+        assert np.sqrt(np.mean(miss**2)) < 4e-3 * np.sqrt(np.mean(np.abs(recorded[:, c][kept[:, c]]) ** 2))
+
+
+def test_with_noise_the_misfit_is_that_of_the_covariance() -> None:
+    # Three times the noise, beside which the finite number of nodes does not show.
+    measured = estimate_windows(campaign(seed=3, noise=3.0), INPUTS, READINGS)
+    miss = predicted(measured) - measured.harmonics[:, [measured.channel(name) for name in READINGS]]
+    sd = np.sqrt(measured.covariance[..., 0, 0])[:, [measured.channel(name) for name in READINGS]]
+    ratio = (np.abs(miss) ** 2 / (2.0 * sd**2))[used(measured)]
+    # Of n numbers of unit variance the mean square scatters by the square root of 2 / n.
+    assert np.mean(ratio) == pytest.approx(1.0, abs=5.0 / np.sqrt(ratio.size))
+
+
+def test_what_is_compared_lies_within_the_record_and_within_the_band() -> None:
+    measured = estimate_windows(campaign(), INPUTS, READINGS)
+    assert measured.part is not None
+    length = 1.0 / measured.frequency
+    np.testing.assert_allclose(measured.part.begin * length / (2.0 * np.pi), LEAD_S)
+    np.testing.assert_allclose((1.0 - measured.part.end / (2.0 * np.pi)) * length, CLOSING_S)
+    hertz = np.flatnonzero(used(measured).any(axis=(0, 1))) * measured.spacing[0]
+    assert hertz[-1] <= HIGHEST_HZ
+    assert np.all(measured.part.every >= 2.0)
+
+
+def test_without_a_standstill_the_noise_is_read_from_the_roughness_and_said_to_be() -> None:
+    measured = estimate_windows(campaign(standstill=False), INPUTS, READINGS)
+    assert [each.code for each in measured.warnings] == ["noise_assumed"]
+    for name, sd in NOISE.items():
+        assert measured.noise_sd[:, measured.channel(name)] == pytest.approx(sd, rel=0.1)
+
+
+def test_a_window_with_a_gap_is_not_compared_in_that_channel() -> None:
+    whole = campaign()
+    road_test, still = whole.recordings
+    accel = road_test.channels["body_accel"]
+    gap = (accel.time > 14.0) & (accel.time < 14.5)
+    holed = _channel(accel.name, accel.time[~gap], accel.values[~gap])
+    channels = dict(road_test.channels) | {"body_accel": holed}
+    test = Recording(road_test.name, "road", None, channels)
+    measured = estimate_windows(Campaign("made", (test, still), (), ""), INPUTS, READINGS)
+    kept = used(measured).any(axis=2)
+    assert kept[:, 1].all()
+    assert not kept[:, 0].all()
+    assert kept[:, 0].any()
+
+
+@pytest.mark.parametrize(
+    ("made", "what"),
+    [
+        (lambda: campaign(seconds=4.0), "s are needed"),
+        (lambda: Campaign("made", campaign().recordings[1:], (), ""), "there is no test"),
+        (lambda: _standing(campaign()), "does not move"),
+        (lambda: _thinned(campaign()), "too slow"),
+    ],
+)
+def test_what_cannot_be_cut_is_refused_with_what_to_do(made, what: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(InputError, match=what) as refused:
+        estimate_windows(made(), INPUTS, READINGS)
+    assert refused.value.remedy
+
+
+def _standing(given: Campaign) -> Campaign:
+    test, still = given.recordings
+    level = test.channels["road_height"]
+    channels = dict(test.channels) | {"road_height": _channel("road_height", level.time, 0.0 * level.time)}
+    return Campaign("made", (Recording(test.name, "road", None, channels), still), (), "")
+
+
+def _thinned(given: Campaign) -> Campaign:
+    test, still = given.recordings
+    channels = {
+        name: _channel(name, each.time[::25], each.values[::25]) for name, each in test.channels.items()
+    }
+    return Campaign("made", (Recording(test.name, "road", None, channels), still), (), "")
+
+
+def test_a_channel_with_a_clock_of_its_own_is_followed_as_well() -> None:
+    test, still = campaign(noise=0.0).recordings
+    deflection = test.channels["susp_deflection"]
+    later = deflection.time[:-1] + 0.37 / RATE
+    shifted = _channel(deflection.name, later, CubicSpline(deflection.time, deflection.values)(later))
+    other = Recording(test.name, "road", None, dict(test.channels) | {deflection.name: shifted})
+    measured = estimate_windows(Campaign("made", (other, still), (), ""), INPUTS, READINGS)
+    found, kept = predicted(measured), used(measured)[:, 1]
+    recorded = measured.harmonics[:, measured.channel(deflection.name)][kept]
+    miss = np.abs(found[:, 1][kept] - recorded)
+    assert np.sqrt(np.mean(miss**2)) < 4e-3 * np.sqrt(np.mean(np.abs(recorded) ** 2))
+
+
+def test_the_share_is_one_inside_zero_outside_and_smooth() -> None:
+    phase = np.linspace(0.0, 2.0 * np.pi, 2001)
+    share = compared_share(phase, 1.0, 5.0)
+    edge = 4.0 * TAPER
+    assert np.all(share[(phase < 1.0) | (phase > 5.0)] == 0.0)
+    assert np.all(share[(phase > 1.0 + edge) & (phase < 5.0 - edge)] == 1.0)
+    assert np.max(np.abs(np.diff(share))) < 1.01 * np.pi / 2.0 / edge * (phase[1] - phase[0])
+
+
+def test_many_harmonics_by_a_table_are_the_sum() -> None:
+    measured = estimate_windows(campaign(noise=0.0), INPUTS, READINGS)
+    excitation = measured_excitation(TwoMass(), measured, PARAMETERS)
+    assert excitation.harmonics["road_height"].shape[1] > SUMMED
+    mesh = uniform_mesh(layout_of(excitation, PeriodicSettings()))
+    ((height, rate),), _ = signals_at(TwoMass(), excitation, mesh)
+    dwell, order = mesh.layout.dwell, np.arange(excitation.harmonics["road_height"].shape[1])
+    some = np.arange(0, dwell.size, 97)
+    amplitudes = np.asarray(excitation.harmonics["road_height"])[dwell[some]]
+    waves = amplitudes * np.exp(1j * order * np.asarray(mesh.phase)[some, None])
+    omega = 2.0 * np.pi * measured.frequency[dwell[some]]
+    np.testing.assert_allclose(np.asarray(height)[some], waves.real.sum(axis=1), atol=1e-8)
+    np.testing.assert_allclose(
+        np.asarray(rate)[some], (1j * order * waves).real.sum(axis=1) * omega, atol=1e-5
+    )
+
+
+def test_powers_of_a_turn_are_its_exponentials() -> None:
+    phase = np.random.default_rng(0).uniform(0.0, 6.0, 50)
+    for orders in (0, 9, 15, 16, 40, 200):
+        exact = np.exp(1j * phase[:, None] * np.arange(orders + 1))
+        np.testing.assert_allclose(np.asarray(turns(phase, orders)), exact, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_fit_of_a_road_finds_what_it_was_made_with() -> None:
+    model = si.PlantModel(si.TwoMass(), PARAMETERS)
+    fit = si.fit(model, campaign(seconds=40.0, seed=7), free=("k", "c"))
+    assert fit.trusted
+    for name in ("k", "c"):
+        found = fit[name]
+        assert abs(found.value - PARAMETERS[name].value) < 4.0 * found.stderr
+        assert found.stderr < 0.02 * found.value
