@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
@@ -24,7 +24,7 @@ from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, SweepResponse
 from savgs_ident.responses.sweeps import estimate_sweep_response
 from savgs_ident.responses.windows import KINDS, estimate_windows
-from savgs_ident.simulate.mesh import Mesh, turns
+from savgs_ident.simulate.mesh import Layout, Mesh, over_dwells, turns
 
 SUMMED = 64
 """Most harmonics that are summed one by one at every node."""
@@ -88,6 +88,29 @@ def _interpolate(
         return y0 + share * (width * d0 + share * (3.0 * rise - bend + share * (bend - 2.0 * rise)))
 
     return between(value, rate), between(rate, second) * omega
+
+
+def motion_scale(
+    model: AbstractPlant, signals: tuple[InputSignal, ...], frequency: Float[Array, " D"], layout: Layout
+) -> Float[Array, "m P"]:
+    """A typical size of every state [its unit] at the dwells' frequencies [Hz], from the amplitudes of the inputs."""
+    amplitudes, speeds = (
+        [_amplitude(each, layout) for each in listed] for listed in zip(*signals, strict=True)
+    )
+    sizes = [
+        sum(given.moves[i] * amplitude for given, amplitude in zip(model.inputs, amplitudes, strict=True))
+        for i in range(len(model.coordinates))
+    ]
+    rates = [
+        sum(given.moves[i] * amplitude for given, amplitude in zip(model.inputs, speeds, strict=True))
+        for i in range(len(model.coordinates))
+    ]
+    states = [jnp.full_like(frequency, state.scale) for state in model.states]
+    return jnp.stack([*sizes, *rates, *states])[:, layout.dwell]
+
+
+def _amplitude(values: Float[Array, " P"], layout: Layout) -> Float[Array, " D"]:
+    return (over_dwells(values, layout) + over_dwells(-values, layout)) / 2.0
 
 
 def typical_amplitude(plant: AbstractPlant | type[AbstractPlant], table: ParameterTable) -> float:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
@@ -75,6 +76,12 @@ def layout_for(frequency: NDArray[np.float64], nodes: int, slow: float) -> Layou
     """
     wanted = nodes * np.maximum(1.0, slow / np.asarray(frequency))
     return Layout(tuple(int(count) for count in CHUNK * np.ceil(wanted / CHUNK)))
+
+
+def over_dwells(values: Float[Array, " P"], layout: Layout) -> Float[Array, " D"]:
+    """The largest value in each dwell, in its unit; infinite where one is NaN."""
+    finite = jnp.where(jnp.isnan(values), jnp.inf, values)
+    return jax.ops.segment_max(finite, layout.dwell, len(layout.counts), indices_are_sorted=True)
 
 
 SPREAD = 0.5

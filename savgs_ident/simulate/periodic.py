@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.effects.base import InputSignal
 from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.responses.harmonic_response import ComparedPart, compared_share
 from savgs_ident.simulate.collocation import (
@@ -44,9 +43,18 @@ from savgs_ident.simulate.collocation import (
     solve_linearised,
     step_defects,
 )
-from savgs_ident.simulate.excitation import inputs_at, signals_at
+from savgs_ident.simulate.excitation import inputs_at, motion_scale, signals_at
 from savgs_ident.simulate.march import march
-from savgs_ident.simulate.mesh import CHUNK, Layout, Mesh, adapted_mesh, layout_for, turns, uniform_mesh
+from savgs_ident.simulate.mesh import (
+    CHUNK,
+    Layout,
+    Mesh,
+    adapted_mesh,
+    layout_for,
+    over_dwells,
+    turns,
+    uniform_mesh,
+)
 from savgs_ident.simulate.program_cache import placed, run_cached
 
 TOLERANCE = 1e-7
@@ -79,35 +87,6 @@ def newton_structure() -> PyTreeDef:
 class _Progress(NamedTuple):
     result: NewtonResult
     share: Float[Array, " D"]
-
-
-def motion_scale(
-    model: AbstractPlant, signals: tuple[InputSignal, ...], frequency: Float[Array, " D"], layout: Layout
-) -> Float[Array, "m P"]:
-    """A typical size of every state [its unit] at the dwells' frequencies [Hz], from the amplitudes of the inputs."""
-    amplitudes, speeds = (
-        [_amplitude(each, layout) for each in listed] for listed in zip(*signals, strict=True)
-    )
-    sizes = [
-        sum(given.moves[i] * amplitude for given, amplitude in zip(model.inputs, amplitudes, strict=True))
-        for i in range(len(model.coordinates))
-    ]
-    rates = [
-        sum(given.moves[i] * amplitude for given, amplitude in zip(model.inputs, speeds, strict=True))
-        for i in range(len(model.coordinates))
-    ]
-    states = [jnp.full_like(frequency, state.scale) for state in model.states]
-    return jnp.stack([*sizes, *rates, *states])[:, layout.dwell]
-
-
-def _over_dwells(values: Float[Array, " P"], layout: Layout) -> Float[Array, " D"]:
-    """The largest value in each dwell; NaN where one is NaN."""
-    finite = jnp.where(jnp.isnan(values), jnp.inf, values)
-    return jax.ops.segment_max(finite, layout.dwell, len(layout.counts), indices_are_sorted=True)
-
-
-def _amplitude(values: Float[Array, " P"], layout: Layout) -> Float[Array, " D"]:
-    return (_over_dwells(values, layout) + _over_dwells(-values, layout)) / 2.0
 
 
 def _rates(model: AbstractPlant, at: Trajectory) -> Array:
@@ -146,7 +125,7 @@ def solve_newton(
         before = progress.result
         at = before.trajectory
         change, lin = _newton_step(model, p, prepared, at, u, layout, steps)
-        length = _over_dwells(jnp.max(jnp.abs(change.x) / scale, axis=0), layout)
+        length = over_dwells(jnp.max(jnp.abs(change.x) / scale, axis=0), layout)
         damped = jnp.maximum(progress.share / 2.0, LEAST_SHARE)
         share = jnp.where(length > before.last_step, damped, jnp.minimum(1.0, 2.0 * progress.share))
         taken = jnp.minimum(share, TRUST / length)[layout.dwell]

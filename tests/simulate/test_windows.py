@@ -14,8 +14,14 @@ from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recordin
 from savgs_ident.responses.harmonic_response import TAPER, HarmonicResponse, compared_share
 from savgs_ident.responses.windows import CLOSING_S, HIGHEST_HZ, LEAD_S, estimate_windows
 from savgs_ident.simulate.excitation import SUMMED, measured_excitation, signals_at
+from savgs_ident.simulate.forgetting import require_forgetting
 from savgs_ident.simulate.mesh import turns, uniform_mesh
-from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, layout_of, simulate_periodic
+from savgs_ident.simulate.periodic import (
+    PeriodicSettings,
+    harmonics,
+    layout_of,
+    simulate_periodic,
+)
 
 RATE = 500.0
 NOISE = {"body_accel": 0.02, "susp_deflection": 5e-5}
@@ -219,6 +225,16 @@ def test_powers_of_a_turn_are_its_exponentials() -> None:
     for orders in (0, 9, 15, 16, 40, 200):
         exact = np.exp(1j * phase[:, None] * np.arange(orders + 1))
         np.testing.assert_allclose(np.asarray(turns(phase, orders)), exact, atol=1e-12)
+
+
+def test_a_plant_that_rings_is_refused_and_the_rig_is_not() -> None:
+    measured = estimate_windows(campaign(noise=0.0), INPUTS, READINGS)
+    plant, excitation = TwoMass(), measured_excitation(TwoMass(), measured, PARAMETERS)
+    damped, ringing = (as_values(PARAMETERS.as_dict() | {"c": c}) for c in (2100.0, 100.0))
+    require_forgetting(simulate_periodic(plant, damped, excitation))
+    # exp(-c / 2 m_s t) of the body's motion is left after three seconds: 0.6.
+    with pytest.raises(InputError, match=r"remembers [4-9]\d %"):
+        require_forgetting(simulate_periodic(plant, ringing, excitation))
 
 
 @pytest.mark.slow
