@@ -8,7 +8,8 @@ import numpy as np
 from benchmarks.outcome import Outcome
 from benchmarks.task import ORDERS, PARAMETERS, Harmonics, Task, errors_percent
 from benchmarks.timing import median_time, timed
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, resolve, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSolution, resolve, simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 
 REPEATS = 15

@@ -68,6 +68,8 @@ def diagnose(
     called a gap. Every effect of the catalogue is then tested, alone and in pairs; if none explains the recordings
     the verdict is "unknown", with the port at which something is missing.
 
+    Of a campaign without dwells a road or a sweep is cut into windows.
+
     Writes diagnosis.html (the report) and diagnosis.json.
 
     Exit code 1 if a search that the verdict stands on did not converge.

@@ -48,7 +48,9 @@ def fit(
 ) -> int:
     """Identify the rig from a campaign: parameters with errors, how well they fit, what the data identify.
 
-    Writes fit.json, model.toml (the identified model), bode.png and bode.pdf.
+    Of a campaign without dwells a road, a sweep or any other motion of at least six seconds is cut into windows.
+
+    Writes fit.json, model.toml (the identified model), bode.png and bode.pdf; of windows spectra.png and spectra.pdf.
 
     Effects that a diagnosis names are put into the model by --with, and their parameters are identified, too.
 

@@ -54,11 +54,10 @@ from savgs_ident.simulate.linearisation import (
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
-    analyse,
-    harmonics,
     simulate_periodic,
     solve_on_mesh,
 )
+from savgs_ident.simulate.readings import analyse, harmonics
 from savgs_ident.simulate.sensitivity import loads_at_nodes
 
 RIG_STATES = (

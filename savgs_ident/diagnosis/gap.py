@@ -27,7 +27,8 @@ from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.base import Excitation
 from savgs_ident.responses.harmonic_response import SweepResponse
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 
 if TYPE_CHECKING:
     from savgs_ident.diagnosis.dwell_problem import DwellProblem

@@ -23,7 +23,8 @@ from savgs_ident.fit.result import Verdict, comparable, gaps
 from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import Pins, Problem, Task
 from savgs_ident.plants.base import Excitation
-from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 
 LARGEST_SD = 0.25
 """A free parameter is identifiable if its standard error is below this share of its value."""

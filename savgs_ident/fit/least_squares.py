@@ -36,12 +36,8 @@ from savgs_ident.inference.problem import Problem, ProblemSettings, Quantity, Ta
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.forgetting import require_forgetting
-from savgs_ident.simulate.periodic import (
-    PeriodicSettings,
-    adapt,
-    harmonics,
-    simulate_periodic,
-)
+from savgs_ident.simulate.periodic import PeriodicSettings, adapt, simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 
 
 @dataclass(frozen=True)

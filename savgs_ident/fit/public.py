@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.least_squares import FitSettings, fit_least_squares
@@ -60,7 +61,7 @@ def fit(
         orders: highest harmonic order to fit.
         peak_to_peak: fit peak-to-peak values only, as the paper did.
         fixed_tolerances: hold what is known to a tolerance at its value instead of estimating it along.
-        max_frequency: leave out faster dwells [Hz].
+        max_frequency: leave out faster dwells [Hz]; of windows, what is faster.
         command: the command line that the result says it was made by.
         progress: called with a sentence on what is being done.
 
@@ -89,6 +90,12 @@ def fit_with(
     drawing = model.before
     names = drawing.free(free)
     response = response_of_tests(measured, model.plant, settings.orders, max_frequency, progress)
+    if response.part is not None and settings.quantity == "peak_to_peak":
+        raise InputError(
+            "tests that do not repeat have no peak-to-peak values",
+            source="--peak-to-peak",
+            remedy="leave it out, or record dwells",
+        )
     origin = model.origin(campaign_of(measured), response.warnings).with_command(command)
     return fit_least_squares(
         response, drawing, free=names, settings=settings, origin=origin, progress=progress

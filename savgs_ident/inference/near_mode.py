@@ -36,8 +36,9 @@ from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.inference.prior import NUISANCE, Prior
 from savgs_ident.inference.problem import Problem
 from savgs_ident.simulate.collocation import Trajectory
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, harmonics_of, resolve, solve_near
+from savgs_ident.simulate.periodic import PeriodicSolution, resolve, solve_near
 from savgs_ident.simulate.program_cache import placed, run_cached
+from savgs_ident.simulate.readings import harmonics, harmonics_of
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities, trajectory_sensitivities
 
 ENOUGH = 1e-4

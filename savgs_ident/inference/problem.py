@@ -28,8 +28,9 @@ from savgs_ident.plants.base import AbstractPlant, Channel, Excitation, Motion
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
 from savgs_ident.simulate.excitation import measured_excitation
-from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, harmonics, resolve
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, resolve
 from savgs_ident.simulate.program_cache import placed, run_cached
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 
 

@@ -96,15 +96,23 @@ class _Even:
         return float(next(iter(self.values.values())).size / self.rate)
 
 
-def estimate_windows(campaign: Campaign, inputs: Sequence[str], readings: Sequence[str]) -> HarmonicResponse:
+def estimate_windows(
+    campaign: Campaign, inputs: Sequence[str], readings: Sequence[str], highest_hz: float = HIGHEST_HZ
+) -> HarmonicResponse:
     """The response of all tests of ``campaign`` that do not repeat, in windows.
 
     ``inputs`` are the channels that drive the plant, the first of which has to move; ``readings`` are what its
     sensors read. The noise is that of the standstill; where none was recorded, it is read from how rough the channels
-    are.
+    are. Up to ``highest_hz`` is compared [Hz].
 
-    Raises :class:`InputError` where no test is long enough or the first input does not move.
+    Raises :class:`InputError` where no test is long enough, the first input does not move, or nothing is compared.
     """
+    if highest_hz < 2.0 * LOWEST_HZ:
+        raise InputError(
+            f"up to {highest_hz:g} Hz there is nothing to compare in windows",
+            source="--max-frequency",
+            remedy=f"they are compared from {LOWEST_HZ:g} Hz on",
+        )
     still, warnings = estimate_standstill_noise(campaign)
     driven, found = inputs[0], []
     for recording in campaign.recordings:
@@ -123,7 +131,7 @@ def estimate_windows(campaign: Campaign, inputs: Sequence[str], readings: Sequen
         warnings += (_noise_assumed(campaign.source, assumed),)
     windows = _Windows.of_one_length(cut)
     channels = tuple(name for name in (*inputs, *readings) if any(name in each.values for each in found))
-    return windows.response(channels, set(inputs), warnings)
+    return windows.response(channels, set(inputs), warnings, highest_hz)
 
 
 def _evenly(
@@ -270,14 +278,18 @@ class _Windows:
         return cls(length, part, tuple(windows))
 
     def response(
-        self, channels: tuple[str, ...], inputs: set[str], warnings: tuple[DataWarning, ...]
+        self,
+        channels: tuple[str, ...],
+        inputs: set[str],
+        warnings: tuple[DataWarning, ...],
+        highest_hz: float,
     ) -> HarmonicResponse:
-        """The complex amplitudes of all windows."""
+        """The complex amplitudes of all windows, up to a frequency [Hz]."""
         orders = floor(self.imposed_hz * self.length)
         shape = (len(self.windows), len(channels), orders + 1)
         harmonics, covariance = np.zeros(shape, np.complex128), np.zeros((*shape, 2, 2))
         valid, noise = np.zeros(shape, np.bool_), np.zeros(shape[:2])
-        every, compared = self._compared(sum(name not in inputs for name in channels))
+        every, compared = self._compared(sum(name not in inputs for name in channels), highest_hz)
         for w, window in enumerate(self.windows):
             for c, name in enumerate(channels):
                 if name not in window.record.values:
@@ -311,9 +323,9 @@ class _Windows:
         begin = window.first / window.record.rate + LEAD_S
         return f"{window.record.test}, {begin:.1f} to {begin + self.length - LEAD_S - CLOSING_S:.1f} s"
 
-    def _compared(self, readings: int) -> tuple[int, NDArray[np.bool_]]:
+    def _compared(self, readings: int, highest_hz: float) -> tuple[int, NDArray[np.bool_]]:
         """From one order that is compared to the next, and which of them are, from 0 to the last."""
-        last = floor(HIGHEST_HZ * self.length)
+        last = floor(highest_hz * self.length)
         every = max(2, ceil(2 * len(self.windows) * readings * last / NUMBERS))
         return every, every * np.arange(last // every + 1) >= LOWEST_HZ * self.length
 

@@ -23,7 +23,7 @@ from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, SweepResponse
 from savgs_ident.responses.sweeps import estimate_sweep_response
-from savgs_ident.responses.windows import KINDS, estimate_windows
+from savgs_ident.responses.windows import HIGHEST_HZ, KINDS, estimate_windows
 from savgs_ident.simulate.mesh import Layout, Mesh, over_dwells, turns
 
 SUMMED = 64
@@ -308,7 +308,8 @@ def response_of_tests(
         return replace(response, warnings=(*response.warnings, *beside))
     progress("cutting windows")
     inputs, readings = ([each.name for each in listed] for listed in (plant.inputs, plant.channels))
-    return estimate_windows(measured.only(recorded_names(plant)), inputs, readings)
+    highest = HIGHEST_HZ if max_frequency is None else min(max_frequency, HIGHEST_HZ)
+    return estimate_windows(measured.only(recorded_names(plant)), inputs, readings, highest)
 
 
 def _not_used(source: str, test: str) -> DataWarning:

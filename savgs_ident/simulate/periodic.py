@@ -1,7 +1,9 @@
-"""Periodic steady states of all dwells at once, and what the sensors read along them.
+"""Periodic steady states of all dwells at once.
 
     solution = simulate_periodic(plant, p, excitation)
     response = harmonics(plant, p, solution, orders=9)   # complex, (dwells, channels, 10)
+
+What the sensors read along them is in :mod:`savgs_ident.simulate.readings`.
 
 A dwell's motion is periodic but not smooth: the rail sticks at every reversal. The motion is found by
 periodic collocation in time (:mod:`savgs_ident.simulate.collocation`): a coarse, evenly spaced solution shows
@@ -17,29 +19,25 @@ rule is of second order. How the response changes with the parameters is in :mod
 """
 
 from dataclasses import dataclass
-from functools import reduce
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.tree_util import PyTreeDef
-from jaxtyping import Array, Complex, Float, Int
+from jaxtyping import Array, Float, Int
 from numpy.typing import NDArray
 
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.base import AbstractPlant, Excitation
-from savgs_ident.responses.harmonic_response import ComparedPart, compared_share
 from savgs_ident.simulate.collocation import (
     CyclicFactors,
     Linearised,
     Trajectory,
     blank_linearised,
-    by_chunks,
     linearise,
-    node_motion,
     solve_linearised,
     step_defects,
 )
@@ -52,7 +50,6 @@ from savgs_ident.simulate.mesh import (
     adapted_mesh,
     layout_for,
     over_dwells,
-    turns,
     uniform_mesh,
 )
 from savgs_ident.simulate.program_cache import placed, run_cached
@@ -326,72 +323,3 @@ def resolve(
     """The solution at other parameters, on the same nodes, started from ``solution`` or a better ``start``."""
     begin = solution.trajectory if start is None else start
     return solve_on_mesh(model, as_values(p), solution.excitation, solution.mesh, begin, limit)
-
-
-def _readings(
-    model: AbstractPlant, p: Values, trajectory: Trajectory, known: PeriodicSolution
-) -> Float[Array, "P C"]:
-    def one(u: Any, *parts: Array) -> tuple[Array, ...]:
-        motion, states, rates = node_motion(model, parts)
-        return model.read(p, motion, states, rates, u)
-
-    u = inputs_at(model, known.excitation, known.mesh)
-    return jnp.stack(jax.vmap(one)(u, *trajectory.x, *trajectory.y), axis=-1)
-
-
-def analyse(
-    signals: Float[Array, "P C"], mesh: Mesh, orders: int, part: ComparedPart | None = None
-) -> Complex[Array, "D C K"]:
-    """Complex harmonics 0..orders of C signals at the nodes of a mesh, in their own units.
-
-    Where only a ``part`` of each period is compared, those of the signals times :func:`compared_share`, every so
-    many-th of them.
-
-    Summed over the nodes of all chunks at a time, then over the chunks of a dwell, so that every operation is a long
-    vector.
-    """
-    twice = jnp.full(orders + 1, 2.0).at[0].set(1.0)
-    phase, weight = jnp.asarray(mesh.phase), jnp.asarray(mesh.weight)
-    if part is not None:
-        begin, end, every = (jnp.asarray(each)[mesh.layout.dwell] for each in part)
-        weight = weight * cast(Any, compared_share)(phase, begin, end)
-        phase = phase * every
-    kernel = twice * jnp.conj(turns(phase, orders)) * weight[:, None]
-    real = by_chunks(jnp.concatenate([kernel.real, kernel.imag], axis=1).T)
-    given = by_chunks(signals.T)
-    chunks = reduce(jnp.add, [given[i][:, None] * real[i] for i in range(CHUNK)])
-    layout = mesh.layout
-    seen = jax.ops.segment_sum(
-        jnp.moveaxis(chunks, -1, 0), layout.dwell[::CHUNK], len(layout.counts), indices_are_sorted=True
-    )
-    return seen[..., : orders + 1] + 1j * seen[..., orders + 1 :]
-
-
-@eqx.filter_jit
-def harmonics(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int
-) -> Complex[Array, "D C K"]:
-    """Complex harmonics 0..orders of the sensor readings, (D, C, orders + 1), in the channels' SI units.
-
-    Channels are those of the plant, in its order.
-    """
-    return harmonics_of(model, p, solution.trajectory, solution, orders)
-
-
-def harmonics_of(
-    model: AbstractPlant, p: Values, motions: Trajectory, known: PeriodicSolution, orders: int
-) -> Complex[Array, "D C K"]:
-    """The same of motions on the nodes of a ``known`` solution, as a part of a larger program that is compiled.
-
-    Each is in the unit of its reading.
-    """
-    seen = analyse(_readings(model, p, motions, known), known.mesh, orders, known.excitation.part)
-    return seen * _sensors(model, p, known.excitation.spacing, orders)
-
-
-def _sensors(
-    model: AbstractPlant, p: Values, spacing: Float[Array, " D"], orders: int
-) -> Complex[Array, "D C K"]:
-    """What the sensors make of each order."""
-    order = jnp.arange(orders + 1, dtype=spacing.dtype)
-    return jnp.moveaxis(model.transfers(p, spacing[:, None] * order), 0, 1)

@@ -34,8 +34,9 @@ from savgs_ident.simulate.excitation import (
     typical_amplitude,
 )
 from savgs_ident.simulate.mesh import Layout, layout_for
-from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
+from savgs_ident.simulate.readings import harmonics
 
 
 @dataclass(frozen=True)

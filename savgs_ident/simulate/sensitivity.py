@@ -26,7 +26,8 @@ from savgs_ident.simulate.collocation import (
     step_defects,
 )
 from savgs_ident.simulate.excitation import inputs_at, signals_at
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonics_of, node_steps
+from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
+from savgs_ident.simulate.readings import harmonics_of
 
 
 class Directions(NamedTuple):

@@ -45,8 +45,9 @@ from savgs_ident.inference.samplers.chains import SamplingSettings, new_checkpoi
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.simulate.excitation import every_so_many, measured_response
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.validation.trials import TrialFile, marks_of, once_a_process, run_trials
 
 SPREAD = 0.15

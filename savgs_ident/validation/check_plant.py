@@ -23,8 +23,9 @@ from savgs_ident.core.values import as_values
 from savgs_ident.plants.model import PlantModel
 from savgs_ident.simulate.excitation import sine_excitation, typical_amplitude
 from savgs_ident.simulate.linearisation import nominal_rest, plant_signals, slopes
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 from savgs_ident.validation.plant_declaration import Finding, check_declaration
 from savgs_ident.validation.plant_equations import check_equations

@@ -32,12 +32,12 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
-    harmonics,
     resolve,
     simulate_periodic,
 )
 from savgs_ident.simulate.program_cache import placed
 from savgs_ident.simulate.public import DWELLS
+from savgs_ident.simulate.readings import harmonics
 
 RANGES = (0.05, 50.0, 0.1)
 """Largest road [m], acceleration [m/s^2] and deflection [m] that the logger's converters read."""

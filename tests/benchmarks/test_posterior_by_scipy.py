@@ -18,7 +18,8 @@ from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.dynamics import SectionCurves, section_curves
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 
 
 @pytest.fixture(scope="module")

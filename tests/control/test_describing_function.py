@@ -19,7 +19,8 @@ from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.quarter_car.catalogue import build_model, model_parameters
 from savgs_ident.plants.quarter_car.inputs import cam_excitation
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 
 CAM = 0.0275
 FREQUENCY = np.array([0.7, 2.0, 4.5])

@@ -16,7 +16,8 @@ from savgs_ident.control.linearisation import linearise, resting
 from savgs_ident.core.values import Values
 from savgs_ident.plants.quarter_car.inputs import cam_excitation
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic, solve_on_mesh
+from savgs_ident.simulate.periodic import simulate_periodic, solve_on_mesh
+from savgs_ident.simulate.readings import harmonics
 
 from .by_hand import slope, travel
 

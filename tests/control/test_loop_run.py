@@ -14,7 +14,8 @@ from savgs_ident.plants.profiles import AbstractProfile, Scalar
 from savgs_ident.plants.quarter_car.drive import Drive, VelocityReference, inertia_at_motor
 from savgs_ident.plants.quarter_car.inputs import RigSource, cam_excitation
 from savgs_ident.plants.quarter_car.plant import QuarterCar
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.transient import simulate_transient
 
 from .loops import CAM, NO_FRICTION, along, cam, evaluated, harmonics_of, ideal, passive, ran, with_changed

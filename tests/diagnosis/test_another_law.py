@@ -37,7 +37,8 @@ from savgs_ident.plants.quarter_car.ports import DAMPER, RAIL, ROAD, SUSPENSION
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
-from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.validation.foreign_laws import FOREIGN
 from savgs_ident.validation.other_port import log_odds_of_port, log_odds_of_stand_in
 

@@ -19,7 +19,8 @@ from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_
 from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.two_mass import GUIDE, PARAMETERS, SUSPENSION, TwoMass
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.validation.foreign_forces import Clearance
 
 from ..relaxed import as_users_have_it

@@ -27,7 +27,8 @@ from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.model import PlantModel
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.periodic import PeriodicSettings, harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.validation.foreign_laws import SecondOrderFilter
 from savgs_ident.validation.varied_constants import VARIED, vary_constants
 

@@ -15,7 +15,8 @@ from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_mo
 from savgs_ident.plants.quarter_car.inputs import RigSource, cam_excitation, cam_road, held_link
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.transient import PlantState, simulate_transient, unpack_state
 
 from ..relaxed import with_kept_programs

@@ -15,7 +15,8 @@ from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.periodic import harmonics, resolve, simulate_periodic
+from savgs_ident.simulate.periodic import resolve, simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 
 TRUTH: Mapping[str, float] = {
     "mu_r": 0.03,

@@ -15,7 +15,8 @@ from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.responses.dwells import estimate_response
-from savgs_ident.simulate.periodic import harmonics, resolve
+from savgs_ident.simulate.periodic import resolve
+from savgs_ident.simulate.readings import harmonics
 
 from ..fit.bench import only, silent, true_rig
 

@@ -34,7 +34,8 @@ from savgs_ident.plants.quarter_car.model import RigModel, load_rig
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass, closed_form
 from savgs_ident.simulate.collocation import node_motion
 from savgs_ident.simulate.excitation import inputs_at
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonics, resolve, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSolution, resolve, simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 from savgs_ident.simulate.transient import simulate_transient
 from savgs_ident.symbolic.translate import to_casadi

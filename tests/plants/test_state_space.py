@@ -11,7 +11,8 @@ import savgs_ident as si
 from savgs_ident.core.values import as_values
 from savgs_ident.plants.two_mass import GUIDE, MOUNT, PARAMETERS, SUSPENSION, TYRE
 from savgs_ident.simulate.excitation import sine_excitation
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 
 from ..relaxed import as_users_have_it
 

@@ -12,7 +12,8 @@ from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.plants.quarter_car.inputs import cam_excitation
 from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.simulate.mesh import Layout
-from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, adapt, harmonics
+from savgs_ident.simulate.periodic import PeriodicSettings, PeriodicSolution, adapt
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.transient import TransientSolution
 
 STROKE = 0.0275

@@ -23,8 +23,9 @@ from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.ports import INERTIA
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate.mesh import Layout, uniform_mesh
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.program_cache import TRACED, digest_of_sources, fingerprint
+from savgs_ident.simulate.readings import harmonics
 
 from ..in_one_test import over
 

@@ -28,7 +28,7 @@ from savgs_ident.plants.quarter_car.catalogue import MODELS, build_model, model_
 from savgs_ident.core.values import as_values
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.plants.quarter_car.inputs import cam_excitation
-from savgs_ident.simulate.periodic import harmonics
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 
 if {kept}:

@@ -27,7 +27,8 @@ from savgs_ident.plants.quarter_car.kinematics import Values, linkage, strut_len
 from savgs_ident.plants.quarter_car.plant import QuarterCar, static_equilibrium
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.simulate import transient
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.transient import (
     TransientSolution,
     rest_state,

@@ -21,7 +21,8 @@ from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.simulate.periodic import harmonics, simulate_periodic
+from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.transient import simulate_transient
 
 pytestmark = pytest.mark.slow

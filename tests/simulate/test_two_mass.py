@@ -20,11 +20,11 @@ from savgs_ident.simulate import transient
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
-    harmonics,
     resolve,
     simulate_periodic,
     solve_on_mesh,
 )
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.transient import TransientSolution, simulate_transient, solve_rates
 
 from .programme import altered, distance, finer, loads_along

@@ -19,8 +19,9 @@ from savgs_ident.effects.base import Load, PortSignals
 from savgs_ident.effects.composition import nothing_imposed
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.plants.base import AbstractPlant, AtPorts
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonics
+from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.program_cache import placed, run_cached
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.sensitivity import (
     TOGETHER,
     Directions,

@@ -45,8 +45,9 @@ from savgs_ident.inference.background.port_functions import (
 )
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.plants.base import AbstractPlant
-from savgs_ident.simulate.periodic import PeriodicSolution, harmonics
+from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.program_cache import placed
+from savgs_ident.simulate.readings import harmonics
 
 Fields = list[tuple[str, Signal]]
 """Ports at which something is imposed, and what, at the nodes."""

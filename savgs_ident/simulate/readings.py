@@ -1,0 +1,114 @@
+"""What sensors read along periodic motions: their harmonics, of whole periods or of the part that is compared."""
+
+from collections.abc import Callable
+from functools import reduce
+from typing import Any, cast
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Complex, Float
+
+from savgs_ident.core.values import Values
+from savgs_ident.plants.base import AbstractPlant
+from savgs_ident.responses.harmonic_response import ComparedPart, compared_share
+from savgs_ident.simulate.collocation import Trajectory, by_chunks, node_motion
+from savgs_ident.simulate.excitation import inputs_at
+from savgs_ident.simulate.mesh import CHUNK, Mesh, turns
+from savgs_ident.simulate.periodic import PeriodicSolution
+
+Share = Callable[[Array, Array, Array], Array]
+"""With what share an instant counts, from its phase and those where the comparison begins and ends."""
+
+
+def _share(phase: Array, begin: Array, end: Array) -> Array:
+    share: Array = cast(Any, compared_share)(phase, begin, end)
+    return share
+
+
+def _share_rate(phase: Array, begin: Array, end: Array) -> Array:
+    """Its change with the phase [1/rad]."""
+    return jax.jvp(lambda each: _share(each, begin, end), (phase,), (jnp.ones_like(phase),))[1]
+
+
+def _readings(
+    model: AbstractPlant, p: Values, trajectory: Trajectory, known: PeriodicSolution
+) -> Float[Array, "P C"]:
+    def one(u: Any, *parts: Array) -> tuple[Array, ...]:
+        motion, states, rates = node_motion(model, parts)
+        return model.read(p, motion, states, rates, u)
+
+    u = inputs_at(model, known.excitation, known.mesh)
+    return jnp.stack(jax.vmap(one)(u, *trajectory.x, *trajectory.y), axis=-1)
+
+
+def analyse(
+    signals: Float[Array, "P C"],
+    mesh: Mesh,
+    orders: int,
+    part: ComparedPart | None = None,
+    share: Share = _share,
+) -> Complex[Array, "D C K"]:
+    """Complex harmonics 0..orders of C signals at the nodes of a mesh, in their own units.
+
+    Where only a ``part`` of each period is compared, those of the signals times their ``share``, every so many-th of
+    them.
+
+    Summed over the nodes of all chunks at a time, then over the chunks of a dwell, so that every operation is a long
+    vector.
+    """
+    twice = jnp.full(orders + 1, 2.0).at[0].set(1.0)
+    phase, weight = jnp.asarray(mesh.phase), jnp.asarray(mesh.weight)
+    if part is not None:
+        begin, end, every = (jnp.asarray(each)[mesh.layout.dwell] for each in part)
+        weight = weight * share(phase, begin, end)
+        phase = phase * every
+    kernel = twice * jnp.conj(turns(phase, orders)) * weight[:, None]
+    real = by_chunks(jnp.concatenate([kernel.real, kernel.imag], axis=1).T)
+    given = by_chunks(signals.T)
+    chunks = reduce(jnp.add, [given[i][:, None] * real[i] for i in range(CHUNK)])
+    layout = mesh.layout
+    seen = jax.ops.segment_sum(
+        jnp.moveaxis(chunks, -1, 0), layout.dwell[::CHUNK], len(layout.counts), indices_are_sorted=True
+    )
+    return seen[..., : orders + 1] + 1j * seen[..., orders + 1 :]
+
+
+@eqx.filter_jit
+def harmonics(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int
+) -> Complex[Array, "D C K"]:
+    """Complex harmonics 0..orders of the sensor readings, (D, C, orders + 1), in the channels' SI units.
+
+    Channels are those of the plant, in its order.
+    """
+    return harmonics_of(model, p, solution.trajectory, solution, orders)
+
+
+def harmonics_of(
+    model: AbstractPlant, p: Values, motions: Trajectory, known: PeriodicSolution, orders: int
+) -> Complex[Array, "D C K"]:
+    """The same of motions on the nodes of a ``known`` solution, as a part of a larger program that is compiled.
+
+    Each is in the unit of its reading.
+    """
+    readings, excitation = _readings(model, p, motions, known), known.excitation
+    seen = analyse(readings, known.mesh, orders, excitation.part)
+    if excitation.part is None or not model.sensors_have_dynamics:
+        return seen * _sensors(model, p, excitation.spacing, orders)
+    # A sensor shows the past. So the share counts for what it shows, which is not what it makes of the share of the
+    # truth: to first order they are apart by the slope of its response times the rate of the share.
+    shown, slope = jax.jvp(
+        lambda spacing: _sensors(model, p, spacing, orders), (excitation.spacing,), (excitation.frequency,)
+    )
+    per_order = slope / jnp.maximum(jnp.arange(orders + 1), 1)
+    changing = analyse(readings, known.mesh, orders, excitation.part, _share_rate)
+    return seen * shown + 1j * per_order * changing
+
+
+def _sensors(
+    model: AbstractPlant, p: Values, spacing: Float[Array, " D"], orders: int
+) -> Complex[Array, "D C K"]:
+    """What the sensors make of each order."""
+    order = jnp.arange(orders + 1, dtype=spacing.dtype)
+    return jnp.moveaxis(model.transfers(p, spacing[:, None] * order), 0, 1)
