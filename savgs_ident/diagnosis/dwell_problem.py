@@ -41,7 +41,6 @@ from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.excitation import measured_excitation
-from savgs_ident.simulate.forgetting import require_forgetting
 from savgs_ident.simulate.mesh import Layout
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
@@ -301,12 +300,6 @@ class DwellProblem(AbstractProblem):
 @dataclass(frozen=True)
 class WindowProblem(DwellProblem):
     """A plant in windows of tests that do not repeat: these have no cycle, no harmonics and no frequency."""
-
-    def start(self, values: Mapping[str, float]) -> PeriodicSolution:
-        """The same; raises :class:`InputError` for a plant that does not forget how a motion began, too."""
-        solution = super().start(values)
-        require_forgetting(solution)
-        return solution
 
     def locations(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution

@@ -33,6 +33,7 @@ from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion, recorded_motion
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
 from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep, response_of_tests
+from savgs_ident.simulate.forgetting import lasting_windows
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
@@ -81,6 +82,7 @@ def diagnose(
             "a held-out motion goes with a measured motion alone", remedy="diagnose each campaign by itself"
         )
     response = response_of_tests(measured, model.plant, orders, max_frequency, progress)
+    response = lasting_windows(response, model)
     campaign, warnings = campaign_of(measured), response.warnings
     given, settings, values = baseline_of(model, orders, without, constants)
     # A sweep in windows is what the model is fitted to, and no test that was left out.

@@ -35,7 +35,6 @@ from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import Problem, ProblemSettings, Quantity, Task, plan_task
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.forgetting import require_forgetting
 from savgs_ident.simulate.periodic import PeriodicSettings, adapt, simulate_periodic
 from savgs_ident.simulate.readings import harmonics
 
@@ -194,8 +193,6 @@ def fit_least_squares(
 
     report("solving the model as given")
     first = simulate_periodic(problem.model, problem.fixed, task.excitation, task.settings.periodic)
-    if task.excitation.part is not None:
-        require_forgetting(first)
     as_given = np.asarray(harmonics(problem.model, problem.fixed, first, problem.orders))
     report("preparing the fit")
     minimiser = Minimiser(problem)

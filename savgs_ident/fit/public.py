@@ -28,6 +28,7 @@ from savgs_ident.simulate.excitation import (
     measured_response,
     response_of_tests,
 )
+from savgs_ident.simulate.forgetting import lasting_windows
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.simulate.public import (
     SimulatedResponse,
@@ -90,6 +91,7 @@ def fit_with(
     drawing = model.before
     names = drawing.free(free)
     response = response_of_tests(measured, model.plant, settings.orders, max_frequency, progress)
+    response = lasting_windows(response, drawing)
     if response.part is not None and settings.quantity == "peak_to_peak":
         raise InputError(
             "tests that do not repeat have no peak-to-peak values",

@@ -240,16 +240,17 @@ def up_to_frequency(response: HarmonicResponse, highest: float | None) -> Harmon
             source="--max-frequency",
             remedy=f"the slowest dwell is at {response.frequency[0]:.3g} Hz",
         )
-    return _only(response, kept)
+    return only_tests(response, kept)
 
 
 def every_so_many(response: HarmonicResponse, step: int) -> HarmonicResponse:
     """Every ``step``-th dwell, the last one among them: it is the fastest."""
     count = response.frequency.size
-    return _only(response, np.arange((count - 1) % step, count, step))
+    return only_tests(response, np.arange((count - 1) % step, count, step))
 
 
-def _only(response: HarmonicResponse, kept: NDArray[np.int64]) -> HarmonicResponse:
+def only_tests(response: HarmonicResponse, kept: NDArray[np.int64]) -> HarmonicResponse:
+    """Those of its tests, by their places."""
     dof, recorded = response.covariance_dof, response.recorded
     return replace(
         response,

@@ -4,6 +4,7 @@ import pytest
 from scipy.stats import binom
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.validation.false_alarms import CONFIDENCE, alarm_bench, rate_bound
 
@@ -30,10 +31,11 @@ def _silent(line: str) -> None:
 def test_campaigns_with_nothing_missing_give_no_alarm_and_one_with_a_gap_does(
     measure_few: Measure, rig: Rig
 ) -> None:
-    bench = alarm_bench(measure_few("nominal"), rig, COARSE, {}, 3, _silent)
+    model = RigModel(rig, COARSE.baseline)
+    bench = alarm_bench(measure_few("nominal"), model, COARSE, {}, 3, _silent)
     draws = [bench.draw(number) for number in range(2)]
     assert not any(each.alarm for each in draws)
     assert all(each.odds is not None and each.odds < DEFAULTS.alarm_log_odds for each in draws)
     assert draws[1] != draws[0]
-    with_a_gap = alarm_bench(measure_few("stribeck_rail"), rig, COARSE, {}, 3, _silent)
+    with_a_gap = alarm_bench(measure_few("stribeck_rail"), model, COARSE, {}, 3, _silent)
     assert with_a_gap.odds > 10.0 * DEFAULTS.alarm_log_odds

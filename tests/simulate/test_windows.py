@@ -15,10 +15,11 @@ from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recordin
 from savgs_ident.responses.harmonic_response import TAPER, HarmonicResponse, compared_share
 from savgs_ident.responses.windows import CLOSING_S, HIGHEST_HZ, LEAD_S, estimate_windows
 from savgs_ident.simulate.excitation import SUMMED, measured_excitation, signals_at
-from savgs_ident.simulate.forgetting import require_forgetting
+from savgs_ident.simulate.forgetting import lasting_windows
 from savgs_ident.simulate.mesh import turns, uniform_mesh
-from savgs_ident.simulate.periodic import PeriodicSettings, layout_of, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, layout_of, resolve, simulate_periodic
 from savgs_ident.simulate.readings import harmonics
+from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 
 RATE = 500.0
 NOISE = {"body_accel": 0.02, "susp_deflection": 5e-5}
@@ -124,6 +125,22 @@ def test_a_sensor_that_lags_shows_the_share_of_what_it_shows() -> None:
     miss = np.abs(found - recorded)[kept]
     # Without the rate of the share it is off by 1.5 %.
     assert np.sqrt(np.mean(miss**2)) < 4e-3 * np.sqrt(np.mean(np.abs(recorded[kept]) ** 2))
+
+
+@pytest.mark.slow
+def test_slopes_in_windows_are_those_of_differences() -> None:
+    measured = estimate_windows(campaign(noise=0.0), INPUTS, READINGS)
+    plant = TwoMass() + generic_effects(TwoMass.ports)["accelerometer_lag"]
+    values = PARAMETERS.as_dict() | {"accelerometer_lag_time": LAG_S}
+    names, orders = ("k", "c", "accelerometer_lag_time"), 30
+    solution = simulate_periodic(plant, as_values(values), measured_excitation(plant, measured, PARAMETERS))
+    slopes = np.asarray(harmonic_sensitivities(plant, as_values(values), solution, names, orders))
+    for name, slope in zip(names, slopes, strict=True):
+        step = 1e-4 * values[name]
+        ahead, behind = (as_values(values | {name: values[name] + sign * step}) for sign in (1.0, -1.0))
+        two = [np.asarray(harmonics(plant, p, resolve(plant, p, solution), orders)) for p in (ahead, behind)]
+        difference = (two[0] - two[1]) / (2.0 * step)
+        np.testing.assert_allclose(slope, difference, atol=1e-5 * np.abs(difference).max())
 
 
 @pytest.mark.slow
@@ -261,14 +278,13 @@ def test_powers_of_a_turn_are_its_exponentials() -> None:
 
 
 @pytest.mark.slow
-def test_a_plant_that_rings_is_refused_and_the_rig_is_not() -> None:
-    measured = estimate_windows(campaign(noise=0.0), INPUTS, READINGS)
-    plant, excitation = TwoMass(), measured_excitation(TwoMass(), measured, PARAMETERS)
-    damped, ringing = (as_values(PARAMETERS.as_dict() | {"c": c}) for c in (2100.0, 100.0))
-    require_forgetting(simulate_periodic(plant, damped, excitation))
+def test_windows_that_remember_their_beginning_are_left_out_and_a_plant_that_rings_is_refused() -> None:
+    whole = estimate_windows(campaign(noise=0.0), INPUTS, READINGS)
+    damped, ringing = (si.PlantModel(si.TwoMass(), PARAMETERS.with_values({"c": c})) for c in (2100.0, 100.0))
+    assert lasting_windows(whole, damped) is whole
     # exp(-c / 2 m_s t) of the body's motion is left after three seconds: 0.6.
     with pytest.raises(InputError, match=r"remembers [4-9]\d %"):
-        require_forgetting(simulate_periodic(plant, ringing, excitation))
+        lasting_windows(whole, ringing)
 
 
 @pytest.mark.slow
