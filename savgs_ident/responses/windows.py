@@ -64,6 +64,7 @@ LONGEST_GAP = 5.0
 """Samples that may lack one after the other, in mean intervals, where a curve through the others stands in."""
 
 _RATE_HZ = 1000.0
+_FEWEST = 10
 _NORMAL = 1.4826
 
 
@@ -91,9 +92,14 @@ class _Even:
     noise: dict[str, float]
 
     @property
+    def count(self) -> int:
+        """How many instants there are."""
+        return next(iter(self.values.values())).size
+
+    @property
     def duration(self) -> float:
         """[s]."""
-        return float(next(iter(self.values.values())).size / self.rate)
+        return self.count / self.rate
 
 
 def estimate_windows(
@@ -118,9 +124,9 @@ def estimate_windows(
     for recording in campaign.recordings:
         if recording.kind not in KINDS:
             continue
-        even, refusal = _evenly(campaign.source, recording, driven, (*inputs, *readings), still)
-        if even is None:
-            warnings += (refusal,)
+        even = _evenly(campaign.source, recording, driven, (*inputs, *readings), still)
+        if isinstance(even, DataWarning):
+            warnings += (even,)
         else:
             found.append(even)
     cut = [(even, *span) for even in found for span in _spans(even.duration)]
@@ -136,32 +142,37 @@ def estimate_windows(
 
 def _evenly(
     source: str, recording: Recording, driven: str, names: Collection[str], still: dict[str, float]
-) -> tuple[_Even | None, DataWarning]:
-    """The channels of a test at even instants; None, and why, if it cannot be used."""
+) -> _Even | DataWarning:
+    """The channels of a test at even instants, or why it cannot be used."""
 
-    def refuse(what: str, remedy: str) -> tuple[None, DataWarning]:
-        return None, DataWarning("window_not_used", what, source, recording.name, driven, None, remedy)
+    def refuse(what: str, remedy: str) -> DataWarning:
+        return DataWarning("window_not_used", what, source, recording.name, driven, None, remedy)
 
     usable = {}
     for name in names:
         channel = recording.channels.get(name)
         known = None if channel is None else np.isfinite(channel.values)
-        if channel is not None and known is not None and np.count_nonzero(known) >= 10:
-            usable[name] = channel.time[known], channel.values[known]
+        if channel is not None and known is not None and np.count_nonzero(known) >= _FEWEST:
+            time, first = np.unique(channel.time[known], return_index=True)
+            usable[name] = time, channel.values[known][first]
     if driven not in usable:
         return refuse(f"{driven} was not recorded", "map its channel, or leave this test out")
     if np.ptp(usable[driven][1]) == 0.0:
         return refuse(f"{driven} does not move", "name this test a standstill")
     start = max(time[0] for time, _ in usable.values())
     end = min(time[-1] for time, _ in usable.values())
-    slowest = min((time.size - 1) / (time[-1] - time[0]) for time, _ in usable.values())
-    if slowest < 2.5 * HIGHEST_HZ:
+    if end - start < LEAST_S:
         return refuse(
-            f"a channel is sampled at {slowest:.3g} Hz, too slow for what is compared up to {HIGHEST_HZ:g} Hz",
+            f"its channels overlap for {max(end - start, 0.0):.2g} s", "look at the clocks of the channels"
+        )
+    rates = {name: (time.size - 1) / (time[-1] - time[0]) for name, (time, _) in usable.items()}
+    last = min(rates, key=lambda name: rates[name])
+    if rates[last] < 2.5 * HIGHEST_HZ:
+        return refuse(
+            f"{last} is sampled at {rates[last]:.3g} Hz, too slow for what is compared up to {HIGHEST_HZ:g} Hz",
             f"sample every channel at {4.0 * HIGHEST_HZ:g} Hz or faster",
         )
-    fastest = max((time.size - 1) / (time[-1] - time[0]) for time, _ in usable.values())
-    rate = min(fastest, _RATE_HZ)
+    rate = min(max(rates.values()), _RATE_HZ)
     instants = start + np.arange(floor((end - start) * rate) + 1) / rate
     even = {name: _at(instants, *each) for name, each in usable.items()}
     noise = {
@@ -170,7 +181,7 @@ def _evenly(
         for name, (time, values) in usable.items()
     }
     gaps = {name: _gaps(each[0], start) for name, each in usable.items()}
-    return _Even(recording.name, start, rate, slowest, even, gaps, noise), DataWarning("", "", source)
+    return _Even(recording.name, start, rate, rates[last], even, gaps, noise)
 
 
 def _at(instants: Array, time: Array, values: Array) -> Array:
@@ -272,7 +283,7 @@ class _Windows:
         part = 2.0 * np.pi * LEAD_S / length, 2.0 * np.pi * (LEAD_S + compared) / length
         windows = []
         for record, _, end in cut:
-            last = min(round(end * record.rate), next(iter(record.values.values())).size - 1)
+            last = min(round(end * record.rate), record.count - 1)
             first = last - round((LEAD_S + compared) * record.rate)
             windows.append(_Window(record, max(first, round(CLOSING_S * record.rate))))
         return cls(length, part, tuple(windows))

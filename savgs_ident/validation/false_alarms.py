@@ -60,6 +60,10 @@ class NullDraw:
     named: Sequence[str]
 
 
+LEAST_ODDS = -1000.0
+"""Log odds of a campaign in which no hypothesis came near enough to be fitted."""
+
+
 @dataclass(frozen=True)
 class AlarmBench:
     """A recorded campaign, recalibrated: what campaigns with nothing missing are drawn from.
@@ -85,9 +89,7 @@ class AlarmBench:
             if problem is None:
                 return NullDraw(number, None, False, ())
             evidence = _concluded(*fit_hypotheses(problem, no_progress))
-        odds, alarm = alarm_odds(evidence.weighed), evidence.kind != "none"
-        if not np.isfinite(odds):
-            return NullDraw(number, None, False, ())
+        odds, alarm = max(alarm_odds(evidence.weighed), LEAST_ODDS), evidence.kind != "none"
         named = evidence.chosen.hypothesis.effects or (evidence.kind,) * alarm
         return NullDraw(number, odds, alarm, named)
 
@@ -153,7 +155,7 @@ def alarm_bench(
         plant, data = problem_of_dwells(measured, given, settings)
         problem = recalibrate(plant, data, values, progress, settings.constants)
         problem, fitted = fit_hypotheses(problem, progress)
-        odds = alarm_odds(decide_among(problem, fitted).weighed)
+        odds = max(alarm_odds(decide_among(problem, fitted).weighed), LEAST_ODDS)
     level = data.test * len(plant.channels) + plant.channel
     return AlarmBench(problem, odds, _degrees_of_freedom(measured, problem), level, seed)
 

@@ -207,6 +207,7 @@ def test_peak_to_peak_values_of_a_road_are_refused() -> None:
         (lambda: Campaign("made", campaign().recordings[1:], (), ""), "there is no test"),
         (lambda: _standing(campaign()), "does not move"),
         (lambda: _thinned(campaign()), "too slow"),
+        (lambda: _apart(campaign()), "overlap for 0 s"),
     ],
 )
 def test_what_cannot_be_cut_is_refused_with_what_to_do(made, what: str) -> None:  # type: ignore[no-untyped-def]
@@ -219,6 +220,14 @@ def _standing(given: Campaign) -> Campaign:
     test, still = given.recordings
     level = test.channels["road_height"]
     channels = dict(test.channels) | {"road_height": _channel("road_height", level.time, 0.0 * level.time)}
+    return Campaign("made", (Recording(test.name, "road", None, channels), still), (), "")
+
+
+def _apart(given: Campaign) -> Campaign:
+    test, still = given.recordings
+    accel = test.channels["body_accel"]
+    later = _channel(accel.name, accel.time + 100.0, accel.values)
+    channels = dict(test.channels) | {accel.name: later}
     return Campaign("made", (Recording(test.name, "road", None, channels), still), (), "")
 
 
