@@ -1,5 +1,7 @@
 """Tests that do not repeat, cut into windows: a road in simulation, against an independent integration of it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -305,3 +307,13 @@ def test_a_fit_of_a_road_finds_what_it_was_made_with() -> None:
         found = fit[name]
         assert abs(found.value - PARAMETERS[name].value) < 4.0 * found.stderr
         assert found.stderr < 0.02 * found.value
+
+
+@pytest.mark.slow
+def test_a_diagnosis_of_a_road_of_a_true_model_finds_nothing_missing(tmp_path: Path) -> None:
+    found = si.diagnose(si.PlantModel(si.TwoMass(), PARAMETERS), campaign(seed=4, noise=3.0))
+    assert found.verdict.kind == "none"
+    assert found.shrink.recalibrated < 1.2 * found.shrink.floor
+    page = found.to_html(tmp_path / "road.html").read_text()
+    assert "2 windows of tests that do not repeat" in page
+    assert list(found.figure_names) == ["gap body_accel", "gap susp_deflection", "shrink"]
