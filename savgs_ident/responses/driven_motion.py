@@ -183,7 +183,7 @@ def _driven(
     if period is not None:
         noise = _repeatability(left, period, step)
         return DrivenMotion(source, step, position, velocity, acceleration, force, period * step, noise)
-    noise = _roughness(_thinned(left, step))
+    noise = roughness(_thinned(left, step))
     warning = DataWarning(
         "noise_assumed",
         "the motion does not repeat: its noise is taken from what is rough in the force, as if it were white",
@@ -227,8 +227,8 @@ def _repeatability(left: NDArray[np.float64], period: int, step: float) -> float
     return float(_NORMAL * np.median(np.abs(apart)) / np.sqrt(2.0))
 
 
-def _roughness(rows: NDArray[np.float64]) -> float:
-    """Standard deviation of white noise in rows [N] that are smooth but for that."""
+def roughness(rows: NDArray[np.float64]) -> float:
+    """Standard deviation of white noise in values (n,) that are smooth but for that, in their unit."""
     # The squares of the binomial coefficients 1, 3, 3, 1 add up to 20.
     return float(_NORMAL * np.median(np.abs(np.diff(rows, 3))) / np.sqrt(20.0))
 

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.recording import Campaign, Recording, TestKind
+from savgs_ident.responses.driven_motion import roughness
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, compared_share
 from savgs_ident.responses.outliers import estimate_standstill_noise
 
@@ -65,7 +66,6 @@ LONGEST_GAP = 5.0
 
 _RATE_HZ = 1000.0
 _FEWEST = 10
-_NORMAL = 1.4826
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ def _evenly(
     instants = start + np.arange(floor((end - start) * rate) + 1) / rate
     even = {name: _at(instants, *each) for name, each in usable.items()}
     noise = {
-        name: (still.get(name) or _roughness(values))
+        name: (still.get(name) or roughness(values))
         * max(1.0, rate * (time[-1] - time[0]) / time.size) ** 0.5
         for name, (time, values) in usable.items()
     }
@@ -192,12 +192,6 @@ def _at(instants: Array, time: Array, values: Array) -> Array:
     from scipy.interpolate import CubicSpline
 
     return np.asarray(CubicSpline(time, values)(instants))
-
-
-def _roughness(values: Array) -> float:
-    """Standard deviation of white noise in samples that are smooth but for that."""
-    # The squares of the binomial coefficients 1, 3, 3, 1 add up to 20.
-    return float(_NORMAL * np.median(np.abs(np.diff(values, 3))) / np.sqrt(20.0))
 
 
 def _gaps(time: Array, start: float) -> list[tuple[float, float]]:
