@@ -25,6 +25,7 @@ from savgs_ident.inference.find_map import (
     find_map,
     find_map_from_both,
     find_map_from_several,
+    is_hopeless,
     refine,
 )
 from savgs_ident.inference.observations import NumberChange, Term
@@ -114,7 +115,10 @@ class Fits:
     def extended(
         self, parent: LaplaceFit, scores: Sequence[Score], least: float = -np.inf
     ) -> list[LaplaceFit]:
-        """Fits of the scored terms, each added to those of ``parent``; those below ``least`` are given up."""
+        """Fits of the scored terms, each added to those of ``parent``.
+
+        Those below ``least`` are given up, and those whose scores promise too little for it are not begun.
+        """
         inherited = tuple(self.terms[name] for name in parent.terms)
 
         def fit(score: Score) -> LaplaceFit:
@@ -126,7 +130,14 @@ class Fits:
                 start = densest(self.search, terms, (start, instead), near)
             return find_map_from_both(self.search, terms, start, near, least=least)
 
-        return in_parallel(fit, scores)
+        return in_parallel(
+            fit,
+            [
+                each
+                for each in scores
+                if not is_hopeless(parent.evidence, each.evidence - parent.evidence, least)
+            ],
+        )
 
     def beside(self, parent: LaplaceFit, scores: Sequence[Score], least: float) -> list[LaplaceFit]:
         """Fits of the scored terms, each added to those of ``parent``: what swings, from its likely frequencies.

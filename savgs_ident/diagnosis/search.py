@@ -154,9 +154,10 @@ def _single_effects(fits: Fits, scores: Sequence[Score]) -> list[LaplaceFit]:
     worth = [each for each in scores if each.evidence > base.evidence + constants.promising_log_evidence]
     first, second = constants.first_fits, constants.first_fits + constants.further_fits
     alike = fits.lookalikes(worth[first:second], worth[:1])
-    begun = fits.extended(base, worth[:first])
+    # The best alone: where it explains all, little or nothing is worth fitting beside it.
+    begun = fits.refined(fits.extended(base, worth[:1]))
     least = fits.negligible(begun)
-    ranked = fits.refined([*begun, *fits.extended(base, alike, least)])
+    ranked = fits.refined([*begun, *fits.extended(base, [*worth[1:first], *alike], least)])
     names = {each.term.name for each in (*worth[:first], *alike)}
     later = [each for each in worth if each.term.name not in names]
     beyond = max(least, fits.negligible(ranked))

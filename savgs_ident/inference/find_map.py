@@ -41,6 +41,11 @@ HOPE = 10.0
 """How many times what its next step promises a search may still rise [1]; with less to go for it is given up."""
 
 
+def is_hopeless(value: float, promised: float, least: float) -> bool:
+    """Whether a search at a log density of ``value`` that rises by ``promised`` to first order misses ``least``."""
+    return value + HOPE * promised < least
+
+
 @dataclass(frozen=True)
 class LaplaceFit:
     """A hypothesis at its best.
@@ -206,19 +211,25 @@ class _Ascent:
         promised = top.value - point.value
         if promised < self._level:
             return point._replace(status=Status.CONVERGED if top.converged else Status.STALLED)
-        if point.value + HOPE * promised < self._least:
+        if is_hopeless(point.value, promised, self._least):
             return point._replace(status=Status.HOPELESS)
         there = self._at(top.x, here.warm_start)
         if there.value > point.value:
-            return there
-        for halving in range(1, HALVINGS):
-            there = self._without_slopes(point.x + 0.5**halving * (top.x - point.x), here.warm_start)
+            done = there.value < point.value + self._level and promised < ROUGH
+            return there._replace(status=Status.CONVERGED) if done else there
+        for share in self._shares(promised):
+            there = self._without_slopes(point.x + share * (top.x - point.x), here.warm_start)
             if there.value > point.value:
                 there = self._at(there.x, there.prediction.warm_start)
             if there.value > point.value:
                 little = there.value < point.value + self._level
                 return there._replace(status=Status.CONVERGED) if little else there
         return point._replace(status=Status.CONVERGED if promised < ROUGH else Status.STALLED)
+
+    def _shares(self, promised: float) -> list[float]:
+        """Shares of a step to try in its place: those that to first order rise by as much as counts."""
+        every = (0.5**halving for halving in range(1, HALVINGS))
+        return [share for share in every if share * (2.0 - share) * promised > self._level]
 
     def mode(self, point: _Point, steps: int, progress: Progress | None = None) -> LaplaceFit:
         """The fit where at most so many further steps lead to."""
