@@ -45,10 +45,11 @@ if TYPE_CHECKING:
     from savgs_ident.export.json_export import read_model_json
     from savgs_ident.export.public import Exported, export
     from savgs_ident.export.python_control_export import load_python_control, resting_point
+    from savgs_ident.fit.along_motion import HeldOutForce, MotionFit
     from savgs_ident.fit.estimate import Estimate
+    from savgs_ident.fit.identified import Verdict as Identifiability
     from savgs_ident.fit.public import Comparison, compare, demo, fit
     from savgs_ident.fit.result import Fit
-    from savgs_ident.fit.result import Verdict as Identifiability
     from savgs_ident.fit.sampling import sample
     from savgs_ident.inference.result import Convergence, Marginal, Posterior
     from savgs_ident.plants.axis import Axis
@@ -64,7 +65,7 @@ if TYPE_CHECKING:
     from savgs_ident.recordings.channels import ChannelMap
     from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording, RecordingLayout
     from savgs_ident.report.presenters import plot_bode
-    from savgs_ident.responses.driven_motion import DrivenMotion, load_motion
+    from savgs_ident.responses.driven_motion import DrivenMotion, is_motion, load_motion
     from savgs_ident.responses.harmonic_response import HarmonicResponse
     from savgs_ident.responses.summary import CampaignSummary, inspect
     from savgs_ident.simulate.public import (
@@ -89,6 +90,7 @@ _PLACES = {
     "load_baseline": "plants.quarter_car.model",
     "load_campaign": "plants.quarter_car.rig_recordings",
     "load_motion": "responses.driven_motion",
+    "is_motion": "responses.driven_motion",
     "ChannelMap": "recordings.channels",
     "RecordingLayout": "recordings.recording",
     "default_campaign_path": "plants.quarter_car.rig",
@@ -164,6 +166,7 @@ _PLACES = {
     "LinearStudy": "control.linear_study",
     "LoopStudy": "control.closed_loop.study",
     "PlantCheck": "validation.check_plant",
+    "MotionFit": "fit.along_motion",
     "Posterior": "inference.result",
     "Rig": "plants.quarter_car.rig",
     "SimulatedResponse": "simulate.public",
@@ -175,8 +178,9 @@ _PLACES = {
     "DataWarning": "core.errors",
     "Estimate": "fit.estimate",
     "Finding": "validation.plant_declaration",
+    "HeldOutForce": "fit.along_motion",
     "Hypothesis": "diagnosis.result",
-    "Identifiability": "fit.result:Verdict",
+    "Identifiability": "fit.identified:Verdict",
     "Marginal": "inference.result",
     "Margins": "control.synthesis",
     "NextTest": "diagnosis.result",
@@ -224,6 +228,7 @@ __all__ = [
     "Finding",
     "Fit",
     "HarmonicResponse",
+    "HeldOutForce",
     "Hypothesis",
     "Identifiability",
     "Input",
@@ -233,6 +238,7 @@ __all__ = [
     "Marginal",
     "Margins",
     "Model",
+    "MotionFit",
     "NextTest",
     "Number",
     "Origin",
@@ -278,6 +284,7 @@ __all__ = [
     "fit",
     "generic_effects",
     "inspect",
+    "is_motion",
     "linearise",
     "load_baseline",
     "load_campaign",

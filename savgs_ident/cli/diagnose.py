@@ -1,15 +1,16 @@
 """``savgs-ident diagnose``: where the gap between rig and model lies, what causes it, how far it shrinks."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from savgs_ident.cli.console import Progress, Reporter, ends_with_code
+from savgs_ident.cli.console import Reporter, ends_with_code
 from savgs_ident.cli.options import (
     QUARTER_CAR,
     BaselineOption,
     ChannelsOption,
+    HeldOutOption,
     JsonOption,
     MaxFrequencyOption,
     OrdersOption,
@@ -19,11 +20,8 @@ from savgs_ident.cli.options import (
     WithOption,
     baseline_model,
     command_line,
-    read_campaign,
+    read_recorded,
 )
-
-if TYPE_CHECKING:
-    from savgs_ident import Campaign, DrivenMotion, Model
 
 
 @ends_with_code
@@ -47,14 +45,7 @@ def diagnose(
         list[str] | None,
         typer.Option("--without", metavar="EFFECT ...", help="Leave effects out of the catalogue."),
     ] = None,
-    held_out: Annotated[
-        Path | None,
-        typer.Option(
-            "--held-out",
-            metavar="FILE",
-            help="Another motion along the drive, which is predicted and compared.",
-        ),
-    ] = None,
+    held_out: HeldOutOption = None,
     max_frequency: MaxFrequencyOption = None,
     orders: OrdersOption = 9,
     channels: ChannelsOption = None,
@@ -87,8 +78,8 @@ def diagnose(
     with reporter.working() as progress:
         found = si.diagnose(
             baseline,
-            _recorded(baseline, campaign, channels, progress),
-            held_out=None if held_out is None else _recorded(baseline, held_out, channels, progress),
+            read_recorded(campaign, channels, progress, baseline),
+            held_out=None if held_out is None else read_recorded(held_out, channels, progress, baseline),
             without=without or (),
             orders=orders,
             max_frequency=max_frequency,
@@ -97,15 +88,3 @@ def diagnose(
         )
         files = found.save(out, progress)
     return reporter.conclude(found, files)
-
-
-def _recorded(
-    baseline: "Model", path: Path, channels: Path | None, progress: Progress
-) -> "Campaign | DrivenMotion":
-    """What was recorded; raises :class:`InputError` if it cannot be read."""
-    import savgs_ident as si
-
-    if path.suffix != ".mat":
-        return read_campaign(path, channels, progress, baseline)
-    progress(f"reading {path}")
-    return si.load_motion(path)

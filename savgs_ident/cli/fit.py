@@ -13,6 +13,7 @@ from savgs_ident.cli.options import (
     FitOrdersOption,
     FixedTolerancesOption,
     FreeOption,
+    HeldOutOption,
     JsonOption,
     MaxFrequencyOption,
     ModelOption,
@@ -23,7 +24,7 @@ from savgs_ident.cli.options import (
     WithOption,
     command_line,
     model_to_fit,
-    read_campaign,
+    read_recorded,
 )
 
 
@@ -42,6 +43,7 @@ def fit(
         bool, typer.Option("--peak-to-peak", help="Fit peak-to-peak values only, as the paper did.")
     ] = False,
     max_frequency: MaxFrequencyOption = None,
+    held_out: HeldOutOption = None,
     out: OutOption = Path("out/fit"),
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -50,7 +52,10 @@ def fit(
 
     Of a campaign without dwells a road, a sweep or any other motion of at least six seconds is cut into windows.
 
-    Writes fit.json, model.toml (the identified model), bode.png and bode.pdf; of windows spectra.png and spectra.pdf.
+    A plant with one coordinate and one input is held against the force of its drive along the measured motion then.
+
+    Writes fit.json, model.toml (the identified model), bode.png and bode.pdf; of windows spectra.png and spectra.pdf,
+    along a motion drive.png and drive.pdf.
 
     Effects that a diagnosis names are put into the model by --with, and their parameters are identified, too.
 
@@ -62,6 +67,8 @@ def fit(
     Example: savgs-ident fit campaign.csv.gz --with rail_stribeck
 
     Example: savgs-ident fit tests.csv --plant pendulum.py:Pendulum
+
+    Example: savgs-ident fit axis.mat --plant axis --with guide_preload --held-out axis_again.mat
     """
     import savgs_ident as si
     from savgs_ident.core.files import prepare_folder
@@ -72,8 +79,9 @@ def fit(
     with reporter.working() as progress:
         found = si.fit(
             start,
-            read_campaign(campaign, channels, progress, start),
+            read_recorded(campaign, channels, progress, start),
             free or (),
+            held_out=None if held_out is None else read_recorded(held_out, channels, progress, start),
             orders=orders,
             peak_to_peak=peak_to_peak,
             fixed_tolerances=fixed_tolerances,

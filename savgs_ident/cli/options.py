@@ -16,7 +16,7 @@ import typer
 from savgs_ident.cli.console import Progress
 
 if TYPE_CHECKING:
-    from savgs_ident import Campaign, Model, PlantModel
+    from savgs_ident import Campaign, DrivenMotion, Model, PlantModel
 
 
 class ModelName(StrEnum):
@@ -114,6 +114,14 @@ JobsOption = Annotated[
         "--jobs", min=1, help="Trials at a time; one for each core if not given.", show_default=False
     ),
 ]
+HeldOutOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--held-out",
+        metavar="FILE",
+        help="Another motion along the drive, which is predicted and compared.",
+    ),
+]
 OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress and no tables.")]
@@ -192,6 +200,21 @@ def read_campaign(
     if model is None:
         return si.load_campaign(path, channels, progress=told)
     return si.load_campaign(path, channels, layout=model.layout, progress=told)
+
+
+def read_recorded(
+    path: Path, channels: Path | None, progress: Progress, model: "Model"
+) -> "Campaign | DrivenMotion":
+    """A campaign, or the motion of a servo axis where a MATLAB file holds one.
+
+    Raises :class:`InputError` for what cannot be read.
+    """
+    import savgs_ident as si
+
+    if not si.is_motion(path):
+        return read_campaign(path, channels, progress, model)
+    progress(f"reading {path}")
+    return si.load_motion(path)
 
 
 def effects_of(model: ModelName | None) -> Literal["simqc", "simtr"] | None:

@@ -14,6 +14,12 @@ from math import inf, isfinite
 
 from savgs_ident.core.errors import InputError
 
+TYPICAL = "typical"
+"""Source of a number that stands for an order of magnitude alone: no sheet has it."""
+
+SIZED = "typical of the recorded force"
+"""Source of such a number once it was set beside what was recorded."""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -21,7 +27,7 @@ class Parameter:
 
     ``tolerance`` is the standard deviation with which the value is known beforehand [``unit``]; 0 means
     exact or, for a parameter that is to be identified, that only its bounds are known beforehand.
-    ``source`` is where the number comes from, ``about`` what it describes.
+    ``source`` is where the number comes from, :data:`TYPICAL` if from nowhere, ``about`` what it describes.
     """
 
     name: str

@@ -9,16 +9,14 @@ sensor are not among the candidates.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import ceil
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, cycle_position
 from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.loops import root_sum_square
@@ -38,27 +36,20 @@ from savgs_ident.inference.background.port_functions import (
     motion_functions,
     prandtl_element,
 )
+from savgs_ident.inference.drive_force import force_data, force_rows, relative_miss
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.plants.base import AbstractPlant, AtPorts
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.simulate.along_motion import (
-    Needed,
     Samples,
     force_gain,
-    force_slopes,
     needed_force,
     needed_forces,
     ports_along,
 )
+from savgs_ident.simulate.driven_plant import samples_of
 from savgs_ident.simulate.program_cache import placed
-from savgs_ident.simulate.sensitivity import unit_tangents
-
-WIDTH = 48
-"""Room for slopes in one program, or multiples of it: a program for each number of them would have to be compiled."""
-
-PRECISION = 1e-6
-"""Largest Newton step that may remain in a state, in its typical size [1]."""
 
 
 class _Seen(NamedTuple):
@@ -88,53 +79,27 @@ class MotionProblem(AbstractProblem):
         """The channel of each row: there is one."""
         return np.zeros(self.motion.row_times.size, np.intp)
 
-    @property
+    @cached_property
     def samples(self) -> Samples:
         """The motion as the equations take it."""
-        motion = self.motion
-        speed = 2.0 * np.pi / motion.period
-        angle = speed * motion.step * np.arange(motion.position.size)
-        signals = (
-            motion.position,
-            motion.velocity,
-            motion.acceleration,
-            motion.drive,
-            np.gradient(motion.drive, motion.step),
-            angle,
-            np.full_like(angle, speed),
-        )
-        return Samples(*(jnp.asarray(each) for each in signals))
+        return samples_of(self.motion)
 
     def start(self, values: Mapping[str, float]) -> None:
         """Nothing: the motion is known."""
         del values
 
-    def _force(self, terms: tuple[str, ...], values: Mapping[str, float]) -> NDArray[np.float64]:
-        """The force that is needed from the drive [N] at every sample, (n,)."""
-        p = placed(self.values(values))
-        return np.asarray(needed_force(self.model(terms), p, self.samples, self.motion.step).force)
-
     def predict(
         self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
     ) -> Prediction:
         """Force rows [N] with ``terms`` at ``values`` [SI], with slopes in ``names``."""
-        needed, slopes = self._with_slopes(self.model(terms), values, names)
-        status = Status.CONVERGED if float(needed.step_left) < PRECISION else Status.STALLED
-        return Prediction(self.motion.rows(np.asarray(needed.force)), slopes, status, warm_start)
+        found = force_rows(self.model(terms), self.values(values), self.motion, names)
+        return Prediction(found.rows, found.slopes, found.status, warm_start)
 
-    def _with_slopes(
+    def _slopes(
         self, model: AbstractPlant, values: Mapping[str, float], names: Sequence[str]
-    ) -> tuple[Needed, NDArray[np.float64]]:
-        """The force that is needed, and slopes of the rows in the named parameters [N per SI unit], (m, n)."""
-        p, step = placed(self.values(values)), self.motion.step
-        if not names:
-            needed = needed_force(model, p, self.samples, step)
-            return needed, np.zeros((self.motion.row_times.size, 0))
-        directions = placed(unit_tangents(p, names, ceil(len(names) / WIDTH) * WIDTH))
-        needed, slopes = force_slopes(
-            model, p, self.samples, step, directions, placed(np.asarray(len(names)))
-        )
-        return needed, self.motion.rows(np.asarray(slopes)[: len(names)]).T
+    ) -> NDArray[np.float64]:
+        """Slopes of the rows in the named parameters [N per SI unit], (m, n)."""
+        return force_rows(model, self.values(values), self.motion, names).slopes
 
     def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
@@ -156,7 +121,7 @@ class MotionProblem(AbstractProblem):
     ) -> NDArray[np.float64]:
         names, everything = [each.name for each in term.amplitudes], self.complete(terms)
         tries = [dict(values) | shapes for shapes in term.tried]
-        return np.stack([self._with_slopes(everything, each, names)[1] for each in tries])
+        return np.stack([self._slopes(everything, each, names) for each in tries])
 
     def _secants(
         self, terms: tuple[str, ...], values: Mapping[str, float], base: NDArray[np.float64], term: Term
@@ -186,7 +151,9 @@ class MotionProblem(AbstractProblem):
     ) -> list[InputLocation]:
         """What an unknown signal at each location could do to the force that is needed."""
         del warm_start
-        seen = _Seen(self._at_ports(terms, values).signals, self._force(terms, values))
+        p = placed(self.values(values))
+        needed = needed_force(self.model(terms), p, self.samples, self.motion.step)
+        seen = _Seen(self._at_ports(terms, values).signals, np.asarray(needed.force))
         found = []
         for name, ports in ports_by_location(self.plant).items():
             kinds = {port.kind for port in ports}
@@ -243,7 +210,7 @@ class MotionProblem(AbstractProblem):
     ) -> InputLocation:
         """A location of numbers alone: slopes in them."""
         numbers = [number for port in ports for number in port.numbers]
-        columns = self._with_slopes(self.complete(terms), values, [each.name for each in numbers])[1]
+        columns = self._slopes(self.complete(terms), values, [each.name for each in numbers])
         columns = columns * np.array([each.change for each in numbers])
         laws = laws_of_functions(columns, (Family.NUMBER,) * len(numbers), self.constants)
         return InputLocation(name, laws, columns)
@@ -356,17 +323,10 @@ def motion_problem(
     free: tuple[str, ...] = (),
     constants: DecisionConstants = DEFAULTS,
 ) -> tuple[MotionProblem, Data]:
-    """The problem of a measured motion, and the force of its drive as data.
-
-    A relative discrepancy of one moves every row by the root mean square of the force: a model misses by as much
-    whenever it does.
-    """
+    """The problem of a measured motion, and the force of its drive as data."""
     offered = {name: each for name, each in catalogue.items() if each.port.kind is not PortKind.SENSOR}
     problem = MotionProblem(plant, parameters, offered, baseline, free, motion=motion, constants=constants)
-    force = motion.rows(motion.drive)
-    size = float(np.sqrt(np.mean(force**2)))
-    variance, scale = (np.full(force.size, each) for each in (motion.noise**2, size))
-    return problem, Data(force, variance, scale, motion.blocks)
+    return problem, force_data(motion)
 
 
 def further_motion(
@@ -380,12 +340,7 @@ def further_motion(
     """
     there = replace(problem, motion=motion)
     measured = motion.rows(motion.drive)
-    gaps = [
-        float(
-            np.linalg.norm(measured - there.predict(terms, values, (), None).rows) / np.linalg.norm(measured)
-        )
-        for terms, values in points
-    ]
+    gaps = [relative_miss(measured, there.predict(terms, values, (), None).rows) for terms, values in points]
     floor = float(problem.motion.noise * np.sqrt(measured.size) / np.linalg.norm(measured))
     return FurtherShrink(
         Path(motion.source).name, gaps[0], gaps[1], gaps[2] if len(gaps) > 2 else np.nan, floor

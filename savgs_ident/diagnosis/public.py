@@ -7,7 +7,7 @@ The model says which effects may be missing in its plant, and which such plants 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from savgs_ident.core.errors import DataWarning, InputError
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progress
 from savgs_ident.diagnosis.diagnose import (
     Watch,
@@ -24,14 +24,14 @@ from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.observations import Data
-from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.responses.driven_motion import DrivenMotion, recorded_motion
+from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
+from savgs_ident.simulate.driven_plant import longest_motion, motion_in, sized_along
 from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep, response_of_tests
 from savgs_ident.simulate.forgetting import lasting_windows
 from savgs_ident.simulate.program_cache import use_persistent_cache
@@ -72,8 +72,8 @@ def diagnose(
     do not exist, and for a model without periodic motion.
     """
     use_persistent_cache()
-    if isinstance(measured, Campaign) and _is_driven(model.plant) and not measured.of_kind("dwell"):
-        measured = longest_motion(measured, model)
+    motion = motion_in(measured, model) if isinstance(measured, Campaign) else None
+    measured = measured if motion is None else motion
     if isinstance(measured, DrivenMotion):
         held_out = longest_motion(held_out, model) if isinstance(held_out, Campaign) else held_out
         return _diagnose_motion(model, measured, held_out, without, constants, command, progress)
@@ -91,41 +91,6 @@ def diagnose(
     plant, data = problem_of_dwells(response, given, settings)
     origin = model.origin(campaign, (*warnings, *found_in_sweep)).with_command(command)
     return diagnose_dwells(plant, data, response, given, settings, values, progress, sweep, origin=origin)
-
-
-def _is_driven(plant: AbstractPlant | type[AbstractPlant]) -> bool:
-    """Whether a plant can be held against the force of its drive along a measured motion."""
-    return len(plant.coordinates) == 1 and len(plant.inputs) == 1
-
-
-def longest_motion(campaign: Campaign, model: Model) -> DrivenMotion:
-    """The longest test of a campaign that is not at rest, as a motion of a plant with one coordinate and its drive.
-
-    Raises :class:`InputError` where no channel reads the coordinate, or the test cannot be used.
-    """
-    plant = model.plant
-    (coordinate,), (drive,) = plant.coordinates, plant.inputs
-    reading = next((each.name for each in plant.channels if each.unit == coordinate.unit), None)
-    if reading is None:
-        raise InputError(
-            f"no channel of {model.plant_name} reads '{coordinate.name}' in {coordinate.unit}",
-            source=campaign.source,
-            remedy="record harmonic dwells, or declare the channel of the measured motion",
-        )
-    moving = [each for each in campaign.recordings if each.kind != "standstill"]
-    if not moving:
-        raise InputError("nothing moves in it", source=campaign.source, remedy="record a motion")
-    test = max(moving, key=lambda each: each.duration_s)
-    motion = recorded_motion(test, reading, drive.name, campaign.source)
-    if len(moving) == 1:
-        return motion
-    others = DataWarning(
-        "tests_not_used",
-        f"of {len(moving)} motions only the longest is diagnosed, '{test.name}'",
-        source=campaign.source,
-        remedy="give another as a file of its own by --held-out: it is predicted, and compared",
-    )
-    return replace(motion, warnings=(*motion.warnings, others))
 
 
 def problem_of_dwells(
@@ -150,13 +115,8 @@ def _diagnose_motion(
     progress: Progress,
 ) -> Diagnosis:
     """Diagnose a plant from the force of its drive along a measured motion."""
+    model = sized_along(model, motion)
     bare, given = replace(model.build(), effects=()), model.before
-    if len(bare.coordinates) != 1 or len(bare.inputs) != 1:
-        raise InputError(
-            f"{model.name} is no plant with one coordinate and one input, its drive",
-            source=motion.source,
-            remedy="give a recording of dwells, or a plant that is driven along the measured motion",
-        )
     settings, values = _asked(model, 0, without, constants)
     offered = offered_effects(given.candidates, settings)
     problem, data = motion_problem(

@@ -195,6 +195,10 @@ def best_pairs(search: Search, mode: LaplaceFit, scores: Sequence[Score], most: 
     return sorted((scored(*pair) for pair in first), key=lambda each: -each.evidence)
 
 
+SINGULAR = 1e-12
+"""Share of the information on two effects at which they are the same one: what double precision resolves."""
+
+
 def _ranked_pairs(
     mode: LaplaceFit,
     residual: NDArray[np.float64],
@@ -214,9 +218,12 @@ def _ranked_pairs(
 
     def promise(pair: tuple[int, int]) -> float:
         both = parts[pair[0]] + parts[pair[1]]
-        block = information[np.ix_(both, both)]
-        rise = gradient[both] @ np.linalg.solve(block, gradient[both])
-        return 0.5 * float(rise - np.linalg.slogdet(block)[1])
+        # In units in which its diagonal is one, so that typical sizes far from the true ones cost no digits.
+        unit = 1.0 / np.sqrt(np.diag(information)[both])
+        along, axes = np.linalg.eigh(information[np.ix_(both, both)] * np.outer(unit, unit))
+        along = np.maximum(along, SINGULAR)
+        rise = np.sum((axes.T @ (gradient[both] * unit)) ** 2 / along)
+        return 0.5 * float(rise - np.sum(np.log(along)) + 2.0 * np.sum(np.log(unit)))
 
     return sorted(combinations(range(len(moved)), 2), key=promise, reverse=True)
 

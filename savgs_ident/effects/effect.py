@@ -168,6 +168,27 @@ class Effect(eqx.Module):
         assert isinstance(self.law, AbstractSensorLaw), self.name
         return self.law.transfer(self._values(p), frequency)
 
+    def sized(self, port: Port) -> "Effect":
+        """The effect with the typical numbers of its law where those at its port are of the sizes of ``port``.
+
+        Numbers that are none of the typical ones, as a plant's own effects have them, stay as they are.
+        """
+        here, there = self.law.typical(self.port), self.law.typical(port)
+        own = {each.name: each for each in self.parameters}
+        numbers: list[tuple[str, str | float]] = []
+        for role, given in self.numbers:
+            typical, other = here.get(role), there.get(role)
+            if isinstance(given, str):
+                numbers.append((role, given))
+                mine = own.get(given)
+                if isinstance(typical, Parameter) and isinstance(other, Parameter) and mine is not None:
+                    own[given] = replace(other, name=given) if mine == replace(typical, name=given) else mine
+            else:
+                typically = given == typical and isinstance(other, float)
+                numbers.append((role, other if typically and isinstance(other, float) else given))
+        resized = tuple(own[each.name] for each in self.parameters)
+        return replace(self, parameters=resized, numbers=tuple(numbers))
+
     def _values(self, p: Values) -> Values:
         """The law's numbers by role."""
         return {

@@ -18,8 +18,9 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Progress
+from savgs_ident.fit.identified import Verdict
 from savgs_ident.fit.minimise import Minimiser, Minimum
-from savgs_ident.fit.result import Verdict, comparable, gaps
+from savgs_ident.fit.result import comparable, gaps
 from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import Pins, Problem, Task
 from savgs_ident.plants.base import Excitation
@@ -246,6 +247,9 @@ def _proposals(
     return proposals
 
 
+INFORMED = 0.5
+"""Share of its spread before the data below which an identified parameter has a standard error."""
+
 EXPLAINED = 2.0
 """chi2 per datum up to which the data count as explained."""
 
@@ -277,7 +281,7 @@ def assess(task: Task, minimiser: Minimiser, best: Minimum, explained: bool, pro
         return Verdict(False, ("The fit broke down: nothing can be said about the parameters.",))
     per_datum, missed = _chi2_per_datum(problem, best), _misfit(task, best)
     if not explained:
-        return Verdict(False, (_unexplained(per_datum, missed),), explained=False)
+        return Verdict(False, (unexplained(per_datum, missed),), explained=False)
     covariance = _log_covariance(problem, best, values)
     bounds: dict[str, float] = {}
     advice: tuple[str, ...] = ()
@@ -299,7 +303,8 @@ def assess(task: Task, minimiser: Minimiser, best: Minimum, explained: bool, pro
     return replace(verdict, sentences=(beyond, *verdict.sentences))
 
 
-def _unexplained(per_datum: float, missed: float) -> str:
+def unexplained(per_datum: float, missed: float) -> str:
+    """That a model misses its data, by chi2 per datum and as a share of the response [1]."""
     return (
         f"The model does not explain these data: it misses by {100.0 * missed:.2g} % of the response beyond the "
         f"noise (chi2/dof = {per_datum:.3g}). Look for what is missing with `diagnose`. Until then the parameters "

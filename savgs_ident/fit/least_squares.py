@@ -23,13 +23,15 @@ from savgs_ident.core.values import as_values
 from savgs_ident.fit.estimate import Estimate
 from savgs_ident.fit.identifiability import (
     EXPLAINED,
+    INFORMED,
     assess,
     explained_by_noise,
     misses_little,
     weighed_by_misfit,
 )
+from savgs_ident.fit.identified import Verdict
 from savgs_ident.fit.minimise import Minimiser, Minimum
-from savgs_ident.fit.result import Fit, Verdict
+from savgs_ident.fit.result import Fit
 from savgs_ident.fit.small_errors import FitWithErrors, fit_with_errors, own_part
 from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import Problem, ProblemSettings, Quantity, Task, plan_task
@@ -166,9 +168,6 @@ EXPLORING = 12
 _SHIFT = 0.4
 """Distance of further starts from the first in every identified coordinate: about a factor of one and a half, or less
 than half a tolerance."""
-
-INFORMED = 0.5
-"""Share of its spread before the data below which an identified parameter has a standard error."""
 
 
 def fit_least_squares(

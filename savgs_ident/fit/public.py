@@ -14,13 +14,17 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.presentation import Progress, Result, no_progress
+from savgs_ident.fit.along_motion import MotionFit, fit_along_motion
 from savgs_ident.fit.least_squares import FitSettings, fit_least_squares
 from savgs_ident.fit.result import Fit, comparable
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.model import load_model
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.driven_plant import longest_motion, motion_in
 from savgs_ident.simulate.excitation import (
     Measurements,
     campaign_of,
@@ -40,25 +44,28 @@ from savgs_ident.simulate.public import (
 
 def fit(
     model: Model,
-    measured: Measurements,
+    measured: Measurements | DrivenMotion,
     free: Sequence[str] = (),
     *,
+    held_out: Campaign | DrivenMotion | None = None,
     orders: int = 9,
     peak_to_peak: bool = False,
     fixed_tolerances: bool = False,
     max_frequency: float | None = None,
     command: Sequence[str] = (),
     progress: Progress = no_progress,
-) -> Fit:
+) -> Fit | MotionFit:
     """Identify a model: parameters with errors, how well they fit, what the data identify.
 
     Args:
         model: the rig, or another plant, with its effects; one that was identified before starts from what was known
             then, for its values would count the data twice.
         measured: the recordings, or the response of their dwells. Where there are no dwells, a road or a sweep is cut
-            into windows.
+            into windows; a plant with one coordinate and one input is held against the force of its drive along the
+            measured motion, or along one that is given.
         free: names of the parameters to identify; if empty the paper's four, as far as the rig has them, and what its
             further effects bring along; or those of another plant of which nothing is known but two bounds.
+        held_out: another motion, that nothing is fitted to: its force is predicted, and compared.
         orders: highest harmonic order to fit.
         peak_to_peak: fit peak-to-peak values only, as the paper did.
         fixed_tolerances: hold what is known to a tolerance at its value instead of estimating it along.
@@ -69,12 +76,48 @@ def fit(
     Look at ``trusted`` of the result. Raises :class:`InputError` for a campaign that cannot be used and for unknown
     parameters.
     """
+    use_persistent_cache()
+    motion = motion_in(measured, model) if isinstance(measured, Campaign) else None
+    measured = measured if motion is None else motion
+    if isinstance(measured, DrivenMotion):
+        if peak_to_peak or max_frequency is not None:
+            raise InputError(
+                "a force along a measured motion has neither peak-to-peak values nor frequencies",
+                remedy="leave out --peak-to-peak and --max-frequency",
+            )
+        return _fit_motion(model, measured, free, held_out, fixed_tolerances, command, progress)
+    if held_out is not None:
+        raise InputError(
+            "a held-out motion goes with a measured motion alone", remedy="fit each campaign by itself"
+        )
     settings = FitSettings(
         orders=orders,
         fixed_tolerances=fixed_tolerances,
         quantity="peak_to_peak" if peak_to_peak else "harmonics",
     )
     return fit_with(model, measured, free, settings, max_frequency, command, progress)
+
+
+def _fit_motion(
+    model: Model,
+    motion: DrivenMotion,
+    free: Sequence[str],
+    held_out: Campaign | DrivenMotion | None,
+    fixed_tolerances: bool,
+    command: Sequence[str],
+    progress: Progress,
+) -> MotionFit:
+    """Identify a model by the force of its drive along a measured motion."""
+    drawing = model.before
+    return fit_along_motion(
+        drawing,
+        motion,
+        free=drawing.free(free),
+        fixed_tolerances=fixed_tolerances,
+        held_out=longest_motion(held_out, model) if isinstance(held_out, Campaign) else held_out,
+        origin=replace(model.origin(warnings=motion.warnings), data=motion.source, command=tuple(command)),
+        progress=progress,
+    )
 
 
 def fit_with(
@@ -112,7 +155,8 @@ def demo(progress: Progress = no_progress, *, command: Sequence[str] = ()) -> Fi
     """
     path = default_campaign_path()
     progress(f"reading {path}")
-    return fit(load_model(), load_campaign(path), command=command, progress=progress)
+    campaign = load_campaign(path)
+    return fit_with(load_model(), campaign, (), FitSettings(), None, command, progress)
 
 
 @dataclass(frozen=True)

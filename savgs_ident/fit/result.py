@@ -14,52 +14,18 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.files import spelled_out
-from savgs_ident.core.presentation import Result, package_versions
 from savgs_ident.core.status import Status
-from savgs_ident.fit.estimate import FAR_OFF, Estimate, far_off_sentence
-from savgs_ident.inference.result import UNEXPLAINED
-from savgs_ident.plants.model import Model
+from savgs_ident.fit.identified import Identified
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
 
-PACKAGES = ("jax", "optimistix", "numpy", "scipy")
-"""Whose version matters to a fit."""
-
 
 @dataclass(frozen=True)
-class Verdict:
-    """What the data identify, in words.
+class Fit(Identified):
+    """A finished fit of harmonics; arrays are read-only.
 
     Attributes:
-        identifiable: whether every free parameter is identified.
-        sentences: the verdict, one statement each.
-        confounded: groups of free parameters that trade off against each other.
-        explained: whether the model explains the data, but for small errors that every model has.
-    """
-
-    identifiable: bool
-    sentences: tuple[str, ...]
-    confounded: tuple[tuple[str, ...], ...] = ()
-    explained: bool = True
-
-    def __str__(self) -> str:
-        return "\n".join(self.sentences)
-
-
-@dataclass(frozen=True)
-class Fit(Result):
-    """A finished fit; arrays are read-only.
-
-    Attributes:
-        estimated: the model with the estimated values in place of the assumed ones.
-        estimates: all estimated parameters, free ones first.
-        covariance: of the estimates in their order [products of their units], (n, n).
-        chi2: weighted sum of squared residuals of the data alone.
-        dof: real data entries less free parameters.
         prior_chi2: squared deviations of all parameters from what was known before, in its standard deviations.
-        status: how the optimisation ended, over all dwells.
         dwell_status: whether the model's periodic solution converged, per dwell.
-        verdict: what the data identify and what they do not.
         measured: the response that was fitted.
         orders: highest harmonic order used.
         used: which entries of ``predicted`` were fitted, (D, C, orders + 1).
@@ -69,22 +35,12 @@ class Fit(Result):
         as_given: the model before fitting [unit of the reading], (D, C, orders + 1).
         starts: (chi2 reached, status) of each start of the optimisation.
         quantity: "harmonics" or "peak_to_peak", what was fitted.
-        wall_s: time taken [s].
-
-    ``fit["mu_r"].value`` is an estimate, ``fit.model`` the identified model.
     """
 
     presenter: ClassVar[str] = "FIT"
 
-    estimated: Model
-    estimates: tuple[Estimate, ...]
-    covariance: NDArray[np.float64]
-    chi2: float
-    dof: int
     prior_chi2: float
-    status: Status
     dwell_status: tuple[Status, ...]
-    verdict: Verdict
     measured: HarmonicResponse
     orders: int
     used: NDArray[np.bool_]
@@ -94,26 +50,6 @@ class Fit(Result):
     as_given: NDArray[np.complex128]
     starts: tuple[tuple[float, Status], ...]
     quantity: str
-    wall_s: float
-
-    def __post_init__(self) -> None:
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
-
-    def __getitem__(self, name: str) -> Estimate:
-        """The estimate of a parameter; raises ``KeyError`` for one that was not estimated."""
-        return self.by_name[name]
-
-    @property
-    def model(self) -> Model:
-        """The identified model, of the kind that was fitted, which remembers where its numbers come from."""
-        return self.estimated.with_provenance(self._provenance())
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names of the effects in the model."""
-        return self.estimated.effects
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -121,77 +57,15 @@ class Fit(Result):
         return tuple(each.name for each in self.estimated.channels)
 
     @property
-    def trusted(self) -> bool:
-        """Whether the fit converged everywhere, the model explains the data, and they identify what is free."""
-        return not self.doubt
+    def unsolved(self) -> str:
+        """Whether periodic motions are lacking, in words."""
+        found = all(each.ok for each in self.dwell_status)
+        return "" if found else "the model's periodic motion was not found in every dwell"
 
     @property
-    def far_off(self) -> tuple[Estimate, ...]:
-        """What is known to a tolerance and would be off its sheet by more than is believed, farthest first."""
-        off = [each for each in self.estimates if not each.free and each.tolerances_off > FAR_OFF]
-        return tuple(sorted(off, key=lambda each: -each.tolerances_off))
-
-    @property
-    def doubt(self) -> str:
-        """The first reason why the fit is not to be trusted; empty if it is.
-
-        Where the model does not explain the data, that steps or motions are lacking is no advice: parameters that are
-        to make up for what is missing lead far away. Nor is that something is missing where a number is off as by a
-        wrong unit.
-        """
-        if self.far_off and (self.far_off[0].unit_taken or self.verdict.explained):
-            return far_off_sentence(self.far_off[0])
-        if not self.verdict.explained and self.status in (Status.CONVERGED, Status.MAX_ITERATIONS):
-            return UNEXPLAINED
-        if not self.status.ok:
-            return self.status.advice
-        if not all(each.ok for each in self.dwell_status):
-            return "the model's periodic motion was not found in every dwell"
-        return "" if self.verdict.identifiable else "the data do not identify every free parameter"
-
-    @property
-    def by_name(self) -> Mapping[str, Estimate]:
-        """The estimates by parameter name."""
-        return {estimate.name: estimate for estimate in self.estimates}
-
-    @property
-    def free_names(self) -> tuple[str, ...]:
-        """Names of the identified parameters."""
-        return tuple(estimate.name for estimate in self.estimates if estimate.free)
-
-    @property
-    def correlation(self) -> NDArray[np.float64]:
-        """Correlation of the estimates [1], (n, n)."""
-        sd = np.sqrt(np.diag(self.covariance))
-        return np.asarray(self.covariance / np.outer(sd, sd))
-
-    def _provenance(self) -> dict[str, object]:
-        """The table ``[provenance]`` of a ``model.toml``.
-
-        ``before`` holds the values that the estimated parameters had before the fit, the centres of their priors;
-        the covariance is in the order of its names. SI.
-        """
-        return {
-            "command": spelled_out(self.origin.command_line),
-            "data": spelled_out(self.origin.data),
-            "data_sha256": self.origin.data_sha256,
-            "effects": list(self.effects),
-            "free": list(self.free_names),
-            "known_to_tolerance": [each.name for each in self.estimates if not each.free],
-            "quantity": self.quantity,
-            "orders": self.orders,
-            "chi2": float(self.chi2),
-            "dof": int(self.dof),
-            "status": self.status.name.lower(),
-            "trusted": self.trusted,
-            **({"doubt": self.doubt} if self.doubt else {}),
-            "before": {each.name: each.prior for each in self.estimates},
-            "versions": package_versions(PACKAGES),
-            "covariance": {
-                "names": [each.name for each in self.estimates],
-                "matrix": self.covariance.tolist(),
-            },
-        }
+    def compared(self) -> Mapping[str, object]:
+        """Quantity and highest order."""
+        return {"quantity": self.quantity, "orders": self.orders}
 
 
 @dataclass(frozen=True)

@@ -346,7 +346,7 @@ def plan_task(
     """
     table, plant = model.table, model.build()
     used = used_parameters(plant, table)
-    _check_free(free, table, used)
+    check_free(free, table, used)
     tolerated = tuple(name for name in known_to_tolerance(table, free) if name in used)
     free_vector = FreeVector(table, free, () if settings.fixed_tolerances else tolerated)
     target: Target
@@ -360,7 +360,8 @@ def plan_task(
     return Task(model, table, measured, settings, excitation, problem)
 
 
-def _check_free(free: tuple[str, ...], table: ParameterTable, used: frozenset[str]) -> None:
+def check_free(free: tuple[str, ...], table: ParameterTable, used: frozenset[str]) -> None:
+    """Raises :class:`InputError` for parameters to identify that do not exist or are not ``used``."""
     remedy = "choose among: " + ", ".join(sorted(used))
     for name in free:
         if name not in table:

@@ -15,7 +15,7 @@ from typing import ClassVar, NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from savgs_ident.core.parameter import Parameter, ParameterTable
+from savgs_ident.core.parameter import TYPICAL, Parameter, ParameterTable
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import Number, Port, PortKind, PortSignals
 from savgs_ident.effects.composition import EffectsAtInstant
@@ -78,11 +78,21 @@ ENCODER = Port("encoder", PortKind.SENSOR, "sensor.position", displacement=1e-5)
 
 PARAMETERS = ParameterTable(
     (
-        Parameter("mass", 100.0, "kg", lower=1.0, upper=1e4, about="mass that the motor feels"),
-        Parameter("viscous_friction", 100.0, "N s/m", lower=0.0, upper=1e5, about="viscous friction"),
+        Parameter("mass", 100.0, "kg", lower=1e-4, upper=1e8, about="mass that the motor feels"),
+        Parameter("viscous_friction", 100.0, "N s/m", lower=0.0, upper=1e9, about="viscous friction"),
         Parameter("holding", 0.0, "N/m", lower=0.0, about="stiffness of the position loop"),
-        Parameter("k_pre", 1e6, "N/m", lower=1.0, about="stiffness of the guide before it slides"),
-        Parameter("c_pre", 3e3, "N s/m", lower=0.0, about="damping of the guide before it slides"),
+        Parameter(
+            "k_pre",
+            1e6,
+            "N/m",
+            tolerance=2e6,
+            lower=0.0,
+            about="stiffness of the guide before it slides",
+            source=TYPICAL,
+        ),
+        Parameter(
+            "c_pre", 3e3, "N s/m", lower=0.0, about="damping of the guide before it slides", source=TYPICAL
+        ),
         Parameter("g", 9.80665, "m/s^2", about="acceleration of free fall"),
     )
 )

@@ -15,8 +15,9 @@ from math import isfinite
 from typing import Any, Protocol, Self
 
 from savgs_ident.core.errors import DataWarning, InputError, blamed_on
-from savgs_ident.core.parameter import Parameter, ParameterTable, merge_parameters
+from savgs_ident.core.parameter import SIZED, TYPICAL, Parameter, ParameterTable, merge_parameters
 from savgs_ident.core.presentation import Origin
+from savgs_ident.effects.base import Port
 from savgs_ident.effects.effect import Effect, generic_effects
 from savgs_ident.plants.base import AbstractPlant, Channel
 from savgs_ident.recordings.recording import Campaign, ChannelSpec, RecordingLayout
@@ -240,6 +241,33 @@ class PlantModel:
             )
         return found
 
+    def sized(self, ports: Mapping[str, Port]) -> "PlantModel":
+        """The model with effects whose laws are of the sizes of ``ports``, by name, which stand for its own.
+
+        So are contacts whose stiffness and damping are typical numbers only.
+        """
+
+        def sized(effect: Effect) -> Effect:
+            return effect.sized(ports[effect.port.name]) if effect.port.name in ports else effect
+
+        catalogue = {name: sized(effect) for name, effect in self.catalogue.items()}
+        plant = replace(self.plant, effects=tuple(sized(effect) for effect in self.plant.effects))
+        ratios = {
+            name: ports[port.name].force / port.force
+            for port in self.plant.ports
+            if port.contact is not None and port.name in ports
+            for name in port.contact
+        }
+        brought = {
+            old: new
+            for name, effect in self.catalogue.items()
+            for old, new in zip(effect.parameters, catalogue[name].parameters, strict=True)
+        }
+        # A table that was set as a whole has the parameters of effects, too.
+        known = (brought.get(each, each) for each in self.parameters.entries)
+        resized = ParameterTable(tuple(_times(each, ratios.get(each.name, 1.0)) for each in known))
+        return replace(self, plant=plant, parameters=resized, catalogue=catalogue)
+
     @property
     def identified(self) -> tuple[tuple[str, ...], dict[str, float]]:
         """The parameters that a fit left free, and the values of all that it moved [SI]."""
@@ -276,6 +304,20 @@ class PlantModel:
             return origin
         every = (*campaign.warnings, *warnings)
         return replace(origin, data=campaign.source, data_sha256=campaign.sha256, warnings=every)
+
+
+def _times(number: Parameter, ratio: float) -> Parameter:
+    """A typical number that is so many times as large; any other as it is."""
+    if number.source != TYPICAL:
+        return number
+    return replace(
+        number,
+        value=number.value * ratio,
+        tolerance=number.tolerance * ratio,
+        lower=number.lower * ratio,
+        upper=number.upper * ratio,
+        source=SIZED,
+    )
 
 
 def layout_of(plant: AbstractPlant | type[AbstractPlant]) -> RecordingLayout:

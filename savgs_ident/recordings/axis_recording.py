@@ -245,6 +245,14 @@ class AxisRecording:
         return float(self.time[-1] - self.time[0]) / (self.time.size - 1)
 
 
+def is_axis(path: Path) -> bool:
+    """Whether a file has all variables of such a recording; not where it cannot be read as one."""
+    try:
+        return {*SIGNALS, GAIN} <= {*array_names(path)}
+    except InputError:
+        return False
+
+
 def read_axis(path: Path) -> AxisRecording:
     """A recording from a MATLAB file.
 

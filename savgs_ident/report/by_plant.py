@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from savgs_ident.diagnosis.result import Diagnosis
-    from savgs_ident.fit.result import Fit
+    from savgs_ident.fit.identified import Identified
     from savgs_ident.plants.model import PlantModel
     from savgs_ident.plants.quarter_car.model import RigModel
 
@@ -35,7 +35,7 @@ class PlantReport:
         write_model: writes the identified plant into a folder; the files.
     """
 
-    write_model: Callable[["Fit", Path], Iterator[Path]]
+    write_model: Callable[["Identified", Path], Iterator[Path]]
     ports_figure: Callable[["Diagnosis"], "Figure"] | None = None
     scale: str = ""
 
@@ -46,14 +46,14 @@ def _rig_figure(diagnosis: "Diagnosis") -> "Figure":
     return rig_figure(diagnosis)
 
 
-def _write_rig(fit: "Fit", folder: Path) -> Iterator[Path]:
+def _write_rig(fit: "Identified", folder: Path) -> Iterator[Path]:
     from savgs_ident.plants.quarter_car.rig import write_rig
 
     write_rig(cast("RigModel", fit.model).rig, folder / "model.toml")
     yield folder / "model.toml"
 
 
-def _write_plant_model(fit: "Fit", folder: Path) -> Iterator[Path]:
+def _write_plant_model(fit: "Identified", folder: Path) -> Iterator[Path]:
     from savgs_ident.plants.model_toml import write_model
 
     yield write_model(cast("PlantModel", fit.model), folder / "model.toml")

@@ -13,6 +13,7 @@ from rich.console import Group, RenderableType
 
 from savgs_ident.core.files import warning_record
 from savgs_ident.fit.estimate import Estimate
+from savgs_ident.fit.identified import Identified
 from savgs_ident.fit.public import Comparison
 from savgs_ident.fit.result import (
     Fit,
@@ -37,19 +38,8 @@ def fit_record(fit: Fit) -> dict[str, object]:
     """
     return {
         "schema": 1,
-        "parameters": {
-            each.name: {
-                "value": each.value,
-                "stderr": each.stderr,
-                "own_stderr": each.own_stderr,
-                "unit": each.unit,
-                "free": each.free,
-                "prior": each.prior,
-                "prior_sd": each.prior_sd,
-            }
-            for each in fit.estimates
-        },
-        "correlation": _named_matrix(fit, fit.correlation),
+        "parameters": parameter_records(fit),
+        "correlation": correlation_record(fit),
         "chi2": fit.chi2,
         "dof": fit.dof,
         "chi2_per_dof": fit.chi2 / fit.dof if fit.dof > 0 else None,
@@ -94,11 +84,27 @@ def gap_entry(before: Gap, after: Gap) -> dict[str, float]:
     }
 
 
-def _named_matrix(fit: Fit, matrix: NDArray[np.float64]) -> dict[str, dict[str, float]]:
-    names = [each.name for each in fit.estimates]
+def parameter_records(fit: Identified) -> dict[str, dict[str, object]]:
+    """All estimates by name, in SI."""
     return {
-        name: dict(zip(names, row, strict=True)) for name, row in zip(names, matrix.tolist(), strict=True)
+        each.name: {
+            "value": each.value,
+            "stderr": each.stderr,
+            "own_stderr": each.own_stderr,
+            "unit": each.unit,
+            "free": each.free,
+            "prior": each.prior,
+            "prior_sd": each.prior_sd,
+        }
+        for each in fit.estimates
     }
+
+
+def correlation_record(fit: Identified) -> dict[str, dict[str, float]]:
+    """Correlations of the estimates [1], by name."""
+    names = [each.name for each in fit.estimates]
+    rows = fit.correlation.tolist()
+    return {name: dict(zip(names, row, strict=True)) for name, row in zip(names, rows, strict=True)}
 
 
 def _dwell_records(fit: Fit) -> list[dict[str, object]]:
@@ -203,12 +209,12 @@ _FAR = 2.0
 def fit_text(fit: Fit) -> RenderableType:
     """Tables and sentences of a fit, most important first."""
     parts = [
-        _identified(fit),
+        identified_table(fit),
         _quality(fit),
         *_correlation(fit),
         plain(""),
         _gap_table(fit),
-        *_tolerances(fit),
+        *tolerance_tables(fit),
         *_far_dwells(fit),
         plain("Verdict", "bold"),
         *(plain(f"- {sentence}") for sentence in _verdict(fit)),
@@ -229,7 +235,8 @@ def value_with_error(value: float, error: float) -> str:
     return f"{value:.{places}f} ± {error:.{places}f}"
 
 
-def _identified(fit: Fit) -> RenderableType:
+def identified_table(fit: Identified) -> RenderableType:
+    """The identified parameters with their errors."""
     rows = [
         (
             each.name,
@@ -260,7 +267,7 @@ def _compared(fit: Fit) -> str:
     return f"harmonics of orders 1 to {fit.orders} of {tests} dwells"
 
 
-def _about(fit: Fit, name: str) -> str:
+def _about(fit: Identified, name: str) -> str:
     """What a parameter is, in a few words."""
     return fit.estimated.table[name].about.split(",")[0]
 
@@ -294,7 +301,8 @@ def _gap_table(fit: Fit) -> RenderableType:
     return table("Gap between measurement and model", headers, rows)
 
 
-def _tolerances(fit: Fit) -> list[RenderableType]:
+def tolerance_tables(fit: Identified) -> list[RenderableType]:
+    """What was known to a tolerance and has changed by half of one or more."""
     known = [each for each in fit.estimates if not each.free]
     if not known:
         return []

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from savgs_ident.diagnosis.result import Diagnosis
+    from savgs_ident.fit.along_motion import MotionFit
+    from savgs_ident.fit.identified import Identified
     from savgs_ident.fit.public import Comparison
     from savgs_ident.fit.result import Fit
     from savgs_ident.inference.result import Posterior
@@ -69,6 +71,16 @@ class _Identified(AbstractPresenter[Shown]):
         yield from draw_comparison(self.comparison(result), folder, progress)
 
 
+def doubts_of(fit: "Identified") -> tuple[str, ...]:
+    """Why a fit is not to be trusted, in a sentence that says what to do next; nothing if it is."""
+    from savgs_ident.inference.result import UNEXPLAINED
+
+    if not fit.doubt:
+        return ()
+    remedy = ": look for what is missing with `diagnose`" if fit.doubt == UNEXPLAINED else ""
+    return (f"{fit.doubt}{remedy}.",)
+
+
 class _Fit(_Identified["Fit"]):
     stem = "fit"
 
@@ -83,12 +95,7 @@ class _Fit(_Identified["Fit"]):
         return fit_text(result)
 
     def doubts(self, result: "Fit") -> tuple[str, ...]:
-        from savgs_ident.inference.result import UNEXPLAINED
-
-        if not result.doubt:
-            return ()
-        remedy = ": look for what is missing with `diagnose`" if result.doubt == UNEXPLAINED else ""
-        return (f"{result.doubt}{remedy}.",)
+        return doubts_of(result)
 
     def comparison(self, result: "Fit") -> "Comparison":
         from savgs_ident.fit.public import comparison_of
@@ -96,6 +103,33 @@ class _Fit(_Identified["Fit"]):
         return comparison_of(result)
 
     def more(self, result: "Fit", folder: Path) -> Iterator[Path]:
+        from savgs_ident.report.by_plant import report_of
+
+        yield from report_of(result.estimated).write_model(result, folder)
+
+
+class _MotionFit(AbstractPresenter["MotionFit"]):
+    stem = "fit"
+
+    def record(self, result: "MotionFit") -> Mapping[str, Any]:
+        from savgs_ident.report.motion_fit import motion_fit_record
+
+        return motion_fit_record(result)
+
+    def text(self, result: "MotionFit") -> RenderableType:
+        from savgs_ident.report.motion_fit import motion_fit_text
+
+        return motion_fit_text(result)
+
+    def doubts(self, result: "MotionFit") -> tuple[str, ...]:
+        return doubts_of(result)
+
+    def figures(self, result: "MotionFit") -> Figures:
+        from savgs_ident.report.motion_fit import force_figure
+
+        return {"drive": lambda: force_figure(result)}
+
+    def more(self, result: "MotionFit", folder: Path) -> Iterator[Path]:
         from savgs_ident.report.by_plant import report_of
 
         yield from report_of(result.estimated).write_model(result, folder)
@@ -162,6 +196,7 @@ def comparison_figure(comparison: "Comparison", progress: Progress = no_progress
 
 
 FIT = _Fit()
+MOTION_FIT = _MotionFit()
 COMPARISON = _Comparison()
 
 
@@ -246,7 +281,7 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
 
     def figures(self, result: "Diagnosis") -> Figures:
         from savgs_ident.report.by_plant import report_of
-        from savgs_ident.report.diagnosis.compared import diagnosis_bode_figure, drive_figure
+        from savgs_ident.report.diagnosis.compared import diagnosis_bode_figure, drive_figure_of
         from savgs_ident.report.diagnosis.figures import (
             gap_map_figure,
             regime_figure,
@@ -261,7 +296,7 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
             f"force {number}": partial(force_figure, result, loop) for number, loop in enumerate(result.loops)
         }
         if result.measured is None:
-            return {"drive": lambda: drive_figure(result), **shrink, **loops}
+            return {"drive": lambda: drive_figure_of(result), **shrink, **loops}
         if result.measured.part is not None:
             from savgs_ident.report.diagnosis.gap_spectra import gap_spectrum_figure
 

@@ -95,6 +95,7 @@ _FILES = {
     "ALARM_STUDY": "present_validation",
     "CALIBRATION_STUDY": "present_validation",
     "FIT": "present_campaign",
+    "MOTION_FIT": "present_campaign",
     "COMPARISON": "present_campaign",
     "SIMULATED_RESPONSE": "present_models",
     "SIMULATED_SWEEP": "present_models",

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.axis_recording import AxisRecording, read_axis
+from savgs_ident.recordings.axis_recording import AxisRecording, is_axis, read_axis
 from savgs_ident.recordings.recording import RecordedChannel, Recording
 
 CUTOFF_HZ = 100.0
@@ -109,6 +109,11 @@ class DrivenMotion:
         """The block of time that each row belongs to, (m,)."""
         every = self.every * self.step
         return (np.arange(self.row_times.size) / round(BLOCK_S / every)).astype(np.intp)
+
+
+def is_motion(path: Path | str) -> bool:
+    """Whether a file is a MATLAB file with the variables that :func:`load_motion` reads."""
+    return Path(path).suffix == ".mat" and is_axis(Path(path))
 
 
 def load_motion(path: Path | str) -> DrivenMotion:

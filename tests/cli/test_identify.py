@@ -12,7 +12,8 @@ from click.testing import Result
 
 from savgs_ident.core.status import Status
 from savgs_ident.fit import public
-from savgs_ident.fit.result import Fit, Verdict
+from savgs_ident.fit.identified import Verdict
+from savgs_ident.fit.result import Fit
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
 from savgs_ident.report import present_campaign
 

@@ -7,6 +7,7 @@ from ..cli.command_rows import COMMANDS
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PAGE = (REPOSITORY / "docs/plants.md").read_text("utf-8")
+HARDWARE = (REPOSITORY / "docs/hardware.md").read_text("utf-8")
 
 
 def test_the_file_on_the_page_is_the_one_that_is_shipped_and_has_forty_lines() -> None:
@@ -16,9 +17,24 @@ def test_the_file_on_the_page_is_the_one_that_is_shipped_and_has_forty_lines() -
 
 
 def test_its_commands_are_those_of_the_program() -> None:
-    (block,) = re.findall(r"^```sh\n(.*?)^```$", PAGE, re.M | re.S)
-    typed = [line.split() for line in block.splitlines() if line.startswith("savgs-ident ")]
+    typed = _commands(PAGE)
     assert {words[1] for words in typed} == {"check-plant", "inspect", "fit", "diagnose", "posterior"}
+    _are_known(typed)
+
+
+def test_the_commands_of_the_page_on_hardware_are_those_of_the_program() -> None:
+    typed = _commands(HARDWARE)
+    assert {words[1] for words in typed} == {"fit", "diagnose"}
+    _are_known(typed)
+
+
+def _commands(page: str) -> list[list[str]]:
+    blocks = re.findall(r"^```sh\n(.*?)^```$", page, re.M | re.S)
+    lines = (line for block in blocks for line in block.splitlines())
+    return [line.split() for line in lines if line.startswith("savgs-ident ")]
+
+
+def _are_known(typed: list[list[str]]) -> None:
     for words in typed:
         known = {name for each in COMMANDS[words[1]].params for name in each.opts}
         assert {word for word in words if word.startswith("--")} <= known

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.result import Diagnosis
 from savgs_ident.fit.estimate import Estimate
-from savgs_ident.fit.result import Fit, Verdict
+from savgs_ident.fit.identified import Verdict
+from savgs_ident.fit.result import Fit
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak

@@ -19,7 +19,8 @@ from savgs_ident.core.errors import DataWarning
 from savgs_ident.core.files import to_json
 from savgs_ident.core.presentation import Origin
 from savgs_ident.core.status import Status
-from savgs_ident.fit.result import Fit, Verdict, chi2_by_dwell
+from savgs_ident.fit.identified import Verdict
+from savgs_ident.fit.result import Fit, chi2_by_dwell
 from savgs_ident.plants.quarter_car.rig import read_rig, write_rig
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.report.campaigns.inspect import campaign_text, summary_record

@@ -44,7 +44,7 @@ from savgs_ident.fit.collocation.transcription import (
     unknowns_of,
 )
 from savgs_ident.fit.estimate import Estimate
-from savgs_ident.fit.least_squares import INFORMED
+from savgs_ident.fit.identifiability import INFORMED
 from savgs_ident.inference.laplace import Spread, spread_of
 from savgs_ident.inference.problem import ProblemSettings, Task, plan_task
 from savgs_ident.plants.base import AbstractPlant

@@ -22,9 +22,10 @@ from savgs_ident.diagnosis.result import Diagnosis, DriveForces, Responses
 from savgs_ident.fit.result import measured_points
 from savgs_ident.report.bode import LINES, draw_magnitude, draw_phase
 from savgs_ident.report.diagnosis.text import model_label
+from savgs_ident.report.drive import drive_figure
 from savgs_ident.report.html import Picture, embed
 from savgs_ident.report.text import channel_labels
-from savgs_ident.report.theme import GREY, INK, PALE, frequency_axis, magnitude_axis, new_figure, styled
+from savgs_ident.report.theme import PALE, frequency_axis, magnitude_axis, new_figure, styled
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.public import ModelCurve, model_curve
 
@@ -160,38 +161,19 @@ def _draw_gap(axes: Axes, frequency: NDArray[np.float64], gap: FirstHarmonicGap)
     axes.set_ylim(bottom, 1.6 * top)
 
 
-SHOWN_S = 7.0
-"""Longest stretch of the motion that is drawn [s]: about a cycle of a slow axis."""
-
-
-def drive_figure(diagnosis: Diagnosis) -> Figure:
+def drive_figure_of(diagnosis: Diagnosis) -> Figure:
     """The force of the drive and what is left of it; the diagnosis must be one along a motion."""
     forces = diagnosis.responses
     assert isinstance(forces, DriveForces)
-    shown = forces.time <= forces.time[0] + SHOWN_S
-    time = forces.time[shown]
-    with styled():
-        figure = new_figure(9.2, 5.6)
-        above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(0.5, 1.0, 1.0))
-        above.plot(time, forces.velocity[shown], color=GREY, lw=1.2)
-        above.set_ylabel("velocity [m/s]")
-        middle.plot(time, forces.measured[shown], color=INK, lw=3.2, alpha=0.35, label="measured")
-        noise = diagnosis.shrink.floor * float(np.sqrt(np.mean(forces.measured**2)))
-        below.axhspan(-noise, noise, color=PALE, lw=0.0, zorder=0.5)
-        models = (
-            (model_label(diagnosis), forces.after),
-            ("recalibrated", forces.recalibrated),
-            ("before, as given", forces.before),
-        )
-        for (label, force), line in zip(models, LINES, strict=True):
-            middle.plot(time, force[shown], label=label, **line)
-            below.plot(time, (forces.measured - force)[shown], **line)
-        middle.set_ylabel("force of the drive [N]")
-        below.set_ylabel("measured less\nneeded [N]")
-        below.set_xlabel("time since the first sample [s]")
-        _explain_lines(figure, middle)
-        figure.align_ylabels()
-        return figure
+    noise = diagnosis.shrink.floor * float(np.sqrt(np.mean(forces.measured**2)))
+    models = (
+        (model_label(diagnosis), forces.after),
+        ("recalibrated", forces.recalibrated),
+        ("before, as given", forces.before),
+    )
+    plant = diagnosis.given.plant
+    units = plant.inputs[0].unit, f"{plant.coordinates[0].unit}/s"
+    return drive_figure(forces.time, forces.velocity, forces.measured, models, noise, units)
 
 
 def drive_words(diagnosis: Diagnosis) -> str:
@@ -212,10 +194,4 @@ def drive_picture(diagnosis: Diagnosis) -> Picture | None:
     """The force along a motion for the page, with its words; there is none of dwells."""
     if not isinstance(diagnosis.responses, DriveForces):
         return None
-    return embed(drive_figure(diagnosis), drive_words(diagnosis))
-
-
-def _explain_lines(figure: Figure, axes: Axes) -> None:
-    lines, _ = axes.get_legend_handles_labels()
-    noise = Patch(color=PALE, label="measurement noise")
-    figure.legend(handles=[*lines, noise], loc="outside upper center", ncols=5, columnspacing=1.2)
+    return embed(drive_figure_of(diagnosis), drive_words(diagnosis))

@@ -1,0 +1,210 @@
+"""The fit of a plant along a measured motion: the parameters with which it needs the force that its drive exerted.
+
+    fit = fit_along_motion(model, motion, free=("mass", "viscous_friction"))
+    fit["mass"].value, fit["mass"].stderr
+
+The motion hides under closed loop what a model lacks; the force shows it. Every row of force is weighed by its noise.
+What the model leaves beyond that is in the errors of the parameters as in a fit of harmonics: all of it may lie along
+a parameter (:func:`savgs_ident.fit.identifiability.weighed_by_misfit`).
+"""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progress
+from savgs_ident.core.transforms import known_to_tolerance
+from savgs_ident.fit.estimate import Estimate
+from savgs_ident.fit.identifiability import (
+    CHANCE,
+    EXPLAINED,
+    INFORMED,
+    MATERIAL_MISFIT,
+    unexplained,
+    verdict_of,
+)
+from savgs_ident.fit.identified import Identified, Verdict
+from savgs_ident.inference.drive_force import DriveForce, force_data, relative_miss
+from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.inference.laplace import spread_of
+from savgs_ident.inference.prior import sheet_coordinate, slopes_at
+from savgs_ident.inference.problem import check_free, used_parameters
+from savgs_ident.plants.model import Model
+from savgs_ident.responses.driven_motion import DrivenMotion
+from savgs_ident.simulate.driven_plant import sized_along
+
+
+class HeldOutForce(NamedTuple):
+    """Another motion that nothing was fitted to: its file, and by how much its force is missed [1].
+
+    ``as_given`` before the fit, ``identified`` with the estimated values, ``noise`` by the noise alone.
+    """
+
+    source: str
+    as_given: float
+    identified: float
+    noise: float
+
+
+@dataclass(frozen=True)
+class MotionFit(Identified):
+    """A finished fit along a measured motion of m rows.
+
+    Attributes:
+        motion: what was measured.
+        measured: force of the drive, low-passed and thinned [N], (m,).
+        as_given: force that the model needs before the fit [N], (m,).
+        predicted: force that the identified model needs [N], (m,).
+        held_out: another motion, predicted; None where there is none.
+    """
+
+    presenter: ClassVar[str] = "MOTION_FIT"
+
+    motion: DrivenMotion
+    measured: NDArray[np.float64]
+    as_given: NDArray[np.float64]
+    predicted: NDArray[np.float64]
+    held_out: HeldOutForce | None = None
+
+    @property
+    def unsolved(self) -> str:
+        """Nowhere: that states were not found is in the status."""
+        return ""
+
+    @property
+    def compared(self) -> Mapping[str, object]:
+        """The force of the drive."""
+        return {"quantity": "force of the drive"}
+
+    @property
+    def gap(self) -> tuple[float, float, float]:
+        """Relative rms [1] by which the force is missed before the fit and after, and that of the noise alone."""
+        noise = self.motion.noise / float(np.sqrt(np.mean(self.measured**2)))
+        before, after = (relative_miss(self.measured, rows) for rows in (self.as_given, self.predicted))
+        return before, after, noise
+
+
+def fit_along_motion(
+    model: Model,
+    motion: DrivenMotion,
+    *,
+    free: tuple[str, ...],
+    fixed_tolerances: bool = False,
+    held_out: DrivenMotion | None = None,
+    origin: Origin = NO_ORIGIN,
+    progress: Progress = no_progress,
+) -> MotionFit:
+    """Fit ``free`` parameters of a model with one coordinate to the force of its drive.
+
+    What is known to a tolerance is estimated along, unless ``fixed_tolerances``. ``held_out`` is predicted, and
+    compared. Look at ``trusted`` of the result. Raises :class:`InputError` for names that do not exist or that the
+    model does not use, and for a plant that is not held against its drive.
+    """
+    began = time.perf_counter()
+    model = sized_along(model, motion)
+    table, plant = model.table, model.build()
+    used = used_parameters(plant, table)
+    check_free(free, table, used)
+    tolerated = () if fixed_tolerances else tuple(n for n in known_to_tolerance(table, free) if n in used)
+    coordinates = tuple(sheet_coordinate(table[name]) for name in (*free, *tolerated))
+    problem, data = DriveForce(plant, table, motion, coordinates), force_data(motion)
+    progress("finding the force that the model needs as given")
+    as_given = problem.predict((), {}, (), None).rows
+    mode = find_map(search_of(problem, data), (), {}, None, progress=progress)
+    predicted = mode.prediction.rows
+    residual = (data.measured - predicted) / motion.noise
+    chi2, dof = float(residual @ residual), data.measured.size - len(free)
+    estimates, covariance = _estimates(mode, model, free, chi2, motion.noise)
+    verdict = _verdict(estimates, covariance, len(free), chi2, dof, relative_miss(data.measured, predicted))
+    apart = None if held_out is None else _apart(problem, held_out, mode)
+    return MotionFit(
+        estimated=model.with_values({each.name: each.value for each in estimates}),
+        estimates=estimates,
+        covariance=covariance,
+        chi2=chi2,
+        dof=dof,
+        status=mode.status,
+        verdict=verdict,
+        wall_s=time.perf_counter() - began,
+        motion=motion,
+        measured=data.measured,
+        as_given=as_given,
+        predicted=predicted,
+        held_out=apart,
+        origin=origin,
+    )
+
+
+def _estimates(
+    mode: LaplaceFit, model: Model, free: tuple[str, ...], chi2: float, noise: float
+) -> tuple[tuple[Estimate, ...], NDArray[np.float64]]:
+    """The estimates, free ones first, and their covariance [products of their units]."""
+    coordinates, rows = mode.coordinates, mode.slopes.shape[0]
+    expected = rows - len(free)
+    beyond = max(chi2 - expected - CHANCE * np.sqrt(2.0 * max(expected, 0)), 0.0)
+    known = np.array([each.name not in free for each in coordinates], np.float64)
+    priors = np.diag(known)
+    scaled, own = (
+        spread_of(np.concatenate([mode.slopes / noise / size, priors]))
+        for size in (np.sqrt(1.0 + beyond), 1.0)
+    )
+    slope = slopes_at(coordinates, mode.x)
+    estimates = []
+    for place, each in enumerate(coordinates):
+        before = model.table[each.name]
+        told = scaled.sd[place] < INFORMED or each.name not in free
+        unit = abs(slope[place]) if told else np.inf
+        estimates.append(
+            Estimate(
+                name=each.name,
+                value=mode.values[each.name],
+                stderr=float(unit * scaled.sd[place]),
+                own_stderr=float(unit * own.sd[place]),
+                unit=before.unit,
+                free=each.name in free,
+                prior=before.value,
+                prior_sd=before.tolerance,
+            )
+        )
+    return tuple(estimates), scaled.covariance * np.outer(slope, slope)
+
+
+def _verdict(
+    estimates: tuple[Estimate, ...],
+    covariance: NDArray[np.float64],
+    free: int,
+    chi2: float,
+    dof: int,
+    missed: float,
+) -> Verdict:
+    """What the data say of the free parameters, where the model explains them."""
+    per_datum = chi2 / max(dof, 1)
+    beyond = missed * float(np.sqrt(max(1.0 - 1.0 / max(per_datum, 1.0), 0.0)))
+    if per_datum > EXPLAINED and beyond > MATERIAL_MISFIT:
+        return Verdict(False, (unexplained(per_datum, beyond),), explained=False)
+    names = tuple(each.name for each in estimates[:free])
+    values = np.array([each.value for each in estimates[:free]])
+    logarithms = covariance[:free, :free] / np.outer(values, values)
+    return verdict_of(
+        names,
+        dict(zip(names, values.tolist(), strict=True)),
+        {each.name: each.unit for each in estimates},
+        logarithms,
+        {},
+        (),
+    )
+
+
+def _apart(problem: DriveForce, motion: DrivenMotion, mode: LaplaceFit) -> HeldOutForce:
+    """How a motion that nothing was fitted to is predicted."""
+    there = DriveForce(problem.model, problem.table, motion, problem.nuisances)
+    measured = motion.rows(motion.drive)
+    before, after = (
+        relative_miss(measured, there.predict((), values, (), None).rows) for values in ({}, mode.values)
+    )
+    noise = motion.noise / float(np.sqrt(np.mean(measured**2)))
+    return HeldOutForce(motion.source, before, after, noise)

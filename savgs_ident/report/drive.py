@@ -1,0 +1,53 @@
+"""The force of a drive along a measured motion, drawn: measured, as models need it, and what they leave."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from savgs_ident.report.bode import LINES
+from savgs_ident.report.theme import GREY, INK, PALE, new_figure, styled
+
+SHOWN_S = 7.0
+"""Longest stretch of the motion that is drawn [s]: about a cycle of a slow axis."""
+
+
+def drive_figure(
+    time: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    models: Sequence[tuple[str, NDArray[np.float64]]],
+    noise: float,
+    units: tuple[str, str],
+) -> Figure:
+    """Velocity, force, and force less that which each of the ``models`` needs, over ``time`` [s]; (m,) each.
+
+    The models are labels with their force, the best first. ``noise`` is the standard deviation of the force,
+    ``units`` are those of force and velocity.
+    """
+    shown = time <= time[0] + SHOWN_S
+    with styled():
+        figure = new_figure(9.2, 5.6)
+        above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(0.5, 1.0, 1.0))
+        above.plot(time[shown], velocity[shown], color=GREY, lw=1.2)
+        above.set_ylabel(f"velocity [{units[1]}]")
+        middle.plot(time[shown], measured[shown], color=INK, lw=3.2, alpha=0.35, label="measured")
+        below.axhspan(-noise, noise, color=PALE, lw=0.0, zorder=0.5)
+        for (label, force), line in zip(models, LINES, strict=False):
+            middle.plot(time[shown], force[shown], label=label, **line)
+            below.plot(time[shown], (measured - force)[shown], **line)
+        middle.set_ylabel(f"force of the drive [{units[0]}]")
+        below.set_ylabel(f"measured less\nneeded [{units[0]}]")
+        below.set_xlabel("time since the first sample [s]")
+        _explain_lines(figure, middle)
+        figure.align_ylabels()
+        return figure
+
+
+def _explain_lines(figure: Figure, axes: Axes) -> None:
+    lines, _ = axes.get_legend_handles_labels()
+    noise = Patch(color=PALE, label="measurement noise")
+    figure.legend(handles=[*lines, noise], loc="outside upper center", ncols=5, columnspacing=1.2)

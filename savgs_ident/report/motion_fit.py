@@ -1,0 +1,82 @@
+"""A fit along a measured motion: as a JSON object, in the terminal, and drawn."""
+
+from matplotlib.figure import Figure
+from rich.console import Group, RenderableType
+
+from savgs_ident.core.files import warning_record
+from savgs_ident.fit.along_motion import MotionFit
+from savgs_ident.report.drive import drive_figure
+from savgs_ident.report.fit import correlation_record, identified_table, parameter_records, tolerance_tables
+from savgs_ident.report.text import fixed, plain, table
+
+
+def motion_fit_record(fit: MotionFit) -> dict[str, object]:
+    """Parameters first, then how well the force is explained and how the fit went; SI, gaps relative [1]."""
+    before, after, noise = fit.gap
+    record: dict[str, object] = {
+        "schema": 1,
+        "parameters": parameter_records(fit),
+        "correlation": correlation_record(fit),
+        "chi2": fit.chi2,
+        "dof": fit.dof,
+        "chi2_per_dof": fit.chi2 / fit.dof if fit.dof > 0 else None,
+        "converged": fit.status.ok,
+        "trusted": fit.trusted,
+        "gap": {"force": {"before": before, "after": after, "floor": noise}},
+        "status": fit.status.name.lower(),
+        "advice": fit.status.advice,
+        "verdict": {
+            "explained": fit.verdict.explained,
+            "identifiable": fit.verdict.identifiable,
+            "sentences": fit.verdict.sentences,
+            "confounded": fit.verdict.confounded,
+        },
+        "effects": fit.effects,
+        "quantity": fit.compared["quantity"],
+        "wall_s": fit.wall_s,
+        "warnings": [warning_record(warning) for warning in fit.origin.warnings],
+    }
+    if fit.held_out is not None:
+        apart = fit.held_out
+        record["held_out"] = {
+            "source": apart.source,
+            "before": apart.as_given,
+            "after": apart.identified,
+            "floor": apart.noise,
+        }
+    return record
+
+
+def motion_fit_text(fit: MotionFit) -> RenderableType:
+    """Tables and sentences, most important first."""
+    rows = [("this motion", *(fixed(100.0 * each, 2) for each in fit.gap))]
+    if fit.held_out is not None:
+        apart = fit.held_out
+        gaps = (apart.as_given, apart.identified, apart.noise)
+        rows.append(("held out", *(fixed(100.0 * each, 2) for each in gaps)))
+    status = [] if fit.status.ok else [f"The fit is not to be trusted: {fit.status.advice}."]
+    return Group(
+        identified_table(fit),
+        plain(
+            f"chi2/dof = {fit.chi2:.1f}/{fit.dof} on {fit.measured.size} rows of force over "
+            f"{fit.motion.row_times[-1] - fit.motion.row_times[0]:.3g} s ({fit.wall_s:.1f} s)"
+        ),
+        plain(""),
+        table(
+            "Force of the drive, measured less needed (rms)",
+            ("motion", "before\n[%]", "after\n[%]", "noise\n[%]"),
+            rows,
+        ),
+        *tolerance_tables(fit),
+        plain("Verdict", "bold"),
+        *(plain(f"- {sentence}") for sentence in (*status, *fit.verdict.sentences)),
+    )
+
+
+def force_figure(fit: MotionFit) -> Figure:
+    """The force of the drive over the first seconds, measured and as the model needs it, and what is left."""
+    plant = fit.estimated.plant
+    models = (("identified model", fit.predicted), ("before the fit", fit.as_given))
+    velocity = fit.motion.rows(fit.motion.velocity)
+    units = plant.inputs[0].unit, f"{plant.coordinates[0].unit}/s"
+    return drive_figure(fit.motion.row_times, velocity, fit.measured, models, fit.motion.noise, units)

@@ -1,0 +1,129 @@
+"""A fit along a measured motion: known truth, the literature on a real axis, and any unit of force."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import savgs_ident as si
+from savgs_ident.core.values import as_values
+from savgs_ident.fit.along_motion import MotionFit
+from savgs_ident.responses.driven_motion import DrivenMotion, driven_motion
+from savgs_ident.simulate.along_motion import needed_force
+from savgs_ident.simulate.driven_plant import samples_of
+
+from ..diagnosis.recorded_axis import BASE, recorded_axis
+from ..relaxed import with_kept_programs
+
+EMPS = Path(__file__).resolve().parents[3] / "shared/data/real/EMPS"
+TEXTBOOK = ("guide_preload", "drive_offset")
+TRUTH = {
+    "mass": BASE["mass"],
+    "viscous_friction": BASE["viscous"],
+    "guide_preload_force": 12.0,
+    "drive_offset_force": -2.0,
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _relaxed() -> Iterator[None]:
+    with with_kept_programs():
+        yield
+
+
+def _axis(*effects: str) -> si.PlantModel:
+    model = si.PlantModel(si.Axis(), si.Axis.parameters)
+    for name in effects:
+        model = model + name
+    return model
+
+
+def _motion(seed: int = 3) -> DrivenMotion:
+    return driven_motion(recorded_axis({"coulomb": 12.0, "offset": 2.0}, seed))
+
+
+def _needed(laws: Mapping[str, float], seed: int, noise: float = 0.3) -> DrivenMotion:
+    """A motion whose drive exerted what the textbook's model needs with parameters ``laws`` [SI], and white noise."""
+    recording = recorded_axis({}, seed)
+    model, motion = _axis(*TEXTBOOK), driven_motion(recording)
+    p = as_values(model.table.as_dict() | dict(laws))
+    force = np.asarray(needed_force(model.build(), p, samples_of(motion), motion.step).force)
+    drawn = noise * np.random.default_rng(seed).normal(size=force.size)
+    return driven_motion(replace(recording, force=force + drawn))
+
+
+def _fit(motion: DrivenMotion, *effects: str, held_out: DrivenMotion | None = None) -> MotionFit:
+    found = si.fit(_axis(*effects), motion, held_out=held_out)
+    assert isinstance(found, MotionFit)
+    return found
+
+
+def test_parameters_are_found_within_their_errors() -> None:
+    fit = _fit(_needed(TRUTH, 3), *TEXTBOOK, held_out=_needed(TRUTH, 4))
+    assert fit.trusted, fit.doubt
+    for name, true in TRUTH.items():
+        assert abs(fit[name].value - true) < 4.0 * fit[name].stderr
+        assert fit[name].stderr < 0.02 * abs(true)
+    assert fit.held_out is not None
+    assert fit.held_out.identified < 1.2 * fit.held_out.noise < fit.held_out.as_given
+
+
+def test_a_friction_that_turns_otherwise_is_not_trusted_and_its_errors_contain_the_truth() -> None:
+    fit = _fit(_motion(), *TEXTBOOK)
+    assert not fit.trusted
+    for name, true in TRUTH.items():
+        assert abs(fit[name].value - true) < 2.0 * fit[name].stderr
+
+
+def test_what_lacks_its_friction_is_not_trusted_and_its_errors_contain_the_truth() -> None:
+    fit = _fit(_motion(), "drive_offset")
+    assert not fit.trusted
+    assert not fit.verdict.explained
+    for name in ("mass", "viscous_friction"):
+        assert abs(fit[name].value - TRUTH[name]) < 4.0 * fit[name].stderr
+
+
+@pytest.mark.parametrize("factor", [100.0, 0.01])
+def test_force_in_another_unit_gives_parameters_in_that_unit(factor: float) -> None:
+    motion = _motion()
+    other = replace(motion, drive=factor * motion.drive, noise=factor * motion.noise)
+    fit, scaled = _fit(motion, *TEXTBOOK), _fit(other, *TEXTBOOK)
+    for name in TRUTH:
+        assert scaled[name].value == pytest.approx(factor * fit[name].value, rel=1e-3)
+        assert scaled[name].stderr == pytest.approx(factor * fit[name].stderr, rel=1e-2)
+
+
+def test_the_identified_model_is_written_and_fits_as_well(tmp_path: Path) -> None:
+    motion = _motion()
+    fit = _fit(motion, *TEXTBOOK)
+    names = {path.name for path in fit.save(tmp_path)}
+    assert names == {"fit.json", "model.toml", "drive.png", "drive.pdf"}
+    again = si.load_plant("axis", tmp_path / "model.toml")
+    assert again.effects == fit.effects
+    assert again.table["mass"].value == pytest.approx(fit["mass"].value, rel=1e-9)
+    refitted = si.fit(again, motion)
+    assert refitted["mass"].value == pytest.approx(fit["mass"].value, rel=1e-3)
+
+
+def test_options_that_mean_nothing_along_a_motion_are_refused() -> None:
+    with pytest.raises(si.InputError, match="neither peak-to-peak"):
+        si.fit(_axis(), _motion(), max_frequency=3.0)
+
+
+@pytest.mark.skipif(not EMPS.exists(), reason="published recordings are not here")
+def test_a_published_axis_has_its_published_parameters() -> None:
+    first, second = (si.load_motion(EMPS / name) for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"))
+    fit = _fit(first, *TEXTBOOK, held_out=second)
+    published = {
+        "mass": 95.1089,
+        "viscous_friction": 203.5034,
+        "guide_preload_force": 20.3935,
+        "drive_offset_force": 3.1648,
+    }
+    for name, value in published.items():
+        assert fit[name].value == pytest.approx(value, rel=0.02)
+    assert fit.held_out is not None
+    assert fit.gap[1] < 0.0408
+    assert fit.held_out.identified < 0.0598
