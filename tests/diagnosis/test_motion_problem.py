@@ -162,10 +162,12 @@ def test_where_nothing_is_missing_nothing_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_spring_that_was_put_in_is_named_and_nothing_else() -> None:
-    gap = si.diagnose(_axis(), driven_motion(_held({"spring": 60.0}, 4)))
+@pytest.mark.parametrize("unit", [1.0, 0.01])
+def test_a_spring_that_was_put_in_is_named_and_nothing_else_whatever_the_unit_of_force(unit: float) -> None:
+    motion = driven_motion(_held({"spring": 60.0}, 4))
+    gap = si.diagnose(_axis(), replace(motion, drive=motion.drive / unit, noise=motion.noise / unit))
     assert gap.verdict.effects == ("screw_stiffness",)
-    assert gap.identified["mass"] == pytest.approx(BASE["mass"], rel=0.005)
+    assert gap.identified["mass"] == pytest.approx(BASE["mass"] / unit, rel=0.005)
     assert gap.shrink.after < 1.1 * gap.shrink.floor
 
 
