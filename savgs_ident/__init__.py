@@ -80,6 +80,7 @@ if TYPE_CHECKING:
     from savgs_ident.validation.calibration import CalibrationStudy, calibrate
     from savgs_ident.validation.check_plant import PlantCheck, check_plant
     from savgs_ident.validation.false_alarms import AlarmStudy, false_alarms
+    from savgs_ident.validation.plan import CampaignPlan, PlannedEffect, PlannedTest, plan
     from savgs_ident.validation.plant_declaration import Finding
     from savgs_ident.validation.virtual_campaign import draw_truth, simulate_campaign, write_campaign
 
@@ -117,6 +118,7 @@ _PLACES = {
     "load_plant": "plants.from_file",
     # What is done with it, a command each.
     "check_plant": "validation.check_plant",
+    "plan": "validation.plan",
     "demo": "fit.public",
     "inspect": "responses.summary",
     "fit": "fit.public",
@@ -150,6 +152,7 @@ _PLACES = {
     "AlarmStudy": "validation.false_alarms",
     "BlindStudy": "validation.blind",
     "CalibrationStudy": "validation.calibration",
+    "CampaignPlan": "validation.plan",
     "CampaignStudy": "campaigns.study",
     "Campaign": "recordings.recording",
     "CampaignSummary": "responses.summary",
@@ -186,6 +189,8 @@ _PLACES = {
     "NextTest": "diagnosis.result",
     "Origin": "core.presentation",
     "ParameterInterval": "diagnosis.result:Estimate",
+    "PlannedEffect": "validation.plan",
+    "PlannedTest": "validation.plan",
     "PortShare": "diagnosis.result",
     "RecordedChannel": "recordings.recording",
     "Recording": "recordings.recording",
@@ -206,6 +211,7 @@ __all__ = [
     "BlindStudy",
     "CalibrationStudy",
     "Campaign",
+    "CampaignPlan",
     "CampaignRow",
     "CampaignStudy",
     "CampaignSummary",
@@ -245,6 +251,8 @@ __all__ = [
     "Parameter",
     "ParameterInterval",
     "ParameterTable",
+    "PlannedEffect",
+    "PlannedTest",
     "PlantCheck",
     "PlantModel",
     "Port",
@@ -293,6 +301,7 @@ __all__ = [
     "load_plant",
     "load_python_control",
     "load_rig",
+    "plan",
     "plot_bode",
     "read_model_json",
     "resting_point",

@@ -217,7 +217,7 @@ def room_for_programs() -> Iterator[None]:
     yield
     from savgs_ident.simulate.program_cache import make_room_for_programs
 
-    make_room_for_programs(most=30_000)
+    make_room_for_programs(most=30_000, most_memory=4 * 2**30)
 
 
 @pytest.fixture(scope="session")

@@ -43,6 +43,7 @@ CALLS = {
     "export": "export",
     "campaign": "run_campaigns",
     "check-plant": "check_plant",
+    "plan": "plan",
 }
 """Each command and its public call."""
 

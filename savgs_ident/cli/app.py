@@ -30,6 +30,7 @@ from savgs_ident.cli.fit import fit
 from savgs_ident.cli.inspect import inspect
 from savgs_ident.cli.linearise import linearise
 from savgs_ident.cli.options import spread_values
+from savgs_ident.cli.plan import plan
 from savgs_ident.cli.posterior import posterior
 from savgs_ident.cli.simulate import simulate
 
@@ -98,7 +99,7 @@ def _root(
 
 for _command in (
     demo, inspect, fit, bode, simulate, posterior, calibrate, diagnose, false_alarms, blind, linearise, design,
-    closed_loop, export, campaign, check_plant,
+    closed_loop, export, campaign, check_plant, plan,
 ):  # fmt: skip
     app.command()(_command)
 

@@ -217,6 +217,14 @@ def read_recorded(
     return si.load_motion(path)
 
 
+def numbers_by_name(option: str, words: Sequence[str]) -> dict[str, float]:
+    """Values like ``angle=0.002`` by name; raises :class:`typer.BadParameter` for another word."""
+    for word in words:
+        if not _is_named_number(word):
+            raise typer.BadParameter(f"'{word}' is no NAME=NUMBER, such as angle=0.002", param_hint=option)
+    return {name: float(number) for name, _, number in (word.partition("=") for word in words)}
+
+
 def effects_of(model: ModelName | None) -> Literal["simqc", "simtr"] | None:
     """What an option says of the effects; None where it is left out."""
     return None if model is None else model.value
@@ -234,6 +242,11 @@ def _is_number(word: str) -> bool:
     return True
 
 
+def _is_named_number(word: str) -> bool:
+    name, _, number = word.partition("=")
+    return name.isidentifier() and _is_number(number)
+
+
 def _is_format(word: str) -> bool:
     return word[:1] != "-" and word.replace("-", "_").isidentifier() and not Path(word).exists()
 
@@ -243,6 +256,8 @@ SEVERAL: dict[str, Callable[[str], bool]] = {
     "--with": _is_name,
     "--without": _is_name,
     "--frequency": _is_number,
+    "--amplitude": _is_number,
+    "--noise": _is_named_number,
     "--to": _is_format,
 }
 """The options, and what a further value of each looks like; a word that does not is an argument."""

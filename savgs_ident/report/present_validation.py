@@ -3,14 +3,16 @@
 What draws is loaded when something is drawn.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Group, RenderableType
 from scipy.stats import binom
 
+from savgs_ident.core.files import write_bytes
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.report.presenters import AbstractPresenter, Figures
 from savgs_ident.report.text import decimal, percentage, plain, table
@@ -20,6 +22,8 @@ from savgs_ident.validation.false_alarms import CONFIDENCE, AlarmStudy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from savgs_ident.validation.plan import CampaignPlan
 
 
 def alarms_record(study: AlarmStudy) -> dict[str, Any]:
@@ -267,3 +271,43 @@ class _PlantCheck(AbstractPresenter[PlantCheck]):
 
 
 PLANT_CHECK = _PlantCheck()
+
+
+class _CampaignPlan(AbstractPresenter["CampaignPlan"]):
+    stem = "plan"
+
+    def record(self, result: "CampaignPlan") -> Mapping[str, Any]:
+        from savgs_ident.report.plan import plan_record
+
+        return plan_record(result)
+
+    def text(self, result: "CampaignPlan") -> RenderableType:
+        from savgs_ident.report.plan import plan_text
+
+        return plan_text(result)
+
+    def doubts(self, result: "CampaignPlan") -> tuple[str, ...]:
+        short = [
+            f"{name} to {100.0 * error:.4g} %"
+            for name, error in result.errors.items()
+            if error > result.target
+        ]
+        if not short:
+            return ()
+        return (
+            f"the campaign would give {', '.join(short)}, where {100.0 * result.target:.2g} % are asked for: "
+            "allow more tests, other frequencies or larger amplitudes.",
+        )
+
+    def figures(self, result: "CampaignPlan") -> Figures:
+        from savgs_ident.report.plan import plan_figure
+
+        return {"plan": lambda: plan_figure(result)}
+
+    def more(self, result: "CampaignPlan", folder: Path) -> Iterator[Path]:
+        from savgs_ident.report.plan import plan_list
+
+        yield write_bytes(folder / "plan.csv", plan_list(result).encode())
+
+
+CAMPAIGN_PLAN = _CampaignPlan()

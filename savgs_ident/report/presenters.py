@@ -106,6 +106,7 @@ _FILES = {
     "LOOP_STUDY": "present_models",
     "EXPORTED": "present_models",
     "PLANT_CHECK": "present_validation",
+    "CAMPAIGN_PLAN": "present_validation",
 }
 
 

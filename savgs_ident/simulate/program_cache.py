@@ -10,6 +10,7 @@ in one digest. What cannot be described with certainty, such as an effect that i
 none, and is traced anew.
 """
 
+import ctypes
 import dataclasses
 import enum
 import gc
@@ -203,6 +204,9 @@ def _write(file: Path, program: export.Exported) -> None:
 MANY_REGIONS = 20_000
 """Mapped regions of memory above which compiled programs are let go; Linux ends a process at 65 530."""
 
+MUCH_MEMORY = 2 * 2**30
+"""Memory of a process [byte] above which compiled programs are let go: those of three diagnoses take 1.3 GB."""
+
 LEAST_ROOM = 64 * 2**20
 """Space on the disk [byte] below which no programs are kept: half of one would be found in every later run."""
 
@@ -258,15 +262,28 @@ def use_persistent_cache() -> bool:
     return True
 
 
-def make_room_for_programs(most: int = MANY_REGIONS) -> None:
+def make_room_for_programs(most: int = MANY_REGIONS, most_memory: int = MUCH_MEMORY) -> None:
     """Let compiled programs go where they take more than ``most`` regions of the process's memory, some twenty each.
 
-    For processes that do one task after another. Beyond the bound of the system the next program, compiled or read
-    from the cache, would end the process.
+    Or where the process has more than ``most_memory`` [byte] of it. For processes that do one task after another.
+    Beyond the bound of the system the next program, compiled or read from the cache, would end the process.
     """
-    if mapped_regions() > most:
+    if mapped_regions() > most or memory_in_use() > most_memory:
         jax.clear_caches()
         gc.collect()
+        _give_back()
+
+
+def _give_back() -> None:
+    """Hand memory that was let go to the system: the C library of Linux keeps what may be asked for again."""
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
+
+
+def memory_in_use() -> int:
+    """Memory that this process has [byte]; 0 where the system does not say."""
+    pages = Path("/proc/self/statm")
+    return int(pages.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") if pages.exists() else 0
 
 
 def mapped_regions() -> int:

@@ -88,7 +88,7 @@ def check_plant(model: PlantModel, progress: Progress = no_progress) -> PlantChe
         progress("looking for its rest")
         natural, found = _natural_frequencies(model)
         findings += found
-        frequencies = _dwells(model, natural)
+        frequencies = _about(model, natural, DWELLS)
         progress(f"solving motions at {len(frequencies)} frequencies")
         findings += _motions(model, np.array(frequencies))
     origin = model.origin()
@@ -125,12 +125,17 @@ def _natural_frequencies(model: PlantModel) -> tuple[tuple[float, ...], list[Fin
     return tuple(float(each) for each in hertz), faults
 
 
-def _dwells(model: PlantModel, natural: tuple[float, ...]) -> tuple[float, ...]:
+def frequencies_about(model: PlantModel, count: int) -> tuple[float, ...]:
+    """So many frequencies [Hz] about the natural ones of a plant."""
+    return _about(model, _natural_frequencies(model)[0], count)
+
+
+def _about(model: PlantModel, natural: tuple[float, ...], count: int) -> tuple[float, ...]:
     """Frequencies about the natural ones [Hz], or about that of the typical sizes where there are none."""
     first = model.plant.coordinates[0]
     typical = first.rate_size / first.size / (2.0 * np.pi)
     low, high = (min(natural), max(natural)) if natural else (typical, typical)
-    return tuple(float(each) for each in np.geomspace(BELOW * low, ABOVE * high, DWELLS))
+    return tuple(float(each) for each in np.geomspace(BELOW * low, ABOVE * high, count))
 
 
 def _motions(model: PlantModel, frequency: NDArray[np.float64]) -> Iterator[Finding]:

@@ -21,6 +21,7 @@ ROWS: dict[str, tuple[str, ...]] = {
     "export": ("{rig}", "--to", "json"),
     "campaign": ("{campaign}",),
     "check-plant": ("two_mass",),
+    "plan": ("--rig", "{rig}"),
 }
 """The words of each; ``{campaign}`` and ``{rig}`` stand for files."""
 

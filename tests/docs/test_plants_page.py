@@ -18,7 +18,7 @@ def test_the_file_on_the_page_is_the_one_that_is_shipped_and_has_forty_lines() -
 
 def test_its_commands_are_those_of_the_program() -> None:
     typed = _commands(PAGE)
-    assert {words[1] for words in typed} == {"check-plant", "inspect", "fit", "diagnose", "posterior"}
+    assert {words[1] for words in typed} == {"check-plant", "plan", "inspect", "fit", "diagnose", "posterior"}
     _are_known(typed)
 
 

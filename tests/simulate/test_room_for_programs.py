@@ -23,7 +23,7 @@ before = compilation.mapped_regions()
 for number in range({programs}):
     jax.jit(lambda x, n=number: jnp.cumsum(jnp.sin(n * x)))(jnp.ones(number + 2)).block_until_ready()
 full = compilation.mapped_regions()
-compilation.make_room_for_programs(full + {room})
+compilation.make_room_for_programs(full + {room}, {memory})
 print(before, full, compilation.mapped_regions())
 """
 
@@ -31,9 +31,9 @@ if mapped_regions() == 0:
     pytest.skip("this system does not say what is mapped", allow_module_level=True)
 
 
-def _regions(room: int) -> tuple[int, int, int]:
+def _regions(room: int, memory: int = 2**40) -> tuple[int, int, int]:
     """Mapped regions before the programs, with them, and after room was made for ``room`` regions less than many."""
-    code = _COUNT.format(programs=PROGRAMS, room=room)
+    code = _COUNT.format(programs=PROGRAMS, room=room, memory=memory)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     before, full, after = (int(each) for each in done.stdout.split())
     return before, full, after
@@ -49,3 +49,8 @@ def test_programs_are_let_go_where_they_are_many() -> None:
 def test_programs_are_kept_while_there_is_room() -> None:
     _, full, after = _regions(room=PROGRAMS)
     assert abs(after - full) < PROGRAMS
+
+
+def test_programs_are_let_go_where_a_process_has_much_memory() -> None:
+    _, full, after = _regions(room=PROGRAMS, memory=2**20)
+    assert full - after > PROGRAMS

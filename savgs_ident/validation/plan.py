@@ -1,0 +1,384 @@
+"""A campaign before it is recorded: which dwells identify the free parameters and tell the catalogue's effects apart.
+
+    found = plan(model, amplitudes=(0.01, 0.02), noise={"angle": 2e-3}, tests=10, target=0.02)
+    found.tests[0].frequency_hz, found.errors["k"], found.not_separated
+
+All that could be recorded, dwells at some frequencies and amplitudes of the first input, is linearised about the
+model: slopes of the harmonics in the free parameters and in those known to a tolerance, and what each effect of the
+catalogue would change, in standard deviations of the noise. The information of dwells adds up, so that they are
+chosen one after the other, each the one that helps most beside those before it: until every free parameter is known
+to the ``target``, the one that brings their errors closest to it; from then on the one that tells effects apart.
+
+With the information of parameters and effects in blocks, A and H of their own and B between them, that on the effects
+once the parameters have made up for what they can is
+
+    S = H - B' A^-1 B.
+
+An effect of typical size stands out of the noise by sqrt(S_ee), and from another one, whatever that one's size, by
+sqrt(S_ee - S_ef^2 / S_ff). All is to first order and by noise and tolerances alone: small errors that every model has
+are not in it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import InputError
+from savgs_ident.core.presentation import Progress, Result, no_progress
+from savgs_ident.diagnosis.public import baseline_of, problem_of_dwells
+from savgs_ident.diagnosis.result import DiagnosisSettings
+from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.inference.prior import slopes_at, values_at
+from savgs_ident.plants.model import Model, PlantModel
+from savgs_ident.simulate.excitation import typical_amplitude
+from savgs_ident.simulate.program_cache import use_persistent_cache
+from savgs_ident.simulate.public import DWELLS, SimulatedResponse, simulate, simulate_dwells
+from savgs_ident.validation.check_plant import frequencies_about
+
+Array = NDArray[np.float64]
+
+OFFERED = 16
+"""Frequencies that are offered about the natural ones of a plant, where none are given."""
+
+ASSUMED_NOISE = 0.01
+"""Noise of one sample where none is given, as a share of the rms of the channel's largest motion. Origin: by choice,
+that of a sensor whose range is ten times the motion, with ten bits."""
+
+
+@dataclass(frozen=True)
+class PlannedTest:
+    """A dwell of a plan.
+
+    Attributes:
+        frequency_hz: of the first input [Hz].
+        amplitude: of the first input [its unit].
+        errors: relative standard errors [1] of the free parameters with it and all before it, in their order.
+    """
+
+    frequency_hz: float
+    amplitude: float
+    errors: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class PlannedEffect:
+    """What a campaign would show of an effect.
+
+    Attributes:
+        name: of the effect.
+        sigma: by how many standard deviations it stands out at its typical size [1], parameters estimated along.
+        smallest: the size of its first amplitude that would be seen [``unit``]; infinite if none would.
+        unit: of that.
+        alike: the effect that imitates it best; empty where there is no other.
+        apart: by how many standard deviations it differs from that one [1].
+    """
+
+    name: str
+    sigma: float
+    smallest: float
+    unit: str
+    alike: str
+    apart: float
+
+
+@dataclass(frozen=True)
+class CampaignPlan(Result):
+    """A plan of a campaign.
+
+    Attributes:
+        model: what it is for.
+        tests: its dwells, in the order of what they are worth.
+        free: the parameters that are to be identified.
+        target: the relative standard error [1] that was asked for.
+        effects: what it would show of the catalogue, the most visible first.
+        visible: standard deviations by which an effect is seen, and told from another [1].
+        noise: standard deviation of one sample of each channel [its unit].
+        assumed: channels whose noise was assumed.
+        offered: how many dwells there were to choose among.
+        unsolved: dwells without a periodic motion, in words.
+    """
+
+    presenter: ClassVar[str] = "CAMPAIGN_PLAN"
+
+    model: Model
+    tests: tuple[PlannedTest, ...]
+    free: tuple[str, ...]
+    target: float
+    effects: tuple[PlannedEffect, ...]
+    visible: float
+    noise: Mapping[str, float]
+    assumed: tuple[str, ...]
+    offered: int
+    unsolved: tuple[str, ...]
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Relative standard errors [1] of the free parameters with the whole campaign."""
+        return dict(zip(self.free, self.tests[-1].errors, strict=True))
+
+    @property
+    def trusted(self) -> bool:
+        """Whether every free parameter would be known as well as was asked for."""
+        return all(each <= self.target for each in self.errors.values())
+
+    @property
+    def not_visible(self) -> tuple[str, ...]:
+        """Effects that would not be seen at their typical size."""
+        return tuple(each.name for each in self.effects if each.sigma < self.visible)
+
+    @property
+    def not_separated(self) -> tuple[tuple[str, str], ...]:
+        """Effects that would be seen, but not told from another one, which stands second."""
+        seen = (each for each in self.effects if each.sigma >= self.visible and each.alike)
+        return tuple((each.name, each.alike) for each in seen if each.apart < self.visible)
+
+
+def plan(
+    model: Model,
+    *,
+    free: Sequence[str] = (),
+    frequencies: Sequence[float] = (),
+    amplitudes: Sequence[float] = (),
+    noise: Mapping[str, float] | None = None,
+    tests: int = 12,
+    target: float = 0.02,
+    samples: int = 4000,
+    orders: int = 9,
+    constants: DecisionConstants = DEFAULTS,
+    command: Sequence[str] = (),
+    progress: Progress = no_progress,
+) -> CampaignPlan:
+    """Plan a campaign of dwells.
+
+    Args:
+        model: the rig, or another plant, as it is known before any recording.
+        free: names of the parameters to identify; those of a fit if empty.
+        frequencies: that the rig can be driven at [Hz]; those of the shipped campaign for the rig, some about the
+            natural frequencies of another plant, if empty.
+        amplitudes: of the first input that it can be driven with [its unit]; the typical one if empty.
+        noise: standard deviation of one sample of each channel [its unit], by name; a hundredth of the largest
+            motion's rms where it is not given.
+        tests: most dwells of the campaign.
+        target: relative standard error that is wanted of the free parameters [1].
+        samples: samples of each channel in a dwell.
+        orders: highest harmonic order that is compared.
+        constants: of the diagnosis, for typical sizes of effects and what is seen.
+        command: the command line that the result says it was made by.
+        progress: called with a sentence on what is being done.
+
+    Look at ``trusted`` of the result. Raises :class:`InputError` for names that do not exist, for numbers that are
+    not above zero, and where no dwell has a periodic motion.
+    """
+    use_persistent_cache()
+    hertz, sizes = _offers(model, frequencies, amplitudes)
+    _above_zero({"tests": tests, "target": target, "samples": samples, "orders": orders})
+    given, settings, values = baseline_of(model, orders, (), constants)
+    settings = replace(settings, free=given.free(free))
+    solved = []
+    for size in sizes:
+        progress(f"solving {len(hertz)} dwells at {size:g} {given.plant.inputs[0].unit}")
+        solved.append(simulate(given, hertz, orders=orders, amplitude=size))
+    known, assumed = _noise(given, solved, dict(noise or {}))
+    blocks = []
+    for size, response in zip(sizes, solved, strict=True):
+        there = [float(f) for f, ok in zip(response.frequency, response.ok, strict=True) if ok]
+        if there:
+            progress(f"what {len(there)} dwells at {size:g} {given.plant.inputs[0].unit} would show")
+            blocks.append(_block(given, settings, values, size, there, known, samples))
+    if not blocks:
+        raise InputError(
+            "no dwell that was offered has a periodic motion", remedy="offer smaller amplitudes or others"
+        )
+    lost = [
+        f"{f:.3g} Hz at {size:g} {given.plant.inputs[0].unit}"
+        for size, response in zip(sizes, solved, strict=True)
+        for f, ok in zip(response.frequency, response.ok, strict=True)
+        if not ok
+    ]
+    every = _joined(blocks)
+    chosen, errors = _choose(every, len(settings.free), tests, target, constants)
+    origin = replace(model.origin(), command=tuple(command))
+    return CampaignPlan(
+        model=given,
+        tests=tuple(
+            PlannedTest(*every.dwells[each], tuple(after.tolist()))
+            for each, after in zip(chosen, errors, strict=True)
+        ),
+        free=settings.free,
+        target=target,
+        effects=_effects(every, every.information[chosen].sum(axis=0), constants),
+        visible=constants.visible_sigma,
+        noise=known,
+        assumed=assumed,
+        offered=len(every.dwells),
+        unsolved=tuple(lost),
+        origin=origin,
+    )
+
+
+def _offers(
+    model: Model, frequencies: Sequence[float], amplitudes: Sequence[float]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Frequencies [Hz] and amplitudes of the first input [its unit] to choose among, growing."""
+    if not frequencies:
+        frequencies = frequencies_about(model, OFFERED) if isinstance(model, PlantModel) else DWELLS
+    sizes = tuple(amplitudes) or (typical_amplitude(model.plant, model.table),)
+    for size in sizes:
+        if not 0.0 < size < np.inf:
+            raise InputError(f"an amplitude of {size:g} moves nothing", remedy="give one above zero")
+    return tuple(sorted(set(frequencies))), tuple(sorted(set(sizes)))
+
+
+def _above_zero(numbers: Mapping[str, float]) -> None:
+    for name, number in numbers.items():
+        if not 0.0 < number < np.inf:
+            raise InputError(f"{name} is {number:g}", source=name, remedy="give a number above zero")
+
+
+def _noise(
+    model: Model, solved: Sequence[SimulatedResponse], given: Mapping[str, float]
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Noise of one sample of each channel [its unit], and the channels for which it was assumed."""
+    names = [each.name for each in model.channels]
+    absent = sorted(set(given) - set(names))
+    if absent:
+        raise InputError(
+            f"the plant has no channel '{absent[0]}'", remedy="choose among: " + ", ".join(names)
+        )
+    _above_zero(given)
+    motions = np.concatenate([each.harmonics[each.ok, :, 1:] for each in solved])
+    largest = np.sqrt(0.5 * np.max(np.sum(np.abs(motions) ** 2, axis=2), axis=0, initial=0.0))
+    known = {
+        name: given.get(name, ASSUMED_NOISE * float(size)) for name, size in zip(names, largest, strict=True)
+    }
+    return known, tuple(name for name in names if name not in given)
+
+
+class _Block(NamedTuple):
+    """Dwells linearised: their frequency [Hz] and amplitude, and the information of each, (T, n + k, n + k) [1].
+
+    That of n coordinates of the parameters comes first, then that of k effects of typical size. ``slopes`` are
+    relative changes of the free parameters per unit of their coordinates [1]; ``units`` are by effect the size of its
+    first amplitude and its unit.
+    """
+
+    dwells: tuple[tuple[float, float], ...]
+    information: Array
+    slopes: Array
+    units: Mapping[str, tuple[float, str]]
+
+
+def _block(
+    given: Model,
+    settings: DiagnosisSettings,
+    values: Mapping[str, float],
+    size: float,
+    hertz: Sequence[float],
+    noise: Mapping[str, float],
+    samples: int,
+) -> _Block:
+    """The dwells of one amplitude of the first input."""
+    driven = {given.plant.inputs[0].name: size}
+    measured = simulate_dwells(given, hertz, driven, noise, samples=samples, orders=settings.orders)
+    problem, data = problem_of_dwells(measured, given, settings)
+    motion, origin = problem.start(values), np.zeros(len(problem.nuisances))
+    at = dict(values) | values_at(problem.nuisances, origin)
+    names = [each.name for each in problem.nuisances]
+    steepness = slopes_at(problem.nuisances, origin)
+    parameters = problem.slopes(problem.model(()), problem.values(at), motion, names) * steepness
+    found = problem.sensitivities((), at, motion, problem.candidates)
+    typical = settings.constants.typical_coordinate
+    sizes = [np.array([typical * each.scale for each in term.amplitudes]) for term in problem.candidates]
+    effects = [each[0] @ by for each, by in zip(found, sizes, strict=True)]
+    columns = np.concatenate([parameters, np.stack(effects, axis=1)], axis=1)
+    columns /= np.sqrt(data.variance)[:, None]
+    rows = [columns[data.test == test] for test in range(data.tests)]
+    count = len(settings.free)
+    relative = np.abs(steepness[:count]) / np.array([abs(at[name]) or 1.0 for name in settings.free])
+    units = {
+        term.name: (float(by[0]), term.amplitudes[0].unit)
+        for term, by in zip(problem.candidates, sizes, strict=True)
+    }
+    return _Block(
+        tuple((f, size) for f in measured.frequency.tolist()),
+        np.stack([each.T @ each for each in rows]),
+        relative,
+        units,
+    )
+
+
+def _joined(blocks: Sequence[_Block]) -> _Block:
+    dwells = tuple(dwell for each in blocks for dwell in each.dwells)
+    information = np.concatenate([each.information for each in blocks])
+    return blocks[0]._replace(dwells=dwells, information=information)
+
+
+def _split(block: _Block, total: Array) -> tuple[Array, Array]:
+    """Covariance of the parameters [1], (n, n), beside their priors, and the information on the effects, (k, k)."""
+    count = total.shape[0] - len(block.units)
+    known = np.linalg.inv(total[:count, :count] + np.eye(count))
+    across = total[:count, count:]
+    return np.asarray(known), np.asarray(total[count:, count:] - across.T @ known @ across)
+
+
+def _choose(
+    block: _Block, free: int, most: int, target: float, constants: DecisionConstants
+) -> tuple[list[int], list[Array]]:
+    """Places of the dwells that help most, and relative errors of the free parameters with each."""
+    total = np.zeros(block.information.shape[1:])
+    chosen: list[int] = []
+    errors: list[Array] = []
+
+    def errors_with(information: Array) -> Array:
+        known, _ = _split(block, information)
+        return np.asarray(np.sqrt(np.diag(known)[:free]) * block.slopes)
+
+    def worth(place: int) -> tuple[float, float]:
+        with_it = total + block.information[place]
+        beyond = np.maximum(np.log(errors_with(with_it) / target), 0.0)
+        return -float(np.sum(beyond)), _told_apart(_split(block, with_it)[1], constants.visible_sigma)
+
+    while len(chosen) < min(most, len(block.dwells)):
+        best = max((each for each in range(len(block.dwells)) if each not in chosen), key=worth)
+        total = total + block.information[best]
+        chosen.append(best)
+        errors.append(errors_with(total))
+    return chosen, errors
+
+
+def _told_apart(information: Array, visible: float) -> float:
+    """How well effects are told from each other, over all pairs [1]; what is told apart for sure adds little more."""
+    return float(np.sum(np.log1p(_apart(information) / visible**2)))
+
+
+def _apart(information: Array) -> Array:
+    """Squares of the sd by which each effect differs from each other one [1], (k, k); 0 from itself."""
+    own = np.diag(information)
+    shared = information**2 / np.where(own > 0.0, own, 1.0)
+    apart = np.maximum(own[:, None] - shared, 0.0)
+    np.fill_diagonal(apart, 0.0)
+    return np.asarray(apart)
+
+
+def _effects(block: _Block, total: Array, constants: DecisionConstants) -> tuple[PlannedEffect, ...]:
+    """What a campaign of that information would show of every effect, the most visible first."""
+    _, information = _split(block, total)
+    apart, names, found = _apart(information), list(block.units), []
+    for place, (name, (size, unit)) in enumerate(block.units.items()):
+        sigma = float(np.sqrt(max(information[place, place], 0.0)))
+        others = [each for each in range(len(names)) if each != place and information[each, each] > 0.0]
+        nearest = min(others, key=lambda each: apart[place, each], default=None)
+        found.append(
+            PlannedEffect(
+                name,
+                sigma,
+                constants.visible_sigma / sigma * size if sigma > 0.0 else np.inf,
+                unit,
+                "" if nearest is None else names[nearest],
+                0.0 if nearest is None else float(np.sqrt(apart[place, nearest])),
+            )
+        )
+    return tuple(sorted(found, key=lambda each: -each.sigma))
