@@ -36,7 +36,7 @@ from savgs_ident.inference.background.port_functions import (
     motion_functions,
     prandtl_element,
 )
-from savgs_ident.inference.drive_force import force_data, force_rows, relative_miss
+from savgs_ident.inference.drive_force import force_data, force_rows, relative_miss, relative_noise
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.plants.base import AbstractPlant, AtPorts
@@ -341,7 +341,5 @@ def further_motion(
     there = replace(problem, motion=motion)
     measured = motion.rows(motion.drive)
     gaps = [relative_miss(measured, there.predict(terms, values, (), None).rows) for terms, values in points]
-    floor = float(problem.motion.noise * np.sqrt(measured.size) / np.linalg.norm(measured))
-    return FurtherShrink(
-        Path(motion.source).name, gaps[0], gaps[1], gaps[2] if len(gaps) > 2 else np.nan, floor
-    )
+    after = gaps[2] if len(gaps) > 2 else np.nan
+    return FurtherShrink(Path(motion.source).name, gaps[0], gaps[1], after, relative_noise(motion))

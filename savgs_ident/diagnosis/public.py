@@ -31,7 +31,7 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
-from savgs_ident.simulate.driven_plant import longest_motion, motion_in, sized_along
+from savgs_ident.simulate.driven_plant import motion_in, motion_of, sized_along
 from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep, response_of_tests
 from savgs_ident.simulate.forgetting import lasting_windows
 from savgs_ident.simulate.program_cache import use_persistent_cache
@@ -75,7 +75,7 @@ def diagnose(
     motion = motion_in(measured, model) if isinstance(measured, Campaign) else None
     measured = measured if motion is None else motion
     if isinstance(measured, DrivenMotion):
-        held_out = longest_motion(held_out, model) if isinstance(held_out, Campaign) else held_out
+        held_out = motion_of(held_out, model) if isinstance(held_out, Campaign) else held_out
         return _diagnose_motion(model, measured, held_out, without, constants, command, progress)
     if held_out is not None:
         raise InputError(

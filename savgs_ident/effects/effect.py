@@ -169,9 +169,9 @@ class Effect(eqx.Module):
         return self.law.transfer(self._values(p), frequency)
 
     def sized(self, port: Port) -> "Effect":
-        """The effect with the typical numbers of its law where those at its port are of the sizes of ``port``.
+        """The effect with the typical numbers that its law has for the sizes of ``port``, in place of its own port's.
 
-        Numbers that are none of the typical ones, as a plant's own effects have them, stay as they are.
+        Numbers that are not the typical ones, as those of effects that a plant brings along, stay as they are.
         """
         here, there = self.law.typical(self.port), self.law.typical(port)
         own = {each.name: each for each in self.parameters}

@@ -28,7 +28,8 @@ from savgs_ident.fit.identifiability import (
     verdict_of,
 )
 from savgs_ident.fit.identified import Identified, Verdict
-from savgs_ident.inference.drive_force import DriveForce, force_data, relative_miss
+from savgs_ident.fit.small_errors import own_part
+from savgs_ident.inference.drive_force import DriveForce, force_data, relative_miss, relative_noise
 from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
 from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.prior import sheet_coordinate, slopes_at
@@ -41,7 +42,8 @@ from savgs_ident.simulate.driven_plant import sized_along
 class HeldOutForce(NamedTuple):
     """Another motion that nothing was fitted to: its file, and by how much its force is missed [1].
 
-    ``as_given`` before the fit, ``identified`` with the estimated values, ``noise`` by the noise alone.
+    ``as_given`` before the fit, ``identified`` with the estimated values, ``noise`` by the noise alone; NaN where
+    the model has no solution along it.
     """
 
     source: str
@@ -83,9 +85,8 @@ class MotionFit(Identified):
     @property
     def gap(self) -> tuple[float, float, float]:
         """Relative rms [1] by which the force is missed before the fit and after, and that of the noise alone."""
-        noise = self.motion.noise / float(np.sqrt(np.mean(self.measured**2)))
         before, after = (relative_miss(self.measured, rows) for rows in (self.as_given, self.predicted))
-        return before, after, noise
+        return before, after, relative_noise(self.motion)
 
 
 def fit_along_motion(
@@ -146,12 +147,13 @@ def _estimates(
     coordinates, rows = mode.coordinates, mode.slopes.shape[0]
     expected = rows - len(free)
     beyond = max(chi2 - expected - CHANCE * np.sqrt(2.0 * max(expected, 0)), 0.0)
-    known = np.array([each.name not in free for each in coordinates], np.float64)
-    priors = np.diag(known)
-    scaled, own = (
+    priors = np.eye(len(coordinates))
+    scaled, alone = (
         spread_of(np.concatenate([mode.slopes / noise / size, priors]))
         for size in (np.sqrt(1.0 + beyond), 1.0)
     )
+    known = np.array([model.table[each.name].tolerance > 0.0 for each in coordinates])
+    own = np.sqrt(np.diag(own_part(alone.covariance, np.where(known, 1.0, np.inf))))
     slope = slopes_at(coordinates, mode.x)
     estimates = []
     for place, each in enumerate(coordinates):
@@ -163,7 +165,7 @@ def _estimates(
                 name=each.name,
                 value=mode.values[each.name],
                 stderr=float(unit * scaled.sd[place]),
-                own_stderr=float(unit * own.sd[place]),
+                own_stderr=float(unit * own[place]),
                 unit=before.unit,
                 free=each.name in free,
                 prior=before.value,
@@ -203,8 +205,6 @@ def _apart(problem: DriveForce, motion: DrivenMotion, mode: LaplaceFit) -> HeldO
     """How a motion that nothing was fitted to is predicted."""
     there = DriveForce(problem.model, problem.table, motion, problem.nuisances)
     measured = motion.rows(motion.drive)
-    before, after = (
-        relative_miss(measured, there.predict((), values, (), None).rows) for values in ({}, mode.values)
-    )
-    noise = motion.noise / float(np.sqrt(np.mean(measured**2)))
-    return HeldOutForce(motion.source, before, after, noise)
+    found = [there.predict((), values, (), None) for values in ({}, mode.values)]
+    before, after = (relative_miss(measured, each.rows) if each.solved else np.nan for each in found)
+    return HeldOutForce(motion.source, before, after, relative_noise(motion))

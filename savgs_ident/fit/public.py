@@ -24,7 +24,7 @@ from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.driven_plant import longest_motion, motion_in
+from savgs_ident.simulate.driven_plant import motion_in, motion_of
 from savgs_ident.simulate.excitation import (
     Measurements,
     campaign_of,
@@ -114,7 +114,7 @@ def _fit_motion(
         motion,
         free=drawing.free(free),
         fixed_tolerances=fixed_tolerances,
-        held_out=longest_motion(held_out, model) if isinstance(held_out, Campaign) else held_out,
+        held_out=motion_of(held_out, model) if isinstance(held_out, Campaign) else held_out,
         origin=replace(model.origin(warnings=motion.warnings), data=motion.source, command=tuple(command)),
         progress=progress,
     )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Origin, Progress, no_progress
+from savgs_ident.fit.along_motion import MotionFit
 from savgs_ident.fit.identifiability import (
     LARGEST_SD,
     advice_of,
@@ -35,7 +36,7 @@ from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
 def sample(
-    identified: Fit | Model,
+    identified: Fit | MotionFit | Model,
     measured: Measurements | None = None,
     sampler: Sampler = "emcee",
     *,
@@ -84,6 +85,10 @@ def sample(
         orders=orders,
         seed=seed,
     )
+    if isinstance(identified, MotionFit):
+        raise InputError(
+            "a fit along a measured motion has no posterior", remedy="its errors are those of `fit`"
+        )
     model = identified.model if isinstance(identified, Fit) else identified
     response = _measured(identified, measured, settings.orders, max_frequency, progress)
     question = question_about(model, response)

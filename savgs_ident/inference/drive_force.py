@@ -73,6 +73,11 @@ def relative_miss(measured: NDArray[np.float64], rows: NDArray[np.float64]) -> f
     return float(np.linalg.norm(measured - rows) / np.linalg.norm(measured))
 
 
+def relative_noise(motion: DrivenMotion) -> float:
+    """The noise of a row of force, relative to the rms of the rows [1]."""
+    return motion.noise / float(np.sqrt(np.mean(motion.rows(motion.drive) ** 2)))
+
+
 @dataclass(frozen=True)
 class DriveForce:
     """A model along a measured motion, with nothing that may be added; the plant of a search.

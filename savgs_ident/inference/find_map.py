@@ -32,7 +32,7 @@ HALVINGS = 8
 slopes say."""
 
 LEVEL = 0.1
-"""Rise of the log density below which the mode is found: that which a step promises, or which a halved step finds."""
+"""Rise of the log density below which the mode is found: that which a step promises, or which it finds."""
 
 ROUGH = 2.0
 """Rise that is promised, but not found, up to which a mode is as good: friction makes the density rough."""

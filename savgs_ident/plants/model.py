@@ -242,9 +242,10 @@ class PlantModel:
         return found
 
     def sized(self, ports: Mapping[str, Port]) -> "PlantModel":
-        """The model with effects whose laws are of the sizes of ``ports``, by name, which stand for its own.
+        """The model with typical numbers in its effects for other typical sizes at its ports.
 
-        So are contacts whose stiffness and damping are typical numbers only.
+        ``ports`` have these sizes, by name. Stiffness and damping of a contact follow the force where they are but
+        typical numbers.
         """
 
         def sized(effect: Effect) -> Effect:

@@ -81,6 +81,9 @@ def read_head(block: bytes, layout: RecordingLayout, source: str) -> CsvHead:
             # What may be a broken row of data is for the table to judge.
             break
         last, data = data, data + 1
+    columns = tuple(
+        "time" if not name and unit in _TIMES else name for name, unit in zip(columns, units, strict=True)
+    )
     _, end, count = lines[last if data < len(lines) else place]
     first = _cells(texts[data], delimiter) if data < len(lines) else ()
     decimal = "," if any(_WITH_COMMA.fullmatch(cell) for cell in first) else "."
@@ -92,6 +95,10 @@ _MOST_LINES = 400
 _WITH_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 _FEW_WORDS = 4
 """Lines of words that may stand between the names of the columns and the data."""
+_ROWS, _MOST_OF_THEM = 8, 0.7
+"""Rows below the names that are looked at, and the least share of them with numbers: a preamble has some, too."""
+_TIMES = ("s", "ms", "us", "µs", "min")
+"""Units by which a column without a name is known to be the time."""
 
 
 def _header_line(texts: list[str], layout: RecordingLayout) -> tuple[int, str]:
@@ -99,9 +106,9 @@ def _header_line(texts: list[str], layout: RecordingLayout) -> tuple[int, str]:
 
     Of several such lines the one with most names that are known. The first line where there is no data below any.
     """
-    best, known = (0, max(_DELIMITERS, key=texts[0].count)), -1
+    best, known = (0, max(_DELIMITERS, key=texts[0].count)), (False, -1)
     for place, text in enumerate(texts):
-        if known >= 0 and place > best[0] + _FEW_WORDS:
+        if known[0] and place > best[0] + _FEW_WORDS:
             break
         for delimiter in _possible_delimiters(text):
             cells = _cells(text, delimiter)
@@ -111,9 +118,17 @@ def _header_line(texts: list[str], layout: RecordingLayout) -> tuple[int, str]:
             if not any(_is_data(_cells(each, delimiter), len(cells)) for each in below):
                 continue
             names = sum(layout.canonical_name(layout.split_header(each).label) is not None for each in cells)
-            if names > known:
-                best, known = (place, delimiter), names
+            found = _goes_on(texts[place + 1 :], delimiter, len(cells)), names
+            if found > known:
+                best, known = (place, delimiter), found
     return best
+
+
+def _goes_on(below: list[str], delimiter: str, count: int) -> bool:
+    """Whether the lines below the names of so many columns are a table, once there are numbers in one."""
+    rows = [_is_data(_cells(each, delimiter), count) for each in below[: _FEW_WORDS + _ROWS]]
+    table = rows[rows.index(True) :][:_ROWS]
+    return sum(table) >= _MOST_OF_THEM * len(table)
 
 
 def _possible_delimiters(text: str) -> list[str]:
@@ -168,9 +183,14 @@ def _check_columns(columns: tuple[str, ...], layout: RecordingLayout, source: st
 
 
 def _is_unit_row(row: tuple[str, ...], columns: tuple[str, ...], layout: RecordingLayout) -> bool:
-    """A second line such as ``s;mm;g``: what stands below a known column is a unit or empty."""
+    """A second line such as ``s;mm;g``: what stands below a known column is a unit or empty.
+
+    So is one with a time below a column without a name.
+    """
     if len(row) != len(columns) or any(_is_number(cell) for cell in row):
         return False
+    if any(not name and cell.strip("[]() ") in _TIMES for cell, name in zip(row, columns, strict=True)):
+        return True
     known = [
         cell.strip("[]() ")
         for cell, name in zip(row, columns, strict=True)

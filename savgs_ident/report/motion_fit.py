@@ -21,6 +21,7 @@ def motion_fit_record(fit: MotionFit) -> dict[str, object]:
         "dof": fit.dof,
         "chi2_per_dof": fit.chi2 / fit.dof if fit.dof > 0 else None,
         "converged": fit.status.ok,
+        "dwells": [],
         "trusted": fit.trusted,
         "gap": {"force": {"before": before, "after": after, "floor": noise}},
         "status": fit.status.name.lower(),

@@ -56,13 +56,13 @@ def plan_record(plan: CampaignPlan) -> dict[str, Any]:
 
 
 def plan_list(plan: CampaignPlan) -> str:
-    """The dwells as CSV, by growing amplitude and frequency: what a rig is to run."""
+    """The dwells as CSV, by growing amplitude and frequency, with the names that they have in the record."""
     out = io.StringIO()
     driven = plan.model.plant.inputs[0]
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(["test", "frequency [Hz]", f"amplitude of {driven.name} [{driven.unit}]"])
-    ordered = sorted(plan.tests, key=lambda each: (each.amplitude, each.frequency_hz))
-    for place, each in enumerate(ordered):
+    ordered = sorted(enumerate(plan.tests), key=lambda each: (each[1].amplitude, each[1].frequency_hz))
+    for place, each in ordered:
         writer.writerow(
             [_name(each.frequency_hz, place), f"{each.frequency_hz:.5g}", f"{each.amplitude:.5g}"]
         )
@@ -71,7 +71,8 @@ def plan_list(plan: CampaignPlan) -> str:
 
 def _name(hertz: float, place: int) -> str:
     """A test's name, from which readers know that it is a dwell, and at which frequency."""
-    return f"dwell_{hertz:.3g}Hz_{place + 1}"
+    digits = np.format_float_positional(hertz, precision=4, fractional=False, trim="-")
+    return f"dwell_{digits}Hz_{place + 1}"
 
 
 def plan_text(plan: CampaignPlan) -> RenderableType:

@@ -18,7 +18,9 @@ row more roughly than a force does that a motion so slow makes: the median size 
 that is smooth over some rows is gone. That the noise is white is then assumed, and a warning says so.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +76,7 @@ class DrivenMotion:
         period: time in which the reference repeats [s]; the whole recording where it does not.
         noise: standard deviation of the noise of a row of force [N].
         warnings: what is to be known of it.
+        starts: places of the samples with which tests begin, several that were recorded one after the other.
 
     Position and force of a plant that turns are an angle [rad] and a torque [N m].
     """
@@ -87,28 +90,102 @@ class DrivenMotion:
     period: float
     noise: float
     warnings: tuple[DataWarning, ...] = ()
+    starts: tuple[int, ...] = (0,)
 
     @property
     def every(self) -> int:
         """Samples to a row."""
         return _samples_to_a_row(self.step)
 
+    @property
+    def _tests(self) -> list[slice]:
+        """The samples of each test."""
+        return [slice(*ends) for ends in pairwise((*self.starts, self.position.size))]
+
     def rows(self, signals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Signals (..., n) of any unit as rows, (..., m)."""
-        return _thinned(signals, self.step)
+        return np.concatenate([_thinned(signals[..., test], self.step) for test in self._tests], axis=-1)
+
+    def rate(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Time derivative of a signal (n,) [its unit per second]."""
+        return np.concatenate([np.gradient(signal[test], self.step) for test in self._tests])
+
+    @property
+    def begins(self) -> NDArray[np.float64]:
+        """1 where a test begins, 0 elsewhere, (n,)."""
+        found = np.zeros(self.position.size)
+        found[list(self.starts)] = 1.0
+        return found
 
     @property
     def row_times(self) -> NDArray[np.float64]:
-        """Time of each row since the first sample [s], (m,)."""
+        """Time of each row since the first sample [s], (m,), as if tests followed each other."""
         edge = round(CUT_S / self.step)
-        samples = np.arange(self.position.size, dtype=np.float64)
-        return self.step * samples[edge : self.position.size - edge : self.every]
+        samples = [np.arange(test.start + edge, test.stop - edge, self.every) for test in self._tests]
+        return self.step * np.concatenate(samples).astype(np.float64)
 
     @property
     def blocks(self) -> NDArray[np.intp]:
-        """The block of time that each row belongs to, (m,)."""
-        every = self.every * self.step
-        return (np.arange(self.row_times.size) / round(BLOCK_S / every)).astype(np.intp)
+        """The block of time that each row belongs to, (m,); none is of two tests."""
+        long, edge = round(BLOCK_S / (self.every * self.step)), round(CUT_S / self.step)
+        found, first = list[NDArray[np.intp]](), 0
+        for test in self._tests:
+            rows = np.arange(len(range(test.start + edge, test.stop - edge, self.every)))
+            found.append(first + (rows / max(long, 1)).astype(np.intp))
+            first = int(found[-1][-1]) + 1
+        return np.concatenate(found)
+
+
+def joined(motions: Sequence[DrivenMotion], source: str) -> DrivenMotion:
+    """Several motions of one plant as one, whose tests begin from rest; sampled as often as the one sampled most."""
+    if len(motions) == 1:
+        return motions[0]
+    step = min(each.step for each in motions)
+    even = [_resampled(each, step) for each in motions]
+    sizes = [each.position.size for each in even]
+    weights = np.array([each.row_times.size for each in motions])
+    noise = float(np.sqrt(np.average([each.noise**2 for each in motions], weights=weights)))
+    position, velocity, acceleration, drive = (
+        np.concatenate([getattr(each, name) for each in even])
+        for name in ("position", "velocity", "acceleration", "drive")
+    )
+    return DrivenMotion(
+        source,
+        step,
+        position,
+        velocity,
+        acceleration,
+        drive,
+        max(each.period for each in motions),
+        noise,
+        _said_once([warning for each in motions for warning in each.warnings], source),
+        tuple(np.cumsum([0, *sizes[:-1]]).tolist()),
+    )
+
+
+def _resampled(motion: DrivenMotion, step: float) -> DrivenMotion:
+    """The motion at another time between samples [s]."""
+    if abs(step / motion.step - 1.0) < UNEVEN:
+        return motion
+    old = motion.step * np.arange(motion.position.size)
+    new = np.arange(0.0, old[-1], step)
+    signals = {
+        name: np.interp(new, old, getattr(motion, name))
+        for name in ("position", "velocity", "acceleration", "drive")
+    }
+    return replace(motion, step=step, **signals)
+
+
+def _said_once(warnings: Sequence[DataWarning], source: str) -> tuple[DataWarning, ...]:
+    """Of warnings with the same code one, which says of how many tests it is."""
+    codes = dict.fromkeys(each.code for each in warnings)
+    found = {code: [each for each in warnings if each.code == code] for code in codes}
+    return tuple(
+        same[0]
+        if len(same) == 1
+        else replace(same[0], what=f"in {len(same)} tests {same[0].what}", source=source, test="")
+        for same in found.values()
+    )
 
 
 def is_motion(path: Path | str) -> bool:
@@ -149,6 +226,27 @@ def recorded_motion(recording: Recording, motion: str, drive: str, source: str) 
     Samples that are not even in time are interpolated. Raises :class:`InputError` for a test that lacks a channel or
     is too short.
     """
+    step, position, force = _even(recording, motion, drive, source)
+    return _driven(
+        f"{source}, {recording.name}", step, position, force, period_of(position, SAME_AS_MEASURED)
+    )
+
+
+def recorded_speed(recording: Recording, speed: str, drive: str, source: str) -> DrivenMotion:
+    """The same where the channel ``speed`` has the velocity: the position is its integral, from zero.
+
+    Raises :class:`InputError` as :func:`recorded_motion` does.
+    """
+    step, velocity, force = _even(recording, speed, drive, source)
+    position = np.concatenate([[0.0], np.cumsum(0.5 * step * (velocity[1:] + velocity[:-1]))])
+    period = period_of(velocity, SAME_AS_MEASURED)
+    return _driven(f"{source}, {recording.name}", step, position, force, period)
+
+
+def _even(
+    recording: Recording, motion: str, drive: str, source: str
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Time between samples [s], and both channels at even times."""
     for name in (motion, drive):
         if name not in recording.channels:
             raise InputError(
@@ -162,10 +260,7 @@ def recorded_motion(recording: Recording, motion: str, drive: str, source: str) 
     start, end = max(led.time[0], driven.time[0]), min(led.time[-1], driven.time[-1])
     step = float(led.time[-1] - led.time[0]) / max(led.time.size - 1, 1)
     time = start + step * np.arange(int((end - start) / step + 1e-6) + 1)
-    position, force = _at(time, led), _at(time, driven)
-    return _driven(
-        f"{source}, {recording.name}", step, position, force, period_of(position, SAME_AS_MEASURED)
-    )
+    return step, _at(time, led), _at(time, driven)
 
 
 def _at(time: NDArray[np.float64], channel: RecordedChannel) -> NDArray[np.float64]:

@@ -33,7 +33,10 @@ NEWTON_STEPS = 4
 
 
 class Samples(NamedTuple):
-    """The measured motion at n even samples: q, qd, qdd, force of the drive and its rate, angle of the cycle; SI."""
+    """The measured motion at n even samples: q, qd, qdd, force of the drive and its rate, angle of the cycle; SI.
+
+    ``begins`` is 1 where a test begins and 0 elsewhere: there the states are at rest.
+    """
 
     q: Float[Array, " n"]
     qd: Float[Array, " n"]
@@ -42,6 +45,7 @@ class Samples(NamedTuple):
     drive_rate: Float[Array, " n"]
     angle: Float[Array, " n"]
     speed: Float[Array, " n"]
+    begins: Float[Array, " n"]
 
 
 class Course(NamedTuple):
@@ -95,6 +99,8 @@ def _march(
     scale = jnp.asarray([each.scale for each in model.states])
 
     def advance(before: Array, at: Samples) -> tuple[Array, tuple[Array, Array]]:
+        before = (1.0 - at.begins) * before
+
         def defect(now: Array) -> Array:
             return _defect(model, p, at, step, now, before)
 
@@ -108,14 +114,15 @@ def _march(
     return jax.lax.scan(advance, jnp.zeros(size), along)[1]
 
 
-def _before(now: Float[Array, "n ..."]) -> Float[Array, "n ..."]:
-    """The same a sample earlier; at rest before the first."""
-    return jnp.concatenate([jnp.zeros_like(now[:1]), now[:-1]])
+def _before(now: Float[Array, "n s"], along: Samples) -> Float[Array, "n s"]:
+    """The same a sample earlier; at rest before the first of each test."""
+    earlier = jnp.concatenate([jnp.zeros_like(now[:1]), now[:-1]])
+    return (1.0 - along.begins)[:, None] * earlier
 
 
-def _course(model: AbstractPlant, now: Float[Array, "n s"], step: float) -> Course:
+def _course(model: AbstractPlant, along: Samples, now: Float[Array, "n s"], step: float) -> Course:
     """States at samples as the equations take them: between the ends of each step."""
-    weight, before = _weights(model), _before(now)
+    weight, before = _weights(model), _before(now, along)
     return Course(weight * now + (1.0 - weight) * before, (now - before) / step)
 
 
@@ -132,13 +139,14 @@ def _moved(
 
     By the implicit function theorem at each sample, all at once; only the sum over time is taken step by step.
     """
-    count, before = next(iter(directions.values())).size, _before(now)
+    count, before = next(iter(directions.values())).size, _before(now, along)
     if now.shape[1] == 0:
         return jnp.zeros((count, *now.shape))
 
     def carried(at: Samples, now: Array, before: Array) -> tuple[Array, Array]:
         _, ahead = jacobian(lambda each: _defect(model, p, at, step, each, before), now)
         _, behind = jacobian(lambda each: _defect(model, p, at, step, now, each), before)
+        behind = (1.0 - at.begins) * behind
         return ahead, jax.vmap(lambda column: -solve_dense(ahead, column), in_axes=1, out_axes=1)(behind)
 
     def forced(direction: Values) -> Array:
@@ -186,7 +194,7 @@ def _force(
 def needed_force(model: AbstractPlant, p: Values, along: Samples, step: float) -> Needed:
     """What the drive would have had to exert, and whether the states were found."""
     now, left = _march(model, p, along, step)
-    course = _course(model, now, step)
+    course = _course(model, along, now, step)
     force = _force(model, p, along, course, nothing_imposed(model.ports, along.q))
     return Needed(force, jnp.max(left))
 
@@ -210,10 +218,10 @@ def force_slopes(
 ) -> NeededSlopes:
     """What :func:`needed_force` gives, and slopes of the force along the first ``wanted`` directions of k."""
     now, left = _march(model, p, along, step)
-    course, blank = _course(model, now, step), nothing_imposed(model.ports, along.q)
+    course, blank = _course(model, along, now, step), nothing_imposed(model.ports, along.q)
 
     def force(p: Values, now: Array) -> Array:
-        return _force(model, p, along, _course(model, now, step), blank)
+        return _force(model, p, along, _course(model, along, now, step), blank)
 
     def slope(given: tuple[Values, Array]) -> Array:
         return jax.jvp(force, (dict(p), now), given)[1]
@@ -226,7 +234,7 @@ def force_slopes(
 @eqx.filter_jit
 def force_gain(model: AbstractPlant, p: Values, along: Samples, step: float, port: str) -> Float[Array, " n"]:
     """Change of the needed force per unit of a signal imposed at a port [N per the port's unit], (n,)."""
-    course = _course(model, _march(model, p, along, step)[0], step)
+    course = _course(model, along, _march(model, p, along, step)[0], step)
     blank = nothing_imposed(model.ports, along.q)
     unit = jnp.zeros_like(blank[port])
     unit = unit.at[:, 0].set(1.0) if unit.ndim == 2 else jnp.ones_like(unit)
@@ -245,4 +253,4 @@ def ports_along(model: AbstractPlant, p: Values, along: Samples, step: float) ->
         motion, signals, fundamental = _at(model, now)
         return model.at_ports(p, motion, s, sd, model.drive(signals, fundamental))
 
-    return jax.vmap(at)(along, *_course(model, _march(model, p, along, step)[0], step))
+    return jax.vmap(at)(along, *_course(model, along, _march(model, p, along, step)[0], step))

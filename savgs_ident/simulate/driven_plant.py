@@ -9,13 +9,13 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 
-from savgs_ident.core.errors import DataWarning, InputError
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import as_values
 from savgs_ident.effects.base import Port, PortKind
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model, PlantModel
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.responses.driven_motion import DrivenMotion, recorded_motion
+from savgs_ident.responses.driven_motion import DrivenMotion, joined, recorded_motion, recorded_speed
 from savgs_ident.simulate.along_motion import Samples, force_gain
 
 FORCE_SHARE = 0.35
@@ -27,48 +27,75 @@ DRIVE_SHARE = 0.1
 
 
 def is_driven(plant: AbstractPlant | type[AbstractPlant]) -> bool:
-    """Whether a plant can be held against the force of its drive along a measured motion."""
-    return len(plant.coordinates) == 1 and len(plant.inputs) == 1
+    """Whether a plant can be held against the force of its drive along a measured motion.
+
+    An input that is a motion itself, as a road is, is no drive.
+    """
+    if len(plant.coordinates) != 1 or len(plant.inputs) != 1:
+        return False
+    unit = plant.coordinates[0].unit
+    return plant.inputs[0].unit not in (unit, f"{unit}/s", f"{unit}/s^2")
 
 
 def motion_in(campaign: Campaign, model: Model) -> DrivenMotion | None:
-    """The motion along which a model is held against its drive; None where that is not how it is held.
+    """The motions along which a model is held against its drive; None where that is not how it is held.
 
-    Raises :class:`InputError` as :func:`longest_motion` does.
+    Raises :class:`InputError` as :func:`motion_of` does.
     """
-    if not is_driven(model.plant) or campaign.of_kind("dwell"):
+    if not is_driven(model.plant) or campaign.of_kind("dwell") or not _reading(model.plant):
         return None
-    return longest_motion(campaign, model)
+    return motion_of(campaign, model)
 
 
-def longest_motion(campaign: Campaign, model: Model) -> DrivenMotion:
-    """The longest test of a campaign that is not at rest, as a motion of a plant with one coordinate and its drive.
+def motion_of(campaign: Campaign, model: Model) -> DrivenMotion:
+    """All tests of a campaign that are not at rest, as motions of a plant with one coordinate and its drive.
 
-    Raises :class:`InputError` where no channel reads the coordinate, or the test cannot be used.
+    Raises :class:`InputError` for a plant that is not held against its drive, where no channel reads the coordinate
+    or its rate, and where no test can be used.
     """
     plant = model.plant
+    _refuse_undriven(model, campaign.source)
     (coordinate,), (drive,) = plant.coordinates, plant.inputs
-    reading = next((each.name for each in plant.channels if each.unit == coordinate.unit), None)
-    if reading is None:
+    reading = _reading(plant)
+    if not reading:
         raise InputError(
-            f"no channel of {model.plant_name} reads '{coordinate.name}' in {coordinate.unit}",
+            f"no channel of {model.plant_name} reads '{coordinate.name}' in {coordinate.unit}, or its rate",
             source=campaign.source,
             remedy="record harmonic dwells, or declare the channel of the measured motion",
         )
+    is_rate = next(each.unit for each in plant.channels if each.name == reading) != coordinate.unit
+    recorded = recorded_speed if is_rate else recorded_motion
     moving = [each for each in campaign.recordings if each.kind != "standstill"]
     if not moving:
         raise InputError("nothing moves in it", source=campaign.source, remedy="record a motion")
-    test = max(moving, key=lambda each: each.duration_s)
-    motion = recorded_motion(test, reading, drive.name, campaign.source)
-    if len(moving) == 1:
-        return motion
-    others = DataWarning(
-        "tests_not_used",
-        f"of {len(moving)} motions only the longest is compared, '{test.name}'",
-        source=campaign.source,
-        remedy="give another as a file of its own by --held-out: it is predicted, and compared",
-    )
-    return replace(motion, warnings=(*motion.warnings, others))
+    found: list[DrivenMotion] = []
+    refused: list[InputError] = []
+    for test in moving:
+        try:
+            found.append(recorded(test, reading, drive.name, campaign.source))
+        except InputError as error:
+            refused.append(error)
+    if not found:
+        raise refused[0]
+    motion = joined(found, campaign.source)
+    left_out = tuple(error.as_warning("tests_not_used") for error in refused)
+    return replace(motion, warnings=(*motion.warnings, *left_out))
+
+
+def _refuse_undriven(model: Model, source: str) -> None:
+    if not is_driven(model.plant):
+        raise InputError(
+            f"{model.name} is no plant with one coordinate and one input, its drive",
+            source=source,
+            remedy="give a recording of dwells, or a plant that is driven along the measured motion",
+        )
+
+
+def _reading(plant: AbstractPlant | type[AbstractPlant]) -> str:
+    """Name of the channel that reads the coordinate of a plant, or else its rate; empty where none does."""
+    (coordinate,) = plant.coordinates
+    read = {each.unit: each.name for each in reversed(plant.channels)}
+    return read.get(coordinate.unit) or read.get(f"{coordinate.unit}/s", "")
 
 
 def samples_of(motion: DrivenMotion) -> Samples:
@@ -80,9 +107,10 @@ def samples_of(motion: DrivenMotion) -> Samples:
         motion.velocity,
         motion.acceleration,
         motion.drive,
-        np.gradient(motion.drive, motion.step),
+        motion.rate(motion.drive),
         angle,
         np.full_like(angle, speed),
+        motion.begins,
     )
     return Samples(*(jnp.asarray(each) for each in signals))
 
@@ -92,12 +120,7 @@ def sized_along(model: Model, motion: DrivenMotion) -> Model:
 
     Raises :class:`InputError` for a plant that is not held against its drive.
     """
-    if not is_driven(model.plant):
-        raise InputError(
-            f"{model.name} is no plant with one coordinate and one input, its drive",
-            source=motion.source,
-            remedy="give a recording of dwells, or a plant that is driven along the measured motion",
-        )
+    _refuse_undriven(model, motion.source)
     if not isinstance(model, PlantModel):
         return model
     force = float(np.sqrt(np.mean(motion.rows(motion.drive) ** 2)))

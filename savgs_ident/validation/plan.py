@@ -32,6 +32,7 @@ from savgs_ident.diagnosis.public import baseline_of, problem_of_dwells
 from savgs_ident.diagnosis.result import DiagnosisSettings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.prior import slopes_at, values_at
+from savgs_ident.inference.problem import check_free, used_parameters
 from savgs_ident.plants.model import Model, PlantModel
 from savgs_ident.simulate.excitation import typical_amplitude
 from savgs_ident.simulate.program_cache import use_persistent_cache
@@ -44,8 +45,9 @@ OFFERED = 16
 """Frequencies that are offered about the natural ones of a plant, where none are given."""
 
 ASSUMED_NOISE = 0.01
-"""Noise of one sample where none is given, as a share of the rms of the channel's largest motion. Origin: by choice,
-that of a sensor whose range is ten times the motion, with ten bits."""
+"""Standard deviation of one sample where none is given, as a share of the largest rms of the channel in a dwell.
+
+Origin: by choice."""
 
 
 @dataclass(frozen=True)
@@ -175,8 +177,10 @@ def plan(
     use_persistent_cache()
     hertz, sizes = _offers(model, frequencies, amplitudes)
     _above_zero({"tests": tests, "target": target, "samples": samples, "orders": orders})
-    given, settings, values = baseline_of(model, orders, (), constants)
+    given, settings, _ = baseline_of(model, orders, (), constants)
     settings = replace(settings, free=given.free(free))
+    check_free(settings.free, given.table, used_parameters(given.build(), given.table))
+    _have_sizes(given, settings.free)
     solved = []
     for size in sizes:
         progress(f"solving {len(hertz)} dwells at {size:g} {given.plant.inputs[0].unit}")
@@ -187,7 +191,7 @@ def plan(
         there = [float(f) for f, ok in zip(response.frequency, response.ok, strict=True) if ok]
         if there:
             progress(f"what {len(there)} dwells at {size:g} {given.plant.inputs[0].unit} would show")
-            blocks.append(_block(given, settings, values, size, there, known, samples))
+            blocks.append(_block(given, settings, size, there, known, samples))
     if not blocks:
         raise InputError(
             "no dwell that was offered has a periodic motion", remedy="offer smaller amplitudes or others"
@@ -232,6 +236,17 @@ def _offers(
     return tuple(sorted(set(frequencies))), tuple(sorted(set(sizes)))
 
 
+def _have_sizes(model: Model, free: Sequence[str]) -> None:
+    """Raises :class:`InputError` for a parameter of which a relative error says nothing, for it is zero."""
+    for name in free:
+        if model.table[name].value == 0.0:
+            raise InputError(
+                f"a relative error of '{name}' means nothing, for its value is 0",
+                source="--free",
+                remedy="give it a value, or name other parameters",
+            )
+
+
 def _above_zero(numbers: Mapping[str, float]) -> None:
     for name, number in numbers.items():
         if not 0.0 < number < np.inf:
@@ -274,7 +289,6 @@ class _Block(NamedTuple):
 def _block(
     given: Model,
     settings: DiagnosisSettings,
-    values: Mapping[str, float],
     size: float,
     hertz: Sequence[float],
     noise: Mapping[str, float],
@@ -284,23 +298,25 @@ def _block(
     driven = {given.plant.inputs[0].name: size}
     measured = simulate_dwells(given, hertz, driven, noise, samples=samples, orders=settings.orders)
     problem, data = problem_of_dwells(measured, given, settings)
-    motion, origin = problem.start(values), np.zeros(len(problem.nuisances))
-    at = dict(values) | values_at(problem.nuisances, origin)
+    origin = np.zeros(len(problem.nuisances))
+    at = values_at(problem.nuisances, origin)
+    motion = problem.start(at)
     names = [each.name for each in problem.nuisances]
     steepness = slopes_at(problem.nuisances, origin)
     parameters = problem.slopes(problem.model(()), problem.values(at), motion, names) * steepness
-    found = problem.sensitivities((), at, motion, problem.candidates)
+    # Each at its typical shape alone.
+    terms = [replace(term, tries=({},)) for term in problem.candidates]
+    found = problem.sensitivities((), at, motion, terms)
     typical = settings.constants.typical_coordinate
-    sizes = [np.array([typical * each.scale for each in term.amplitudes]) for term in problem.candidates]
+    sizes = [np.array([typical * each.scale for each in term.amplitudes]) for term in terms]
     effects = [each[0] @ by for each, by in zip(found, sizes, strict=True)]
     columns = np.concatenate([parameters, np.stack(effects, axis=1)], axis=1)
     columns /= np.sqrt(data.variance)[:, None]
     rows = [columns[data.test == test] for test in range(data.tests)]
     count = len(settings.free)
-    relative = np.abs(steepness[:count]) / np.array([abs(at[name]) or 1.0 for name in settings.free])
+    relative = np.abs(steepness[:count]) / np.array([abs(at[name]) for name in settings.free])
     units = {
-        term.name: (float(by[0]), term.amplitudes[0].unit)
-        for term, by in zip(problem.candidates, sizes, strict=True)
+        term.name: (float(by[0]), term.amplitudes[0].unit) for term, by in zip(terms, sizes, strict=True)
     }
     return _Block(
         tuple((f, size) for f in measured.frequency.tolist()),
@@ -339,7 +355,7 @@ def _choose(
     def worth(place: int) -> tuple[float, float]:
         with_it = total + block.information[place]
         beyond = np.maximum(np.log(errors_with(with_it) / target), 0.0)
-        return -float(np.sum(beyond)), _told_apart(_split(block, with_it)[1], constants.visible_sigma)
+        return -float(np.sum(beyond)), _told_separations(_split(block, with_it)[1], constants.visible_sigma)
 
     while len(chosen) < min(most, len(block.dwells)):
         best = max((each for each in range(len(block.dwells)) if each not in chosen), key=worth)
@@ -349,12 +365,12 @@ def _choose(
     return chosen, errors
 
 
-def _told_apart(information: Array, visible: float) -> float:
+def _told_separations(information: Array, visible: float) -> float:
     """How well effects are told from each other, over all pairs [1]; what is told apart for sure adds little more."""
-    return float(np.sum(np.log1p(_apart(information) / visible**2)))
+    return float(np.sum(np.log1p(_separations(information) / visible**2)))
 
 
-def _apart(information: Array) -> Array:
+def _separations(information: Array) -> Array:
     """Squares of the sd by which each effect differs from each other one [1], (k, k); 0 from itself."""
     own = np.diag(information)
     shared = information**2 / np.where(own > 0.0, own, 1.0)
@@ -366,7 +382,7 @@ def _apart(information: Array) -> Array:
 def _effects(block: _Block, total: Array, constants: DecisionConstants) -> tuple[PlannedEffect, ...]:
     """What a campaign of that information would show of every effect, the most visible first."""
     _, information = _split(block, total)
-    apart, names, found = _apart(information), list(block.units), []
+    apart, names, found = _separations(information), list(block.units), []
     for place, (name, (size, unit)) in enumerate(block.units.items()):
         sigma = float(np.sqrt(max(information[place, place], 0.0)))
         others = [each for each in range(len(names)) if each != place and information[each, each] > 0.0]

@@ -66,6 +66,17 @@ def _quoted_commas(text: bytes) -> bytes:
     return b"\n".join([head, *cells]) + b"\n"
 
 
+PREAMBLE = b"""Date:;2020-07-08 21:11:37
+Firmware:;0x0120;0x6150
+Index:;0x30D3;0x30D2;0x0000
+Max. samples:;500
+Recorded samples:;500
+Sampling period:;6.400
+Scale:;0;True;2.000;-159.000;151.000;167.000
+Trigger:;1;0.000000;"Channel 1";"Rising above value"
+"""
+"""As a drive's commissioning tool writes it: lines of words and numbers, of two cells and of more."""
+
 DIALECTS: dict[str, Callable[[Signals, Csv], bytes]] = {
     "units of the laboratory": lambda s, csv: csv(_lab(s), headers=LAB),
     "semicolons": lambda s, csv: csv(s, separator=";"),
@@ -99,13 +110,21 @@ DIALECTS: dict[str, Callable[[Signals, Csv], bytes]] = {
     "a row of words and a row of units": lambda s, csv: (
         TITLE + NAMED + WORDS + csv(s, separator=";").split(b"\n", 1)[1]
     ),
+    "a preamble with numbers, and a time without a name": lambda s, csv: (
+        PREAMBLE + _with_unit_row(csv(s, separator=";")).replace(b"time", b"", 1)
+    ),
     "quoted decimal commas": lambda s, csv: _quoted_commas(csv(s)),
     "ISO dates": lambda s, csv: _dated(s, csv, "%Y-%m-%dT%H:%M:%S.%f"),
     "ISO dates with a zone": lambda s, csv: _dated(s, csv, "%Y-%m-%d %H:%M:%S.%f+00:00"),
     "dates that begin with the day": lambda s, csv: _dated(s, csv, "%d.%m.%Y %H:%M:%S.%f"),
 }
 
-TITLED = ("title lines", "title lines and a table of semicolons", "a row of words and a row of units")
+TITLED = (
+    "title lines",
+    "title lines and a table of semicolons",
+    "a row of words and a row of units",
+    "a preamble with numbers, and a time without a name",
+)
 """Dialects with lines above the names of the columns, which a warning tells of."""
 
 

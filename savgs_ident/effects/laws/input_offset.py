@@ -1,8 +1,8 @@
-"""A constant force on top of what a drive is said to exert: an offset of its amplifier, a weight along its axis.
+"""A constant force or torque beside what a drive is said to exert: an offset of its amplifier, a weight to be held.
 
     u = recorded u + b
 
-with the offset b [N].
+with the offset b [N, or N m].
 
 Source: Janot, Gautier and Brunot 2019, Data set and reference models of EMPS, nonlinearbenchmark.org, eq. (1).
 """
@@ -36,8 +36,8 @@ class InputOffset(AbstractInputLaw):
         }
 
     def suits(self, port: Port) -> bool:
-        """Only where the input is a force: a road that lies higher is the same road."""
-        return port.kind is PortKind.INPUT and port.displacement_unit == "N"
+        """Only where the input is a force or a torque: a road that lies higher is the same road."""
+        return port.kind is PortKind.INPUT and port.displacement_unit in ("N", "N m")
 
     def shift(self, v: Values, signal: InputSignal, fundamental: Fundamental) -> InputSignal:
         """The constant."""
