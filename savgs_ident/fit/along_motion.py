@@ -158,8 +158,8 @@ def _estimates(
     estimates = []
     for place, each in enumerate(coordinates):
         before = model.table[each.name]
-        told = scaled.sd[place] < INFORMED or each.name not in free
-        unit = abs(slope[place]) if told else np.inf
+        informed = scaled.sd[place] < INFORMED or each.name not in free
+        unit = abs(slope[place]) if informed else np.inf
         estimates.append(
             Estimate(
                 name=each.name,
