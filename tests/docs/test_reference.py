@@ -52,7 +52,7 @@ def test_the_pages_by_hand_are_there(built: Path, page: str) -> None:
 def test_signatures_and_fields_are_shown_as_written(built: Path) -> None:
     base = _text_of(built, "savgs_ident.plants.base")
     assert "transfers( p: Values, frequency: Float[Array, '*f'], ) → Complex[Array, 'C *f']" in base
-    fit = _text_of(built, "savgs_ident.fit.result")
+    fit = _text_of(built, "savgs_ident.fit.identified")
     assert "covariance: NDArray[float64]" in fit
     assert "of the estimates in their order [products of their units], (n, n)." in fit
     assert "Annotated" not in _text_of(built, "savgs_ident.cli.simulate")
@@ -69,7 +69,7 @@ def test_private_names_and_those_of_others_are_left_out(built: Path) -> None:
 @pytest.mark.slow
 def test_names_lead_to_where_they_are_reported(built: Path) -> None:
     """One of an annotation, and one of a text."""
-    assert _link("plants.model", "Model") in _page(built, "fit.result")
+    assert _link("plants.model", "Model") in _page(built, "fit.identified")
     assert _link("plants.quarter_car.rig_recordings", "load_campaign") in _page(built, "campaigns.run")
 
 
