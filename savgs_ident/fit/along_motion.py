@@ -20,12 +20,12 @@ from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progre
 from savgs_ident.core.transforms import known_to_tolerance
 from savgs_ident.fit.estimate import Estimate
 from savgs_ident.fit.identifiability import (
-    CHANCE,
     EXPLAINED,
     INFORMED,
     MATERIAL_MISFIT,
     unexplained,
     verdict_of,
+    widened_by_misfit,
 )
 from savgs_ident.fit.identified import Identified, Verdict
 from savgs_ident.fit.small_errors import own_part
@@ -145,12 +145,10 @@ def _estimates(
 ) -> tuple[tuple[Estimate, ...], NDArray[np.float64]]:
     """The estimates, free ones first, and their covariance [products of their units]."""
     coordinates, rows = mode.coordinates, mode.slopes.shape[0]
-    expected = rows - len(free)
-    beyond = max(chi2 - expected - CHANCE * np.sqrt(2.0 * max(expected, 0)), 0.0)
     priors = np.eye(len(coordinates))
     scaled, alone = (
         spread_of(np.concatenate([mode.slopes / noise / size, priors]))
-        for size in (np.sqrt(1.0 + beyond), 1.0)
+        for size in (widened_by_misfit(chi2, rows - len(free)), 1.0)
     )
     known = np.array([model.table[each.name].tolerance > 0.0 for each in coordinates])
     own = np.sqrt(np.diag(own_part(alone.covariance, np.where(known, 1.0, np.inf))))

@@ -345,10 +345,15 @@ def weighed_by_misfit(problem: Problem, best: Minimum) -> np.ndarray:
     """
     rows = _rows_of(problem, best)
     expected = problem.target.entries - len(problem.free.identified)
-    beyond = float(rows @ rows) - expected - CHANCE * np.sqrt(2.0 * max(expected, 0))
     weighed = np.array(best.jacobian)
-    weighed[: rows.size] /= np.sqrt(1.0 + max(beyond, 0.0))
+    weighed[: rows.size] /= widened_by_misfit(float(rows @ rows), expected)
     return weighed
+
+
+def widened_by_misfit(chi2: float, expected: int) -> float:
+    """By what factor errors grow [1] where ``chi2`` is beyond the ``expected`` one, and what chance adds to it."""
+    beyond = chi2 - expected - CHANCE * np.sqrt(2.0 * max(expected, 0))
+    return float(np.sqrt(1.0 + max(beyond, 0.0)))
 
 
 def advice_of(task: Task, minimiser: Minimiser, best: Minimum) -> tuple[str, ...]:

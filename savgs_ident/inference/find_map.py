@@ -323,41 +323,6 @@ def find_map_again(
     return ascent.mode(ascent.again(fit), steps)
 
 
-@dataclass(frozen=True)
-class _NearFit:
-    """A plant near a fit, with the slopes that it has at the fit: to find them takes longer than to find a motion."""
-
-    plant: Plant
-    fit: LaplaceFit
-
-    @property
-    def nuisances(self) -> Coordinates:
-        return self.plant.nuisances
-
-    def predict(
-        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
-    ) -> Prediction:
-        found = self.plant.predict(terms, values, (), warm_start)
-        return found._replace(slopes=self.fit.prediction.slopes) if names else found
-
-    def refined(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any) -> Any:
-        return self.plant.refined(terms, values, warm_start)
-
-    def sensitivities(
-        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
-    ) -> list[Array]:
-        return self.plant.sensitivities(terms, values, warm_start, candidates)
-
-
-def find_map_near(search: Search, terms: tuple[Term, ...], fit: LaplaceFit, steps: int = STEPS) -> LaplaceFit:
-    """The mode near a ``fit`` of the same plant with the same terms, by the slopes that the rows have at the fit.
-
-    For other rows of the same data: without some of the tests the mode is a few of its standard deviations away,
-    where the slopes are still those of the fit.
-    """
-    return find_map_again(replace(search, plant=_NearFit(search.plant, fit)), terms, fit, steps)
-
-
 def find_map_from_both(
     search: Search,
     terms: tuple[Term, ...],

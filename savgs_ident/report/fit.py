@@ -49,12 +49,7 @@ def fit_record(fit: Fit) -> dict[str, object]:
         "dwells": _dwell_records(fit),
         "status": fit.status.name.lower(),
         "advice": fit.status.advice,
-        "verdict": {
-            "explained": fit.verdict.explained,
-            "identifiable": fit.verdict.identifiable,
-            "sentences": fit.verdict.sentences,
-            "confounded": fit.verdict.confounded,
-        },
+        "verdict": verdict_record(fit),
         "prior_chi2": fit.prior_chi2,
         "effects": fit.effects,
         "quantity": fit.quantity,
@@ -97,6 +92,17 @@ def parameter_records(fit: Identified) -> dict[str, dict[str, object]]:
             "prior_sd": each.prior_sd,
         }
         for each in fit.estimates
+    }
+
+
+def verdict_record(fit: Identified) -> dict[str, object]:
+    """What the data identify."""
+    verdict = fit.verdict
+    return {
+        "explained": verdict.explained,
+        "identifiable": verdict.identifiable,
+        "sentences": verdict.sentences,
+        "confounded": verdict.confounded,
     }
 
 

@@ -6,7 +6,13 @@ from rich.console import Group, RenderableType
 from savgs_ident.core.files import warning_record
 from savgs_ident.fit.along_motion import MotionFit
 from savgs_ident.report.drive import drive_figure
-from savgs_ident.report.fit import correlation_record, identified_table, parameter_records, tolerance_tables
+from savgs_ident.report.fit import (
+    correlation_record,
+    identified_table,
+    parameter_records,
+    tolerance_tables,
+    verdict_record,
+)
 from savgs_ident.report.text import fixed, plain, table
 
 
@@ -26,12 +32,7 @@ def motion_fit_record(fit: MotionFit) -> dict[str, object]:
         "gap": {"force": {"before": before, "after": after, "floor": noise}},
         "status": fit.status.name.lower(),
         "advice": fit.status.advice,
-        "verdict": {
-            "explained": fit.verdict.explained,
-            "identifiable": fit.verdict.identifiable,
-            "sentences": fit.verdict.sentences,
-            "confounded": fit.verdict.confounded,
-        },
+        "verdict": verdict_record(fit),
         "effects": fit.effects,
         "quantity": fit.compared["quantity"],
         "wall_s": fit.wall_s,

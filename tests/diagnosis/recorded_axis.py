@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.signal import lfilter
 
+import savgs_ident as si
 from savgs_ident.recordings.axis_recording import AxisRecording
 
 PERIOD_S = 5.0
@@ -36,3 +37,11 @@ def recorded_axis(
     draw = np.random.default_rng(seed).normal(size=time.size)
     force += noise * np.sqrt(1.0 - colour**2) * lfilter([1.0], [1.0, -colour], draw)
     return AxisRecording("synthetic", time, np.round(q, 7), q, force)
+
+
+def axis_with(*effects: str) -> si.PlantModel:
+    """The axis with effects of its catalogue."""
+    model = si.PlantModel(si.Axis(), si.Axis.parameters)
+    for name in effects:
+        model = model + name
+    return model

@@ -17,7 +17,7 @@ from savgs_ident.recordings.axis_recording import AxisRecording
 from savgs_ident.responses.driven_motion import SAME, driven_motion, period_of
 
 from ..relaxed import with_kept_programs
-from .recorded_axis import BASE, PERIOD_S, RATE_HZ, recorded_axis
+from .recorded_axis import BASE, PERIOD_S, RATE_HZ, axis_with, recorded_axis
 
 PUBLISHED = {
     "mass": 95.1089,
@@ -36,15 +36,8 @@ def _relaxed() -> Iterator[None]:
         yield
 
 
-def _axis(*effects: str) -> si.PlantModel:
-    model = si.PlantModel(si.Axis(), si.Axis.parameters)
-    for name in effects:
-        model = model + name
-    return model
-
-
 def _problem(recording: AxisRecording, *effects: str) -> tuple[MotionProblem, Data]:
-    model = _axis(*effects)
+    model = axis_with(*effects)
     return motion_problem(
         driven_motion(recording), si.Axis(), model.table, model.catalogue, effects, model.free()
     )
@@ -149,7 +142,7 @@ def test_a_plant_with_more_coordinates_and_a_campaign_of_dwells_are_refused() ->
 
 @pytest.mark.slow
 def test_where_nothing_is_missing_nothing_is_named(tmp_path: Path) -> None:
-    gap = si.diagnose(_axis(), driven_motion(recorded_axis({}, 0)))
+    gap = si.diagnose(axis_with(), driven_motion(recorded_axis({}, 0)))
     assert (gap.verdict.kind, gap.verdict.effects) == ("none", ())
     assert gap.trusted
     assert set(gap.by_channel) == {"drive_force"}
@@ -165,7 +158,7 @@ def test_where_nothing_is_missing_nothing_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("unit", [1.0, 0.01])
 def test_a_spring_that_was_put_in_is_named_and_nothing_else_whatever_the_unit_of_force(unit: float) -> None:
     motion = driven_motion(_held({"spring": 60.0}, 4))
-    gap = si.diagnose(_axis(), replace(motion, drive=motion.drive / unit, noise=motion.noise / unit))
+    gap = si.diagnose(axis_with(), replace(motion, drive=motion.drive / unit, noise=motion.noise / unit))
     assert gap.verdict.effects == ("screw_stiffness",)
     assert gap.identified["mass"] == pytest.approx(BASE["mass"] / unit, rel=0.005)
     assert gap.shrink.after < 1.1 * gap.shrink.floor
@@ -194,7 +187,7 @@ def test_the_published_parameters_and_force_errors_come_out(
     real: tuple[si.DrivenMotion, si.DrivenMotion],
 ) -> None:
     learned, other = real
-    model = _axis(*TEXTBOOK)
+    model = axis_with(*TEXTBOOK)
     both = [
         motion_problem(each, si.Axis(), model.table, model.catalogue, TEXTBOOK, model.free())
         for each in (learned, other)
@@ -219,7 +212,7 @@ def test_the_friction_of_the_real_axis_is_found_at_its_guide(
 ) -> None:
     """Learned from two of the four cycles: time grows with the samples."""
     learned, other = real
-    gap = si.diagnose(_axis(), _first_cycles(learned, 2), held_out=other)
+    gap = si.diagnose(axis_with(), _first_cycles(learned, 2), held_out=other)
     assert gap.trusted
     assert gap.verdict.ports == ("guide",)
     assert tuple(map(str, gap.verdict.families)) == ("guide/friction",)

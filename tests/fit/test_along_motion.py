@@ -14,7 +14,7 @@ from savgs_ident.responses.driven_motion import DrivenMotion, driven_motion
 from savgs_ident.simulate.along_motion import needed_force
 from savgs_ident.simulate.driven_plant import samples_of
 
-from ..diagnosis.recorded_axis import BASE, recorded_axis
+from ..diagnosis.recorded_axis import BASE, axis_with, recorded_axis
 from ..relaxed import with_kept_programs
 
 EMPS = Path(__file__).resolve().parents[3] / "shared/data/real/EMPS"
@@ -33,13 +33,6 @@ def _relaxed() -> Iterator[None]:
         yield
 
 
-def _axis(*effects: str) -> si.PlantModel:
-    model = si.PlantModel(si.Axis(), si.Axis.parameters)
-    for name in effects:
-        model = model + name
-    return model
-
-
 def _motion(seed: int = 3) -> DrivenMotion:
     return driven_motion(recorded_axis({"coulomb": 12.0, "offset": 2.0}, seed))
 
@@ -47,7 +40,7 @@ def _motion(seed: int = 3) -> DrivenMotion:
 def _needed(laws: Mapping[str, float], seed: int, noise: float = 0.3) -> DrivenMotion:
     """A motion whose drive exerted what the textbook's model needs with parameters ``laws`` [SI], and white noise."""
     recording = recorded_axis({}, seed)
-    model, motion = _axis(*TEXTBOOK), driven_motion(recording)
+    model, motion = axis_with(*TEXTBOOK), driven_motion(recording)
     p = as_values(model.table.as_dict() | dict(laws))
     force = np.asarray(needed_force(model.build(), p, samples_of(motion), motion.step).force)
     drawn = noise * np.random.default_rng(seed).normal(size=force.size)
@@ -55,7 +48,7 @@ def _needed(laws: Mapping[str, float], seed: int, noise: float = 0.3) -> DrivenM
 
 
 def _fit(motion: DrivenMotion, *effects: str, held_out: DrivenMotion | None = None) -> MotionFit:
-    found = si.fit(_axis(*effects), motion, held_out=held_out)
+    found = si.fit(axis_with(*effects), motion, held_out=held_out)
     assert isinstance(found, MotionFit)
     return found
 
@@ -109,7 +102,7 @@ def test_the_identified_model_is_written_and_fits_as_well(tmp_path: Path) -> Non
 
 def test_options_that_mean_nothing_along_a_motion_are_refused() -> None:
     with pytest.raises(si.InputError, match="neither peak-to-peak"):
-        si.fit(_axis(), _motion(), max_frequency=3.0)
+        si.fit(axis_with(), _motion(), max_frequency=3.0)
 
 
 @pytest.mark.skipif(not EMPS.exists(), reason="published recordings are not here")

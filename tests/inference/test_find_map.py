@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.status import Status
+from savgs_ident.diagnosis.held_out import find_map_near
 from savgs_ident.inference.find_map import (
     Search,
     Start,
     find_map,
     find_map_from_both,
-    find_map_near,
     search_of,
 )
 from savgs_ident.inference.observations import Prediction
