@@ -19,7 +19,7 @@ from arviz_stats.base.array import array_stats
 from emcee.autocorr import integrated_time
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
-from scipy.special import ndtri
+from scipy.special import logsumexp, ndtri
 
 from savgs_ident.core.status import Status
 from savgs_ident.core.transforms import FreeVector
@@ -49,6 +49,10 @@ PRECISE = 0.025
 
 PARETO_K = 0.7
 """Pareto index of the weights up to which the surrogate covers the posterior."""
+
+EVEN = 1.1
+"""Largest weight over the mean up to which the index says nothing: it measures the shape of a tail, whatever the
+tail's size, and no state holds a chain for longer than so many steps."""
 
 DIVERGING = 0.01
 """Share of trajectories that may diverge."""
@@ -116,6 +120,7 @@ def assess_convergence(
     r_hat_others = _greatest_r_hat(others) if others else 1.0
     # ArviZ takes log likelihoods, of which the logarithms of the weights are the negatives.
     k = float(array_stats.psislw(-chains.log_ratio)[1]) if chains.log_ratio.size > 20 else np.nan
+    heaviest = _heaviest(chains.log_ratio)
     diverging = chains.divergences / max(chains.evaluations, 1)
     acceptance = float(np.mean(chains.accepted)) if chains.accepted.size else 0.0
     reasons = list(doubts)
@@ -127,8 +132,11 @@ def assess_convergence(
         reasons.append(
             f"the chains disagree in a tolerated parameter: R-hat is {r_hat_others:.3f}, above {R_HAT_OTHERS}"
         )
-    if k > PARETO_K:
-        reasons.append(f"the surrogate does not cover the posterior: Pareto k is {k:.2f}, above {PARETO_K}")
+    if k > PARETO_K and heaviest > EVEN:
+        reasons.append(
+            f"the surrogate does not cover the posterior: Pareto k is {k:.2f}, above {PARETO_K}, and a draw weighs up"
+            f" to {heaviest:.3g} times the mean"
+        )
     if diverging > DIVERGING:
         reasons.append(f"{chains.divergences} trajectories diverged")
     return Convergence(
@@ -140,8 +148,16 @@ def assess_convergence(
         acceptance=acceptance,
         divergences=chains.divergences,
         pareto_k=k,
+        heaviest_weight=heaviest,
         evaluations=chains.evaluations,
         unsolved=chains.unsolved,
+    )
+
+
+def _heaviest(log_ratio: Float[np.ndarray, " W"]) -> float:
+    """The largest weight over the mean; NaN without any."""
+    return (
+        float(np.exp(log_ratio.max() - logsumexp(log_ratio)) * log_ratio.size) if log_ratio.size else np.nan
     )
 
 

@@ -95,8 +95,9 @@ class Convergence:
         r_hat_max: the largest over all parameters [1].
         acceptance: share of proposals that the exact model accepted [1].
         divergences: diverging trajectories of the gradient-based sampler; 0 for emcee, which has none.
-        pareto_k: tail index of the ratios of exact to surrogate density at the proposals [1]; the proposals
-            cover the posterior if it is below 0.7.
+        pareto_k: tail index of the weights, the ratios of exact to surrogate density at the proposals [1]; the
+            proposals cover the posterior if it is below 0.7, or if the weights are nearly equal.
+        heaviest_weight: the largest of these over their mean [1].
         evaluations: responses of the exact model, all dwells each.
         unsolved: proposals at which the model found no periodic motion; they were rejected.
     """
@@ -109,6 +110,7 @@ class Convergence:
     acceptance: float
     divergences: int
     pareto_k: float
+    heaviest_weight: float
     evaluations: int
     unsolved: int
 

@@ -59,6 +59,7 @@ def test_good_chains_may_be_used() -> None:
     assert found.ess_min == least_ess([mixing_of(draws)]) >= 1000.0
     assert (found.acceptance, found.unsolved, found.evaluations) == (1.0, 3, 31_000)
     assert np.isnan(found.pareto_k)
+    assert np.isnan(found.heaviest_weight)
 
 
 def test_chains_that_stay_apart_are_found_out() -> None:
@@ -129,6 +130,20 @@ def test_the_tail_of_the_weights_is_measured(index: float) -> None:
     assert found.pareto_k == pytest.approx(index, abs=0.12)
     assert found.converged == (index < 0.7)
     assert any("Pareto" in reason for reason in found.reasons) == (index > 0.7)
+
+
+def test_a_tail_of_weights_that_are_nearly_equal_is_no_reason() -> None:
+    """Its index is the same as that of one that matters."""
+    shape = np.exp(np.random.default_rng(4).exponential(1.0, size=20_000))
+    even, uneven = (
+        _assessed(_autoregressive(0.0), log_ratio=np.log1p(size * shape / shape.max()))
+        for size in (0.05, 50.0)
+    )
+    assert even.converged
+    assert not uneven.converged
+    assert min(even.pareto_k, uneven.pareto_k) > 0.8
+    assert even.heaviest_weight == pytest.approx(1.05, abs=0.01)
+    assert uneven.heaviest_weight > 10.0
 
 
 def test_divergences_are_a_reason_beyond_one_in_a_hundred() -> None:

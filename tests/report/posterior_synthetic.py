@@ -89,6 +89,7 @@ def synthetic_posterior(
             acceptance=0.873,
             divergences=0,
             pareto_k=0.21,
+            heaviest_weight=1.6,
             evaluations=8123,
             unsolved=2,
         ),

@@ -331,6 +331,7 @@ def posterior_record(posterior: Posterior, origin: Origin) -> dict[str, object]:
         "r_hat_max": convergence.r_hat_max,
         "target_ess": convergence.target_ess,
         "pareto_k": convergence.pareto_k,
+        "heaviest_weight": convergence.heaviest_weight,
         "evaluations": convergence.evaluations,
         "unsolved": convergence.unsolved,
         "draws": dict(zip(("chains", "length"), next(iter(posterior.draws.values())).shape, strict=True)),

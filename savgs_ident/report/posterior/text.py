@@ -188,8 +188,14 @@ def _sampler_checks(posterior: Posterior) -> tuple[Check, ...]:
             "Pareto k",
             decimal(c.pareto_k, 2),
             "below 0.7",
-            "Heaviness of the tail of exact over approximate density at the proposals; above 0.7 the proposals"
-            " do not cover the posterior.",
+            "Shape of the tail of exact over approximate density at the proposals; above 0.7 the proposals do not"
+            " cover the posterior, unless that ratio is nearly the same everywhere.",
+        ),
+        Check(
+            "Heaviest weight",
+            decimal(c.heaviest_weight, 2),
+            "below 1.1 where Pareto k is not below 0.7",
+            "The largest of these ratios over their mean.",
         ),
         Check(
             "Exact evaluations",
