@@ -32,8 +32,8 @@ from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
 from savgs_ident.simulate.driven_plant import motion_in, motion_of, sized_along
-from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep, response_of_tests
-from savgs_ident.simulate.forgetting import lasting_windows
+from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep
+from savgs_ident.simulate.forgetting import forgetful_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
@@ -81,8 +81,7 @@ def diagnose(
         raise InputError(
             "a held-out motion goes with a measured motion alone", remedy="diagnose each campaign by itself"
         )
-    response = response_of_tests(measured, model.plant, orders, max_frequency, progress)
-    response = lasting_windows(response, model)
+    response = forgetful_response(measured, model, orders, max_frequency, progress)
     campaign, warnings = campaign_of(measured), response.warnings
     given, settings, values = baseline_of(model, orders, without, constants)
     # A sweep in windows is what the model is fitted to, and no test that was left out.

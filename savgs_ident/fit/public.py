@@ -30,9 +30,8 @@ from savgs_ident.simulate.excitation import (
     campaign_of,
     measured_excitation,
     measured_response,
-    response_of_tests,
 )
-from savgs_ident.simulate.forgetting import lasting_windows
+from savgs_ident.simulate.forgetting import forgetful_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.simulate.public import (
     SimulatedResponse,
@@ -133,8 +132,7 @@ def fit_with(
     use_persistent_cache()
     drawing = model.before
     names = drawing.free(free)
-    response = response_of_tests(measured, model.plant, settings.orders, max_frequency, progress)
-    response = lasting_windows(response, drawing)
+    response = forgetful_response(measured, drawing, settings.orders, max_frequency, progress)
     if response.part is not None and settings.quantity == "peak_to_peak":
         raise InputError(
             "tests that do not repeat have no peak-to-peak values",

@@ -2,10 +2,11 @@
 
     response = estimate_windows(campaign, inputs=("road_height",), readings=("sprung_accel", "susp_deflection"))
 
-A rig forgets how a motion began. So each window begins some seconds before what is compared of it (:data:`LEAD_S`),
-and at its end its inputs are led over, in :data:`CLOSING_S`, to what they were before it began. In such a window the
-inputs repeat, and the periodic motion that they lead to is the recorded one in the part that is compared, wherever
-the recorded one came from: no state at the beginning has to be estimated.
+A rig forgets how a motion began. So each window begins some seconds before what is compared of it (:data:`LEAD_S`,
+more for a plant that rings), and at its end its inputs are led over, in :data:`CLOSING_S`, to what they were before
+it began. In such a window the inputs repeat, and the periodic motion that they lead to is the recorded one in what is
+compared, wherever the recorded one came from: no state at the beginning has to be estimated. A test that
+begins at rest is compared from its beginning, for before it the rig rested.
 
 What is compared are complex amplitudes of the readings, weighted in time by a share that is zero outside that part
 (:func:`savgs_ident.responses.harmonic_response.compared_share`), recorded and predicted alike:
@@ -18,7 +19,7 @@ and every so many-th where there would be more than :data:`NUMBERS`.
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil, floor
 
@@ -46,8 +47,8 @@ the wheel nothing; friction shortens both.
 CLOSING_S = 0.5
 """Length in which the inputs are led over to where the window began [s]."""
 
-COMPARED_S = 9.0
-"""About how much of each window is compared [s]. Origin: computing time; a longer one wastes less on the lead."""
+COMPARED = 3.0
+"""About how much of each window is compared, over its lead. Origin: computing time; more wastes less on the lead."""
 
 LEAST_S = 2.0
 """Less than this is not worth a window [s]."""
@@ -64,8 +65,15 @@ NUMBERS = 1200
 LONGEST_GAP = 5.0
 """Samples that may lack one after the other, in mean intervals, where a curve through the others stands in."""
 
+REST_S = 0.2
+"""As long as this a test has to rest at its beginning to be taken for one that rested before [s]."""
+
+RESTING = 1e-3
+"""Range that a channel may have at rest, over that in the whole test, where its noise is not larger [1]."""
+
 _RATE_HZ = 1000.0
 _FEWEST = 10
+_NOISY = 8.0
 
 
 @dataclass(frozen=True)
@@ -81,6 +89,7 @@ class _Even:
         gaps: spans without samples of each channel [s], pairs of their ends.
         noise: standard deviation of each channel's noise at one instant [its unit], which neighbours share where the
             channel has fewer samples than there are instants; the amplitudes have as much of it as if they did not.
+        before: how much of it is rest before the test began [s].
     """
 
     test: str
@@ -90,6 +99,7 @@ class _Even:
     values: dict[str, Array]
     gaps: dict[str, list[tuple[float, float]]]
     noise: dict[str, float]
+    before: float = 0.0
 
     @property
     def count(self) -> int:
@@ -101,15 +111,43 @@ class _Even:
         """[s]."""
         return self.count / self.rate
 
+    @property
+    def begins_at_rest(self) -> bool:
+        """Whether no channel shows anything but noise at the beginning."""
+        beginning = ceil(REST_S * self.rate)
+        return all(
+            np.ptp(each[:beginning]) <= max(RESTING * np.ptp(each), _NOISY * self.noise[name])
+            for name, each in self.values.items()
+        )
+
+    def rested(self, seconds: float) -> "_Even":
+        """The same with so much rest before it [s], as it began."""
+        beginning, count = ceil(REST_S * self.rate), ceil(seconds * self.rate)
+        before = count / self.rate
+        return replace(
+            self,
+            start=self.start - before,
+            values={
+                name: np.concatenate([np.full(count, np.mean(each[:beginning])), each])
+                for name, each in self.values.items()
+            },
+            gaps={name: [(a + before, b + before) for a, b in each] for name, each in self.gaps.items()},
+            before=before,
+        )
+
 
 def estimate_windows(
-    campaign: Campaign, inputs: Sequence[str], readings: Sequence[str], highest_hz: float = HIGHEST_HZ
+    campaign: Campaign,
+    inputs: Sequence[str],
+    readings: Sequence[str],
+    highest_hz: float = HIGHEST_HZ,
+    lead_s: float = LEAD_S,
 ) -> HarmonicResponse:
     """The response of all tests of ``campaign`` that do not repeat, in windows.
 
     ``inputs`` are the channels that drive the plant, the first of which has to move; ``readings`` are what its
     sensors read. The noise is that of the standstill; where none was recorded, it is read from how rough the channels
-    are. Up to ``highest_hz`` is compared [Hz].
+    are. Up to ``highest_hz`` is compared [Hz], from ``lead_s`` [s] after the beginning of each window on.
 
     Raises :class:`InputError` where no test is long enough, the first input does not move, or nothing is compared.
     """
@@ -128,14 +166,14 @@ def estimate_windows(
         if isinstance(even, DataWarning):
             warnings += (even,)
         else:
-            found.append(even)
-    cut = [(even, *span) for even in found for span in _spans(even.duration)]
+            found.append(even.rested(lead_s + CLOSING_S) if even.begins_at_rest else even)
+    cut = [(even, *span) for even in found for span in _spans(even.duration, lead_s)]
     if not cut:
-        raise _no_window(campaign, found, warnings)
+        raise _no_window(campaign, found, warnings, lead_s)
     assumed = [name for name in readings if name not in still and any(name in each.values for each in found)]
     if assumed:
         warnings += (_noise_assumed(campaign.source, assumed),)
-    windows = _Windows.of_one_length(cut)
+    windows = _Windows.of_one_length(cut, lead_s)
     channels = tuple(name for name in (*inputs, *readings) if any(name in each.values for each in found))
     return windows.response(channels, set(inputs), warnings, highest_hz)
 
@@ -201,24 +239,26 @@ def _gaps(time: Array, start: float) -> list[tuple[float, float]]:
     return [(float(time[place] - start), float(time[place + 1] - start)) for place in long]
 
 
-def _spans(duration: float) -> list[tuple[float, float]]:
+def _spans(duration: float, lead: float) -> list[tuple[float, float]]:
     """Beginning and end of what is compared in each window of a test [s after its beginning]."""
-    first, last = LEAD_S + CLOSING_S, duration
+    first, last = lead + CLOSING_S, duration
     if last - first < LEAST_S:
         return []
-    count = max(1, round((last - first) / COMPARED_S))
+    count = max(1, round((last - first) / (COMPARED * lead)))
     edges = np.linspace(first, last, count + 1)
     return [(float(one), float(other)) for one, other in pairwise(edges)]
 
 
-def _no_window(campaign: Campaign, found: list[_Even], warnings: tuple[DataWarning, ...]) -> InputError:
+def _no_window(
+    campaign: Campaign, found: list[_Even], warnings: tuple[DataWarning, ...], lead: float
+) -> InputError:
     if found:
-        longest = max(each.duration for each in found)
-        least = LEAD_S + CLOSING_S + LEAST_S
+        longest = max(each.duration - each.before for each in found)
+        least = lead + CLOSING_S + LEAST_S
         return InputError(
             f"the longest test has {longest:.3g} s, {least:.3g} s are needed",
             source=campaign.source,
-            remedy="record a longer one: the motion has to forget how it began",
+            remedy="record a longer one, for the motion has to forget how it began; or one that begins at rest",
         )
     if not warnings:
         return InputError(
@@ -258,9 +298,10 @@ class _Window:
 
 @dataclass(frozen=True)
 class _Windows:
-    """Windows of one length [s], of which the part between two phases [rad] is compared."""
+    """Windows of one length [s], of which the part between two phases [rad] is compared, after a lead [s]."""
 
     length: float
+    lead: float
     part: tuple[float, float]
     windows: tuple[_Window, ...]
 
@@ -270,17 +311,17 @@ class _Windows:
         return min(IMPOSED_HZ, 0.45 * min(each.record.slowest for each in self.windows))
 
     @classmethod
-    def of_one_length(cls, cut: Sequence[tuple[_Even, float, float]]) -> "_Windows":
-        """The windows about what is compared, as long as the longest of them needs."""
+    def of_one_length(cls, cut: Sequence[tuple[_Even, float, float]], lead: float) -> "_Windows":
+        """The windows about what is compared, as long as the longest of them needs, with a ``lead`` [s]."""
         compared = max(end - begin for _, begin, end in cut)
-        length = LEAD_S + compared + CLOSING_S
-        part = 2.0 * np.pi * LEAD_S / length, 2.0 * np.pi * (LEAD_S + compared) / length
+        length = lead + compared + CLOSING_S
+        part = 2.0 * np.pi * lead / length, 2.0 * np.pi * (lead + compared) / length
         windows = []
         for record, _, end in cut:
             last = min(round(end * record.rate), record.count - 1)
-            first = last - round((LEAD_S + compared) * record.rate)
+            first = last - round((lead + compared) * record.rate)
             windows.append(_Window(record, max(first, round(CLOSING_S * record.rate))))
-        return cls(length, part, tuple(windows))
+        return cls(length, lead, part, tuple(windows))
 
     def response(
         self,
@@ -325,8 +366,9 @@ class _Windows:
         )
 
     def _name(self, window: _Window) -> str:
-        begin = window.first / window.record.rate + LEAD_S
-        return f"{window.record.test}, {begin:.1f} to {begin + self.length - LEAD_S - CLOSING_S:.1f} s"
+        # Rounded to what is printed, and no negative zero.
+        begin = round(window.first / window.record.rate + self.lead - window.record.before, 1) + 0.0
+        return f"{window.record.test}, {begin:.1f} to {begin + self.length - self.lead - CLOSING_S:.1f} s"
 
     def _compared(self, readings: int, highest_hz: float) -> tuple[int, NDArray[np.bool_]]:
         """From one order that is compared to the next, and which of them are, from 0 to the last."""

@@ -23,7 +23,7 @@ from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, SweepResponse
 from savgs_ident.responses.sweeps import estimate_sweep_response
-from savgs_ident.responses.windows import HIGHEST_HZ, KINDS, estimate_windows
+from savgs_ident.responses.windows import HIGHEST_HZ, KINDS, LEAD_S, estimate_windows
 from savgs_ident.simulate.mesh import Layout, Mesh, over_dwells, turns
 
 SUMMED = 64
@@ -296,10 +296,12 @@ def response_of_tests(
     orders: int,
     max_frequency: float | None = None,
     progress: Progress = no_progress,
+    lead_s: float = LEAD_S,
 ) -> HarmonicResponse:
     """The same; of a campaign without dwells that of its other tests, a road or a sweep, in windows.
 
-    With a warning ``tests_not_used`` for roads beside dwells.
+    What is compared of these begins ``lead_s`` [s] after they do. With a warning ``tests_not_used`` for roads beside
+    dwells.
     """
     if isinstance(measured, HarmonicResponse):
         return measured_response(measured, plant, orders, max_frequency, progress)
@@ -310,7 +312,7 @@ def response_of_tests(
     progress("cutting windows")
     inputs, readings = ([each.name for each in listed] for listed in (plant.inputs, plant.channels))
     highest = HIGHEST_HZ if max_frequency is None else min(max_frequency, HIGHEST_HZ)
-    return estimate_windows(measured.only(recorded_names(plant)), inputs, readings, highest)
+    return estimate_windows(measured.only(recorded_names(plant)), inputs, readings, highest, lead_s)
 
 
 def _not_used(source: str, test: str) -> DataWarning:

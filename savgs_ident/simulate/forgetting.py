@@ -6,27 +6,81 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
+from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.core.values import as_values
 from savgs_ident.plants.model import Model
-from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse
-from savgs_ident.simulate.excitation import measured_excitation, only_tests
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.windows import LEAD_S
+from savgs_ident.simulate.excitation import Measurements, measured_excitation, only_tests, response_of_tests
 from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 
 REMEMBERED = 0.01
 """Largest share of how a motion began that may be left where the comparison in a window begins [1]."""
 
+LONGEST_LEAD_S = 45.0
+"""The longest lead that is tried [s]. Origin: computing time."""
 
-def lasting_windows(response: HarmonicResponse, model: Model) -> HarmonicResponse:
-    """The windows of a response in which a model forgets how the motion began; dwells as they are.
+ENDURED = 0.5
+"""Part of :data:`REMEMBERED` that a longer lead is to leave: a fit may find less damping than it begins with."""
 
-    With a warning ``window_remembers`` for each that is left out: friction may stick through its beginning. Raises
-    :class:`InputError` if the model has no motion or forgets in no window.
+
+def forgetful_response(
+    measured: Measurements,
+    model: Model,
+    orders: int,
+    max_frequency: float | None = None,
+    progress: Progress = no_progress,
+) -> HarmonicResponse:
+    """The response that a model is compared with: dwells, else windows as long as it needs to forget their beginning.
+
+    ``orders`` are compared up to ``max_frequency`` [Hz]. With a warning ``window_remembers`` for each window that is
+    left out for it remembers: friction may stick through its beginning. Raises :class:`InputError` if nothing can be
+    compared, or the model has no motion in any window or forgets in none.
     """
+    response = response_of_tests(measured, model.plant, orders, max_frequency, progress)
     if response.part is None:
         return response
+    left, half = _left(response, model)
+    if np.min(left) >= REMEMBERED and isinstance(measured, Campaign):
+        lead = _longer(LEAD_S, float(np.median(half)), float(np.median(left)))
+        progress(f"cutting windows of which the first {lead:.3g} s are not compared")
+        response = response_of_tests(measured, model.plant, orders, max_frequency, lead_s=lead)
+        left, _ = _left(response, model)
+    return _lasting(response, left)
+
+
+def _left(response: HarmonicResponse, model: Model) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What a model remembers of the beginning of each window [1], (D,): after the lead, and after half of it."""
+    assert response.part is not None
     plant, p = model.build(), as_values(model.table.as_dict())
     solution = simulate_periodic(plant, p, measured_excitation(plant, response, model.table))
-    left = remembered(solution, response.part)
+    begin = response.part.begin
+    return remembered(solution, begin), remembered(solution, 0.5 * begin)
+
+
+def _longer(lead: float, half: float, left: float) -> float:
+    """The lead [s] after which little enough is left, where that is ``left`` after ``lead`` and ``half`` after half.
+
+    Raises :class:`InputError` if the motion does not forget, or not soon.
+    """
+    rate = np.log(half / left) / (0.5 * lead) if np.isfinite([half, left]).all() else 0.0
+    longer = lead + np.log(left / (ENDURED * REMEMBERED)) / rate if rate > 0.0 else np.inf
+    if longer > LONGEST_LEAD_S:
+        what = (
+            "does not forget how a motion began"
+            if np.isfinite(left)
+            else "does not follow the recorded motion"
+        )
+        raise InputError(
+            f"the model {what}: {LONGEST_LEAD_S:g} s before what is compared would not do",
+            remedy="give the plant the damping that it has, or record dwells",
+        )
+    return float(longer)
+
+
+def _lasting(response: HarmonicResponse, left: NDArray[np.float64]) -> HarmonicResponse:
+    """The windows of which less than :data:`REMEMBERED` is ``left``."""
     kept = np.flatnonzero(left < REMEMBERED)
     if kept.size == 0:
         raise InputError(
@@ -46,8 +100,8 @@ def lasting_windows(response: HarmonicResponse, model: Model) -> HarmonicRespons
     return replace(only_tests(response, kept), warnings=(*response.warnings, *warnings)) if gone else response
 
 
-def remembered(solution: PeriodicSolution, part: ComparedPart) -> NDArray[np.float64]:
-    """What is left of how the motion in each window began where the comparison begins [1], (D,).
+def remembered(solution: PeriodicSolution, upto: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What is left of how the motion in each window began at a phase of it [rad], (D,): a share [1], (D,).
 
     A deviation of the states, each in units of its largest value in the window, is followed along the linearised
     motion; the windows are of one length. Infinite where there is no motion.
@@ -58,7 +112,7 @@ def remembered(solution: PeriodicSolution, part: ComparedPart) -> NDArray[np.flo
     phase = np.asarray(solution.mesh.phase).reshape(windows, nodes)
     left = np.broadcast_to(np.eye(steps.shape[0]), by_node.shape[1:])
     for node in range(nodes):
-        before = phase[:, node] < part.begin
+        before = phase[:, node] < upto
         left = np.where(before[:, None, None], by_node[node] @ left, left)
     largest = np.abs(np.asarray(solution.trajectory.x)).reshape(-1, windows, nodes).max(axis=2).T
     size = np.maximum(largest, np.finfo(float).tiny)

@@ -17,7 +17,7 @@ from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recordin
 from savgs_ident.responses.harmonic_response import TAPER, HarmonicResponse, compared_share
 from savgs_ident.responses.windows import CLOSING_S, HIGHEST_HZ, LEAD_S, estimate_windows
 from savgs_ident.simulate.excitation import SUMMED, measured_excitation, signals_at
-from savgs_ident.simulate.forgetting import lasting_windows
+from savgs_ident.simulate.forgetting import REMEMBERED, forgetful_response, remembered
 from savgs_ident.simulate.mesh import turns, uniform_mesh
 from savgs_ident.simulate.periodic import PeriodicSettings, layout_of, resolve, simulate_periodic
 from savgs_ident.simulate.readings import harmonics
@@ -288,14 +288,73 @@ def test_powers_of_a_turn_are_its_exponentials() -> None:
         np.testing.assert_allclose(np.asarray(turns(phase, orders)), exact, atol=1e-12)
 
 
+def _damped(c: float) -> si.PlantModel:
+    return si.PlantModel(si.TwoMass(), PARAMETERS.with_values({"c": c}))
+
+
 @pytest.mark.slow
-def test_windows_that_remember_their_beginning_are_left_out_and_a_plant_that_rings_is_refused() -> None:
-    whole = estimate_windows(campaign(noise=0.0), INPUTS, READINGS)
-    damped, ringing = (si.PlantModel(si.TwoMass(), PARAMETERS.with_values({"c": c})) for c in (2100.0, 100.0))
-    assert lasting_windows(whole, damped) is whole
+def test_windows_begin_as_long_before_what_is_compared_as_the_plant_remembers() -> None:
+    made = campaign(noise=0.0)
+    usual = forgetful_response(made, _damped(2100.0), 9)
+    assert _leads(usual) == pytest.approx(LEAD_S)
+    # exp(-r t) of the body's motion is left, with r = c / 2 m_s (k_t / (k + k_t))^2: 0.11 after three seconds.
+    ringing = _damped(700.0)
+    longer = forgetful_response(made, ringing, 9)
+    assert LEAD_S * 1.2 < _leads(longer) < LEAD_S * 3.0
+    p = as_values(ringing.table.as_dict())
+    solution = simulate_periodic(
+        ringing.build(), p, measured_excitation(ringing.plant, longer, ringing.table)
+    )
+    assert longer.part is not None
+    assert np.max(remembered(solution, longer.part.begin)) < REMEMBERED
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("c", "says"), [(250.0, r"longest test has 10 s, 2[3-9].* s are needed"), (50.0, "does not forget")]
+)
+def test_a_plant_that_rings_for_longer_than_the_record_is_refused(c: float, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        forgetful_response(campaign(seconds=10.0, noise=0.0), _damped(c), 9)
+
+
+@pytest.mark.slow
+def test_windows_that_were_cut_already_are_refused_where_the_plant_remembers() -> None:
+    windows = estimate_windows(campaign(noise=0.0), INPUTS, READINGS)
     # exp(-c / 2 m_s t) of the body's motion is left after three seconds: 0.6.
     with pytest.raises(InputError, match=r"remembers [4-9]\d %"):
-        lasting_windows(whole, ringing)
+        forgetful_response(windows, _damped(100.0), 9)
+
+
+def _leads(response: HarmonicResponse) -> float:
+    assert response.part is not None
+    return float(np.max(response.part.begin / (2.0 * np.pi * response.frequency)))
+
+
+def rested(seconds: float) -> Campaign:
+    """A road after so much rest [s]."""
+    test, still = campaign(noise=0.0).recordings
+    time = next(iter(test.channels.values())).time
+    count = round(seconds * RATE)
+    after = np.arange(time.size + count) / RATE
+    values = {name: np.concatenate([np.zeros(count), each.values]) for name, each in test.channels.items()}
+    return Campaign("made", (_test(test.name, "road", after, values), still), (), "")
+
+
+def test_a_test_that_begins_at_rest_is_compared_from_its_beginning() -> None:
+    before, after = (estimate_windows(made, INPUTS, READINGS) for made in (campaign(noise=0.0), rested(0.3)))
+    assert before.tests[0].startswith("road_c, 3.5 to ")
+    assert after.tests[0].startswith("road_c, 0.0 to ")
+    assert after.tests[-1].endswith(" to 20.3 s")
+
+
+@pytest.mark.slow
+def test_what_is_compared_of_the_beginning_is_what_the_plant_does_there() -> None:
+    measured = estimate_windows(rested(0.3), INPUTS, READINGS)
+    found, kept = predicted(measured), used(measured)
+    recorded = measured.harmonics[:, [measured.channel(name) for name in READINGS]]
+    miss = np.abs(found - recorded)[0][kept[0]]
+    assert np.sqrt(np.mean(miss**2)) < 4e-3 * np.sqrt(np.mean(np.abs(recorded[0][kept[0]]) ** 2))
 
 
 @pytest.mark.slow
