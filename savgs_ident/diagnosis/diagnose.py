@@ -14,6 +14,7 @@ The stages in order, each a whole record:
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from savgs_ident.core.errors import InputError
@@ -176,12 +177,29 @@ def diagnose_problem(
     with threadpool_limits(1, "blas"):
         began = time.perf_counter()
         recalibrated = recalibrate(plant, data, values, progress, settings.constants)
+        _refuse_mistaken(recalibrated)
         problem, fitted = fit_hypotheses(recalibrated, progress)
         found = _concluded(
             problem, fitted, measured, given, settings, values, progress, further, began, origin
         )
         watch(problem, fitted)
         return found
+
+
+MENDED = 0.1
+"""Part of what the baseline misses as given that calibration leaves of it at least where a recording is mistaken."""
+
+
+def _refuse_mistaken(problem: DiagnosisProblem) -> None:
+    """Raises :class:`InputError` where a channel has another unit or sign, which no effect should have to explain."""
+    mistaken = problem.plant.mistaken(problem.given)
+    measured, size = problem.search.data.measured, problem.search.data.discrepancy_scale
+    before, after = (
+        float(np.linalg.norm((rows - measured) / size))
+        for rows in (problem.given, problem.base.prediction.rows)
+    )
+    if mistaken and after > MENDED * before:
+        raise InputError(mistaken, remedy="mend its header, or give its unit and scale in channels.toml")
 
 
 def fit_hypotheses(

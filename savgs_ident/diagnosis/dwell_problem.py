@@ -35,6 +35,7 @@ from savgs_ident.inference.background.port_functions import InputLocation
 from savgs_ident.inference.background.shared_errors import background_about, without_drifts
 from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of
+from savgs_ident.inference.likely_mistake import likely_mistake
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.inference.problem import harmonic_target
 from savgs_ident.plants.base import AbstractPlant, Excitation
@@ -281,6 +282,12 @@ class DwellProblem(AbstractProblem):
     def next_tests(self, search: Search, one: LaplaceFit, other: LaplaceFit) -> tuple[NextTest, ...]:
         """Dwells under other conditions that separate two hypotheses best."""
         return next_tests(search, self, one, other)
+
+    def mistaken(self, given: NDArray[np.float64]) -> str:
+        """A channel with another unit or sign than its header's, or two that were exchanged, in words."""
+        rows = np.stack([np.asarray(self.likelihood.measured), given])
+        measured, predicted = self.likelihood.harmonics(rows, self.shape)
+        return likely_mistake(measured, predicted, measured != 0.0, self.plant)
 
     def responses(self, data: Data, *rows: NDArray[np.float64]) -> Responses:
         """The harmonics of three models."""

@@ -334,6 +334,14 @@ class AbstractProblem(ABC):
     def next_tests(self, search: Search, one: LaplaceFit, other: LaplaceFit) -> tuple[NextTest, ...]:
         """Tests that would separate two hypotheses, the most significant first."""
 
+    def mistaken(self, given: NDArray[np.float64]) -> str:
+        """What was probably recorded otherwise than it is said to be, in words; empty where nothing tells.
+
+        ``given`` (m,) are rows of the baseline as given [units of the rows].
+        """
+        del given
+        return ""
+
     @abstractmethod
     def responses(self, data: Data, *rows: NDArray[np.float64]) -> Responses | DriveForces:
         """Rows before, recalibrated and after, (m,) each [units of the rows], as a report shows them."""

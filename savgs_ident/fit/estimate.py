@@ -7,9 +7,10 @@ import numpy as np
 FAR_OFF = 5.0
 """Standard deviations from its sheet at which a number is not believed: by chance it is there once in two million."""
 
+_THOUSAND = 1000.0
 _UNITS_TAKEN = (
     (9.80665, "g was taken for m/s^2, or the other way round"),
-    (1000.0, "a unit was taken for another one a thousand times as large"),
+    (_THOUSAND, "a unit was taken for another one a thousand times as large"),
     (180.0 / np.pi, "degrees were taken for radians"),
     (25.4, "inches were taken for millimetres"),
     (0.0254, "inches were taken for metres"),
@@ -45,12 +46,18 @@ class Estimate:
 
     @property
     def unit_taken(self) -> str:
-        """Which unit was taken for which, where the value is off its sheet by as much; empty where it is not."""
+        """Which unit was taken for which, where the value is off its sheet by as much; empty where it is not.
+
+        A gain shows the unit of what it multiplies. Of any other number a thousandth is a slip of the sheet's.
+        """
         ratio = self.value / self.prior if self.prior else 0.0
         if ratio <= 0.0:
             return ""
         found = (
-            words for factor, words in _UNITS_TAKEN if abs(abs(np.log(ratio)) - abs(np.log(factor))) < _NEARLY
+            words
+            for factor, words in _UNITS_TAKEN
+            if (self.unit == "1" or factor == _THOUSAND)
+            and abs(abs(np.log(ratio)) - abs(np.log(factor))) < _NEARLY
         )
         return next(found, "")
 

@@ -103,9 +103,11 @@ class Identified(Result):
         """The first reason why the fit is not to be trusted; empty if it is.
 
         Where the model does not explain the data, that steps or motions are lacking is no advice: parameters that are
-        to make up for what is missing lead far away. Nor is that something is missing where a number is off as by a
-        wrong unit.
+        to make up for what is missing lead far away. Nor is that something is missing where the recordings, or a
+        number, are off as by a wrong unit.
         """
+        if self.mistaken and not self.verdict.explained:
+            return self.mistaken
         if self.far_off and (self.far_off[0].unit_taken or self.verdict.explained):
             return far_off_sentence(self.far_off[0])
         if not self.verdict.explained and self.status in (Status.CONVERGED, Status.MAX_ITERATIONS):
@@ -115,6 +117,11 @@ class Identified(Result):
         if self.unsolved:
             return self.unsolved
         return "" if self.verdict.identifiable else "the data do not identify every free parameter"
+
+    @property
+    def mistaken(self) -> str:
+        """What was probably recorded otherwise than it is said to be, in words; empty where nothing tells."""
+        return ""
 
     @property
     def by_name(self) -> Mapping[str, Estimate]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.status import Status
 from savgs_ident.fit.identified import Identified
+from savgs_ident.inference.likely_mistake import likely_mistake
 from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
 
 
@@ -61,6 +62,13 @@ class Fit(Identified):
         """Whether periodic motions are lacking, in words."""
         found = all(each.ok for each in self.dwell_status)
         return "" if found else "the model's periodic motion was not found in every dwell"
+
+    @property
+    def mistaken(self) -> str:
+        """A channel with another unit or sign than its header's, or two that were exchanged, in words."""
+        kept = self.as_given.shape[2]
+        measured = _readings_of(self.measured, self.channels, self.measured.harmonics)[..., :kept]
+        return likely_mistake(measured, self.as_given, self.used, self.estimated.plant)
 
     @property
     def compared(self) -> Mapping[str, object]:

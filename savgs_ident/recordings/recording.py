@@ -345,6 +345,11 @@ class Campaign:
         )
         return replace(self, recordings=kept)
 
+    @property
+    def left_out(self) -> tuple[DataWarning, ...]:
+        """Why tests of it were left out."""
+        return tuple(each for each in self.warnings if each.code == "test_left_out")
+
     def of_kind(self, kind: TestKind) -> tuple[Recording, ...]:
         """The tests of one kind, in recorded order."""
         return tuple(recording for recording in self.recordings if recording.kind == kind)

@@ -34,7 +34,7 @@ from savgs_ident.responses.fundamental import (
     shared_line,
     step_variance,
 )
-from savgs_ident.responses.periodic_fit import fit_periodic, plan_basis, plan_transform, sums
+from savgs_ident.responses.periodic_fit import fit_resolved, plan_transform, sums
 
 _HIGHEST_DEGREE = 6
 _NEIGHBOURS = 24
@@ -250,8 +250,7 @@ def _fit_group(group: ClockGroup, frequency: float, orders: int) -> dict[str, Ch
     if last < 1:
         return {}
     highest = highest_fitted_order(group, frequency)
-    basis = plan_basis(group.time, frequency, highest)
-    fit = fit_periodic(basis, group.values, highest, last)
+    basis, fit, highest = fit_resolved(group.time, frequency, group.values, highest, last)
     noise = estimate_noise_density(group.time, fit.residual, frequency, highest, last, group.left_out)
     floor = smallest_density(group.values)[:, None]
     density = np.maximum(noise.density, floor)

@@ -146,6 +146,7 @@ def _start_frequency(
 
 
 def _no_dwell(campaign: Campaign, warnings: tuple[DataWarning, ...]) -> InputError:
+    warnings = (*warnings, *campaign.left_out)
     if not warnings:
         return InputError(
             "there is no harmonic dwell", source=campaign.source, remedy="name the tests dwell_<f>Hz"

@@ -35,7 +35,7 @@ from savgs_ident.core.errors import DataWarning
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 from savgs_ident.responses.dwell_fit import DwellFit, fit_dwell, smallest_density
 from savgs_ident.responses.fundamental import ClockGroup
-from savgs_ident.responses.periodic_fit import fit_periodic, plan_basis, signals
+from savgs_ident.responses.periodic_fit import fit_resolved, plan_basis, signals
 
 FARTHEST = 8.0
 """Distance from the fit [robust standard deviations] beyond which a sample may be an outlier."""
@@ -312,9 +312,7 @@ def residual_without(
     left do not determine the harmonics.
     """
     highest, values = fit.channels[name].highest, group.values[group.names.index(name)]
-    some = fit_periodic(
-        plan_basis(group.time[~out], fit.frequency, highest), values[None, ~out], highest, gains_to=0
-    )
+    _, some, highest = fit_resolved(group.time[~out], fit.frequency, values[None, ~out], highest, 1)
     everywhere = plan_basis(group.time, fit.frequency, highest)
     fitted = signals(everywhere.plan, some.amplitude)[0] + some.slope[0] * group.time
     residual: NDArray[np.float64] = values - fitted

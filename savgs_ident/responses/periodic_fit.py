@@ -13,7 +13,7 @@ The signals y_c(t_j) of one clock are written as
 The normal matrix of the exponentials has the entries sum_j exp(i (l - k) w t_j): it depends on l - k only (a
 Toeplitz matrix), so 2K + 1 sums over the stamps determine it, and it is close to N times the identity whatever
 the jitter. Conjugate gradients, with products by fast Fourier transform, therefore converge to rounding in about
-ten steps; where they do not, the stamps do not determine the harmonics. The slope b absorbs slow drift. Neither
+ten steps. The slope b absorbs slow drift. Neither
 equal spacing nor a whole number of periods is needed.
 
 These sums of exponentials over unevenly spaced stamps are a nonuniform fast Fourier transform. Each sample is
@@ -98,6 +98,7 @@ _MOST_STEPS = 150
 _PRECISION = 1e-13
 _GAIN_PRECISION = 1e-8
 _DIVERGED = 1e6
+_SINGULAR = 1e-9
 
 
 @dataclass(frozen=True)
@@ -170,6 +171,24 @@ def fit_periodic(
     return PeriodicFit(amplitude, drift, residual, gain, pseudo_gain)
 
 
+def fit_resolved(
+    time: NDArray[np.float64], frequency: float, values: NDArray[np.float64], highest: int, gains_to: int
+) -> tuple[PeriodicBasis, PeriodicFit, int]:
+    """The same at ``time`` [s], up to ``highest``, halved as often as stamps that lack leave it unresolved.
+
+    With the basis and the highest order fitted, which is ``gains_to`` at least. Raises
+    :class:`numpy.linalg.LinAlgError` when the stamps do not determine even these.
+    """
+    while True:
+        basis = plan_basis(time, frequency, highest)
+        try:
+            return basis, fit_periodic(basis, values, highest, gains_to), highest
+        except np.linalg.LinAlgError:
+            if highest <= gains_to:
+                raise
+            highest = max(highest // 2, gains_to)
+
+
 def _both_sides(positive: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Orders -K..K from orders 0..K of sums over real data."""
     return np.concatenate([positive[:, :0:-1].conj(), positive], axis=1)
@@ -185,7 +204,8 @@ def _solve_toeplitz(
 ) -> NDArray[np.complex128]:
     """Rows x of G x = b for the rows b of ``right`` (R, n); G_kl = conj(lags[l - k]), by conjugate gradients.
 
-    Raises :class:`numpy.linalg.LinAlgError` if that does not converge.
+    By elimination where these are slow, as with stamps that jitter. Raises :class:`numpy.linalg.LinAlgError` if G is
+    singular.
     """
     count = right.shape[1]
     length = scipy.fft.next_fast_len(2 * count - 1)
@@ -212,7 +232,17 @@ def _solve_toeplitz(
         residual = residual - stride[:, None] * image
         before, power = power, _squared_norms(residual)
         direction = residual + (power / np.where(before > 0.0, before, 1.0))[:, None] * direction
-    raise np.linalg.LinAlgError("the time stamps do not determine the harmonics")
+    return _eliminated(lags, right)
+
+
+def _eliminated(lags: NDArray[np.complex128], right: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    order = np.arange(right.shape[1])
+    both_sides = np.concatenate([lags[:0:-1], lags.conj()])
+    gram = both_sides[order - order[:, None] + lags.size - 1]
+    sizes = np.linalg.eigvalsh(gram)
+    if not sizes[0] > _SINGULAR * sizes[-1]:
+        raise np.linalg.LinAlgError("the time stamps do not determine the harmonics")
+    return np.asarray(np.linalg.solve(gram, right.T).T)
 
 
 def _toeplitz_product(symbol: NDArray[np.complex128], rows: NDArray[np.complex128]) -> NDArray[np.complex128]:

@@ -18,17 +18,16 @@ share what they see of it, for the part that is compared is shorter than the win
 and every so many-th where there would be more than :data:`NUMBERS`.
 """
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
-from math import ceil, floor
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, floor, log
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.recording import Campaign, Recording, TestKind
-from savgs_ident.responses.driven_motion import roughness
+from savgs_ident.recordings.recording import Campaign, TestKind
+from savgs_ident.responses.even_record import EvenRecord, even_record
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, compared_share
 from savgs_ident.responses.outliers import estimate_standstill_noise
 
@@ -62,78 +61,7 @@ IMPOSED_HZ = 80.0
 NUMBERS = 1200
 """About how many numbers are compared. Origin: computing time; it rises with their cube where they share errors."""
 
-LONGEST_GAP = 5.0
-"""Samples that may lack one after the other, in mean intervals, where a curve through the others stands in."""
-
-REST_S = 0.2
-"""As long as this a test has to rest at its beginning to be taken for one that rested before [s]."""
-
-RESTING = 1e-3
-"""Range that a channel may have at rest, over that in the whole test, where its noise is not larger [1]."""
-
-_RATE_HZ = 1000.0
-_FEWEST = 10
-_NOISY = 8.0
-
-
-@dataclass(frozen=True)
-class _Even:
-    """Channels of a test at even instants.
-
-    Attributes:
-        test: its name.
-        start: the first instant on the clock of the recording [s].
-        rate: instants a second [Hz].
-        slowest: samples a second of the channel with the fewest [Hz].
-        values: of each channel by its name [its unit], (n,).
-        gaps: spans without samples of each channel [s], pairs of their ends.
-        noise: standard deviation of each channel's noise at one instant [its unit], which neighbours share where the
-            channel has fewer samples than there are instants; the amplitudes have as much of it as if they did not.
-        before: how much of it is rest before the test began [s].
-    """
-
-    test: str
-    start: float
-    rate: float
-    slowest: float
-    values: dict[str, Array]
-    gaps: dict[str, list[tuple[float, float]]]
-    noise: dict[str, float]
-    before: float = 0.0
-
-    @property
-    def count(self) -> int:
-        """How many instants there are."""
-        return next(iter(self.values.values())).size
-
-    @property
-    def duration(self) -> float:
-        """[s]."""
-        return self.count / self.rate
-
-    @property
-    def begins_at_rest(self) -> bool:
-        """Whether no channel shows anything but noise at the beginning."""
-        beginning = ceil(REST_S * self.rate)
-        return all(
-            np.ptp(each[:beginning]) <= max(RESTING * np.ptp(each), _NOISY * self.noise[name])
-            for name, each in self.values.items()
-        )
-
-    def rested(self, seconds: float) -> "_Even":
-        """The same with so much rest before it [s], as it began."""
-        beginning, count = ceil(REST_S * self.rate), ceil(seconds * self.rate)
-        before = count / self.rate
-        return replace(
-            self,
-            start=self.start - before,
-            values={
-                name: np.concatenate([np.full(count, np.mean(each[:beginning])), each])
-                for name, each in self.values.items()
-            },
-            gaps={name: [(a + before, b + before) for a, b in each] for name, each in self.gaps.items()},
-            before=before,
-        )
+_NEAR = 1.5
 
 
 def estimate_windows(
@@ -162,95 +90,76 @@ def estimate_windows(
     for recording in campaign.recordings:
         if recording.kind not in KINDS:
             continue
-        even = _evenly(campaign.source, recording, driven, (*inputs, *readings), still)
+        even = even_record(
+            campaign.source, recording, driven, (*inputs, *readings), still, LEAST_S, HIGHEST_HZ
+        )
         if isinstance(even, DataWarning):
             warnings += (even,)
         else:
             found.append(even.rested(lead_s + CLOSING_S) if even.begins_at_rest else even)
-    cut = [(even, *span) for even in found for span in _spans(even.duration, lead_s)]
-    if not cut:
+    first = lead_s + CLOSING_S
+    compared = _compared_s([each.duration - first for each in found], COMPARED * lead_s)
+    if compared == 0.0:
         raise _no_window(campaign, found, warnings, lead_s)
+    warnings += tuple(
+        _too_short(campaign.source, each, first + compared)
+        for each in found
+        if each.duration - first < compared
+    )
+    cut = [(even, end) for even in found for end in _ends(even.duration, first, compared)]
     assumed = [name for name in readings if name not in still and any(name in each.values for each in found)]
     if assumed:
         warnings += (_noise_assumed(campaign.source, assumed),)
-    windows = _Windows.of_one_length(cut, lead_s)
+    windows = _Windows.of(cut, lead_s, compared)
     channels = tuple(name for name in (*inputs, *readings) if any(name in each.values for each in found))
     return windows.response(channels, set(inputs), warnings, highest_hz)
 
 
-def _evenly(
-    source: str, recording: Recording, driven: str, names: Collection[str], still: dict[str, float]
-) -> _Even | DataWarning:
-    """The channels of a test at even instants, or why it cannot be used."""
+def _compared_s(lasting: Sequence[float], wanted: float) -> float:
+    """How much of every window is compared [s], where tests have so much that can be [s]; 0 where none has enough.
 
-    def refuse(what: str, remedy: str) -> DataWarning:
-        return DataWarning("window_not_used", what, source, recording.name, driven, None, remedy)
-
-    usable = {}
-    for name in names:
-        channel = recording.channels.get(name)
-        known = None if channel is None else np.isfinite(channel.values)
-        if channel is not None and known is not None and np.count_nonzero(known) >= _FEWEST:
-            time, first = np.unique(channel.time[known], return_index=True)
-            usable[name] = time, channel.values[known][first]
-    if driven not in usable:
-        return refuse(f"{driven} was not recorded", "map its channel, or leave this test out")
-    if np.ptp(usable[driven][1]) == 0.0:
-        return refuse(f"{driven} does not move", "name this test a standstill")
-    start = max(time[0] for time, _ in usable.values())
-    end = min(time[-1] for time, _ in usable.values())
-    if end - start < LEAST_S:
-        return refuse(
-            f"its channels overlap for {max(end - start, 0.0):.2g} s", "look at the clocks of the channels"
-        )
-    rates = {name: (time.size - 1) / (time[-1] - time[0]) for name, (time, _) in usable.items()}
-    last = min(rates, key=lambda name: rates[name])
-    if rates[last] < 2.5 * HIGHEST_HZ:
-        return refuse(
-            f"{last} is sampled at {rates[last]:.3g} Hz, too slow for what is compared up to {HIGHEST_HZ:g} Hz",
-            f"sample every channel at {4.0 * HIGHEST_HZ:g} Hz or faster",
-        )
-    rate = min(max(rates.values()), _RATE_HZ)
-    instants = start + np.arange(floor((end - start) * rate) + 1) / rate
-    even = {name: _at(instants, *each) for name, each in usable.items()}
-    noise = {
-        name: (still.get(name) or roughness(values))
-        * max(1.0, rate * (time[-1] - time[0]) / time.size) ** 0.5
-        for name, (time, values) in usable.items()
+    Windows are of one length. It is one near ``wanted`` that leaves least uncompared, of several such the nearest;
+    where all tests are shorter, of theirs.
+    """
+    longest = max(lasting, default=0.0)
+    if longest < LEAST_S:
+        return 0.0
+    least = max(min(wanted / _NEAR, longest), LEAST_S)
+    lengths = {
+        each / count
+        for each in lasting
+        for count in range(1, ceil(each / least) + 1)
+        if each >= count * least
     }
-    gaps = {name: _gaps(each[0], start) for name, each in usable.items()}
-    return _Even(recording.name, start, rate, rates[last], even, gaps, noise)
+    near = [each for each in lengths if each <= wanted * _NEAR] or [min(lengths)]
+
+    def worth(each: float) -> tuple[float, float]:
+        return round(sum(each * _count(one, each) for one in lasting), 6), -abs(log(each / wanted))
+
+    return max(near, key=worth)
 
 
-def _at(instants: Array, time: Array, values: Array) -> Array:
-    """A channel at other instants [s]; as it was sampled where these are its own."""
-    if time.size == instants.size and np.max(np.abs(time - instants)) < 1e-3 * (instants[1] - instants[0]):
-        return values
-    # Takes a second to import, which campaigns of dwells would wait for.
-    from scipy.interpolate import CubicSpline
-
-    return np.asarray(CubicSpline(time, values)(instants))
+def _count(lasting: float, compared: float) -> int:
+    return floor(lasting / compared + 1e-9)
 
 
-def _gaps(time: Array, start: float) -> list[tuple[float, float]]:
-    """Spans in which samples lack [s after ``start``]."""
-    step = np.diff(time)
-    long = np.flatnonzero(step > LONGEST_GAP * np.median(step))
-    return [(float(time[place] - start), float(time[place + 1] - start)) for place in long]
+def _ends(duration: float, first: float, compared: float) -> list[float]:
+    """Where what is compared in each window of a test ends [s after its beginning]."""
+    return [duration - place * compared for place in reversed(range(_count(duration - first, compared)))]
 
 
-def _spans(duration: float, lead: float) -> list[tuple[float, float]]:
-    """Beginning and end of what is compared in each window of a test [s after its beginning]."""
-    first, last = lead + CLOSING_S, duration
-    if last - first < LEAST_S:
-        return []
-    count = max(1, round((last - first) / (COMPARED * lead)))
-    edges = np.linspace(first, last, count + 1)
-    return [(float(one), float(other)) for one, other in pairwise(edges)]
+def _too_short(source: str, even: EvenRecord, needed: float) -> DataWarning:
+    return DataWarning(
+        "window_not_used",
+        f"has {even.duration - even.before:.3g} s, the windows of this campaign need {needed:.3g} s",
+        source,
+        even.test,
+        remedy="give it as a campaign of its own, or record a longer one",
+    )
 
 
 def _no_window(
-    campaign: Campaign, found: list[_Even], warnings: tuple[DataWarning, ...], lead: float
+    campaign: Campaign, found: list[EvenRecord], warnings: tuple[DataWarning, ...], lead: float
 ) -> InputError:
     if found:
         longest = max(each.duration - each.before for each in found)
@@ -260,6 +169,7 @@ def _no_window(
             source=campaign.source,
             remedy="record a longer one, for the motion has to forget how it began; or one that begins at rest",
         )
+    warnings = (*warnings, *campaign.left_out)
     if not warnings:
         return InputError(
             "there is no test to compare with: neither a dwell nor a sweep or a road",
@@ -292,7 +202,7 @@ def _noise_assumed(source: str, names: Sequence[str]) -> DataWarning:
 class _Window:
     """One window: the even record, and the place of its first instant in it."""
 
-    record: _Even
+    record: EvenRecord
     first: int
 
 
@@ -311,13 +221,12 @@ class _Windows:
         return min(IMPOSED_HZ, 0.45 * min(each.record.slowest for each in self.windows))
 
     @classmethod
-    def of_one_length(cls, cut: Sequence[tuple[_Even, float, float]], lead: float) -> "_Windows":
-        """The windows about what is compared, as long as the longest of them needs, with a ``lead`` [s]."""
-        compared = max(end - begin for _, begin, end in cut)
+    def of(cls, cut: Sequence[tuple[EvenRecord, float]], lead: float, compared: float) -> "_Windows":
+        """The windows of which so much is compared [s], up to an end [s], after a ``lead`` [s]."""
         length = lead + compared + CLOSING_S
         part = 2.0 * np.pi * lead / length, 2.0 * np.pi * (lead + compared) / length
         windows = []
-        for record, _, end in cut:
+        for record, end in cut:
             last = min(round(end * record.rate), record.count - 1)
             first = last - round((lead + compared) * record.rate)
             windows.append(_Window(record, max(first, round(CLOSING_S * record.rate))))

@@ -77,12 +77,7 @@ def test_a_package_that_is_not_there_stands_in_the_way_of_no_other_format(
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=() if name == "mat" else pytest.mark.slow)
-        for name in EXPORTS
-        if name != "json"
-    ],
+    "name", [pytest.param(name, marks=pytest.mark.slow) for name in EXPORTS if name != "json"]
 )
 def test_a_rig_that_finds_no_rest_is_refused_before_anything_is_written(
     name: str, rig: Rig, tmp_path: Path

@@ -130,8 +130,9 @@ AT_INSTANTS = _benches("quarter_car")
 """Where equations are compared, the rig without friction is slow: the other one has all its terms."""
 AT_REST = _benches(*RIG)
 """Where a state of rest is solved for, the rig is slow."""
-MOVED = _benches(*BARE, *RIG)
-"""Where motions are solved, plants without effects and the rig are slow."""
+AXIS = tuple(name for name in BENCHES if name.startswith("axis"))
+MOVED = _benches(*BARE, *RIG, *AXIS)
+"""Where motions are solved, all are slow but one that has friction, a spring and something in series."""
 
 
 @pytest.fixture(scope="module", params=AT_INSTANTS)

@@ -58,7 +58,14 @@ class FirstOrder(si.StateSpacePlant):
         return dx.v_s, x.z_u - x.z_s
 
 
-@pytest.mark.parametrize("effects", [(), ("guide_coulomb",), ("tyre_stiffening", "mount_compliance")])
+@pytest.mark.parametrize(
+    "effects",
+    [
+        pytest.param((), marks=pytest.mark.slow),
+        pytest.param(("guide_coulomb",), marks=pytest.mark.slow),
+        ("tyre_stiffening", "mount_compliance"),
+    ],
+)
 def test_it_moves_as_the_same_plant_by_its_equations_of_motion(effects: tuple[str, ...]) -> None:
     hertz = np.array([1.3, 4.0])
     found = []

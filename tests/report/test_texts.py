@@ -101,17 +101,23 @@ def test_the_text_of_a_fit_shows_the_warnings_about_the_data(fit: Fit) -> None:
 
 
 @pytest.mark.parametrize(
-    ("factor", "said"),
+    ("factor", "unit", "said"),
     [
-        (1.0 / 9.80665, "tolerances off: as if g was taken for m/s^2"),
-        (1000.0, "as if a unit was taken for another one a thousand times as large"),
-        (1.7, "tolerances off: look at the units and signs of the channels"),
+        (1.0 / 9.80665, "1", "tolerances off: as if g was taken for m/s^2"),
+        (1.0 / 9.80665, "N/m", "tolerances off: look at the units and signs of the channels"),
+        (1000.0, "N/m", "as if a unit was taken for another one a thousand times as large"),
+        (1.7, "1", "tolerances off: look at the units and signs of the channels"),
     ],
 )
-def test_a_fit_with_a_number_far_off_its_sheet_is_not_trusted(fit: Fit, factor: float, said: str) -> None:
-    """The reason leads, also where so far a number explains the data; four tolerances are believed."""
+def test_a_fit_with_a_number_far_off_its_sheet_is_not_trusted(
+    fit: Fit, factor: float, unit: str, said: str
+) -> None:
+    """The reason leads, also where so far a number explains the data; four tolerances are believed.
+
+    A gain shows the unit of what it multiplies, a stiffness does not.
+    """
     (place,) = [k for k, each in enumerate(fit.estimates) if each.name == "k_t"]
-    known = fit.estimates[place]
+    known = replace(fit.estimates[place], unit=unit)
 
     def with_value(value: float) -> Fit:
         moved = (*fit.estimates[:place], replace(known, value=value), *fit.estimates[place + 1 :])

@@ -109,8 +109,8 @@ def test_no_sample_of_noise_free_friction_is_an_outlier(synthetic: Any) -> None:
     ("names", "share", "change"),
     [
         (("sprung_accel",), 0.002, spike),
-        (("sprung_accel",), 0.01, drop),
-        (NAMES, 0.002, drop),
+        pytest.param(("sprung_accel",), 0.01, drop, marks=pytest.mark.slow),
+        pytest.param(NAMES, 0.002, drop, marks=pytest.mark.slow),
         (NAMES, 0.01, spike),
     ],
 )

@@ -105,7 +105,14 @@ def test_a_clean_sweep_keeps_its_numbers_bit_by_bit(shipped: Recording, clean: S
 
 
 @pytest.mark.parametrize("change", [spike, far_spike, drop])
-@pytest.mark.parametrize("names", [("sprung_accel",), ("road_height",), NAMES])
+@pytest.mark.parametrize(
+    "names",
+    [
+        pytest.param(("sprung_accel",), marks=pytest.mark.slow),
+        pytest.param(("road_height",), marks=pytest.mark.slow),
+        NAMES,
+    ],
+)
 def test_outliers_do_not_change_the_response(
     shipped: Recording, clean: SweepResponse, change: Callable[..., Values], names: tuple[str, ...]
 ) -> None:

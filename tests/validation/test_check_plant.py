@@ -87,7 +87,20 @@ def test_what_is_sound_has_no_fault() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["axis", "two_mass", str(EXAMPLES / "pendulum.py"), str(EXAMPLES / "servo/servo.py")]
+    "name",
+    [
+        str(EXAMPLES / "servo/servo.py"),
+        *(
+            pytest.param(name, marks=pytest.mark.slow)
+            for name in (
+                "axis",
+                "two_mass",
+                str(EXAMPLES / "pendulum.py"),
+                str(EXAMPLES / "bench/bench.py"),
+                str(EXAMPLES / "damper/damper.py"),
+            )
+        ),
+    ],
 )
 def test_plants_that_come_with_the_package_have_no_fault(name: str) -> None:
     assert _faults(name) == []

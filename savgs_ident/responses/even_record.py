@@ -1,0 +1,158 @@
+"""The channels of a test at even instants, all at the same, as a window of it is cut."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from math import ceil, floor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from savgs_ident.core.errors import DataWarning
+from savgs_ident.recordings.recording import Recording
+from savgs_ident.responses.driven_motion import roughness
+
+Array = NDArray[np.float64]
+
+LONGEST_GAP = 5.0
+"""Samples that may lack one after the other, in mean intervals, where a curve through the others stands in."""
+
+REST_S = 0.2
+"""As long as this a test has to rest at its beginning to be taken for one that rested before [s]."""
+
+RESTING = 1e-3
+"""Range that a channel may have at rest, over that in the whole test, where its noise is not larger [1]."""
+
+_RATE_HZ = 1000.0
+_FEWEST = 10
+_NOISY = 8.0
+
+
+@dataclass(frozen=True)
+class EvenRecord:
+    """Channels of a test at even instants.
+
+    Attributes:
+        test: its name.
+        start: the first instant on the clock of the recording [s].
+        rate: instants a second [Hz].
+        slowest: samples a second of the channel with the fewest [Hz].
+        values: of each channel by its name [its unit], (n,).
+        gaps: spans without samples of each channel [s], pairs of their ends.
+        noise: standard deviation of each channel's noise at one instant [its unit], which neighbours share where the
+            channel has fewer samples than there are instants; the amplitudes have as much of it as if they did not.
+        before: how much of it is rest before the test began [s].
+    """
+
+    test: str
+    start: float
+    rate: float
+    slowest: float
+    values: dict[str, Array]
+    gaps: dict[str, list[tuple[float, float]]]
+    noise: dict[str, float]
+    before: float = 0.0
+
+    @property
+    def count(self) -> int:
+        """How many instants there are."""
+        return next(iter(self.values.values())).size
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.count / self.rate
+
+    @property
+    def begins_at_rest(self) -> bool:
+        """Whether no channel shows anything but noise at the beginning."""
+        beginning = ceil(REST_S * self.rate)
+        return all(
+            np.ptp(each[:beginning]) <= max(RESTING * np.ptp(each), _NOISY * self.noise[name])
+            for name, each in self.values.items()
+        )
+
+    def rested(self, seconds: float) -> "EvenRecord":
+        """The same with so much rest before it [s], as it began."""
+        beginning, count = ceil(REST_S * self.rate), ceil(seconds * self.rate)
+        before = count / self.rate
+        return replace(
+            self,
+            start=self.start - before,
+            values={
+                name: np.concatenate([np.full(count, np.mean(each[:beginning])), each])
+                for name, each in self.values.items()
+            },
+            gaps={name: [(a + before, b + before) for a, b in each] for name, each in self.gaps.items()},
+            before=before,
+        )
+
+
+def even_record(
+    source: str,
+    recording: Recording,
+    driven: str,
+    names: Collection[str],
+    still: dict[str, float],
+    least_s: float,
+    highest_hz: float,
+) -> EvenRecord | DataWarning:
+    """The channels of a test at even instants, or why it cannot be used.
+
+    It has to be ``least_s`` [s] long, and its channels sampled for what is compared up to ``highest_hz`` [Hz];
+    ``still`` is the noise of channels at rest, where it is known.
+    """
+
+    def refuse(what: str, remedy: str) -> DataWarning:
+        return DataWarning("window_not_used", what, source, recording.name, driven, None, remedy)
+
+    usable = {}
+    for name in names:
+        channel = recording.channels.get(name)
+        known = None if channel is None else np.isfinite(channel.values)
+        if channel is not None and known is not None and np.count_nonzero(known) >= _FEWEST:
+            time, first = np.unique(channel.time[known], return_index=True)
+            usable[name] = time, channel.values[known][first]
+    if driven not in usable:
+        return refuse(f"{driven} was not recorded", "map its channel, or leave this test out")
+    if np.ptp(usable[driven][1]) == 0.0:
+        return refuse(f"{driven} does not move", "name this test a standstill")
+    start = max(time[0] for time, _ in usable.values())
+    end = min(time[-1] for time, _ in usable.values())
+    if end - start < least_s:
+        return refuse(
+            f"its channels overlap for {max(end - start, 0.0):.2g} s", "look at the clocks of the channels"
+        )
+    rates = {name: (time.size - 1) / (time[-1] - time[0]) for name, (time, _) in usable.items()}
+    last = min(rates, key=lambda name: rates[name])
+    if rates[last] < 2.5 * highest_hz:
+        return refuse(
+            f"{last} is sampled at {rates[last]:.3g} Hz, too slow for what is compared up to {highest_hz:g} Hz",
+            f"sample every channel at {4.0 * highest_hz:g} Hz or faster",
+        )
+    rate = min(max(rates.values()), _RATE_HZ)
+    instants = start + np.arange(floor((end - start) * rate) + 1) / rate
+    even = {name: _at(instants, *each) for name, each in usable.items()}
+    noise = {
+        name: (still.get(name) or roughness(values))
+        * max(1.0, rate * (time[-1] - time[0]) / time.size) ** 0.5
+        for name, (time, values) in usable.items()
+    }
+    gaps = {name: _gaps(each[0], start) for name, each in usable.items()}
+    return EvenRecord(recording.name, start, rate, rates[last], even, gaps, noise)
+
+
+def _at(instants: Array, time: Array, values: Array) -> Array:
+    """A channel at other instants [s]; as it was sampled where these are its own."""
+    if time.size == instants.size and np.max(np.abs(time - instants)) < 1e-3 * (instants[1] - instants[0]):
+        return values
+    # Takes a second to import, which campaigns of dwells would wait for.
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(time, values)(instants))
+
+
+def _gaps(time: Array, start: float) -> list[tuple[float, float]]:
+    """Spans in which samples lack [s after ``start``]."""
+    step = np.diff(time)
+    long = np.flatnonzero(step > LONGEST_GAP * np.median(step))
+    return [(float(time[place] - start), float(time[place + 1] - start)) for place in long]
