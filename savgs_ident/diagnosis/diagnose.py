@@ -187,18 +187,18 @@ def diagnose_problem(
 
 
 MENDED = 0.1
-"""Part of what the baseline misses as given that calibration leaves of it at least where a recording is mistaken."""
+"""Part of what the baseline misses as given, or a model without motion, up to which calibration is an explanation."""
 
 
 def _refuse_mistaken(problem: DiagnosisProblem) -> None:
     """Raises :class:`InputError` where a channel has another unit or sign, which no effect should have to explain."""
     mistaken = problem.plant.mistaken(problem.given)
     measured, size = problem.search.data.measured, problem.search.data.discrepancy_scale
-    before, after = (
+    nothing, given, base = (
         float(np.linalg.norm((rows - measured) / size))
-        for rows in (problem.given, problem.base.prediction.rows)
+        for rows in (np.zeros_like(measured), problem.given, problem.base.prediction.rows)
     )
-    if mistaken and after > MENDED * before:
+    if mistaken and base > MENDED * min(nothing, given):
         raise InputError(mistaken, remedy="mend its header, or give its unit and scale in channels.toml")
 
 

@@ -68,7 +68,8 @@ def model_curve(
     Frequencies that are not ``solved`` (F,) are left open.
     """
     every = np.ones(harmonics.shape, dtype=np.bool_)
-    transfer = np.where(solved[:, None], harmonics[:, :, 1] / driven[:, None], np.nan)
+    known = solved & (driven != 0.0)
+    transfer = np.where(known[:, None], harmonics[:, :, 1] / np.where(known, driven, 1.0)[:, None], np.nan)
     extent = np.where(solved[:, None], peak_to_peak(harmonics, every), np.nan)
     return ModelCurve(label, frequency, transfer, extent)
 

@@ -13,7 +13,7 @@ import pandas as pd
 from savgs_ident.plants.two_mass import PARAMETERS, closed_form
 
 TRUTH = {"k": 5.5e4, "c": 2.5e3}
-DWELLS = (1.0, 1.4, 2.0, 3.0, 5.0, 8.0)
+DWELLS = (1.03, 1.41, 2.03, 3.07, 5.1, 8.3)
 RATE, PERIODS = 200.0, 10
 ROAD_MM = 8.0
 NOISE = {"body_accel [m/s^2]": 0.01, "susp_deflection [mm]": 0.02}
@@ -194,7 +194,7 @@ def stretched(name: str, first: int, count: int, column: str, value: float) -> S
 def frozen(table: Table) -> Table:
     """A sensor that stops in the middle of a test and repeats its last value."""
     table = table.copy()
-    rows = table.index[table["test"] == "dwell_3Hz"]
+    rows = table.index[table["test"] == "dwell_3.07Hz"]
     half = rows[len(rows) // 2 :]
     table.loc[half, ACCEL] = table.loc[half[0], ACCEL]
     return table
