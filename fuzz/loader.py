@@ -18,6 +18,7 @@ class Form(StrEnum):
     hdf5 = "HDF5"
     matlab = "MATLAB"
     parquet = "Parquet"
+    sqlite = "SQLite"
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import sqlite3
 from io import BytesIO
 from pathlib import Path
 
@@ -95,6 +96,37 @@ def json_mcap() -> Original:
 
 def cdr_mcap() -> Original:
     """A test logged by ROS 2: accelerometer, joints, single numbers, and events in words."""
+    return _in_every_container(*_of_ros())
+
+
+def rosbag() -> Original:
+    """The same in a bag in SQLite, with the definitions of its types and without."""
+    topics, messages = _of_ros()
+    contents = []
+    for defined in (True, False):
+        bag = sqlite3.connect(":memory:")
+        bag.execute(
+            "CREATE TABLE topics (id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT)"
+        )
+        bag.execute(
+            "CREATE TABLE messages (id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)"
+        )
+        numbers = {topic: number for number, topic in enumerate(topics, 1)}
+        for topic, (_, kind, _, _) in topics.items():
+            bag.execute("INSERT INTO topics VALUES (?, ?, ?, 'cdr')", (numbers[topic], topic, kind))
+        rows = [(numbers[topic], time, data) for topic, time, data in messages]
+        bag.executemany("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", rows)
+        if defined:
+            bag.execute("CREATE TABLE message_definitions (topic_type, encoding, encoded_message_definition)")
+            held = [(kind, "ros2msg", text.decode()) for _, kind, _, text in topics.values()]
+            bag.executemany("INSERT INTO message_definitions VALUES (?, ?, ?)", held)
+        bag.commit()
+        contents.append(bag.serialize())
+        bag.close()
+    return Original(tuple(contents))
+
+
+def _of_ros() -> tuple[dict[str, Topic], list[Message]]:
     topics: dict[str, Topic] = {
         "/test": ("cdr", "std_msgs/msg/String", "ros2msg", b"string data"),
         "/imu": ("cdr", "sensor_msgs/msg/Imu", "ros2msg", IMU),
@@ -108,10 +140,11 @@ def cdr_mcap() -> Original:
         messages.append(("/joint_states", at, joint_message(at, angle)))
         messages.append(("/road_height", at, number_message(road)))
     first, last = messages[0][1], messages[-1][1]
-    begin = ("/test", first, text_message("start dwell_2.00Hz"))
-    return _in_every_container(
-        topics, [begin, *messages, ("/test", last + 1, text_message("end dwell_2.00Hz"))]
+    begin, end = (
+        ("/test", at, text_message(f"{word} dwell_2.00Hz"))
+        for word, at in (("start", first), ("end", last + 1))
     )
+    return topics, [begin, *messages, end]
 
 
 def channel_map() -> Original:

@@ -41,6 +41,8 @@ _LOADERS = (
            recordings.read_axis_file, _MATLAB),
     Loader("parquet", "campaign in Parquet", "campaign.parquet", Form.parquet, recordings.parquet,
            recordings.read_table, ("recordings.parquet.read_parquet",)),
+    Loader("rosbag2", "campaign in a bag of ROS 2, SQLite", "bag_0.db3", Form.sqlite, recordings.rosbag,
+           recordings.read_table, ("recordings.rosbag.read_rosbag",)),
     Loader("matlab-7.3", "campaign of MATLAB 7.3, which is HDF5", "dwell_2.00Hz.mat", Form.hdf5,
            recordings.matlab_7_3, recordings.read_table, ("recordings.mat._of_hdf5",)),
     Loader("plant-model", "model.toml of another plant", "model.toml", Form.toml, models.plant_model,

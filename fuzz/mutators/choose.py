@@ -10,6 +10,7 @@ from fuzz.mutators.container import damage_mcap
 from fuzz.mutators.matlab import damage_matlab
 from fuzz.mutators.parquet import damage_parquet
 from fuzz.mutators.raw import RAW, Mutator
+from fuzz.mutators.sqlite import damage_sqlite
 from fuzz.mutators.table import damage_packed, damage_table
 from fuzz.mutators.tree import damage_json, damage_lines, damage_toml
 
@@ -23,6 +24,7 @@ OF_FORM: Mapping[Form, Mutator] = {
     Form.hdf5: damage_hdf5,
     Form.matlab: damage_matlab,
     Form.parquet: damage_parquet,
+    Form.sqlite: damage_sqlite,
 }
 """Damage that knows the form."""
 

@@ -9,7 +9,7 @@ decoder, its bindings, its growing columns. At the end each topic gets its clock
 """
 
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
@@ -59,11 +59,18 @@ from savgs_ident.recordings.recording import (
 
 def read_mcap(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading:
     """Read one MCAP file; raises :class:`InputError` where nothing in it can be used."""
-    collector = _TopicCollector(channel_map, str(path))
     records = McapRecords(path, progress)
-    for segment in records:
+    return reading_of_segments(path, records, records.warnings, channel_map)
+
+
+def reading_of_segments(
+    path: Path, segments: Iterable[Segment], damage: Sequence[DataWarning], channel_map: ChannelMap
+) -> Reading:
+    """The reading of the messages in ``segments``; ``damage`` has the warnings that came up while they were read."""
+    collector = _TopicCollector(channel_map, str(path))
+    for segment in segments:
         collector.append(segment)
-    warnings = [*records.warnings, *collector.warnings()]
+    warnings = [*damage, *collector.warnings()]
     topics = collector.topics(warnings)
     spans, notes = pair_events(collector.events, str(path))
     recordings, clock_notes = _split_tests(topics, spans, channel_map, path)

@@ -25,11 +25,13 @@ from savgs_ident.recordings.mcap import MCAP
 from savgs_ident.recordings.mdf import MDF_FILE
 from savgs_ident.recordings.parquet import PARQUET
 from savgs_ident.recordings.recording import Campaign, Recording, RecordingLayout
+from savgs_ident.recordings.rosbag import ROSBAG
 from savgs_ident.recordings.tdms import TDMS
 
 READERS: tuple[Reader, ...] = (
     CSV,
     MCAP,
+    ROSBAG,
     PARQUET,
     MAT,
     TDMS,

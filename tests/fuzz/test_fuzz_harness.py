@@ -29,7 +29,7 @@ PARSERS = (
     "np.loadtxt", "np.genfromtxt", "np.load", "pickle.loads", "pickle.load", "csv.reader", "zlib.decompressobj",
     "zlib.decompress", "gzip.open", "gzip.decompress", "zstandard.ZstdDecompressor", "lz4.frame.LZ4FrameDecompressor",
     "export.deserialize", "HDFBackend", "xr.open_dataset", "xr.open_datatree", "loadmat", "struct.unpack_from",
-    "ElementTree.parse", "pq.read_table", "tomlkit.parse", "tomlkit.loads", "yaml.safe_load",
+    "ElementTree.parse", "pq.read_table", "tomlkit.parse", "tomlkit.loads", "yaml.safe_load", "sqlite3.connect",
 )  # fmt: skip
 """Calls that make something of the content of a file."""
 
