@@ -4,7 +4,7 @@ import savgs_ident as si
 
 FORCE, INPUT, SENSOR = si.PortKind.FORCE, si.PortKind.INPUT, si.PortKind.SENSOR
 STICKS = ("k_pre", "c_pre")
-BEARING = si.Port("bearing", FORCE, "bearing", "angle; torque", "rad", "N m", 0.1, 1.0, 0.01, contact=STICKS)
+BEARING = si.Port("bearing", FORCE, "bearing", "angle; torque", "rad", "N m", 1.0, 10.0, 0.01, contact=STICKS)
 SUPPLY = si.Port("supply", INPUT, "voltage", displacement_unit="V", displacement=0.1)
 ENCODER = si.Port("encoder", SENSOR, "sensor.angle", displacement_unit="rad", displacement=1e-3)
 SHUNT = si.Port("shunt", SENSOR, "sensor.current", displacement_unit="A", displacement=1e-2)

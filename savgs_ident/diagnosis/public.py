@@ -24,6 +24,7 @@ from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.observations import Data
+from savgs_ident.inference.port_sizes import sized_to
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
@@ -82,7 +83,8 @@ def diagnose(
             "a held-out motion goes with a measured motion alone", remedy="diagnose each campaign by itself"
         )
     response = forgetful_response(measured, model, orders, max_frequency, progress)
-    campaign, warnings = campaign_of(measured), response.warnings
+    model, resized = sized_to(model, response)
+    campaign, warnings = campaign_of(measured), (*response.warnings, *resized)
     given, settings, values = baseline_of(model, orders, without, constants)
     # A sweep in windows is what the model is fitted to, and no test that was left out.
     apart = None if response.part is not None else campaign

@@ -72,9 +72,11 @@ def sticking_contacts(effects: Sequence[Effect]) -> tuple[Port, ...]:
 
     A force that adds to what a contact holds makes no contact by itself.
     """
-    return tuple(
-        dict.fromkeys(effect.port for effect in effects if isinstance(effect.law, AbstractFrictionLimitLaw))
-    )
+    found: dict[str, Port] = {}
+    for effect in effects:
+        if isinstance(effect.law, AbstractFrictionLimitLaw):
+            found.setdefault(effect.port.name, effect.port)
+    return tuple(found.values())
 
 
 def states_of(effects: Sequence[Effect]) -> tuple[InternalState, ...]:
@@ -118,7 +120,7 @@ def contact_bristle(
     assert port.contact is not None
     up, down = jnp.zeros_like(signals.load), jnp.zeros_like(signals.load)
     for effect in effects:
-        if effect.loads_contact and effect.port == port:
+        if effect.loads_contact and effect.port.name == port.name:
             share = effect.friction_limit(p, signals)
             up, down = up + share.against_up, down + share.against_down
     return bristle(Presliding(*(p[name] for name in port.contact)), signals, FrictionLimit(up, down), anchor)
@@ -196,8 +198,9 @@ class EffectsAtInstant:
         for effect, state, rate in self._at(port, AbstractForceLaw):
             total = total + effect.force(self.p, signals, state)
             self._out_of_balance[effect.name] = rate - effect.rate(self.p, signals, state)
-        if port in self._contacts:
-            place = self._contacts.index(port)
+        contacts = [each.name for each in self._contacts]
+        if port.name in contacts:
+            place = contacts.index(port.name)
             held = contact_bristle(self._effects, port, self.p, signals, self._s[place])
             total = total + held.force
             self._out_of_balance[_anchor_of(port)] = self._sd[place] - held.rate

@@ -187,7 +187,7 @@ class Effect(eqx.Module):
                 typically = given == typical and isinstance(other, float)
                 numbers.append((role, other if typically and isinstance(other, float) else given))
         resized = tuple(own[each.name] for each in self.parameters)
-        return replace(self, parameters=resized, numbers=tuple(numbers))
+        return replace(self, port=port, parameters=resized, numbers=tuple(numbers))
 
     def _values(self, p: Values) -> Values:
         """The law's numbers by role."""

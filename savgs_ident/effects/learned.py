@@ -147,7 +147,7 @@ class LearnedForce(AbstractForceLaw):
 
     def suits(self, port: Port) -> bool:
         """Only where it was made for."""
-        return port == self.port
+        return port.name == self.port.name
 
     def force(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, ""]:
         """The learned force [N]."""
@@ -217,7 +217,7 @@ class LearnedCompliance(AbstractSeriesLaw):
 
     def suits(self, port: Port) -> bool:
         """Only where it was made for."""
-        return port == self.port
+        return port.name == self.port.name
 
     def balance(
         self, v: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
@@ -244,7 +244,7 @@ class LearnedInput(AbstractInputLaw):
 
     def suits(self, port: Port) -> bool:
         """Only where it was made for."""
-        return port == self.port
+        return port.name == self.port.name
 
     def shift(self, v: Values, signal: InputSignal, fundamental: Fundamental) -> InputSignal:
         """The learned value and its rate."""
@@ -271,7 +271,7 @@ class LearnedTransfer(AbstractSensorLaw):
 
     def suits(self, port: Port) -> bool:
         """Only where it was made for."""
-        return port == self.port
+        return port.name == self.port.name
 
     def transfer(self, v: Values, frequency: Float[Array, "*f"]) -> Complex[Array, "*f"]:
         """Reading over truth at frequencies [Hz]."""

@@ -17,6 +17,7 @@ from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.along_motion import MotionFit, fit_along_motion
 from savgs_ident.fit.least_squares import FitSettings, fit_least_squares
 from savgs_ident.fit.result import Fit, comparable
+from savgs_ident.inference.port_sizes import sized_to
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.model import load_model
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
@@ -133,13 +134,15 @@ def fit_with(
     drawing = model.before
     names = drawing.free(free)
     response = forgetful_response(measured, drawing, settings.orders, max_frequency, progress)
+    drawing, resized = sized_to(drawing, response) if drawing.effects else (drawing, ())
     if response.part is not None and settings.quantity == "peak_to_peak":
         raise InputError(
             "tests that do not repeat have no peak-to-peak values",
             source="--peak-to-peak",
             remedy="leave it out, or record dwells",
         )
-    origin = model.origin(campaign_of(measured), response.warnings).with_command(command)
+    warnings = (*response.warnings, *resized)
+    origin = model.origin(campaign_of(measured), warnings).with_command(command)
     return fit_least_squares(
         response, drawing, free=names, settings=settings, origin=origin, progress=progress
     )
