@@ -4,7 +4,7 @@ import savgs_ident as si
 
 FORCE, SERIES, INPUT, SENSOR = (getattr(si.PortKind, kind) for kind in ("FORCE", "SERIES", "INPUT", "SENSOR"))
 STICKS = ("k_pre", "c_pre")
-GUIDE = si.Port("guide", FORCE, "guide", "height of the body; force, up", force=1.0, contact=STICKS)
+GUIDE = si.Port("guide", FORCE, "guide", "height of the body", displacement=0.02, force=1.0, contact=STICKS)
 SPRING = si.Port("spring", FORCE, "suspension", "deflection of the suspension", force=1.0)
 TYRE = si.Port("tyre", FORCE, "tyre", "deflection of the tyre", force=1.0)
 PLATE = si.Port("plate", INPUT, "plate", displacement=1e-4)
