@@ -6,21 +6,24 @@ recorded motion, or was left at its default, a stop would stand in the way of th
 it fast. A force that matters is one that changes the readings by :data:`SHARE` of themselves.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning
-from savgs_ident.core.values import as_values
+from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import Port, PortKind
 from savgs_ident.inference.background.imposed import impose, node_loads
 from savgs_ident.inference.likelihood import likelihood_of
 from savgs_ident.inference.problem import harmonic_target
+from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model, PlantModel
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
-from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 
 SHARE = 0.35
 """Share of the readings that a force changes where it typically matters. Origin: by choice, as along a drive."""
@@ -47,25 +50,44 @@ def sized_to(model: Model, measured: HarmonicResponse) -> tuple[Model, tuple[Dat
     solution = simulate_periodic(bare, p, measured_excitation(bare, measured, model.table))
     if not ports or not all(each.ok for each in solution.status()):
         return model, ()
-    target = harmonic_target(measured, bare.channels, measured.orders)
-    likelihood = likelihood_of(target)
     seen, _ = node_loads(bare, p, solution)
-    reached = {port.name: float(np.max(np.abs(seen[port.name].displacement))) for port in ports}
-    fast = {port.name: np.asarray(seen[port.name].velocity) for port in ports}
-    moving = [port for port in ports if reached[port.name] > 0.0 and np.max(np.abs(fast[port.name])) > 0.0]
-    pushes = [(port.name, fast[port.name] / np.max(np.abs(fast[port.name]))) for port in moving]
-    answers = impose(bare, likelihood, target.used.shape[2] - 1, p, solution, pushes)
-    size = _channel_sizes(np.asarray(likelihood.measured), likelihood.channel)
-    resized, warnings = {}, []
-    for port, rows in zip(moving, answers, strict=True):
-        gain = float(np.sqrt(np.sum((rows / size) ** 2)))
-        whole = float(np.sqrt(np.sum((np.asarray(likelihood.measured) / size) ** 2)))
-        matters = SHARE * whole / gain if gain > 0.0 else port.force
-        found = _sized(port, reached[port.name], float(np.max(np.abs(fast[port.name]))), matters)
+    reached = {port.name: _largest(seen[port.name].displacement) for port in ports}
+    fast = {port.name: _largest(seen[port.name].velocity) for port in ports}
+    moving = [port for port in ports if min(reached[port.name], fast[port.name]) > 0.0]
+    pushes = [(port.name, np.asarray(seen[port.name].velocity) / fast[port.name]) for port in moving]
+    changes = _changes_by(bare, p, measured, solution, pushes)
+    resized = {}
+    for port, change in zip(moving, changes, strict=True):
+        force = SHARE / change if change > 0.0 else port.force
+        found = _sized(port, reached[port.name], fast[port.name], force)
         if found != port:
             resized[port.name] = found
-            warnings.append(_warning(port, found))
-    return (model.sized(resized), tuple(warnings)) if resized else (model, ())
+    if not resized:
+        return model, ()
+    return model.sized(resized), tuple(
+        _warning(port, resized[port.name]) for port in moving if port.name in resized
+    )
+
+
+def _largest(signal: Any) -> float:
+    return float(np.max(np.abs(signal)))
+
+
+def _changes_by(
+    plant: AbstractPlant,
+    p: Values,
+    measured: HarmonicResponse,
+    solution: PeriodicSolution,
+    pushes: Sequence[tuple[str, NDArray[np.float64]]],
+) -> list[float]:
+    """By which share of themselves the readings change by each of several signals at ports, rms over channels [1]."""
+    target = harmonic_target(measured, plant.channels, measured.orders)
+    likelihood = likelihood_of(target)
+    rows = np.asarray(likelihood.measured)
+    size = _channel_sizes(rows, likelihood.channel)
+    answers = impose(plant, likelihood, target.used.shape[2] - 1, p, solution, pushes)
+    whole = float(np.linalg.norm(rows / size))
+    return [float(np.linalg.norm(answer / size)) / whole for answer in answers]
 
 
 def _channel_sizes(rows: NDArray[np.float64], channel: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -5,7 +5,6 @@ Each is fitted; diagnoses read and compare the same way, so that of them those a
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -49,10 +48,6 @@ class Mishap(NamedTuple):
     spoil: Spoil
     says: str
     suffix: str = ".csv"
-
-
-def _plain(change: Callable[[Table], Table]) -> Spoil:
-    return change
 
 
 RIGHT = {
