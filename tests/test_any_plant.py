@@ -71,6 +71,7 @@ def test_names_that_the_plant_does_not_have_are_refused(model: si.PlantModel) ->
         si.simulate_dwells(model, DWELLS, {"road_height": 0.01}, {"body_accel": 0.05})
 
 
+@pytest.mark.slow
 def test_a_fit_finds_the_truth(fit: si.Fit) -> None:
     assert fit.trusted
     assert fit.free_names == tuple(TRUTH)
@@ -80,6 +81,7 @@ def test_a_fit_finds_the_truth(fit: si.Fit) -> None:
     assert 0.7 < fit.chi2 / fit.dof < 1.3
 
 
+@pytest.mark.slow
 def test_the_identified_model_is_one_of_the_same_plant(fit: si.Fit, model: si.PlantModel) -> None:
     found = fit.model
     assert isinstance(found, si.PlantModel)
@@ -90,6 +92,7 @@ def test_the_identified_model_is_one_of_the_same_plant(fit: si.Fit, model: si.Pl
     assert found.before.table == model.table
 
 
+@pytest.mark.slow
 def test_a_fit_shows_itself(fit: si.Fit) -> None:
     assert "stiffness of the suspension at the wheel" in str(fit)
     record = json.loads(fit.to_json())
@@ -100,6 +103,7 @@ def test_a_fit_shows_itself(fit: si.Fit) -> None:
     assert figure.axes[0].get_ylabel() == "magnitude [m/s² per m of road]"
 
 
+@pytest.mark.slow
 def test_a_model_is_compared_and_what_is_saved_is_read_back(
     model: si.PlantModel, measured: si.HarmonicResponse, fit: si.Fit, tmp_path: Path
 ) -> None:

@@ -57,6 +57,7 @@ def test_trials_that_are_there_are_neither_drawn_nor_diagnosed(tmp_path: Path) -
     assert _record(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_a_run_that_goes_on_marks_what_is_there_by_its_own_rules(tmp_path: Path) -> None:
     """Rules of an earlier version gave nothing for what was named; where its files are gone, its marks stay."""
     concluded(request(), draw, always_right, SILENT, tmp_path)

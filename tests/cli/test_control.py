@@ -18,6 +18,8 @@ from savgs_ident.control.linear_study import LinearStudy
 from savgs_ident.control.synthesis import reduce_order
 from savgs_ident.plants.quarter_car.rig import default_rig_path
 
+pytestmark = pytest.mark.slow
+
 Invoke = Callable[..., Result]
 RIG = default_rig_path()
 RIGS = 4
@@ -67,7 +69,7 @@ def designed(once: Callable[..., Any]) -> tuple[Path, Result, Design]:
     return found
 
 
-@pytest.mark.parametrize("command", [pytest.param("linearise", marks=pytest.mark.slow), "design"])
+@pytest.mark.parametrize("command", ["linearise", "design"])
 def test_the_files_are_there_and_standard_output_is_the_record(
     command: str, request: pytest.FixtureRequest
 ) -> None:
@@ -89,11 +91,7 @@ def test_the_files_are_there_and_standard_output_is_the_record(
 @pytest.mark.parametrize(
     ("run", "stages"),
     [
-        pytest.param(
-            "linearised",
-            ("linear equivalent", "small motions", "motions of the test", "drawing", "writing"),
-            marks=pytest.mark.slow,
-        ),
+        ("linearised", ("linear equivalent", "small motions", "motions of the test", "drawing", "writing")),
         ("designed", ("synthesis", f"robustness on {RIGS} rigs", "regularising", "drawing", "writing")),
     ],
 )
@@ -105,7 +103,6 @@ def test_progress_is_said_on_the_way(
     assert places == sorted(places)
 
 
-@pytest.mark.slow
 def test_the_linear_equivalent_is_that_of_the_paper(linearised: Any) -> None:
     record = json.loads(linearised[1].stdout)
     nominal = record["nominal"]
@@ -120,7 +117,6 @@ def test_the_linear_equivalent_is_that_of_the_paper(linearised: Any) -> None:
     assert max(curve["alpha"]) < 1e-3
 
 
-@pytest.mark.slow
 def test_the_exact_linearisation_is_the_rig_and_every_step_comes_nearer(linearised: Any) -> None:
     small = json.loads(linearised[1].stdout)["small_motions"]
     errors = [each["largest_error_percent"] for each in small["models"].values()]
@@ -130,7 +126,6 @@ def test_the_exact_linearisation_is_the_rig_and_every_step_comes_nearer(linearis
     assert 0.9 < small["slow_link"]["value"] < 1.0
 
 
-@pytest.mark.slow
 def test_describing_functions_hold_at_the_size_of_the_test(linearised: Any) -> None:
     test = json.loads(linearised[1].stdout)["test_motions"]
     assert test["largest_error_percent"] < 1.0
@@ -141,7 +136,6 @@ def test_describing_functions_hold_at_the_size_of_the_test(linearised: Any) -> N
         assert min(described["damping_n_s_per_m"]) > 0.0
 
 
-@pytest.mark.slow
 def test_the_state_space_is_equation_8_in_named_signals(linearised: Any) -> None:
     record = json.loads(linearised[1].stdout)
     space = record["state_space"]
@@ -155,7 +149,6 @@ def test_the_state_space_is_equation_8_in_named_signals(linearised: Any) -> None
     assert set(space["inputs"].values()) == {"m/s"}
 
 
-@pytest.mark.slow
 def test_a_rig_without_friction_has_nothing_to_describe(
     invoke: Invoke, linearised: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -171,7 +164,6 @@ def test_a_rig_without_friction_has_nothing_to_describe(
     assert not Path("o/described.png").exists()
 
 
-@pytest.mark.slow
 def test_an_exact_linearisation_that_is_not_the_rig_is_code_1(
     invoke: Invoke, linearised: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -235,7 +227,6 @@ def again(invoke: Invoke, designed: Any, monkeypatch: pytest.MonkeyPatch) -> Cal
     return run
 
 
-@pytest.mark.slow
 def test_tables_are_shown_without_json(again: Any, designed: Any) -> None:
     done = again(designed[2])
     assert done.exit_code == 0
@@ -243,7 +234,6 @@ def test_tables_are_shown_without_json(again: Any, designed: Any) -> None:
         assert words in done.stdout
 
 
-@pytest.mark.slow
 def test_an_unstable_loop_is_code_1_with_the_reason(again: Any, designed: Any) -> None:
     margins = replace(designed[2].digital_margins, stable=False)
     done = again(replace(designed[2], digital_margins=margins), "--json")
@@ -256,7 +246,6 @@ def test_an_unstable_loop_is_code_1_with_the_reason(again: Any, designed: Any) -
     assert "does not pass its checks" in page
 
 
-@pytest.mark.slow
 def test_a_reduced_controller_is_reported_with_its_own_peak(again: Any, designed: Any) -> None:
     design: Design = designed[2]
     reduced = replace(design, controller=reduce_order(design.controller, 4))
@@ -268,7 +257,6 @@ def test_a_reduced_controller_is_reported_with_its_own_peak(again: Any, designed
     assert "keeps gamma" not in page
 
 
-@pytest.mark.slow
 def test_a_rig_on_which_the_loop_is_unstable_is_named(again: Any, designed: Any) -> None:
     robust = designed[2].robustness
     margins = (replace(robust.margins[0], stable=False), *robust.margins[1:])
@@ -282,7 +270,6 @@ def test_a_rig_on_which_the_loop_is_unstable_is_named(again: Any, designed: Any)
     assert record["least_phase_margin_deg"] == min(each.phase_deg for each in robust.margins[1:])
 
 
-@pytest.mark.slow
 def test_a_posterior_gives_the_rigs(invoke: Invoke, designed: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     draws = np.linspace(0.02, 0.04, 30).reshape(3, 10)
     with h5py.File("posterior.nc", "w") as file:

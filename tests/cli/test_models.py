@@ -31,6 +31,7 @@ def test_a_rig_whose_fit_is_doubtful_says_so(rig: Rig, tmp_path: Path, trusted: 
         si.load_model(path, "simxx")
 
 
+@pytest.mark.slow
 def test_what_follows_from_it_is_not_to_be_trusted_either(invoke: Invoke, rig: Rig, tmp_path: Path) -> None:
     path = _file(replace(rig, provenance=IDENTIFIED), tmp_path)
     done = invoke("simulate", path, "--frequency", "1", "--quiet", "--out", "o")

@@ -34,7 +34,7 @@ def test_nobody_who_listens_is_no_reason_to_stop(
     ("line", "code"),
     [
         ('"$@" | true; exit ${PIPESTATUS[0]}', 2),
-        ('"$@" 2>&1 | true; exit ${PIPESTATUS[0]}', 2),
+        pytest.param('"$@" 2>&1 | true; exit ${PIPESTATUS[0]}', 2, marks=pytest.mark.slow),
         ('"$@" >&- 2>&-', 2),
         ('"$@" --help | true; exit ${PIPESTATUS[0]}', 0),
         ('"$@" --help >&-', 0),

@@ -191,6 +191,7 @@ def _survives(path: Path, text: str) -> None:
     assert outcome.remedy if isinstance(outcome, InputError) else _is_whole(outcome)
 
 
+@pytest.mark.slow
 @given(start=st.integers(0, len(TEXT)), length=st.integers(0, 60), patch=st.text(max_size=20))
 def test_any_damage_gives_a_controller_or_an_input_error(
     tmp_path_factory: pytest.TempPathFactory, start: int, length: int, patch: str

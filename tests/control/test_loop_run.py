@@ -20,6 +20,8 @@ from savgs_ident.simulate.transient import simulate_transient
 
 from .loops import CAM, NO_FRICTION, along, cam, evaluated, harmonics_of, ideal, passive, ran, with_changed
 
+pytestmark = pytest.mark.slow
+
 AT_TWO = cam(2.0)
 SAMPLES = 2501
 """Of the beginning of a run, until the road has been at its full height for half a second."""
@@ -67,7 +69,6 @@ def sliding(friction: QuarterCar, smooth: Values, loop: Loop) -> ClosedLoopRun:
     return ran(friction, smooth, AT_TWO, loop)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("rigid", "within"), [(False, 1e-3), (True, 0.01)])
 def test_the_passive_run_ends_in_the_periodic_motion(
     friction: QuarterCar, numbers: Values, held: ClosedLoopRun, rigid: bool, within: float
@@ -92,7 +93,6 @@ def test_the_passive_run_ends_in_the_periodic_motion(
     assert np.max(np.abs(found / wanted - 1.0)) < within
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("with_friction", [True, False])
 def test_the_active_run_is_that_of_an_error_controlled_integration(
     friction: QuarterCar,
@@ -123,7 +123,6 @@ def test_the_active_run_is_that_of_an_error_controlled_integration(
         assert left < within, name
 
 
-@pytest.mark.slow
 def test_the_plate_carries_the_weight_at_rest_and_on_average(sliding: ClosedLoopRun, smooth: Values) -> None:
     """Over whole periods, where no friction holds the rig: nothing else holds it up."""
     weight = float((smooth["m_s"] + smooth["m_u"]) * smooth["g"])
@@ -205,7 +204,6 @@ def test_at_2_hz_the_active_rig_moves_less_than_one_that_asks_for_nothing(
     assert measure_ride(active, AT_TWO).stable
 
 
-@pytest.mark.slow
 def test_at_2_hz_the_active_rig_moves_less_by_what_the_paper_found(
     held: ClosedLoopRun, active: ClosedLoopRun
 ) -> None:

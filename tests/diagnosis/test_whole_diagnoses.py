@@ -173,7 +173,7 @@ def test_an_effect_is_named() -> None:
         assert not loop.nearest.size
 
 
-@pytest.mark.parametrize("times", [1.4, 2.3])
+@pytest.mark.parametrize("times", [1.4, pytest.param(2.3, marks=pytest.mark.slow)])
 def test_a_number_far_off_its_sheet_is_the_effect_that_does_the_same(times: float) -> None:
     """Calibration takes up the first. That a tolerance does not hold is nothing unknown where it is an effect."""
     found = _diagnosed(_recorded(numbers=TRUTH | {"k_t": times * PARAMETERS["k_t"].value}))
@@ -182,7 +182,8 @@ def test_a_number_far_off_its_sheet_is_the_effect_that_does_the_same(times: floa
     assert found.shrink.after < 1.3 * found.shrink.floor
 
 
-@pytest.mark.parametrize("tolerances", [pytest.param(-9.0, marks=pytest.mark.slow), 12.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("tolerances", [-9.0, 12.0])
 def test_a_number_that_is_off_beside_an_effect_is_said_with_it(tolerances: float) -> None:
     """The catalogue has no change of the unsprung mass."""
     sheet = PARAMETERS["m_u"]

@@ -310,6 +310,7 @@ def test_within_what_was_seen_it_is_the_sum_and_beyond_it_is_held(
     assert _force(effect, p, *outside) == pytest.approx(edge, rel=1e-12)
 
 
+@pytest.mark.slow
 @each_force
 def test_its_derivatives_are_those_of_differences(effect: Effect) -> None:
     numbers = _given(effect, 7.0)

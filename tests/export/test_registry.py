@@ -76,6 +76,7 @@ def test_a_package_that_is_not_there_stands_in_the_way_of_no_other_format(
         EXPORTS["mat"].write(model, tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.slow) for name in EXPORTS if name != "json"]
 )

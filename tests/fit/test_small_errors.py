@@ -54,7 +54,8 @@ def test_a_friction_that_drifts_is_found_in_the_middle_of_its_drift(bench: Bench
     assert np.max(np.abs(off)) < 2.5
 
 
-@pytest.mark.parametrize("channel", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("channel", [0, 1])
 def test_a_sensor_that_reads_three_per_cent_too_much_is_no_small_error(bench: Bench, channel: int) -> None:
     data = bench.predicted(TRUTH) + bench.noise(4)
     data[:, channel] *= 1.03

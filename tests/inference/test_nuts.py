@@ -167,6 +167,7 @@ def test_proposals_that_go_on_from_rejected_ones_would_be_found_out() -> None:
     assert abs(state.std() - 1.0) > 0.02
 
 
+@pytest.mark.slow
 def test_transitions_are_reversible_on_the_surrogate() -> None:
     hill = SkewHill(2.0)
     start = hill.draws(np.random.default_rng(3), CHAINS)

@@ -157,13 +157,14 @@ def test_the_page_says_what_there_is_and_what_there_is_not(by_kind: dict[str, Di
 
 
 def test_the_formula_that_comes_nearest_to_a_learned_law_is_explained_where_it_is_drawn(
-    diagnosis: Diagnosis,
+    diagnosis: Diagnosis, page: Reader
 ) -> None:
     loops = tuple(
         replace(each, law_sd=0.1 * np.abs(each.law), nearest=0.5 * each.law) for each in diagnosis.loops
     )
-    for given, drawn in ((diagnosis, False), (replace(diagnosis, loops=loops), True)):
-        text = " ".join(Reader(diagnosis_html(given, ORIGIN)).texts)
+    learned = Reader(diagnosis_html(replace(diagnosis, loops=loops), ORIGIN))
+    for shown, drawn in ((page, False), (learned, True)):
+        text = " ".join(shown.texts)
         assert ("Dotted: the formula of the catalogue that comes nearest" in text) is drawn
 
 

@@ -61,6 +61,7 @@ def test_frequency_and_rate_follow_the_road() -> None:
     assert response.input_amplitude == pytest.approx(0.01375, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_response_is_the_linear_one_with_its_known_bias() -> None:
     """Averaged over draws: right to 0.3 per cent once the two terms that the docstring states are added."""
     runs = [estimate_sweep_response(sweep(seed, 1e-4), "road_height") for seed in range(6)]

@@ -84,6 +84,7 @@ def clean(shipped: Campaign) -> HarmonicResponse:
     return estimate_response(shipped)
 
 
+@pytest.mark.slow
 def test_a_clean_campaign_keeps_its_numbers_bit_by_bit() -> None:
     campaign = load_campaign(default_campaign_path())
     robust, plain = estimate_response(campaign), plain_response(campaign)
@@ -198,6 +199,7 @@ def test_too_many_outliers_are_not_left_out_but_warned_of(synthetic: Any) -> Non
     assert "too many to leave out: the sensor cannot be trusted in this test" in warning.what
 
 
+@pytest.mark.slow
 @given(
     seed=st.integers(0, 2**32 - 1),
     share=st.floats(0.0, 0.05),

@@ -27,6 +27,7 @@ def _motion(name: str, seconds: float, hertz: float, step: float = STEP) -> Driv
     return recorded_motion(_recording(name, seconds, hertz, step), "position", "drive_force", "tests.csv")
 
 
+@pytest.mark.slow
 def test_rows_and_slopes_of_several_are_those_of_each_alone() -> None:
     motions = [_motion("one", 4.0, 1.0), _motion("other", 3.0, 2.3)]
     model = si.PlantModel(si.Axis(), si.Axis.parameters) + "guide_preload"

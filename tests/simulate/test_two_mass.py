@@ -109,6 +109,7 @@ def _moved(tolerance: float = 1e-9) -> TransientSolution:
     return simulate_transient(PLANT, P, SWAY, TIMES, tolerance=tolerance)
 
 
+@pytest.mark.slow
 def test_it_stays_at_rest_on_a_flat_road() -> None:
     still = simulate_transient(PLANT, P, ProfileSource((Sine(0.0, 1.0, 0.0, 0.0, 0.5),)), TIMES)
     assert still.status().ok
@@ -172,6 +173,7 @@ def test_the_solved_rates_leave_no_residual() -> None:
     assert np.max(np.abs(at(found.motion, found.s, found.sd, found.inputs))) < 1e-6
 
 
+@pytest.mark.slow
 def test_what_gives_way_in_series_has_rates_and_slopes_of_its_own() -> None:
     mount = GENERIC["mount_compliance"]
     plant = TwoMass() + mount

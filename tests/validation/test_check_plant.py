@@ -265,6 +265,7 @@ def test_what_does_not_go_together_is_said(declared: dict[str, Any], said: str) 
     assert any(said in each for each in found), found
 
 
+@pytest.mark.slow
 def test_parameters_that_nothing_shows_and_that_nothing_tells_apart(tmp_path: Path) -> None:
     """Mass, spring and damper scale together where no force is measured; what is used nowhere moves nothing."""
     idle = si.Parameter("idle", 1.0, "N", lower=0.0, upper=2.0)

@@ -125,6 +125,7 @@ def test_a_force_from_outside_is_one_of_an_effect(simqc: QuarterCar, numbers: di
         np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 @over("port", SERIES_PORTS, ids=lambda port: port.name)
 def test_a_way_from_outside_is_one_of_an_effect(
     simtr: QuarterCar, numbers: dict[str, float], port: Port
