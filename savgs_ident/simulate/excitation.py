@@ -24,7 +24,7 @@ from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, SweepResponse
 from savgs_ident.responses.sweeps import estimate_sweep_response
 from savgs_ident.responses.windows import HIGHEST_HZ, KINDS, LEAD_S, estimate_windows
-from savgs_ident.simulate.mesh import Layout, Mesh, over_dwells, turns
+from savgs_ident.simulate.mesh import Layout, Mesh, over_dwells, waves
 
 SUMMED = 64
 """Most harmonics that are summed one by one at every node."""
@@ -60,8 +60,11 @@ def inputs_at(plant: AbstractPlant, excitation: Excitation, mesh: Mesh) -> Any:
 def _synthesise(harmonics: Array, omega: Array, phase: Array) -> tuple[Array, Array]:
     """Value and time derivative at the nodes, both (P,), from harmonics (P, K)."""
     order = jnp.arange(harmonics.shape[1])
-    terms = harmonics * turns(phase, harmonics.shape[1] - 1)
-    return jnp.sum(terms.real, axis=1), jnp.sum((1j * order * terms).real, axis=1) * omega
+    cosines, sines = waves(phase, harmonics.shape[1] - 1)
+    real, imaginary = harmonics.real.T, harmonics.imag.T
+    value = jnp.sum(real * cosines - imaginary * sines, axis=0)
+    rate = -jnp.sum(order[:, None] * (real * sines + imaginary * cosines), axis=0) * omega
+    return value, rate
 
 
 def _interpolate(

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Complex, Float
+from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 CHUNK = 16
@@ -108,24 +108,45 @@ class Mesh(NamedTuple):
     weight: Float[Array | np.ndarray, " P"]
 
 
-MULTIPLIED = 15
-"""Up to this order powers are multiplied one by one."""
+ONE_BY_ONE = 16
+"""So many orders are multiplied one by one; as many at a time are turned on from there."""
 
 
-def turns(phase: Float[Array | np.ndarray, " P"], orders: int) -> Complex[Array, "P K"]:
-    """exp(i k phase) [1] of phases [rad] and orders k = 0..``orders``, by multiplication.
+def waves(
+    phase: Float[Array | np.ndarray, " P"], orders: int
+) -> tuple[Float[Array, "K P"], Float[Array, "K P"]]:
+    """cos(k phase) and sin(k phase) [1] of phases [rad] and orders k = 0..``orders``, by multiplication.
 
-    Exponentials would cost as much as a motion.
+    Cosines of each order would cost more than a motion, and so would powers of complex numbers, of which the compiler
+    makes no vectors.
     """
-    once = jnp.exp(1j * jnp.asarray(phase))
-    powers = [jnp.ones_like(once)]
-    for _ in range(min(orders, MULTIPLIED)):
-        powers.append(powers[-1] * once)
-    found = jnp.stack(powers, axis=1)
-    while found.shape[1] <= orders:
-        # As many again, all at once: a program of hundreds of products would take long to compile.
-        found = jnp.concatenate([found, found * (found[:, -1] * once)[:, None]], axis=1)
-    return found[:, : orders + 1]
+    once = jnp.asarray(phase)
+    cosines, sines = _multiples(once, min(orders + 1, ONE_BY_ONE))
+    if orders < ONE_BY_ONE:
+        return cosines, sines
+    far = _multiples(ONE_BY_ONE * once, orders // ONE_BY_ONE + 1)
+    further_cosines, further_sines = (each[:, None] for each in far)
+    found = (
+        further_cosines * cosines - further_sines * sines,
+        further_sines * cosines + further_cosines * sines,
+    )
+    c, s = (each.reshape(-1, once.size)[: orders + 1] for each in found)
+    return c, s
+
+
+def _multiples(angle: Float[Array, " P"], count: int) -> tuple[Float[Array, "n P"], Float[Array, "n P"]]:
+    """Cosines and sines of 0, 1, 2, ... times an angle.
+
+    In a loop: written out, the compiler would multiply the first ones again for each of the others.
+    """
+    cosine, sine = jnp.cos(angle), jnp.sin(angle)
+
+    def turn(now: tuple[Array, Array], _: None) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        c, s = now
+        return (c * cosine - s * sine, s * cosine + c * sine), now
+
+    nought = jnp.ones_like(angle), jnp.zeros_like(angle)
+    return jax.lax.scan(turn, nought, None, length=count)[1]
 
 
 def uniform_mesh(layout: Layout) -> Mesh:

@@ -1,7 +1,7 @@
 """What sensors read along periodic motions: their harmonics, of whole periods or of the part that is compared."""
 
 from collections.abc import Callable
-from functools import reduce
+from itertools import pairwise
 from typing import Any, cast
 
 import equinox as eqx
@@ -12,9 +12,9 @@ from jaxtyping import Array, Complex, Float
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.responses.harmonic_response import ComparedPart, compared_share
-from savgs_ident.simulate.collocation import Trajectory, by_chunks, node_motion
+from savgs_ident.simulate.collocation import Trajectory, node_motion
 from savgs_ident.simulate.excitation import inputs_at
-from savgs_ident.simulate.mesh import CHUNK, Mesh, turns
+from savgs_ident.simulate.mesh import Mesh, waves
 from savgs_ident.simulate.periodic import PeriodicSolution
 
 Share = Callable[[Array, Array, Array], Array]
@@ -53,25 +53,19 @@ def analyse(
 
     Where only a ``part`` of each period is compared, those of the signals times their ``share``, every so many-th of
     them.
-
-    Summed over the nodes of all chunks at a time, then over the chunks of a dwell, so that every operation is a long
-    vector.
     """
-    twice = jnp.full(orders + 1, 2.0).at[0].set(1.0)
     phase, weight = jnp.asarray(mesh.phase), jnp.asarray(mesh.weight)
     if part is not None:
         begin, end, every = (jnp.asarray(each)[mesh.layout.dwell] for each in part)
         weight = weight * share(phase, begin, end)
         phase = phase * every
-    kernel = twice * jnp.conj(turns(phase, orders)) * weight[:, None]
-    real = by_chunks(jnp.concatenate([kernel.real, kernel.imag], axis=1).T)
-    given = by_chunks(signals.T)
-    chunks = reduce(jnp.add, [given[i][:, None] * real[i] for i in range(CHUNK)])
-    layout = mesh.layout
-    seen = jax.ops.segment_sum(
-        jnp.moveaxis(chunks, -1, 0), layout.dwell[::CHUNK], len(layout.counts), indices_are_sorted=True
-    )
-    return seen[..., : orders + 1] + 1j * seen[..., orders + 1 :]
+    cosines, sines = waves(phase, orders)
+    table, counted = jnp.concatenate([cosines, -sines]), (signals * weight[:, None]).T
+    edges = pairwise((*mesh.layout.starts, mesh.layout.total))
+    # A matrix product for each dwell: its nodes are a sum over the last axis of both.
+    seen = jnp.stack([counted[:, here:end] @ table[:, here:end].T for here, end in edges])
+    twice = jnp.full(orders + 1, 2.0).at[0].set(1.0)
+    return twice * (seen[..., : orders + 1] + 1j * seen[..., orders + 1 :])
 
 
 @eqx.filter_jit
