@@ -77,6 +77,7 @@ if TYPE_CHECKING:
         simulate_sweep,
     )
     from savgs_ident.validation.blind import BlindStudy, blind
+    from savgs_ident.validation.blind_like import blind_like
     from savgs_ident.validation.calibration import CalibrationStudy, calibrate
     from savgs_ident.validation.check_plant import PlantCheck, check_plant
     from savgs_ident.validation.false_alarms import AlarmStudy, false_alarms
@@ -131,6 +132,7 @@ _PLACES = {
     "DecisionConstants": "diagnosis.thresholds",
     "false_alarms": "validation.false_alarms",
     "blind": "validation.blind",
+    "blind_like": "validation.blind_like",
     "linearise": "control.public",
     "design": "control.public",
     "close_loop": "control.public",
@@ -278,6 +280,7 @@ __all__ = [
     "TwoMass",
     "Verdict",
     "blind",
+    "blind_like",
     "calibrate",
     "check_plant",
     "close_loop",

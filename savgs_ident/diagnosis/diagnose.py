@@ -176,14 +176,31 @@ def diagnose_problem(
     # Threads of the linear algebra only get in each other's way: its matrices are small, and there are many.
     with threadpool_limits(1, "blas"):
         began = time.perf_counter()
-        recalibrated = recalibrate(plant, data, values, progress, settings.constants)
-        _refuse_mistaken(recalibrated)
-        problem, fitted = fit_hypotheses(recalibrated, progress)
-        found = _concluded(
-            problem, fitted, measured, given, settings, values, progress, further, began, origin
+        problem = recalibrate(plant, data, values, progress, settings.constants)
+        _refuse_mistaken(problem)
+        return diagnose_recalibrated(
+            problem, given, settings, values, progress, further, measured, watch, origin, began
         )
-        watch(problem, fitted)
-        return found
+
+
+def diagnose_recalibrated(
+    problem: DiagnosisProblem,
+    given: Model,
+    settings: DiagnosisSettings,
+    values: Mapping[str, float],
+    progress: Progress = no_progress,
+    further: FurtherRecording | None = None,
+    measured: HarmonicResponse | None = None,
+    watch: Watch = nobody,
+    origin: Origin = NO_ORIGIN,
+    began: float | None = None,
+) -> Diagnosis:
+    """The same of a baseline that is recalibrated already, since ``began`` [s] of the performance counter."""
+    began = time.perf_counter() if began is None else began
+    problem, fitted = fit_hypotheses(problem, progress)
+    found = _concluded(problem, fitted, measured, given, settings, values, progress, further, began, origin)
+    watch(problem, fitted)
+    return found
 
 
 MENDED = 0.1

@@ -5,9 +5,9 @@ The model says which effects may be missing in its plant, and which such plants 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from savgs_ident.core.errors import InputError
+from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progress
 from savgs_ident.diagnosis.diagnose import (
     Watch,
@@ -82,16 +82,60 @@ def diagnose(
         raise InputError(
             "a held-out motion goes with a measured motion alone", remedy="diagnose each campaign by itself"
         )
-    response = forgetful_response(measured, model, orders, max_frequency, progress)
-    model, resized = sized_to(model, response)
-    campaign, warnings = campaign_of(measured), (*response.warnings, *resized)
-    given, settings, values = baseline_of(model, orders, without, constants)
+    asked = ask_dwells(model, measured, orders, max_frequency, without, constants, progress)
+    response, given, settings = asked.response, asked.given, asked.settings
+    campaign = campaign_of(measured)
     # A sweep in windows is what the model is fitted to, and no test that was left out.
     apart = None if response.part is not None else campaign
     sweep, found_in_sweep = (None, ()) if apart is None else first_sweep(apart, model.plant)
     plant, data = problem_of_dwells(response, given, settings)
-    origin = model.origin(campaign, (*warnings, *found_in_sweep)).with_command(command)
-    return diagnose_dwells(plant, data, response, given, settings, values, progress, sweep, origin=origin)
+    origin = model.origin(campaign, (*asked.warnings, *found_in_sweep)).with_command(command)
+    return diagnose_dwells(
+        plant, data, response, given, settings, asked.values, progress, sweep, origin=origin
+    )
+
+
+@dataclass(frozen=True)
+class AskedDwells:
+    """A response, and the baseline that it is to be diagnosed with.
+
+    Attributes:
+        response: of dwells, or of windows in motions that do not repeat.
+        given: the model as known before its own fit, its effects as large as the recorded motion asks for.
+        settings: what the baseline is, and what is compared.
+        values: those that the baseline is given with [SI], by name.
+        warnings: about the recordings.
+    """
+
+    response: HarmonicResponse
+    given: Model
+    settings: DiagnosisSettings
+    values: Mapping[str, float]
+    warnings: tuple[DataWarning, ...]
+
+
+def ask_dwells(
+    model: Model,
+    measured: Measurements,
+    orders: int = 9,
+    max_frequency: float | None = None,
+    without: Sequence[str] = (),
+    constants: DecisionConstants = DEFAULTS,
+    progress: Progress = no_progress,
+) -> AskedDwells:
+    """What :func:`diagnose` holds recordings of dwells or of roads against.
+
+    Raises as it does, and :class:`InputError` for a motion along which a plant is held against its drive's force.
+    """
+    if isinstance(measured, Campaign) and motion_in(measured, model) is not None:
+        raise InputError(
+            "the recordings are of a motion along which the drive's force is compared",
+            remedy="`fit` and `diagnose` serve them; here record dwells, a sweep or a road that is imposed",
+        )
+    response = forgetful_response(measured, model, orders, max_frequency, progress)
+    model, resized = sized_to(model, response)
+    given, settings, values = baseline_of(model, orders, without, constants)
+    return AskedDwells(response, given, settings, values, (*response.warnings, *resized))
 
 
 def problem_of_dwells(

@@ -231,6 +231,11 @@ _FOREIGN_RIGS = (
     " diagnosis does not have and that changes the response by 3 to 25 %; campaigns simulated in time with another"
     " method, with coloured noise, filters and converters; the answers were opened after the diagnosis."
 )
+_LIKE_RIGS = (
+    "Campaigns like the recorded one: its tests, its noise and small errors, parameters within what it leaves open,"
+    " with effects that change the response by 3 to 25 %. Truth and diagnosis have the equations of the plant in"
+    " common."
+)
 _OWN_NOTE = (
     "Wilson intervals. Located: the ports of the verdict are those at which the effects act. The rates with"
     " “strictly” do not count effects and ports that the verdict lists as indistinguishable from the ones named."
@@ -263,7 +268,7 @@ def blind_html(
             "sentence": summary(scores),
             "alarm": f"Required rate missed: {', '.join(missed)}." if missed else "",
             "facts": [_fact(name, rates[name]) for name in facts],
-            "about": _FOREIGN_RIGS if foreign else _OWN_RIGS,
+            "about": _about(foreign, settings),
             "note": _FOREIGN_NOTE if foreign else _OWN_NOTE,
             "median": f"Median share of the recalibrated gap that is closed: {percentage(median)}."
             if foreign and median is not None
@@ -295,6 +300,13 @@ def blind_html(
             "versions": package_versions(PACKAGES),
         },
     )
+
+
+def _about(foreign: bool, settings: Mapping[str, Any]) -> str:
+    """What the trials are."""
+    if "campaign" in settings:
+        return _LIKE_RIGS
+    return _FOREIGN_RIGS if foreign else _OWN_RIGS
 
 
 def _moved_row(moved: MovedMarks, names: Sequence[str]) -> tuple[str, ...]:

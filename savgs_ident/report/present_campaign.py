@@ -308,11 +308,9 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
             }
             return {**spectra, **shrink}
         names = [each.name for each in result.given.channels]
-        draw = report_of(result.given).ports_figure
-        drawing: Figures = {} if draw is None else {"ports": partial(draw, result)}
         return {
             **{f"gap {name}": partial(gap_map_figure, result, name) for name in names},
-            **drawing,
+            "ports": partial(report_of(result.given).ports_figure, result),
             **shrink,
             **{f"bode {name}": partial(diagnosis_bode_figure, result, c) for c, name in enumerate(names)},
             **loops,

@@ -30,7 +30,7 @@ from math import exp, isfinite
 from typing import Any
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.effects.effect import families_of
+from savgs_ident.effects.effect import Effect, families_of
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.validation.blind_answer import Answer
 from savgs_ident.validation.blind_score import FAILED, Interval, Score, Statement
@@ -59,12 +59,16 @@ def stand_in(answer: Answer, diagnosis: Mapping[str, Any]) -> str | None:
 
 
 def score_of(
-    answer: Answer, diagnosis: Mapping[str, Any], version: str = "", elsewhere: float | None = None
+    answer: Answer,
+    diagnosis: Mapping[str, Any],
+    version: str = "",
+    elsewhere: float | None = None,
+    catalogue: Mapping[str, Effect] = CATALOGUE,
 ) -> Score:
     """The marks of a diagnosis, given as the object of its ``diagnosis.json``; ``version`` is that of the code.
 
     ``elsewhere`` are the log odds of the drawn law at its own port against it at the :func:`port_in_question`, or
-    against its :func:`stand_in`.
+    against its :func:`stand_in`. ``catalogue`` has the effects that the diagnosis knows.
     """
     verdict, kind = diagnosis["verdict"], answer.kind
     said, true = tuple(verdict["effects"]), {*answer.effects}
@@ -113,7 +117,7 @@ def score_of(
         meant=tuple(sorted(_meant(answer, diagnosis))),
         law_known=known,
         imitated=instead is not None and (instead in answer.imitators or _does_the_same(elsewhere)),
-        statements=tuple(_statements(answer, diagnosis)),
+        statements=tuple(_statements(answer, diagnosis, catalogue)),
     )
     unmarked: dict[str, Any] = dict.fromkeys(_OF_WHAT_IS_THERE)
     return replace(score, **unmarked) if score.left_alone or score.imitated else score
@@ -129,7 +133,9 @@ _OF_WHAT_IS_THERE = (
 """Marks that nobody could earn where what is there cannot be seen, or told from what is named."""
 
 
-def _statements(answer: Answer, diagnosis: Mapping[str, Any]) -> Iterator[Statement]:
+def _statements(
+    answer: Answer, diagnosis: Mapping[str, Any], catalogue: Mapping[str, Effect]
+) -> Iterator[Statement]:
     """What a verdict says of ports, families and laws, with the probabilities of all hypotheses that say the same."""
     # Diagnoses of earlier versions, and those that failed, state less.
     verdict = diagnosis["verdict"]
@@ -141,9 +147,9 @@ def _statements(answer: Answer, diagnosis: Mapping[str, Any]) -> Iterator[Statem
             yield Statement("port", port, places[port], port in {*answer.accepted, *answer.ports})
     right = {f"{port}/{family}" for port in answer.accepted for family in answer.families}
     if answer.kind != "foreign":
-        right = _families(answer.effects)
+        right = _families(answer.effects, catalogue)
     for family in verdict.get("families", ()) if named and which else ():
-        share = sum(each["probability"] for each in which if family in _families_said(each))
+        share = sum(each["probability"] for each in which if family in _families_said(each, catalogue))
         yield Statement("family", family, share, family in right)
     stated = _number_or_none(verdict.get("probability"))
     if named and verdict.get("law_known", True) and stated is not None:
@@ -152,15 +158,15 @@ def _statements(answer: Answer, diagnosis: Mapping[str, Any]) -> Iterator[Statem
         )
 
 
-def _families_said(candidate: Mapping[str, Any]) -> set[str]:
+def _families_said(candidate: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> set[str]:
     """The families of a hypothesis of ``diagnosis.json``: its own, or those of its effects."""
     if candidate.get("port") and candidate.get("family"):
         return {f"{candidate['port']}/{candidate['family']}"}
-    return _families(candidate["effects"])
+    return _families(candidate["effects"], catalogue)
 
 
-def _families(effects: Sequence[str]) -> set[str]:
-    return {f"{place}/{family.value}" for place, family in families_of([CATALOGUE[name] for name in effects])}
+def _families(effects: Sequence[str], catalogue: Mapping[str, Effect]) -> set[str]:
+    return {f"{place}/{family.value}" for place, family in families_of([catalogue[name] for name in effects])}
 
 
 def _as_well(answer: Answer, diagnosis: Mapping[str, Any]) -> bool:

@@ -156,11 +156,12 @@ def verdict_of(score: Score) -> str:
 
 
 def confusion_of(scores: Sequence[Score], order: Sequence[str]) -> Confusion:
-    """The confusion matrix, effects in the given order, those that appear nowhere left out."""
+    """The confusion matrix, effects in the given order and then others, those that appear nowhere left out."""
     truths, verdicts = ({name_of(score) for score in scores} for name_of in (truth_of, verdict_of))
-    effects = [name for name in order if name in truths | verdicts]
-    rows = [name for name in (NOTHING, *effects, TWO, UNKNOWN) if name in truths]
     ends = (TWO, OTHERS, UNKNOWN, FAILED)
+    others = sorted((truths | verdicts) - {NOTHING, *ends, *order})
+    effects = [*(name for name in order if name in truths | verdicts), *others]
+    rows = [name for name in (NOTHING, *effects, TWO, UNKNOWN) if name in truths]
     columns = [name for name in (NOTHING, *effects, *ends) if name in truths | verdicts]
     counts = np.zeros((len(rows), len(columns)), dtype=np.int64)
     for score in scores:

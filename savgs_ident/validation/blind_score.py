@@ -4,7 +4,7 @@ How a diagnosis is marked is in :mod:`savgs_ident.validation.blind_marks`, what 
 :mod:`savgs_ident.validation.blind_rates`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -191,16 +191,20 @@ def said_right(score: Score) -> bool:
     return is_right(score) or (score.verdict == "unknown" and score.port_exactly is True)
 
 
-def score_from(record: object) -> Score:
-    """The marks that ``dataclasses.asdict`` and JSON made ``record`` of; ``ValueError`` for others."""
+def score_from(record: object, catalogue: Iterable[str] = CATALOGUE) -> Score:
+    """The marks that ``dataclasses.asdict`` and JSON made ``record`` of; ``ValueError`` for others.
+
+    ``catalogue`` has the effects that a diagnosis can name.
+    """
     if isinstance(record, Mapping):
         # Marks of versions that did not look at other ports are strict.
         strict = {"port_exactly": record.get("port_right"), "family_exactly": record.get("family_right")}
         strict["meant"] = [name for name in record.get("said", ()) if name in record.get("effects", ())]
         record = {**strict, **record}
     score = record_of(Score, record)
-    known = {*CATALOGUE, *FOREIGN} if score.kind == "foreign" else {*CATALOGUE}
-    if score.verdict not in _VERDICTS or not ({*score.effects} <= known and {*score.said} <= {*CATALOGUE}):
+    named = {*catalogue}
+    known = named | {*FOREIGN} if score.kind == "foreign" else named
+    if score.verdict not in _VERDICTS or not ({*score.effects} <= known and {*score.said} <= named):
         raise ValueError(f"trial {score.number} is about something unknown")
     if (score.kind in ("effect", "foreign") and len(score.effects) != 1) or (
         score.verdict == "effect" and not (score.said or score.families)

@@ -7,14 +7,13 @@ campaign, and their odds are what its own odds are to be compared with.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import ClassVar
 from uuid import uuid4
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import beta
 from threadpoolctl import threadpool_limits
 
@@ -24,16 +23,14 @@ from savgs_ident.diagnosis.conclusion import conclude, leave_tests_out
 from savgs_ident.diagnosis.diagnose import fit_hypotheses
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FittedHypotheses
 from savgs_ident.diagnosis.model_selection import decide_among, recalibrate
-from savgs_ident.diagnosis.public import baseline_of, problem_of_dwells
+from savgs_ident.diagnosis.public import AskedDwells, ask_dwells, problem_of_dwells
 from savgs_ident.diagnosis.result import DiagnosisSettings
 from savgs_ident.diagnosis.verdict import alarm_odds
-from savgs_ident.inference.find_map import find_map, refine, search_of
-from savgs_ident.inference.prior import bounds_of, values_at
 from savgs_ident.plants.model import Model
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.excitation import measured_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
+from savgs_ident.validation.recalibrated import RecalibratedCampaign, campaigns_like
 from savgs_ident.validation.trials import TrialFile, marks_of, once_a_process, run_trials
 
 CONFIDENCE = 0.95
@@ -69,68 +66,27 @@ class AlarmBench:
     """A recorded campaign, recalibrated: what campaigns with nothing missing are drawn from.
 
     Attributes:
-        problem: the campaign, its baseline recalibrated.
+        campaign: the campaign.
         odds: its own log odds that something is missing.
-        dof: degrees of freedom of the noise level behind each row, (m,); infinite where it is known.
-        level: which level that is, (m,).
         seed: of all random numbers.
     """
 
-    problem: DiagnosisProblem
+    campaign: RecalibratedCampaign
     odds: float
-    dof: NDArray[np.float64]
-    level: NDArray[np.intp]
     seed: int
 
     def draw(self, number: int) -> NullDraw:
         """The draw with this number; the same every time."""
+        random = np.random.default_rng((self.seed, number))
         with threadpool_limits(1, "blas"):
-            problem = self._null_problem(np.random.default_rng((self.seed, number)))
+            rows = self.campaign.rows((), self.campaign.truth(random))
+            problem = None if rows is None else self.campaign.recorded(rows, random)
             if problem is None:
                 return NullDraw(number, None, False, ())
             evidence = _concluded(*fit_hypotheses(problem, no_progress))
         odds, alarm = max(alarm_odds(evidence.weighed), LEAST_ODDS), evidence.kind != "none"
         named = evidence.chosen.hypothesis.effects or (evidence.kind,) * alarm
         return NullDraw(number, odds, alarm, named)
-
-    def _null_problem(self, random: np.random.Generator) -> DiagnosisProblem | None:
-        base, plant = self.problem.base, self.problem.plant
-        spread = np.linalg.cholesky(base.covariance()) @ random.standard_normal(base.x.size)
-        truth = values_at(base.coordinates, np.clip(base.x + spread, *bounds_of(base.coordinates)))
-        asked = [each.name for each in base.coordinates]
-        found = plant.predict((), truth, asked, base.prediction.warm_start)
-        if not found.solved:
-            return None
-        # On nodes of its own: what finitely many of them cost is then not the same in truth and model.
-        there = plant.predict((), truth, asked, plant.refined((), truth, found.warm_start))
-        scales, data = base.noise_scales, self.problem.data
-        rows = there.rows + data.draw_errors(scales.noise, scales.discrepancy, random)
-        return self._recalibrated(rows, self._estimated_variance(random)) if there.solved else None
-
-    def _estimated_variance(self, random: np.random.Generator) -> NDArray[np.float64]:
-        """The variances (m,) as a record of the same length would show them."""
-        _, first, level = np.unique(self.level, return_index=True, return_inverse=True)
-        dof = self.dof[first]
-        known = np.isinf(dof)
-        shown = np.where(known, 1.0, random.chisquare(np.where(known, 1.0, dof)) / np.where(known, 1.0, dof))
-        return np.asarray(self.problem.data.variance * shown[level])
-
-    def _recalibrated(
-        self, rows: NDArray[np.float64], variance: NDArray[np.float64]
-    ) -> DiagnosisProblem | None:
-        known = self.problem
-        data = replace(known.data, measured=rows, variance=variance)
-        search = search_of(known.plant, data)
-        base = find_map(search, (), known.base.values, known.base.prediction.warm_start)
-        if not base.solved:
-            return None
-        return replace(
-            known,
-            data=data,
-            search=search,
-            given=base.prediction.rows,
-            base=refine(search, base, ()),
-        )
 
 
 def _concluded(problem: DiagnosisProblem, fitted: FittedHypotheses) -> DiagnosisEvidence:
@@ -156,18 +112,7 @@ def alarm_bench(
         problem = recalibrate(plant, data, values, progress, settings.constants)
         problem, fitted = fit_hypotheses(problem, progress)
         odds = max(alarm_odds(decide_among(problem, fitted).weighed), LEAST_ODDS)
-    level = data.test * len(plant.channels) + plant.channel
-    return AlarmBench(problem, odds, _degrees_of_freedom(measured, problem), level, seed)
-
-
-def _degrees_of_freedom(measured: HarmonicResponse, problem: DiagnosisProblem) -> NDArray[np.float64]:
-    """Of the noise level behind each row, (m,)."""
-    if measured.covariance_dof is None:
-        return np.full(problem.data.measured.size, np.inf)
-    channels = enumerate(problem.plant.channels)
-    first = {c: measured.channel(name) for c, name in channels if name in measured.channels}
-    places = np.array([first[channel] for channel in problem.plant.channel])
-    return np.asarray(measured.covariance_dof[problem.data.test, places, 1])
+    return AlarmBench(campaigns_like(measured, problem), odds, seed)
 
 
 MOST = 0.02
@@ -243,20 +188,19 @@ def false_alarms(
     Raises :class:`InputError` as :func:`diagnose` does, and for draws of something else in the folder.
     """
     use_persistent_cache()
-    given, settings, values = baseline_of(model, orders)
     file = None
     if folder is not None:
         marks = marks_of(model, campaign.source, channels)
         marks |= {"max_frequency": max_frequency, "orders": orders, "seed": seed}
         file = TrialFile(prepare_folder(Path(folder)) / FILE, marks, resume)
     done = [] if file is None else file.earlier(read_draw)
-    measured = measured_response(campaign, model.plant, orders, max_frequency, progress)
-    asked = _Asked(measured, given, settings, values, seed)
+    dwells = ask_dwells(model, campaign, orders, max_frequency, progress=progress)
+    asked = _Asked(dwells, seed)
     bench = asked.bench(progress)
     found = run_trials(
         partial(_draw, asked), draws, file, done, jobs=jobs, scheduler=scheduler, progress=progress
     )
-    origin = model.origin(campaign, measured.warnings).with_command(command)
+    origin = model.origin(campaign, dwells.warnings).with_command(command)
     return AlarmStudy(tuple(found), bench.odds, origin=origin)
 
 
@@ -264,16 +208,14 @@ def false_alarms(
 class _Asked:
     """What draws follow from; ``key`` is the same in all processes."""
 
-    measured: HarmonicResponse
-    model: Model
-    settings: DiagnosisSettings
-    values: Mapping[str, float]
+    dwells: AskedDwells
     seed: int
     key: str = field(default_factory=lambda: uuid4().hex)
 
     def bench(self, progress: Progress = no_progress) -> AlarmBench:
         """What they are drawn from."""
-        given = (self.measured, self.model, self.settings, self.values, self.seed)
+        of = self.dwells
+        given = (of.response, of.given, of.settings, of.values, self.seed)
         return once_a_process(self.key, lambda: alarm_bench(*given, progress))
 
 

@@ -134,7 +134,7 @@ def test_the_named_port_and_effect_are_marked_by_colour_and_picture(
     named = "return [...document.querySelectorAll('tr.named th')].map(t => t.innerText.split(/\\s/)[0])"
     assert browser.ask(named) == ["rail", "rail_stribeck"]
     assert browser.ask("return document.images[0].alt").startswith(
-        "The rig with its ports. Named port: rail."
+        "The plant with its ports. Named port: rail."
     )
     browser.open(pages["nothing"])
     assert browser.ask(named) == []

@@ -226,7 +226,11 @@ def test_a_seed_that_nobody_gave_is_another_one_each_time(tmp_path: Path) -> Non
         (("--rig", "none.toml"), "none.toml: cannot be read"),
         (("--out", "taken"), "taken: cannot be written"),
         (("--out", "strange"), "trials.jsonl: is no list of trials"),
-        (("CAMPAIGN",), "unexpected extra argument"),
+        (("none.csv",), "none.csv: does not exist"),
+        (("none.csv", "--foreign"), "--foreign is of campaigns that are simulated in time"),
+        (("none.csv", "--every", "2"), "--every is of campaigns that are simulated in time"),
+        (("--plant", "axis"), "trials of axis need a CAMPAIGN whose tests and noise they are to have"),
+        (("--max-frequency", "3"), "go with a CAMPAIGN that trials are to be like"),
     ],
 )  # fmt: skip
 def test_bad_arguments_are_code_2_with_a_reason(

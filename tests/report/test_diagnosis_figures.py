@@ -9,10 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.patches import Rectangle
 from numpy.testing import assert_allclose
 
 from savgs_ident.diagnosis.gap import MapCell
 from savgs_ident.diagnosis.result import Diagnosis
+from savgs_ident.effects.base import PortKind
+from savgs_ident.plants.model import PlantModel
+from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
+from savgs_ident.report.diagnosis.block_diagram import block_figure, block_ports
 from savgs_ident.report.diagnosis.compared import compared_channels, diagnosis_bode_figure, first_harmonic_gap
 from savgs_ident.report.diagnosis.drawing import rig_figure
 from savgs_ident.report.diagnosis.figures import (
@@ -91,6 +96,32 @@ def test_every_kind_of_verdict_is_drawn_without_an_empty_panel(by_kind: dict[str
         assert len(figures) == (6 if kind == "none" else 10)
         for figure in figures:
             assert all(axes.has_data() for axes in figure.axes)
+
+
+def test_any_plant_is_drawn_as_a_block_with_each_port_once(diagnosis: Diagnosis) -> None:
+    share = replace(diagnosis.ports[0], port="guide", share=0.62)
+    found = replace(
+        diagnosis,
+        given=PlantModel(TwoMass(), PARAMETERS),
+        ports=(share, replace(share, port="sensor.body_accel", share=-0.1)),
+        verdict=replace(diagnosis.verdict, ports=("guide", HOSTILE)),
+    )
+    ports = {each.words: each for each in block_ports(found)}
+    assert len(ports) == len({port.location for port in TwoMass.ports}) + 1
+    words = TwoMass.location_words
+    guide, accelerometer = (ports[words.get(name, name)] for name in ("guide", "sensor.body_accel"))
+    assert (guide.side, guide.share, guide.named) == ("inside", 0.62, True)
+    assert (accelerometer.side, accelerometer.named) == ("sensor", False)
+    road = next(port.location for port in TwoMass.ports if port.kind is PortKind.INPUT)
+    assert ports[words.get(road, road)].side == "input"
+    figure = block_figure(found)
+    texts = [text.get_text() for text in figure.axes[0].texts]
+    assert {"62 %", "\u221210 %", "\u2013"} <= {*texts}
+    assert embed(figure, "block").width > 300
+    widths = sorted(patch.get_width() for patch in figure.axes[0].patches if isinstance(patch, Rectangle))
+    # A negative share is an empty bar, one of 62 % is as long a part of a whole one.
+    assert widths[0] == 0.0
+    assert widths[1] == pytest.approx(0.62 * widths[-1])
 
 
 def test_a_channel_that_was_not_recorded_has_no_bode_figure(diagnosis: Diagnosis) -> None:

@@ -228,7 +228,7 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "facts": _facts(diagnosis),
             "warnings": diagnosis.warnings,
             "rig_picture": _rig(diagnosis),
-            "rig_scale": report_of(diagnosis.given).scale,
+            "rig_legend": report_of(diagnosis.given).legend,
             "ports": [port_row(each, diagnosis) for each in diagnosis.ports],
             "drive": drive_picture(diagnosis),
             "windows": in_windows(diagnosis),
@@ -302,17 +302,14 @@ def _facts(diagnosis: Diagnosis) -> tuple[dict[str, object], ...]:
     )
 
 
-def _rig(diagnosis: Diagnosis) -> Picture | None:
-    """The ports in the drawing of the plant, where there is one."""
-    draw = report_of(diagnosis.given).ports_figure
-    if draw is None:
-        return None
+def _rig(diagnosis: Diagnosis) -> Picture:
+    """The ports in the drawing of the plant."""
     shares = ", ".join(
         f"{port_words(diagnosis, each.port)} {percentage(each.share, 0)}" for each in diagnosis.ports
     )
     named = " and ".join(port_words(diagnosis, port) for port in diagnosis.verdict.ports) or "none"
-    words = f"The rig with its ports. Named port: {named}. Shares of the gap: {shares or 'not known'}."
-    return embed(draw(diagnosis), words)
+    words = f"The plant with its ports. Named port: {named}. Shares of the gap: {shares or 'not known'}."
+    return embed(report_of(diagnosis.given).ports_figure(diagnosis), words)
 
 
 def _loop(diagnosis: Diagnosis, loop: ForceLoop) -> Picture:
