@@ -28,8 +28,9 @@ from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 SHARE = 0.35
 """Share of the readings that a force changes where it typically matters. Origin: by choice, as along a drive."""
 
-REACHED = 2.5
-"""A motion so many times as far as declared is beyond the stops that are looked for, five times as far at most."""
+REACHED = 5.0
+"""A motion so many times as far as declared is beyond all stops that are looked for. One that is not contradicts
+nothing, and what is declared stays: laws that a model has already turn round over a part of it."""
 
 FAR = 10.0
 """Factor by which a size is declared too large, or a velocity too small, where it is not believed."""
