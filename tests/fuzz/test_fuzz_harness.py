@@ -35,6 +35,7 @@ PARSERS = (
 
 NO_DATA = {
     "validation.blind_trial.diagnose_folder": "reads back what it has just written, in memory",
+    "validation.blind_like.LikeBench.trial": "reads back what it has just written, in memory",
     "export.public.diagnosis_document": "reads back what it has just written, in memory",
     "inference.samplers.nuts.save_state": "writes",
     "inference.samplers.chains.Checkpoint.publish": "writes to the scratch file of its own run",
