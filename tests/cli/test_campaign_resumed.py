@@ -129,6 +129,7 @@ def test_other_settings_another_rig_and_other_data_are_done_anew(
     assert again(rig=mine) == 8
 
 
+@pytest.mark.slow
 def test_a_campaign_that_cannot_be_read_is_a_failure_in_one_line(tmp_path: Path) -> None:
     path = campaign_file(tmp_path / "a.csv", 1.0)
     seen: list[Any] = []

@@ -49,6 +49,7 @@ def test_noise_scale_and_discrepancy_are_where_the_density_is_highest(seed: int,
         assert found.discrepancy == pytest.approx(miss, rel=0.15)
 
 
+@pytest.mark.slow
 @over("rows", [10, 30, 400])
 @over("understated", [5.0, 10.0])
 @over("reach", [0.0, 1.0, 10.0])

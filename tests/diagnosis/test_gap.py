@@ -91,6 +91,7 @@ def test_what_calibration_and_the_effect_close_make_up_the_whole() -> None:
     assert np.isnan(nothing.closed_by_effect)
 
 
+@pytest.mark.slow
 def test_the_square_of_a_gap_of_noise_alone_scatters_as_it_says() -> None:
     data, truth, channel = _case(8, 0.02)
     rng = np.random.default_rng(9)

@@ -86,6 +86,7 @@ def test_a_slope_that_fades_is_found_as_a_drift() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_data_of_the_error_model_have_no_regime_more_often_than_the_level_says() -> None:
     """Noise and discrepancy of the fitted sizes, a parameter from its prior: 200 campaigns, level 5 %."""
     alarms = 0

@@ -82,7 +82,14 @@ MODELS = {
 }
 
 
-@pytest.fixture(scope="module", params=MODELS)
+RUBS = "two_mass that rubs"
+"""Its terms are those of the others, too, which are slow."""
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=() if name == RUBS else pytest.mark.slow) for name in MODELS],
+)
 def written(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Written:
     model, folder = MODELS[request.param], tmp_path_factory.mktemp("plant")
     done = si.export(model, [name for name in EXPORTS if name != "fmu"], folder)

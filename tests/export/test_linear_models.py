@@ -99,6 +99,7 @@ def _steepness(model: ExportedModel, effect: Effect, p: Values) -> float:
     return abs(float(jax.grad(force)(jnp.zeros(()))))
 
 
+@pytest.mark.slow
 @over("name", [name for name in LEARNED if isinstance(LEARNED[name].law, LearnedForce)])
 def test_what_turns_round_in_a_learned_force_is_left_out(rig: Rig, name: str) -> None:
     """Of coefficients of 100 N over 0.5 m/s, the dampings among them make 4e3 N s/m at most, the frictions 1e4."""

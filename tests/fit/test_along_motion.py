@@ -78,7 +78,7 @@ def test_what_lacks_its_friction_is_not_trusted_and_its_errors_contain_the_truth
         assert abs(fit[name].value - TRUTH[name]) < 4.0 * fit[name].stderr < 4.0 * TRUTH[name]
 
 
-@pytest.mark.parametrize("factor", [100.0, 0.01])
+@pytest.mark.parametrize("factor", [100.0, pytest.param(0.01, marks=pytest.mark.slow)])
 def test_force_in_another_unit_gives_parameters_in_that_unit(factor: float) -> None:
     motion = _motion()
     other = replace(motion, drive=factor * motion.drive, noise=factor * motion.noise)

@@ -117,6 +117,7 @@ def test_a_loader_that_does_not_end_is_stopped(tmp_path: Path) -> None:
     assert "takes more than" in outcome.reason
 
 
+@pytest.mark.slow
 @over("name", LOADERS)
 def test_the_same_number_is_the_same_input(name: str) -> None:
     inputs = [input_of(LOADERS[name], SEED, number) for number in (1, 2, 3, 4)]

@@ -18,7 +18,8 @@ ONE_OF_THEM_SLOW = [pytest.param(each, marks=pytest.mark.slow if each == "nuts" 
 """What runs around both is the same; NUTS takes long to compile."""
 
 
-@pytest.mark.parametrize("name", ONE_OF_THEM_SLOW)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SAMPLERS)
 def test_it_goes_on_until_every_identified_parameter_is_known_well_enough(
     name: str, bent: Toy, rough: Stand
 ) -> None:

@@ -117,6 +117,7 @@ def test_it_stays_at_rest_on_a_flat_road() -> None:
     assert np.max(np.abs(still.readings.susp_deflection)) < 1e-9
 
 
+@pytest.mark.slow
 def test_a_motion_can_be_cut_and_continued() -> None:
     whole = _moved()
     half = simulate_transient(PLANT, P, SWAY, TIMES / 2.0, tolerance=1e-9)

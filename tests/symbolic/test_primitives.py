@@ -216,6 +216,7 @@ SMOOTH = sorted({*ELEMENTWISE, *BY_EQUATION, "dot_general", "reduce_prod"} - JUM
 """What computes without jumps; what moves elements about has the slopes of what it moves."""
 
 
+@pytest.mark.slow
 @over("name", SMOOTH)
 def test_its_slopes_are_those_of_jax(name: str) -> None:
     """At one place, off all kinks, along one direction."""

@@ -284,6 +284,7 @@ def test_parameters_that_nothing_shows_and_that_nothing_tells_apart(tmp_path: Pa
     assert "known to a tolerance: m" in str(known)
 
 
+@pytest.mark.slow
 def test_a_plant_that_leaves_its_rest_is_no_fault_but_said() -> None:
     table = si.ParameterTable((M, replace(K, lower=-1e4, value=-50.0), C))
     found = si.check_plant(si.load_plant(_changed(parameters=table, ports=(GUIDE, TABLE, SENSOR))))

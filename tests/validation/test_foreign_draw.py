@@ -152,6 +152,7 @@ def test_the_fixed_step_comes_to_the_periodic_motion(bench: Bench) -> None:
         assert change_of(np.stack(found), true.response(names, parameters, solution)) < 5e-3
 
 
+@pytest.mark.slow
 def test_a_whole_foreign_trial(tmp_path: Path) -> None:
     """Of a rig with small errors, recorded first, then diagnosed: sealed, opened, marked, and no alarm."""
     with with_kept_programs():

@@ -96,6 +96,7 @@ def test_derivatives_are_those_of_differences(effect: Effect, numbers: dict[str,
         assert not np.any(wrong & smooth), each.name
 
 
+@pytest.mark.slow
 @over("effect", [each for each in ONE_OF_EACH if isinstance(each.law, MECHANISMS)])
 def test_it_adds_no_energy_over_a_cycle(effect: Effect, numbers: dict[str, float]) -> None:
     cycle = along_a_cycle(effect, as_values(numbers), 1)
