@@ -31,15 +31,17 @@ def _share_rate(phase: Array, begin: Array, end: Array) -> Array:
     return jax.jvp(lambda each: _share(each, begin, end), (phase,), (jnp.ones_like(phase),))[1]
 
 
-def _readings(
-    model: AbstractPlant, p: Values, trajectory: Trajectory, known: PeriodicSolution
+def readings_of(
+    model: AbstractPlant, p: Values, motions: Trajectory, known: PeriodicSolution
 ) -> Float[Array, "P C"]:
+    """What sensors without dynamics read of motions on the nodes of a ``known`` solution, each in its unit."""
+
     def one(u: Any, *parts: Array) -> tuple[Array, ...]:
         motion, states, rates = node_motion(model, parts)
         return model.read(p, motion, states, rates, u)
 
     u = inputs_at(model, known.excitation, known.mesh)
-    return jnp.stack(jax.vmap(one)(u, *trajectory.x, *trajectory.y), axis=-1)
+    return jnp.stack(jax.vmap(one)(u, *motions.x, *motions.y), axis=-1)
 
 
 def analyse(
@@ -86,7 +88,14 @@ def harmonics_of(
 
     Each is in the unit of its reading.
     """
-    readings, excitation = _readings(model, p, motions, known), known.excitation
+    return shown_harmonics(model, p, readings_of(model, p, motions, known), known, orders)
+
+
+def shown_harmonics(
+    model: AbstractPlant, p: Values, readings: Float[Array, "P C"], known: PeriodicSolution, orders: int
+) -> Complex[Array, "D C K"]:
+    """Harmonics of what sensors show, dynamics and all, who read ``readings`` at the nodes; linear in these."""
+    excitation = known.excitation
     seen = analyse(readings, known.mesh, orders, excitation.part)
     if excitation.part is None or not model.sensors_have_dynamics:
         return seen * _sensors(model, p, excitation.spacing, orders)

@@ -27,7 +27,7 @@ from savgs_ident.simulate.collocation import (
 )
 from savgs_ident.simulate.excitation import inputs_at, signals_at
 from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
-from savgs_ident.simulate.readings import harmonics_of
+from savgs_ident.simulate.readings import readings_of, shown_harmonics
 
 
 class Directions(NamedTuple):
@@ -91,29 +91,42 @@ def directional(
     shown: Callable[[Array], Array] = lambda each: each,
 ) -> Array:
     """The same along k directions of the parameters, (k, ...); what is ``shown`` of each is kept."""
-    at = solution.trajectory
+    at, tangents = solution.trajectory, directions.tangents
     moved_along = _linear_motion(model, p, solution, directions.prepared)
 
-    def seen(q: dict[str, Array], motions: Trajectory) -> Array:
-        return harmonics_of(model, q, motions, solution, orders)
+    def read(q: dict[str, Array], motions: Trajectory) -> Array:
+        return readings_of(model, q, motions, solution)
 
-    def one(given: tuple[dict[str, Array], Any]) -> Array:
-        return shown(jax.jvp(seen, (dict(p), at), (given[0], moved_along(*given)))[1])
+    def reading(given: tuple[dict[str, Array], Any]) -> Array:
+        change: Array = jax.jvp(read, (dict(p), at), (given[0], moved_along(*given)))[1]
+        return change
 
-    return along_first(one, (directions.tangents, directions.changes), directions.wanted)
+    def seen(q: dict[str, Array], readings: Array) -> Array:
+        return shown_harmonics(model, q, readings, solution, orders)
+
+    known = read(dict(p), at)
+
+    def one(given: tuple[dict[str, Array], Array]) -> Array:
+        return shown(jax.jvp(seen, (dict(p), known), given)[1])
+
+    changes = along_first(reading, (tangents, directions.changes), directions.wanted)
+    return along_first(one, (tangents, changes), directions.wanted, ANALYSED)
 
 
 TOGETHER = 4
 """Directions that are solved for in one pass: more of them leave the processor's nearest memory."""
 
+ANALYSED = 16
+"""Directions whose harmonics are summed in one pass: one table of waves serves all of them, which takes long."""
 
-def along_first(one: Callable[[Any], Any], given: Any, wanted: Array) -> Any:
-    """What ``one`` gives of each of k things ``given``, with a leading axis (k,).
+
+def along_first(one: Callable[[Any], Any], given: Any, wanted: Array, together: int = TOGETHER) -> Any:
+    """What ``one`` gives of each of k things ``given``, ``together`` in a pass, with a leading axis (k,).
 
     All but the first ``wanted`` may be left zero.
     """
     size = jax.tree.leaves(given)[0].shape[0]
-    width = max(1, min(TOGETHER, size))
+    width = max(1, min(together, size))
     shapes = jax.eval_shape(lambda given: jax.vmap(one)(given), given)
 
     def some(place: Array, known: Any) -> Any:
@@ -175,9 +188,9 @@ def linear_response(
 
 
 def answers(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int
-) -> Callable[[Any], Complex[Array, "D C K"]]:
-    """Derivatives of the harmonics along signals imposed at the plant's ports, to be mapped over.
+    model: AbstractPlant, p: Values, solution: PeriodicSolution
+) -> Callable[[Any], Float[Array, "P C"]]:
+    """Derivatives of the readings at the nodes along signals imposed at the plant's ports, to be mapped over.
 
     They are given at the nodes, as :func:`nothing_imposed` arranges them.
     """
@@ -190,11 +203,10 @@ def answers(
         u = model.drive(signals, turning, imposed)
         return residual_at_nodes(model, p, prepared, (*at.x, *at.y), u)
 
-    def along(imposed: Any) -> Complex[Array, "D C K"]:
+    def along(imposed: Any) -> Float[Array, "P C"]:
         _, change = jax.jvp(residual, (still,), (imposed,))
         motions = respond(change)
-        seen = jax.jvp(lambda found: harmonics_of(model, p, found, solution, orders), (at,), (motions,))
-        answer: Array = seen[1]
+        answer: Array = jax.jvp(lambda found: readings_of(model, p, found, solution), (at,), (motions,))[1]
         return answer
 
     return along

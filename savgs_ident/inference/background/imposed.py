@@ -21,8 +21,9 @@ from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.plants.base import AbstractPlant, AtPorts
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.program_cache import placed, run_cached
-from savgs_ident.simulate.readings import harmonics
+from savgs_ident.simulate.readings import harmonics, shown_harmonics
 from savgs_ident.simulate.sensitivity import (
+    ANALYSED,
     TOGETHER,
     Directions,
     along_first,
@@ -138,8 +139,11 @@ def _answer_rows(
     wanted: Array,
     orders: int,
 ) -> tuple[Array]:
-    along = answers(model, p, solution, orders)
-    return (along_first(lambda one: likelihood.rows(along(one)), imposed, wanted),)
+    def rows(readings: Array) -> Array:
+        return likelihood.rows(shown_harmonics(model, p, readings, solution, orders))
+
+    readings = along_first(answers(model, p, solution), imposed, wanted)
+    return (along_first(rows, readings, wanted, ANALYSED),)
 
 
 def node_loads(
