@@ -42,7 +42,7 @@ def blind(
         typer.Option(
             "--seed",
             min=0,
-            help="Of all that is drawn; a secret one, or that of --out DIR, if not given.",
+            help="Of all that is drawn; a secret one, or that of --out DIR, if not given; with CAMPAIGN 1.",
             show_default=False,
         ),
     ] = None,

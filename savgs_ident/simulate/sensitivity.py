@@ -117,7 +117,7 @@ TOGETHER = 4
 """Directions that are solved for in one pass: more of them leave the processor's nearest memory."""
 
 ANALYSED = 16
-"""Directions whose harmonics are summed in one pass: one table of waves serves all of them, which takes long."""
+"""Directions whose harmonics are summed in one pass: one table of waves, which takes long to make, serves all."""
 
 
 def along_first(one: Callable[[Any], Any], given: Any, wanted: Array, together: int = TOGETHER) -> Any:

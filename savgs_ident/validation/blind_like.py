@@ -240,7 +240,8 @@ class LikeBench:
     def _sigma(self, present: _Present, all_of_them: Sequence[_Present]) -> float:
         """By how many standard deviations an effect stands out of noise, small errors and calibration.
 
-        To first order; what the other one does is projected out.
+        To first order: of a large effect that calibration takes up along a curve more seems to be left than is. What
+        the other one does is projected out.
         """
         base, data = self.campaign.problem.base, self.campaign.problem.data
         scales = base.noise_scales

@@ -108,8 +108,11 @@ def test_a_trial_from_the_draw_to_its_marks(bench: LikeBench) -> None:
 
 @pytest.mark.slow
 def test_effects_of_the_catalogue_are_named(bench: LikeBench) -> None:
-    found = [bench.trial(number) for number in range(1, 5)]
-    assert all(each.named_right or each.left_alone for each in found)
+    found = [bench.trial(number) for number in (1, 2, 4)]
+    assert [each.effects for each in found] == [each.said for each in found]
+    # The stiffness of the suspension is free: calibration takes another value of it up, whatever its name.
+    assert bench.trial(3).effects == ("suspension_stiffness",)
+    assert bench.trial(3).verdict == "none"
     assert all(interval.holds for each in found for interval in each.intervals.values())
     both = _bench(TWO).trial(1)
     assert both.kind == "two"
