@@ -176,31 +176,23 @@ def diagnose_problem(
     # Threads of the linear algebra only get in each other's way: its matrices are small, and there are many.
     with threadpool_limits(1, "blas"):
         began = time.perf_counter()
-        problem = recalibrate(plant, data, values, progress, settings.constants)
-        _refuse_mistaken(problem)
-        return diagnose_recalibrated(
-            problem, given, settings, values, progress, further, measured, watch, origin, began
+        recalibrated = recalibrate(plant, data, values, progress, settings.constants)
+        _refuse_mistaken(recalibrated)
+        problem, fitted = fit_hypotheses(recalibrated, progress)
+        found = _concluded(
+            problem, fitted, measured, given, settings, values, progress, further, began, origin
         )
+        watch(problem, fitted)
+        return found
 
 
 def diagnose_recalibrated(
-    problem: DiagnosisProblem,
-    given: Model,
-    settings: DiagnosisSettings,
-    values: Mapping[str, float],
-    progress: Progress = no_progress,
-    further: FurtherRecording | None = None,
-    measured: HarmonicResponse | None = None,
-    watch: Watch = nobody,
-    origin: Origin = NO_ORIGIN,
-    began: float | None = None,
+    problem: DiagnosisProblem, given: Model, settings: DiagnosisSettings, values: Mapping[str, float]
 ) -> Diagnosis:
-    """The same of a baseline that is recalibrated already, since ``began`` [s] of the performance counter."""
-    began = time.perf_counter() if began is None else began
-    problem, fitted = fit_hypotheses(problem, progress)
-    found = _concluded(problem, fitted, measured, given, settings, values, progress, further, began, origin)
-    watch(problem, fitted)
-    return found
+    """The same of a baseline that is recalibrated already, without a word on the way."""
+    began = time.perf_counter()
+    found, fitted = fit_hypotheses(problem, no_progress)
+    return _concluded(found, fitted, None, given, settings, values, no_progress, None, began, NO_ORIGIN)
 
 
 MENDED = 0.1
