@@ -39,7 +39,7 @@ gc.set_threshold(100_000, 50, 50)
 # The first example of a test compiles; a deadline would time the compiler. No database: examples that failed are
 # printed, and nothing is written into the working folder.
 settings.register_profile(
-    "fast", max_examples=12, deadline=None, database=None, print_blob=True, derandomize=True
+    "fast", max_examples=8, deadline=None, database=None, print_blob=True, derandomize=True
 )
 settings.register_profile("thorough", max_examples=25, deadline=None, database=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fast"))
@@ -257,3 +257,15 @@ def nominal_campaign() -> Path:
 def rig() -> Rig:
     """The rig that is shipped with the package."""
     return read_rig(default_rig_path())
+
+
+@pytest.fixture(scope="module")
+def undrawn() -> Iterator[None]:
+    """Figures are made and written, and nothing is painted on them: for tests of what stands beside them."""
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "draw", lambda self, renderer: None)
+        patch.setattr(ConstrainedLayoutEngine, "execute", lambda self, figure: None)
+        yield

@@ -152,6 +152,7 @@ def test_importing_the_package_loads_nothing_and_takes_no_time() -> None:
     assert min(times) < 0.1
 
 
+@pytest.mark.slow
 def test_nothing_is_computed_before_the_compiler_is_set_up() -> None:
     """What is computed as a module is loaded has XLA read its flags, and programs of later runs differ."""
     code = (

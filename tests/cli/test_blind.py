@@ -21,6 +21,8 @@ from savgs_ident.validation.blind_trial import Drawn
 
 from .blind_fakes import always_none, always_right, concluded, draw, request
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 SILENT = Reporter(False, True)
 

@@ -18,6 +18,8 @@ from savgs_ident.core.errors import InputError
 
 from .campaign_fakes import MONDAY, OWN, STDERR, TALKING, campaign_file, never, record_of, rows_of, run
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def test_every_campaign_has_its_row_in_the_order_of_time(week: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"

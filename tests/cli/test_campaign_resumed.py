@@ -16,6 +16,8 @@ from savgs_ident.fit.least_squares import FitSettings
 
 from .campaign_fakes import TALKING, campaign_file, never, read_number, request, rows_of, run
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 QUICK: dict[str, Any] = {
     "free": ("c_sd",),
     "max_frequency": 1.5,

@@ -119,6 +119,7 @@ def test_words_mean_the_same_in_any_order(name: str, monkeypatch: pytest.MonkeyP
     assert "('quiet', True)" in meaning
 
 
+@pytest.mark.slow
 def test_options_before_and_after_the_argument_give_the_same_result(
     inside: Program, short_campaign: Path
 ) -> None:

@@ -17,6 +17,8 @@ from savgs_ident.fit.result import Fit
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
 from savgs_ident.report import present_campaign
 
+pytestmark = pytest.mark.slow
+
 Invoke = Callable[..., Result]
 WORDS = ("--free", "mu_r", "c_sd", "--fixed-tolerances", "--orders", "5")
 
@@ -196,7 +198,6 @@ def test_ctrl_c_during_the_pictures_keeps_the_fit(again: Any, fitted: Any, tmp_p
     read_rig(tmp_path / "again" / "model.toml")
 
 
-@pytest.mark.slow
 def test_simulate_writes_the_same_numbers_three_times(invoke: Invoke) -> None:
     words = ("--frequency", "2.35", "1.4", "--model", "simqc", "--orders", "5")
     done = invoke("simulate", default_rig_path(), *words, "--json", "--out", "s")

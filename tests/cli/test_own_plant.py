@@ -2,13 +2,34 @@
 
 import json
 import shutil
+import tomllib
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
+from click.testing import Result
 
 from .installed import Installed
 
-SERVO = Path(__file__).resolve().parents[2] / "examples/servo"
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+SERVO, DAMPER = EXAMPLES / "servo", EXAMPLES / "damper"
+
+
+def test_a_fit_is_written_as_it_is_shown_and_code_1_where_the_model_lacks_something(
+    as_users_have_it: Callable[[Sequence[str]], Result], tmp_path: Path
+) -> None:
+    words = ["fit", str(DAMPER / "stroke.csv.gz"), "--plant", str(DAMPER / "damper.py")]
+    done = as_users_have_it([*words, "--with", "cell_offset", "--json", "--quiet", "--out", str(tmp_path)])
+    assert done.exit_code == 1
+    assert done.stdout == (tmp_path / "fit.json").read_text()
+    record = json.loads(done.stdout)
+    assert record["converged"]
+    assert not record["trusted"]
+    assert "diagnose" in done.stderr
+    # The friction of its seals is missing, and the damping makes up for a part of it.
+    assert record["parameters"]["c"]["value"] > 600.0
+    kept = tomllib.loads((tmp_path / "model.toml").read_text())
+    assert kept["parameters"]["c"]["value"] == record["parameters"]["c"]["value"]
 
 
 @pytest.mark.slow

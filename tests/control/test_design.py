@@ -208,6 +208,7 @@ junk = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(key=st.sampled_from(sorted(json.loads(TEXT))), inner=st.sampled_from([None, *ALPHA]), value=junk)
 def test_anything_in_place_of_an_entry_gives_a_controller_or_an_input_error(
     tmp_path_factory: pytest.TempPathFactory, key: str, inner: str | None, value: object

@@ -330,6 +330,7 @@ def shipped(friction: QuarterCar, numbers: Values) -> AlphaMap:
     return alpha_map(friction, numbers)
 
 
+@pytest.mark.slow
 def test_alpha_is_met_within_a_half_per_cent_of_its_magnitude(
     shipped: AlphaMap, friction: QuarterCar, numbers: Values
 ) -> None:
@@ -406,6 +407,7 @@ def test_both_ways_to_the_rest_agree_along_the_link_angle(frictionless: QuarterC
     assert along == pytest.approx(single, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_drawing_is_the_rest_at_the_nominal_link_angle(frictionless: QuarterCar, numbers: Values) -> None:
     at = np.asarray(resting_angles(frictionless, numbers, jnp.asarray(LINKS))[0])
     assert float(numbers["psi_nominal"]) == pytest.approx(LINKS[2])

@@ -44,6 +44,7 @@ def test_three_lags_have_the_gain_and_the_phase_of_the_book(k: float) -> None:
     assert found.delay == pytest.approx(phase / w, rel=1e-6)
 
 
+@pytest.mark.slow
 @given(k=st.floats(6.1, 50.0))
 def test_beyond_its_gain_margin_the_loop_is_unstable(k: float) -> None:
     found = _of(k / (S * (S + 1) * (S + 2)))
@@ -51,6 +52,7 @@ def test_beyond_its_gain_margin_the_loop_is_unstable(k: float) -> None:
     assert found.gain_down == pytest.approx(6.0 / k, rel=1e-6)
 
 
+@pytest.mark.slow
 @given(k=st.floats(1.1, 1e3))
 def test_one_lag_stands_any_gain_and_loses_only_its_phase(k: float) -> None:
     found = _of(k / (S + 1))
@@ -83,6 +85,7 @@ def test_an_unstable_plant_needs_its_gain(k: float) -> None:
     assert not _of(k / (S - 1) / k * 0.9).stable
 
 
+@pytest.mark.slow
 @given(k=st.floats(0.1, 1.4))
 def test_a_sampled_loop_ends_at_half_its_rate(k: float) -> None:
     """L = k/(z - 0.5): the closed pole 0.5 - k leaves the circle at -1."""

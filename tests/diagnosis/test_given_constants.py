@@ -60,6 +60,7 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, "diagnose_problem", stop)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("begun")
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize("constants", [DEFAULTS, OTHERS], ids=["defaults", "others"])

@@ -73,6 +73,7 @@ def test_the_force_that_a_known_axis_needs_is_the_one_it_had() -> None:
     assert np.std(data.measured - predicted.rows) < 0.01 * np.std(data.measured)
 
 
+@pytest.mark.slow
 def test_slopes_of_the_force_are_those_of_its_differences() -> None:
     problem, _ = _problem(_held({"coulomb": 12.0}, 1), *TEXTBOOK)
     values = {
@@ -126,6 +127,7 @@ def test_errors_of_the_sensor_are_no_candidates_where_the_motion_is_taken_as_mea
     assert kinds >= {PortKind.FORCE, PortKind.INPUT, PortKind.NUMBER}
 
 
+@pytest.mark.slow
 def test_a_plant_with_more_coordinates_and_a_campaign_of_dwells_are_refused() -> None:
     motion = driven_motion(_held({}, 4))
     with pytest.raises(si.InputError, match="no plant with one coordinate and one input"):

@@ -146,12 +146,17 @@ def _missing(found: Diagnosis) -> float:
 
 
 def test_nothing_is_missing() -> None:
-    varied, watch = _varied()
-    found = _diagnosed(_recorded(), watch)
+    found = _diagnosed(_recorded())
     assert found.verdict.kind == "none"
     assert found.converged
     assert _missing(found) < DEFAULTS.material_share
     assert found.parameters["k"] == pytest.approx(TRUTH["k"], rel=0.01)
+
+
+@pytest.mark.slow
+def test_the_odds_of_nothing_are_in_proportion_to_its_prior() -> None:
+    varied, watch = _varied()
+    _diagnosed(_recorded(), watch)
     # Effects too small to matter count too, and do not share its prior; that a tolerance does not hold shares it.
     odds = [each.probability / (1.0 - each.probability) for each in varied["prior_none"].values()]
     assert odds[2] - odds[1] == pytest.approx(2.0 * (odds[1] - odds[0]), rel=0.05)

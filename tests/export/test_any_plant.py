@@ -245,6 +245,7 @@ def test_what_stands_anywhere_rests_at_the_origin() -> None:
     assert resting_state(ExportedModel(_bare(si.Axis) + "guide_coulomb")) == [0.0, 0.0, 0.0]
 
 
+@pytest.mark.slow
 def test_the_motion_of_python_control_is_the_free_vibration(tmp_path: Path) -> None:
     model = MODELS["two_mass"]
     (path,) = si.export(model, "python-control", tmp_path).files
@@ -263,7 +264,7 @@ def test_the_motion_of_python_control_is_the_free_vibration(tmp_path: Path) -> N
 
 
 @pytest.mark.skipif(find_spec("fmpy") is None or shutil.which("gcc") is None, reason="needs FMPy and gcc")
-@pytest.mark.parametrize("name", ["two_mass", "axis"])
+@pytest.mark.parametrize("name", ["two_mass", pytest.param("axis", marks=pytest.mark.slow)])
 def test_the_fmu_is_valid_and_moves_as_the_plant(name: str, tmp_path: Path) -> None:
     import fmpy
     from fmpy.validation import validate_fmu

@@ -88,6 +88,7 @@ def test_force_in_another_unit_gives_parameters_in_that_unit(factor: float) -> N
         assert scaled[name].stderr == pytest.approx(factor * fit[name].stderr, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_the_identified_model_is_written_and_fits_as_well(tmp_path: Path) -> None:
     motion = _motion()
     fit = _fit(motion, *TEXTBOOK)
@@ -105,6 +106,7 @@ def test_options_that_mean_nothing_along_a_motion_are_refused() -> None:
         si.fit(axis_with(), _motion(), max_frequency=3.0)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not EMPS.exists(), reason="published recordings are not here")
 def test_a_published_axis_has_its_published_parameters() -> None:
     first, second = (si.load_motion(EMPS / name) for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"))

@@ -35,6 +35,7 @@ def test_a_held_parameter_stays_about_where_it_is_held_and_the_others_follow(
     assert np.max(np.abs(np.asarray(found.u) - follow) / errors) < 0.1
 
 
+@pytest.mark.slow
 def test_the_lower_bound_is_where_chi2_has_risen_by_its_95_percent_point(bench: Bench, best: Minimum) -> None:
     """To the 3 % of its bisection, which is many standard errors here: it never lies above the true bound."""
     minimiser = bench.seeing(bench.predicted(TRUTH) + bench.noise(7))

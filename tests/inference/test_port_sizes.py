@@ -39,6 +39,7 @@ def measured() -> si.HarmonicResponse:
     return si.simulate_dwells(model, DWELLS, {"road_height": 0.01}, NOISE, seed=1)
 
 
+@pytest.mark.slow
 def test_sizes_that_are_about_right_are_left(measured: si.HarmonicResponse) -> None:
     model = si.PlantModel(si.TwoMass(), si.TwoMass.parameters)
     same, warnings = sized_to(model, measured)

@@ -210,6 +210,7 @@ def test_the_residual_has_the_slopes_of_differences(bench: Bench) -> None:
         assert np.max(np.abs(differences - slopes[:, place])) < 1e-5 * size, names[place]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bench", MOVED, indirect=True)
 def test_harmonics_have_the_slopes_of_differences(bench: Bench) -> None:
     """On the same nodes: where these are moved, friction shows it."""

@@ -28,6 +28,8 @@ from savgs_ident.report.fit import fit_record, fit_text, value_with_error
 from savgs_ident.report.text import plain
 from savgs_ident.responses.summary import inspect
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 HOSTILE = "[bold red]run[/bold red][link=http://x]\x1b[2J:smile:"
 
 

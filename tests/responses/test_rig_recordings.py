@@ -45,6 +45,7 @@ def test_noise_is_that_of_the_sensors(
     assert 0.4 * percent < float(np.sqrt(np.mean(relative**2))) < 2.0 * percent
 
 
+@pytest.mark.slow
 @over(
     "channel",
     ["road_height", "sprung_accel", "susp_deflection", "link_angle", "link_velocity", "motor_current"],

@@ -94,6 +94,7 @@ def test_a_warm_start_finds_what_a_cold_one_finds(few: PeriodicSolution) -> None
     assert np.max(distance(_orders(p, warm), _orders(p, anew))) < 2e-3
 
 
+@pytest.mark.slow
 def test_the_order_of_the_dwells_does_not_matter(few: PeriodicSolution) -> None:
     turned = simulate_periodic(PLANT, P, _road(DWELLS[::-1]))
     assert np.max(distance(_orders(P, turned)[::-1], _orders(P, few))) < 1e-10
@@ -128,6 +129,7 @@ def test_a_motion_can_be_cut_and_continued() -> None:
         np.testing.assert_allclose(one[-1], other[-1], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_error_follows_the_tolerance() -> None:
     exact = np.asarray(_moved(1e-11).motion.q.z_s)
 

@@ -90,6 +90,7 @@ def test_an_effect_stands_out_of_all_errors_and_of_what_calibration_does(bench: 
     assert bench._sigma(one, [one, _Present(ALL["tyre_stiffness"], {}, 0.1, 2.0 * moved)]) < 1e-3
 
 
+@pytest.mark.slow
 def test_a_model_that_does_not_explain_the_campaign_is_refused() -> None:
     with pytest.raises(InputError, match="the model does not explain the campaign"):
         _bench(ONE, _recorded(FOREIGN))
