@@ -12,6 +12,7 @@ import pytest
 import savgs_ident as si
 
 from .relaxed import with_kept_programs
+from .simulate.test_windows import campaign
 
 TRUTH = {"k": 5.5e4, "c": 2.5e3}
 DWELLS = (0.8, 1.2, 1.6, 2.0, 2.5, 3.5, 5.0, 8.0, 11.0)
@@ -138,6 +139,25 @@ def test_both_samplers_find_the_same_posterior_and_it_agrees_with_the_fit(fit: s
             assert posterior[name].sd == pytest.approx(fit[name].stderr, rel=0.3)
     assert "\nk " in str(one)
     assert json.loads(one.to_json())["parameters"]["k"]["unit"] == "N/m"
+
+
+@pytest.mark.slow
+def test_a_road_has_a_comparison_and_a_posterior_as_dwells_have(model: si.PlantModel, tmp_path: Path) -> None:
+    road = campaign(40.0)
+    fit = si.fit(model, road)
+    compared = si.compare(fit.model, road)
+    assert compared.trusted
+    assert np.max(np.abs(compared.model.harmonics - fit.predicted)) < 1e-4 * np.max(np.abs(fit.predicted))
+    seen = json.loads(compared.to_json())["channels"]["body_accel"]
+    assert np.all(np.array(seen["missed_rms"]) < 2.0 * np.array(seen["noise_rms"]))
+    assert {each.name for each in compared.save(tmp_path)} == {"bode.json", "spectra.png", "spectra.pdf"}
+    found = si.sample(fit.model, road, "nuts", target_ess=200.0, patience=0.0)
+    assert found.trusted
+    for name in fit.free_names:
+        assert found[name].q025 < model.table[name].value < found[name].q975
+        assert abs(found[name].median - fit[name].value) < fit[name].stderr
+        assert found[name].sd == pytest.approx(fit[name].stderr, rel=0.3)
+    assert "4 windows of tests that do not repeat" in str(found)
 
 
 @pytest.mark.slow

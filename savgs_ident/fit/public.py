@@ -30,7 +30,6 @@ from savgs_ident.simulate.excitation import (
     Measurements,
     campaign_of,
     measured_excitation,
-    measured_response,
 )
 from savgs_ident.simulate.forgetting import forgetful_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
@@ -212,17 +211,20 @@ def compare(
 ) -> Comparison:
     """Hold a model against a campaign or the response of its dwells, orders up to ``orders``; nothing is fitted.
 
-    Raises :class:`InputError` for a campaign that cannot be used.
+    Where there are no dwells, a road or a sweep is cut into windows. Raises :class:`InputError` for a campaign that
+    cannot be used.
     """
     use_persistent_cache()
-    response = measured_response(measured, model.plant, orders, None, progress)
+    response = forgetful_response(measured, model.before, orders, None, progress)
     excitation = measured_excitation(model.plant, response, model.table)
-    progress("solving the model at the dwells")
-    with_effects = simulate_response(model, excitation, response.orders)
-    progress("solving it without effects at the dwells")
-    frictionless = simulate_response(disable_effects(model), excitation, response.orders)
     names = [each.name for each in model.channels]
-    used = comparable(response, names, response.orders) & with_effects.ok[:, None, None]
+    places = [response.channel(name) for name in names if name in response.channels]
+    shown = response.orders if response.part is None else response.last_compared(places)
+    progress("solving the model")
+    with_effects = simulate_response(model, excitation, shown)
+    progress("solving it without effects")
+    frictionless = simulate_response(disable_effects(model), excitation, shown)
+    used = comparable(response, names, shown) & with_effects.ok[:, None, None]
     origin = model.origin(campaign_of(measured), response.warnings)
     return Comparison(response, with_effects, frictionless, used, origin=origin)
 

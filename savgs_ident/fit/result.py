@@ -202,6 +202,41 @@ def _pooled(each: list[Gap]) -> Gap:
 
 
 @dataclass(frozen=True)
+class OverWindows:
+    """What is compared in one channel of D windows, summed over them at each of the n frequencies where any is.
+
+    Attributes:
+        frequency: [Hz], (n,).
+        known: their places among the K numbers of a reading, (n,).
+        used: which numbers are compared, (D, K).
+    """
+
+    frequency: NDArray[np.float64]
+    known: NDArray[np.int64]
+    used: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, measured: HarmonicResponse, used: NDArray[np.bool_]) -> "OverWindows":
+        """Of the numbers that are ``used`` (D, K)."""
+        known = np.flatnonzero(used.any(axis=0))
+        return cls(np.asarray(measured.spacing[0] * known, np.float64), known, used)
+
+    def rms(self, squares: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Root mean square over the windows of what ``squares`` (..., D, K) are the squares of, (..., n)."""
+        total = np.sum(np.where(self.used, squares, 0.0), axis=-2)[..., self.known]
+        return np.asarray(np.sqrt(total / np.sum(self.used, axis=0)[self.known]))
+
+
+def recorded_spectra(
+    measured: HarmonicResponse, name: str, orders: int
+) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+    """What a channel reads, and its variance, in the first numbers up to ``orders``, (D, orders) each."""
+    place = measured.channel(name)
+    spread = np.trace(measured.covariance[:, place, :orders], axis1=-2, axis2=-1)
+    return measured.harmonics[:, place, :orders], spread
+
+
+@dataclass(frozen=True)
 class MeasuredPoints:
     """Measured responses of D dwells with standard deviations, in C channels.
 

@@ -31,7 +31,8 @@ from savgs_ident.inference.sample import Question, sample_posterior
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.excitation import Measurements, campaign_of, measured_response
+from savgs_ident.simulate.excitation import Measurements, campaign_of
+from savgs_ident.simulate.forgetting import forgetful_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 
 
@@ -58,13 +59,14 @@ def sample(
 
     Args:
         identified: a fit, or a model that was identified.
-        measured: the recordings, or the response of their dwells; what was fitted, if left out.
+        measured: the recordings, or the response of their dwells; what was fitted, if left out. Where there are no
+            dwells, a road or a sweep is cut into windows.
         sampler: "emcee", an ensemble of walkers, or "nuts", gradient-based trajectories.
         target_ess: effective sample size to reach for every parameter [1].
         time_limit: stop sampling after this [s].
         patience: go on beyond the target up to this [s], for medians to a fortieth of their standard deviation.
         fixed_tolerances: hold what is known to a tolerance at its value.
-        max_frequency: leave out faster dwells [Hz].
+        max_frequency: leave out faster dwells [Hz]; of windows, what is faster.
         orders: highest harmonic order to compare.
         seed: of all random numbers.
         chain: file in which the chain is kept after every step.
@@ -120,7 +122,7 @@ def _measured(
 ) -> HarmonicResponse:
     if measured is not None:
         model = identified.model if isinstance(identified, Fit) else identified
-        return measured_response(measured, model.plant, orders, max_frequency, progress)
+        return forgetful_response(measured, model.before, orders, max_frequency, progress)
     if isinstance(identified, Fit):
         return identified.measured
     raise InputError("a model alone has no posterior", remedy="give the campaign, or the fit")
@@ -202,7 +204,7 @@ def _discrepancy(marginals: Sequence[Marginal]) -> list[str]:
             f"To explain the data the model would have to err by {100.0 * scale.median:.2g} % of the response at "
             "each of its ports: something is missing in it."
         )
-    return [miss, f"The noise is {noise.median:.3g} times what does not repeat from period to period."]
+    return [miss, f"The noise is {noise.median:.3g} times what the recordings show."]
 
 
 def _added(identified: Sequence[Marginal]) -> list[str]:

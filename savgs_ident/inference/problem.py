@@ -117,7 +117,7 @@ def harmonic_target(measured: HarmonicResponse, channels: Sequence[Channel], ord
     Raises :class:`InputError` if none can be used.
     """
     present, places = response_channels(measured, channels)
-    count = 1 + (min(orders, measured.orders) if measured.part is None else _last_compared(measured, places))
+    count = 1 + (min(orders, measured.orders) if measured.part is None else measured.last_compared(places))
     covariance = measured.covariance[:, places, :count]
     used = measured.valid[:, places, :count] & present[None, :, None]
     used[:, :, 0] = False
@@ -133,11 +133,6 @@ def harmonic_target(measured: HarmonicResponse, channels: Sequence[Channel], ord
         used,
         None if measured.part is not None else tuple(each.decay for each in channels),
     )
-
-
-def _last_compared(measured: HarmonicResponse, places: Sequence[int]) -> int:
-    """The highest order of windows that is compared; ``orders`` of dwells says nothing of them."""
-    return int(np.flatnonzero(measured.valid[:, places].any(axis=(0, 1)))[-1])
 
 
 def peak_to_peak_target(measured: HarmonicResponse, channels: Sequence[Channel]) -> PeakToPeakTarget:

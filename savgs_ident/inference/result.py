@@ -335,6 +335,7 @@ def inference_data(posterior: Posterior) -> "xr.DataTree":
         )
     for group in ("posterior_predictive", "observed_data"):
         tree[group].coords["frequency"] = ("dwell", measured.frequency, {"unit": "Hz"})
+        tree[group].coords["spacing"] = ("dwell", measured.spacing, {"unit": "Hz"})
     tree.attrs["sampler"] = posterior.sampler
     return tree
 

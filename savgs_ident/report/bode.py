@@ -228,7 +228,9 @@ def phase_deg(transfer: NDArray[np.complex128]) -> NDArray[np.float64]:
     return phase
 
 
-_ENDS = (0.025, 0.975)
+PREDICTED = (0.025, 0.975)
+"""Ends of the band in which 95 % of the repetitions lie."""
+
 _LEAST_SHOWN = 2.0
 
 
@@ -273,8 +275,8 @@ def predictive_band(posterior: Posterior, c: int) -> Band:
         frequency=measured.frequency,
         middle=middle,
         measured=np.where(used, points.transfer[:, c], np.nan),
-        magnitude=np.quantile(np.abs(repeated), _ENDS, axis=0),
-        phase=np.quantile(turned, _ENDS, axis=0),
+        magnitude=np.quantile(np.abs(repeated), PREDICTED, axis=0),
+        phase=np.quantile(turned, PREDICTED, axis=0),
         inside=predictive.inside[:, c, 1],
     )
 

@@ -1,11 +1,10 @@
-"""A fit, and a comparison of model and measurement: as JSON objects and in the terminal.
+"""A fit as a JSON object and in the terminal.
 
-The objects of ``fit.json`` and ``bode.json`` are in SI throughout, the unit in the key or beside the value. The
-terminal shows parameters with errors, quality, identifiability; the gap between model and measurement.
+The object of ``fit.json`` is in SI throughout, the unit in the key or beside the value. The terminal shows parameters
+with errors, quality, identifiability; the gap between model and measurement.
 """
 
 from math import floor, isfinite, isinf, log10
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,20 +13,16 @@ from rich.console import Group, RenderableType
 from savgs_ident.core.files import warning_record
 from savgs_ident.fit.estimate import Estimate
 from savgs_ident.fit.identified import Identified
-from savgs_ident.fit.public import Comparison
 from savgs_ident.fit.result import (
     Fit,
     Gap,
-    MeasuredPoints,
     chi2_by_dwell,
     entries_by_dwell,
     gaps,
-    measured_points,
     predicted_peak_to_peak,
     whitened,
 )
-from savgs_ident.plants.model import Model
-from savgs_ident.report.text import channel_label, fixed, per_input_key, plain, table
+from savgs_ident.report.text import channel_label, fixed, plain, table
 
 
 def fit_record(fit: Fit) -> dict[str, object]:
@@ -157,55 +152,6 @@ def _predicted_peaks(fit: Fit, identified: float, frictionless: float) -> dict[s
     if fit.measured.part is not None:
         return {}
     return {"peak_to_peak_identified": identified, "peak_to_peak_simqc": frictionless}
-
-
-def bode_record(compared: Comparison) -> dict[str, object]:
-    """The JSON object of ``bode``; first harmonics per unit of the input, phase against it, SI."""
-    given = compared.given
-    names, key = [each.name for each in given.channels], per_input_key(given)
-    points = measured_points(compared.measured, names, given.plant.inputs[0].name)
-    model, frictionless = compared.model.curve(""), compared.frictionless.curve("")
-    gap = gaps(compared.measured, names, compared.model.harmonics, compared.used)
-    return {
-        "schema": 1,
-        "effects": list(compared.effects),
-        "tests": compared.measured.tests,
-        "frequency_hz": points.frequency,
-        "status": [status.name.lower() for status in compared.model.status],
-        "converged": compared.trusted,
-        "gap": {name: _gap(entry) for name, entry in gap.items()},
-        "channels": {
-            each.name: {
-                "unit": each.unit,
-                "measured": _measured(points, c, key),
-                "identified": _transfer(model.transfer[:, c], model.peak_to_peak[:, c], key),
-                "simqc": _transfer(frictionless.transfer[:, c], frictionless.peak_to_peak[:, c], key),
-            }
-            for c, each in enumerate(given.channels)
-        },
-    }
-
-
-def _gap(gap: Gap) -> dict[str, float]:
-    return {"relative": gap.relative, "floor": gap.floor, "sigma": gap.sigma}
-
-
-def _measured(points: MeasuredPoints, c: int, key: str) -> dict[str, object]:
-    return _transfer(points.transfer[:, c], points.peak_to_peak[:, c], key) | {
-        f"{key}_sd": points.magnitude_sd[:, c],
-        "phase_sd_deg": np.degrees(points.phase_sd[:, c]),
-        "peak_to_peak_sd": points.peak_to_peak_sd[:, c],
-    }
-
-
-def _transfer(
-    transfer: NDArray[np.complex128], peak_to_peak: NDArray[np.float64], key: str
-) -> dict[str, object]:
-    return {
-        key: np.abs(transfer),
-        "phase_deg": np.degrees(np.angle(transfer)),
-        "peak_to_peak": peak_to_peak,
-    }
 
 
 _SHOWN_DWELLS = 5
@@ -369,30 +315,3 @@ def _verdict(fit: Fit) -> list[str]:
     if failed:
         sentences.append("The model's periodic motion was not found in: " + ", ".join(failed) + ".")
     return sentences + list(fit.verdict.sentences)
-
-
-def bode_text(record: dict[str, Any], model: Model) -> RenderableType:
-    """The gap by channel, and the dwells that were not solved."""
-    rows = [
-        (
-            channel_label(name, model).title,
-            fixed(100.0 * gap["relative"], 3),
-            fixed(100.0 * gap["floor"], 3),
-            fixed(gap["sigma"], 2),
-        )
-        for name, gap in record["gap"].items()
-    ]
-    count = len(record["tests"])
-    parts = [
-        table(
-            f"Residual of the model on {count} dwells (rms)",
-            ("channel", "residual\n[%]", "noise\n[%]", "residual\n[noise sd]"),
-            rows,
-        )
-    ]
-    failed = [
-        test for test, status in zip(record["tests"], record["status"], strict=True) if status != "converged"
-    ]
-    if failed:
-        parts.append(plain("The model's periodic motion was not found in: " + ", ".join(failed)))
-    return Group(*parts)

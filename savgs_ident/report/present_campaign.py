@@ -139,14 +139,14 @@ class _Comparison(_Identified["Comparison"]):
     stem = "bode"
 
     def record(self, result: "Comparison") -> Mapping[str, Any]:
-        from savgs_ident.report.fit import bode_record
+        from savgs_ident.report.comparison import bode_record
 
         return bode_record(result)
 
     def text(self, result: "Comparison") -> RenderableType:
-        from savgs_ident.report.fit import bode_text
+        from savgs_ident.report.comparison import bode_text
 
-        return bode_text(dict(self.record(result)), result.given)
+        return bode_text(result)
 
     def doubts(self, result: "Comparison") -> tuple[str, ...]:
         return () if result.trusted else ("the model's periodic motion was not found in every dwell.",)
@@ -206,7 +206,7 @@ class _Posterior(AbstractPresenter["Posterior"]):
     """Whose version matters to a chain."""
 
     def record(self, result: "Posterior") -> Mapping[str, Any]:
-        from savgs_ident.report.posterior.page import posterior_record
+        from savgs_ident.report.posterior.record import posterior_record
 
         return posterior_record(result, result.origin.with_versions(self.packages))
 
@@ -226,8 +226,10 @@ class _Posterior(AbstractPresenter["Posterior"]):
     def figures(self, result: "Posterior") -> Figures:
         from savgs_ident.report.bode import predictive_figure
         from savgs_ident.report.posterior.figures import corner_figure, profile_figure, trace_figure
+        from savgs_ident.report.spectra import predicted_spectrum_figure
 
         identified = result.of_role("identified")
+        predicted = predictive_figure if result.measured.part is None else predicted_spectrum_figure
         return {
             "corner": lambda: corner_figure(result),
             **{f"trace {each.name}": partial(trace_figure, result, each) for each in identified},
@@ -237,7 +239,7 @@ class _Posterior(AbstractPresenter["Posterior"]):
                 if each.profile is not None
             },
             **{
-                f"predicted {each.name}": partial(predictive_figure, result, c)
+                f"predicted {each.name}": partial(predicted, result, c)
                 for c, each in enumerate(result.model.channels)
             },
         }

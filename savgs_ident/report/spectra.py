@@ -1,8 +1,8 @@
-"""The figure of a fit to tests that do not repeat: what is compared, over frequency.
+"""The figures of tests that do not repeat: what is compared over frequency, and what a posterior predicts.
 
-A column for each channel. Above, root mean squares over the windows: of the measurement, the model, the model without
-its effects, what the model misses, and the noise. Below, what the model leaves of each number, in noise standard
-deviations.
+Of a fit, a column for each channel. Above, root mean squares over the windows: of the measurement, the model, the
+model without its effects, what the model misses, and the noise. Below, what the model leaves of each number, in noise
+standard deviations.
 """
 
 import numpy as np
@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from savgs_ident.fit.public import Comparison
-from savgs_ident.fit.result import whitened
-from savgs_ident.report.bode import LINES, draw_residuals, share_legends
+from savgs_ident.fit.result import OverWindows, recorded_spectra, whitened
+from savgs_ident.inference.result import Posterior
+from savgs_ident.report.bode import LINES, PREDICTED, draw_residuals, share_legends
 from savgs_ident.report.text import channel_labels
-from savgs_ident.report.theme import INK, ORANGE, magnitude_axis, new_figure, styled
+from savgs_ident.report.theme import BLUE, INK, ORANGE, magnitude_axis, new_figure, styled
 
 
 def spectra_figure(title: str, compared: Comparison) -> Figure:
@@ -38,23 +39,61 @@ def spectra_figure(title: str, compared: Comparison) -> Figure:
 
 
 def _draw_spectra(axes: Axes, compared: Comparison, c: int, name: str, scale: float) -> None:
-    measured, used = compared.measured, compared.used[:, c]
-    place, orders = measured.channel(name), used.shape[1]
-    known = np.flatnonzero(used.any(axis=0))
-    frequency = float(measured.spacing[0]) * known
-
-    def rms(squares: NDArray[np.float64]) -> NDArray[np.float64]:
-        total = np.sum(np.where(used, squares, 0.0), axis=0)
-        return np.asarray(scale * np.sqrt(total[known] / np.sum(used, axis=0)[known]))
-
-    recorded = measured.harmonics[:, place, :orders]
-    noise = np.trace(measured.covariance[:, place, :orders], axis1=-2, axis2=-1)
+    over = OverWindows.of(compared.measured, compared.used[:, c])
+    recorded, noise = recorded_spectra(compared.measured, name, compared.used.shape[2])
     model, without = compared.model.harmonics[:, c], compared.frictionless.harmonics[:, c]
-    axes.semilogy(
-        frequency, rms(np.abs(recorded) ** 2), "o", color=INK, ms=4.0, mfc="white", label="measured"
-    )
-    axes.semilogy(frequency, rms(np.abs(model) ** 2), label="model", **LINES[0])
+
+    def rms(values: NDArray[np.complex128]) -> NDArray[np.float64]:
+        return scale * over.rms(np.abs(values) ** 2)
+
+    axes.semilogy(over.frequency, rms(recorded), "o", color=INK, ms=4.0, mfc="white", label="measured")
+    axes.semilogy(over.frequency, rms(model), label="model", **LINES[0])
     if compared.effects:
-        axes.semilogy(frequency, rms(np.abs(without) ** 2), label="without its effects", **LINES[1])
-    axes.semilogy(frequency, rms(np.abs(recorded - model) ** 2), ".-", color=ORANGE, lw=0.8, label="missed")
-    axes.semilogy(frequency, rms(noise), label="noise", **LINES[2])
+        axes.semilogy(over.frequency, rms(without), label="without its effects", **LINES[1])
+    axes.semilogy(over.frequency, rms(recorded - model), ".-", color=ORANGE, lw=0.8, label="missed")
+    axes.semilogy(over.frequency, scale * over.rms(noise), label="noise", **LINES[2])
+
+
+def predicted_spectrum(
+    posterior: Posterior, c: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Frequencies [Hz], (n,); what channel ``c`` read there, (n,); what 95 % of repetitions lie between, (2, n).
+
+    Root mean squares over the windows, SI.
+    """
+    predictive, orders = posterior.predictive, posterior.predictive.used.shape[2]
+    over = OverWindows.of(posterior.measured, predictive.used[:, c])
+    recorded, _ = recorded_spectra(posterior.measured, posterior.model.channels[c].name, orders)
+    repeated = over.rms(np.abs(predictive.replicated[:, :, c]) ** 2)
+    return over.frequency, over.rms(np.abs(recorded) ** 2), np.quantile(repeated, PREDICTED, axis=0)
+
+
+def predicted_spectrum_figure(posterior: Posterior, c: int) -> Figure:
+    """What a posterior predicts for one channel in windows: the spectrum, and how far off it the recorded one is."""
+    shown = tuple(channel_labels(posterior.model).values())[c]
+    frequency, recorded, ends = predicted_spectrum(posterior, c)
+    off = (recorded - 0.5 * (ends[0] + ends[1])) / (0.5 * (ends[1] - ends[0]))
+    with styled():
+        figure = new_figure(4.5, 5.6)
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.4, 1.0))
+        above.set_title(shown.title)
+        above.set_ylabel(f"amplitude, rms over windows [{shown.unit}]")
+        above.fill_between(
+            frequency,
+            *(shown.scale * ends),
+            color=BLUE,
+            alpha=0.35,
+            linewidth=0.0,
+            label="95 % of repetitions",
+        )
+        above.plot(frequency, shown.scale * recorded, "o", color=INK, ms=4.0, mfc="white", label="measured")
+        magnitude_axis(above)
+        above.legend(loc="best")
+        below.axhspan(-1.0, 1.0, color=BLUE, alpha=0.15, linewidth=0.0, zorder=0)
+        below.axhline(0.0, color=INK, linewidth=0.8)
+        below.plot(frequency, off, "o", color=BLUE, ms=4.0, mfc="white")
+        limit = 1.12 * max(float(np.max(np.abs(off))), 2.0)
+        below.set_ylim(-limit, limit)
+        below.set_ylabel("distance [band half-widths]")
+        below.set_xlabel("frequency [Hz]")
+        return figure

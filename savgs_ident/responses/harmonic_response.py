@@ -11,6 +11,7 @@ function with the same orders, so that a steep flank, which needs many orders, i
 Noise in the harmonics biases a measured peak-to-peak upwards; :func:`unbiased_peak_to_peak` subtracts that bias.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -96,6 +97,13 @@ class HarmonicResponse:
     def spacing(self) -> NDArray[np.float64]:
         """From one order of the readings to the next [Hz], (D,)."""
         return self.frequency if self.part is None else self.frequency * self.part.every
+
+    def last_compared(self, places: Sequence[int]) -> int:
+        """The highest order of the channels at these ``places`` in which anything can be compared.
+
+        Inputs of windows hold many more, which ``orders`` counts.
+        """
+        return int(np.flatnonzero(self.valid[:, places].any(axis=(0, 1)))[-1])
 
     def channel(self, name: str) -> int:
         """The index of a channel on the second axis; raises ``ValueError`` if it is absent."""

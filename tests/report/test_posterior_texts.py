@@ -20,7 +20,8 @@ from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.report.html import render_page
-from savgs_ident.report.posterior.page import posterior_html, posterior_record
+from savgs_ident.report.posterior.page import posterior_html
+from savgs_ident.report.posterior.record import posterior_record
 from savgs_ident.report.posterior.text import checks, posterior_text, predictive_sentence, shift_in_sd
 from savgs_ident.report.text import DASH
 

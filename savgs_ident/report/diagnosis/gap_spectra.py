@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.result import Diagnosis
-from savgs_ident.fit.result import comparable
+from savgs_ident.fit.result import OverWindows, comparable, recorded_spectra
 from savgs_ident.report.bode import LINES
 from savgs_ident.report.diagnosis.compared import compared_tests
 from savgs_ident.report.diagnosis.text import model_label
@@ -59,23 +59,15 @@ def _gap_spectra(
     measured, answers = compared_tests(diagnosis)
     names = [each.name for each in diagnosis.given.channels]
     orders = answers.after.shape[2]
-    used = comparable(measured, names, orders - 1)[:, c]
-    known = np.flatnonzero(used.any(axis=0))
-    recorded = measured.harmonics[:, measured.channel(names[c]), :orders]
-    spread = np.trace(measured.covariance[:, measured.channel(names[c]), :orders], axis1=-2, axis2=-1)
-
-    def together(squares: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(np.sum(np.where(used, squares, 0.0), axis=0)[known])
-
-    size = together(np.abs(recorded) ** 2)
+    over = OverWindows.of(measured, comparable(measured, names, orders - 1)[:, c])
+    recorded, spread = recorded_spectra(measured, names[c], orders)
+    size = over.rms(np.abs(recorded) ** 2)
     models = {
         model_label(diagnosis): answers.after,
         "recalibrated": answers.recalibrated,
         "before, as given": answers.before,
     }
     gaps = {
-        label: 100.0 * np.sqrt(together(np.abs(model[:, c] - recorded) ** 2) / size)
-        for label, model in models.items()
+        label: 100.0 * over.rms(np.abs(model[:, c] - recorded) ** 2) / size for label, model in models.items()
     }
-    frequency = np.asarray(known * float(measured.spacing[0]), np.float64)
-    return frequency, np.asarray(100.0 * np.sqrt(together(spread) / size)), gaps
+    return over.frequency, 100.0 * over.rms(spread) / size, gaps

@@ -1,16 +1,18 @@
-"""The posterior report: one page that an engineer reads from the top down, and the object of ``posterior.json``.
+"""The posterior report: one page that an engineer reads from the top down.
 
 Whether the numbers may be used comes first, then the findings in words, the parameters, the pictures, the convergence
 and the origin. Every cell of a table is a text that was rounded here to what its error justifies.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
-from savgs_ident.core.files import warning_record
 from savgs_ident.core.presentation import Origin
+from savgs_ident.fit.result import OverWindows
 from savgs_ident.inference.result import Marginal, Posterior
 from savgs_ident.report.bode import predictive_band, predictive_figure
 from savgs_ident.report.html import Picture, embed, render_page
@@ -37,6 +39,7 @@ from savgs_ident.report.posterior.text import (
     short,
     verdict_line,
 )
+from savgs_ident.report.spectra import predicted_spectrum, predicted_spectrum_figure
 from savgs_ident.report.text import (
     DASH,
     channel_labels,
@@ -108,10 +111,10 @@ class DiagnosticRow:
 
 
 @dataclass(frozen=True)
-class OrderRow:
-    """How many measured harmonics of one order lie inside, a cell for each channel."""
+class InsideRow:
+    """How many measured harmonics of one order, or in one octave, lie inside; a cell for each channel."""
 
-    order: int
+    where: str
     cells: tuple[str, ...]
 
 
@@ -156,17 +159,31 @@ def diagnostic_row(each: Marginal) -> DiagnosticRow:
     )
 
 
-def order_rows(posterior: Posterior) -> tuple[OrderRow, ...]:
+def order_rows(posterior: Posterior) -> tuple[InsideRow, ...]:
     """Measured harmonics inside the 95 % region, by order and channel; only orders that are compared."""
+    compared = np.flatnonzero(np.any(posterior.predictive.used, axis=(0, 1)))
+    return tuple(InsideRow(str(k), _inside(posterior, [int(k)])) for k in compared)
+
+
+def octave_rows(posterior: Posterior) -> tuple[InsideRow, ...]:
+    """The same of windows, by octaves."""
     used = posterior.predictive.used
-    inside = posterior.predictive.inside & used
-    return tuple(
-        OrderRow(
-            int(k),
-            tuple(_count_inside(inside[:, c, k].sum(), used[:, c, k].sum()) for c in range(used.shape[1])),
+    over = OverWindows.of(posterior.measured, np.any(used, axis=1))
+    octave = np.floor(np.log2(over.frequency / over.frequency[0]) + 1e-9).astype(int)
+    rows = []
+    for each in np.unique(octave):
+        hertz = over.frequency[octave == each]
+        rows.append(
+            InsideRow(f"{hertz[0]:.2g} to {hertz[-1]:.2g} Hz", _inside(posterior, over.known[octave == each]))
         )
-        for k in np.flatnonzero(np.any(used, axis=(0, 1)))
-    )
+    return tuple(rows)
+
+
+def _inside(posterior: Posterior, places: Sequence[int] | NDArray[np.int64]) -> tuple[str, ...]:
+    """How many of the harmonics at these places lie inside, a cell for each channel."""
+    used = posterior.predictive.used[:, :, places]
+    inside = posterior.predictive.inside[:, :, places] & used
+    return tuple(_count_inside(inside[:, c].sum(), used[:, c].sum()) for c in range(used.shape[1]))
 
 
 def _count_inside(part: int, whole: int) -> str:
@@ -220,9 +237,10 @@ def posterior_html(posterior: Posterior, origin: Origin) -> str:
             "traces": [_trace(posterior, each) for each in (*identified, *nuisance)],
             "profiles": _profiles(posterior),
             "predictive": predictive_sentence(posterior),
-            "bode": [_bode(posterior, c) for c in _compared(posterior)],
+            "windows": posterior.measured.part is not None,
+            "predicted": [predicted_picture(posterior, c) for c in _compared(posterior)],
             "channels": [shown.title for shown in channel_labels(posterior.model).values()],
-            "orders": order_rows(posterior),
+            "inside": order_rows(posterior) if posterior.measured.part is None else octave_rows(posterior),
             "per_input": per_input_words(posterior.model),
             "checks": checks(posterior),
             "diagnostics": [diagnostic_row(each) for each in (*identified, *nuisance)],
@@ -293,88 +311,30 @@ def _profiles(posterior: Posterior) -> list[Picture]:
 
 
 def _compared(posterior: Posterior) -> list[int]:
-    """The channels whose first harmonic is compared anywhere."""
-    return [c for c in range(len(posterior.model.channels)) if np.any(posterior.predictive.used[:, c, 1])]
+    """The channels in which anything is compared; of dwells, their first harmonics."""
+    used = (
+        posterior.predictive.used
+        if posterior.measured.part is not None
+        else posterior.predictive.used[..., 1:2]
+    )
+    return [c for c in range(len(posterior.model.channels)) if np.any(used[:, c])]
 
 
-def _bode(posterior: Posterior, c: int) -> Picture:
+def predicted_picture(posterior: Posterior, c: int) -> Picture:
+    """What is predicted for one channel, against what was measured."""
+    title = tuple(channel_labels(posterior.model).values())[c].title
+    if posterior.measured.part is not None:
+        _, recorded, ends = predicted_spectrum(posterior, c)
+        within = int(np.sum((ends[0] <= recorded) & (recorded <= ends[1])))
+        words = (
+            f"Spectrum of the {title} over the windows, measured against the 95 % predictive band: at {within} of "
+            f"{recorded.size} frequencies it is inside."
+        )
+        return embed(predicted_spectrum_figure(posterior, c), words)
     band = predictive_band(posterior, c)
     compared = np.isfinite(band.measured)
-    title = tuple(channel_labels(posterior.model).values())[c].title
     words = (
         f"Magnitude and phase of the {title} over frequency, measured against the 95 % predictive band:"
         f" {np.sum(band.inside & compared)} of {np.sum(compared)} first harmonics are inside."
     )
     return embed(predictive_figure(posterior, c), words)
-
-
-def posterior_record(posterior: Posterior, origin: Origin) -> dict[str, object]:
-    """The contract's keys first, then further results and the origin.
-
-    ``parameters`` holds all marginals, the identified ones first, then the likelihood's scales, then what was
-    known to a tolerance.
-    """
-    convergence, predictive = posterior.convergence, posterior.predictive
-    inside, compared = predictive.count_inside
-    return {
-        "parameters": {each.name: _marginal(each) for each in posterior.marginals},
-        "sampler": posterior.sampler,
-        "wall_s": posterior.wall_s,
-        "ess_min": convergence.ess_min,
-        "converged": convergence.converged,
-        "divergences": convergence.divergences,
-        "acceptance": convergence.acceptance,
-        "schema": 1,
-        "explained": posterior.explained,
-        "reasons": posterior.reasons,
-        "sentences": posterior.sentences,
-        "r_hat_max": convergence.r_hat_max,
-        "target_ess": convergence.target_ess,
-        "pareto_k": convergence.pareto_k,
-        "heaviest_weight": convergence.heaviest_weight,
-        "evaluations": convergence.evaluations,
-        "unsolved": convergence.unsolved,
-        "draws": dict(zip(("chains", "length"), next(iter(posterior.draws.values())).shape, strict=True)),
-        "predictive": {
-            "inside": inside,
-            "compared": compared,
-            "share": inside / compared if compared else None,
-            "expected": 0.95,
-        },
-        "correlation": _correlation(posterior),
-        "nuisance": [each.name for each in posterior.of_role("nuisance")],
-        "effects": posterior.effects,
-        "origin": {
-            "command": origin.command,
-            "data": origin.data,
-            "data_sha256": origin.data_sha256,
-            "model": origin.model,
-            "versions": origin.versions,
-        },
-        "warnings": [warning_record(warning) for warning in origin.warnings],
-    }
-
-
-def _marginal(each: Marginal) -> dict[str, object]:
-    return {
-        "median": each.median,
-        "sd": each.sd,
-        "q025": each.q025,
-        "q975": each.q975,
-        "unit": each.unit,
-        "ess_bulk": each.ess_bulk,
-        "ess_tail": each.ess_tail,
-        "r_hat": each.r_hat,
-        "role": each.role,
-        "prior": each.prior,
-        "contraction": each.contraction,
-        "laplace": {"value": each.laplace_value, "sd": each.laplace_sd},
-        "autocorrelation": each.autocorrelation,
-        "profile": each.profile and {"values": each.profile.values, "rise": each.profile.rise},
-    }
-
-
-def _correlation(posterior: Posterior) -> dict[str, dict[str, float]]:
-    names = tuple(each.name for each in posterior.of_role("identified"))
-    rows = posterior.correlation(names).tolist()
-    return {name: dict(zip(names, row, strict=True)) for name, row in zip(names, rows, strict=True)}

@@ -12,6 +12,7 @@ from types import MappingProxyType
 import numpy as np
 from rich.console import Group, RenderableType
 
+from savgs_ident.fit.result import OverWindows
 from savgs_ident.inference.result import Marginal, Posterior
 from savgs_ident.report.fit import value_with_error
 from savgs_ident.report.text import DASH, count, decimal, numeral, percentage, plain, table
@@ -19,8 +20,7 @@ from savgs_ident.report.text import DASH, count, decimal, numeral, percentage, p
 NUISANCE_WORDS: Mapping[str, str] = MappingProxyType(
     {
         "noise_scale": (
-            "Factor on the noise that was estimated from what does not repeat from period to period;"
-            " 1 if that estimate is right."
+            "Factor on the noise that was estimated from the recordings; 1 if that estimate is right."
         ),
         "discrepancy": (
             "Size of the small errors that the model may have at each of its ports and inputs, as a share of the"
@@ -69,20 +69,33 @@ def reasons(posterior: Posterior) -> tuple[str, ...]:
 
 def scope_sentence(posterior: Posterior) -> str:
     """What was estimated from what."""
-    measured, used = posterior.measured, posterior.predictive.used
     identified, tolerated = (len(posterior.of_role(role)) for role in ("identified", "tolerated"))
-    orders = np.flatnonzero(np.any(used, axis=(0, 1)))
-    span = f"orders {orders[0]} to {orders[-1]}" if orders.size > 1 else f"order {' '.join(map(str, orders))}"
     along = (
         f"; {tolerated} more that are known to a tolerance were sampled too and marginalised"
         if tolerated
         else "; everything else was held at its value"
     )
     were = "was" if identified == 1 else "were"
+    compared = _dwells if posterior.measured.part is None else _windows
+    return f"{_counted(identified, 'parameter')} {were} identified from {compared(posterior)}{along}."
+
+
+def _dwells(posterior: Posterior) -> str:
+    measured, used = posterior.measured, posterior.predictive.used
+    orders = np.flatnonzero(np.any(used, axis=(0, 1)))
+    span = f"orders {orders[0]} to {orders[-1]}" if orders.size > 1 else f"order {' '.join(map(str, orders))}"
     return (
-        f"{_counted(identified, 'parameter')} {were} identified from {_counted(len(measured.tests), 'dwell')}"
-        f" between {measured.frequency[0]:.2f} and {measured.frequency[-1]:.2f} Hz"
-        f" ({np.sum(used)} harmonics, {span}){along}."
+        f"{_counted(len(measured.tests), 'dwell')} between {measured.frequency[0]:.2f} and "
+        f"{measured.frequency[-1]:.2f} Hz ({np.sum(used)} harmonics, {span})"
+    )
+
+
+def _windows(posterior: Posterior) -> str:
+    measured, used = posterior.measured, posterior.predictive.used
+    frequency = OverWindows.of(measured, np.any(used, axis=1)).frequency
+    return (
+        f"{_counted(len(measured.tests), 'window')} of tests that do not repeat ({np.sum(used)} harmonics at "
+        f"{frequency.size} frequencies from {frequency[0]:.2g} to {frequency[-1]:.3g} Hz)"
     )
 
 
