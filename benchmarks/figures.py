@@ -11,6 +11,18 @@ class Figure(NamedTuple):
     meaning: str
 
 
+_FORMATS = {
+    "csv": "CSV",
+    "csv_gz": "compressed CSV",
+    "parquet": "Parquet",
+    "mdf4": "MDF 4",
+    "tdms": "TDMS",
+    "mat5": "MATLAB 5",
+    "mat73": "MATLAB 7.3",
+    "rosbag": "a bag of ROS 2 in SQLite, a topic for each channel",
+}
+"""Formats of recordings, in words."""
+
 FIGURES: dict[str, Figure] = {
     "response_ms_per_frequency": Figure(
         "ms",
@@ -145,4 +157,17 @@ FIGURES: dict[str, Figure] = {
         "1/s", ",.0f", "Samples (of six channels) read per second from a long MCAP file."
     ),
     "mcap_peak_mb": Figure("MB", ".0f", "Most memory of that process, the samples read included."),
+    **{
+        key: figure
+        for name, words in _FORMATS.items()
+        for key, figure in (
+            (
+                f"read_{name}_x",
+                Figure(
+                    "x", ",.0f", f"How many seconds of {words}, eight channels at 1 kHz, are read in one."
+                ),
+            ),
+            (f"read_{name}_mb", Figure("MB", ".0f", "Most memory of that process, the samples included.")),
+        )
+    },
 }

@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 from benchmarks.outcome import Outcome, Progress
 from benchmarks.write_long_mcap import write_long_mcap
+from benchmarks.write_long_recordings import RATE_HZ, WRITERS, signals
 from savgs_ident.plants.quarter_car.rig import default_campaign_path
-
-RATE_HZ = 1000.0
 
 
 class Ran(NamedTuple):
@@ -86,3 +85,22 @@ def measure_mcap(minutes: float, progress: Progress) -> Outcome:
             f"{size_mb:.0f} MB (zstd).",
         ),
     )
+
+
+def measure_readers(minutes: float, progress: Progress) -> Outcome:
+    """Reading a long recording of eight channels in every format but MCAP, each in a process of its own."""
+    outcome = Outcome()
+    for name, write in WRITERS.items():
+        with TemporaryDirectory() as folder:
+            progress(f"readers: writing {minutes:g} minutes as {name}")
+            path = write(Path(folder), signals(minutes))
+            size_mb = path.stat().st_size / 1e6
+            progress(f"readers: reading {name}")
+            ran = run_process(["-m", "benchmarks.read_whole", str(path)])
+        if ran.code != 0:
+            outcome += Outcome({}, (f"readers: {name} ended with exit code {ran.code}",))
+            continue
+        seconds = float(ran.output)
+        figures = {f"read_{name}_x": 60.0 * minutes / seconds, f"read_{name}_mb": ran.peak_mb}
+        outcome += Outcome(figures, (f"readers: {minutes:g} minutes as {name}, {size_mb:.0f} MB.",))
+    return outcome

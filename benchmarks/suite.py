@@ -9,7 +9,7 @@ from benchmarks.task import DWELLS_HZ
 
 NAMES = (
     "response", "harmonicbalance", "scipy", "diffrax", "fit", "posterior", "posterior-scipy", "collocation", "mcap",
-    "diagnosis", "sindy", "closed-loop", "campaigns",
+    "readers", "diagnosis", "sindy", "closed-loop", "campaigns",
 )  # fmt: skip
 """What can be asked for."""
 
@@ -21,7 +21,7 @@ class Size(NamedTuple):
 
     Attributes:
         dwells_hz: dwells [Hz].
-        mcap_minutes: length of the MCAP file.
+        recording_minutes: length of the recordings that are read.
         target_ess: effective sample size that the posterior's samplers are to reach.
         integrations: of single dwells by scipy, for the time of a likelihood.
         stretch_steps: of emcee's own move, at most.
@@ -30,7 +30,7 @@ class Size(NamedTuple):
     """
 
     dwells_hz: tuple[float, ...]
-    mcap_minutes: float
+    recording_minutes: float
     target_ess: float
     integrations: int
     stretch_steps: int
@@ -80,7 +80,11 @@ def _processes(names: Sequence[str], size: Size, progress: Progress) -> Outcome:
     if "mcap" in names:
         from benchmarks.processes import measure_mcap
 
-        outcome += measure_mcap(size.mcap_minutes, progress)
+        outcome += measure_mcap(size.recording_minutes, progress)
+    if "readers" in names:
+        from benchmarks.processes import measure_readers
+
+        outcome += measure_readers(size.recording_minutes, progress)
     if "campaigns" in names:
         from benchmarks import campaigns
 

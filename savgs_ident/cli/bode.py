@@ -31,7 +31,9 @@ def bode(
 ) -> int:
     """Draw the response of a model against a campaign: magnitude, phase, peak to peak, residuals. No fitting.
 
-    Writes bode.png, bode.pdf and bode.json.
+    Of a campaign without dwells a road, a sweep or any other motion of at least six seconds is cut into windows.
+
+    Writes bode.png, bode.pdf and bode.json; of windows spectra.png and spectra.pdf.
 
     Exit code 1 if a periodic motion was not found.
 

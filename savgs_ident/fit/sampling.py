@@ -10,6 +10,7 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Origin, Progress, no_progress
@@ -96,7 +97,9 @@ def sample(
     question = question_about(model, response)
     origin = _origin(identified, measured, response).with_command(command)
     checkpoint = None if chain is None else Path(chain)
-    return sample_posterior(question, settings, checkpoint, resume, progress, describe_posterior, origin)
+    # As in a fit.
+    with threadpool_limits(1, "blas"):
+        return sample_posterior(question, settings, checkpoint, resume, progress, describe_posterior, origin)
 
 
 def _origin(identified: Fit | Model, measured: Measurements | None, response: HarmonicResponse) -> Origin:
