@@ -12,7 +12,8 @@ from itertools import islice
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.channels import SignalCandidate
-from savgs_ident.recordings.recording import RecordingLayout, find_unit
+from savgs_ident.recordings.recording import RecordingLayout
+from savgs_ident.recordings.units import find_unit
 
 SPACE = " "
 """Stands for any white space between cells; such cells are read as if tabs were between them."""

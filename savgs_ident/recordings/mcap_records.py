@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError, SavgsIdentError
 from savgs_ident.recordings.channels import Progress, SignalCandidate
-from savgs_ident.recordings.recording import find_unit
+from savgs_ident.recordings.units import find_unit
 
 MAGIC = b"\x89MCAP0\r\n"
 LARGEST_CHUNK = 1 << 27

@@ -36,7 +36,7 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, isfinite, pi
+from math import inf, isfinite
 from types import MappingProxyType
 from typing import Literal
 
@@ -44,64 +44,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
-
-STANDARD_GRAVITY = 9.80665
-"""Standard acceleration of free fall [m/s^2] (ISO 80000-3)."""
-
-
-@dataclass(frozen=True)
-class Unit:
-    """``factor`` turns a number in this unit into SI; ``dimension`` is what it measures."""
-
-    factor: float
-    dimension: str
-
-
-_TABLE: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "inch": 0.0254, "ft": 0.3048},
-    "acceleration": {
-        "m/s^2": 1.0, "m/s2": 1.0, "m/s/s": 1.0, "ms^-2": 1.0, "ms-2": 1.0, "mm/s^2": 1e-3, "mm/s2": 1e-3,
-        "g": STANDARD_GRAVITY, "g0": STANDARD_GRAVITY, "gn": STANDARD_GRAVITY,
-        "mg": 1e-3 * STANDARD_GRAVITY, "gal": 1e-2,
-    },
-    "angle": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "degree": pi / 180, "degrees": pi / 180,
-              "rev": 2 * pi, "turn": 2 * pi},
-    "angular velocity": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": pi / 180, "degrees/s": pi / 180,
-                         "rpm": pi / 30, "rev/min": pi / 30, "1/min": pi / 30, "rev/s": 2 * pi},
-    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704,
-                 "in/s": 0.0254, "ft/s": 0.3048},
-    "angular acceleration": {"rad/s^2": 1.0, "rad/s2": 1.0, "deg/s^2": pi / 180, "deg/s2": pi / 180},
-    "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "daN": 10.0, "kgf": STANDARD_GRAVITY, "lbf": 4.4482216152605},
-    "torque": {"Nm": 1.0, "kNm": 1e3, "mNm": 1e-3, "Nmm": 1e-3, "Ncm": 1e-2, "lbfft": 1.3558179483314,
-               "lbfin": 0.1129848290276},
-    "pressure": {"Pa": 1.0, "hPa": 1e2, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "mbar": 1e2, "psi": 6894.757293168},
-    "mass": {"kg": 1.0, "gram": 1e-3, "lb": 0.45359237},
-    "current": {"A": 1.0, "amp": 1.0, "ampere": 1.0, "mA": 1e-3},
-    "voltage": {"V": 1.0, "mV": 1e-3, "kV": 1e3, "volt": 1.0},
-    "power": {"W": 1.0, "kW": 1e3, "mW": 1e-3, "hp": 745.69987158227},
-    "frequency": {"Hz": 1.0, "kHz": 1e3},
-}  # fmt: skip
-
-UNITS: Mapping[str, Unit] = MappingProxyType(
-    {name: Unit(factor, dimension) for dimension, row in _TABLE.items() for name, factor in row.items()}
-)
-"""Every unit that is understood, by its normalised spelling."""
-
-_SPELLINGS = (
-    ("²", "^2"), ("**", "^"), ("⁻¹", "^-1"), ("⁻", "^-"), ("µ", "u"), ("μ", "u"), ("°", "deg"), ("º", "deg"),
-    ("·", ""), ("*", ""), ("(", ""), (")", ""), (" ", ""),
-)  # fmt: skip
-
-
-def find_unit(text: str) -> Unit | None:
-    """The unit written as ``text``, or None if the table does not have it.
-
-    The spelling is tried as it stands, then in lower case (``MM``, ``Deg``, ``RPM``).
-    """
-    for written, plain in _SPELLINGS:
-        text = text.replace(written, plain)
-    return UNITS.get(text) or UNITS.get(text.lower())
+from savgs_ident.recordings.units import factor_between, find_unit, usual_units
 
 
 def _with_article(dimension: str) -> str:
@@ -230,21 +173,24 @@ class RecordingLayout:
     def unit_factor(self, text: str, channel: str, *, source: object = "") -> float:
         """The factor from the unit ``text`` to the SI unit of ``channel`` (or ``time``).
 
-        Raises :class:`InputError` for a unit that is not in the table or measures something else.
+        Raises :class:`InputError` for a unit that nobody knows or that measures something else.
         """
         si = self.si_unit(channel)
         if text.strip() == si:
             return 1.0
-        expected = find_unit(si)
+        expected, unit = find_unit(si), find_unit(text)
+        if expected is None or unit is None:
+            factor = factor_between(text, si)
+            if factor is not None:
+                return factor
         if expected is None:
             raise InputError(
                 f"unit '{text}' cannot be converted to '{si}'",
                 source=source,
                 channel=channel,
-                remedy=f"write it in '{si}', or give that unit and a scale in channels.toml",
+                remedy=f"write it in '{si}', or give that unit, a scale and an offset in channels.toml",
             )
-        dimension, usual = expected.dimension, ", ".join(_TABLE[expected.dimension])
-        unit = find_unit(text)
+        dimension, usual = expected.dimension, ", ".join(usual_units(expected.dimension))
         if unit is None:
             raise InputError(
                 f"unknown unit '{text}'",

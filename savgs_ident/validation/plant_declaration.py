@@ -11,7 +11,7 @@ from typing import Literal
 
 from savgs_ident.effects.base import Port, PortKind
 from savgs_ident.plants.model import PlantModel
-from savgs_ident.recordings.recording import find_unit
+from savgs_ident.recordings.units import factor_between, find_unit
 
 Severity = Literal["fault", "warning", "note"]
 
@@ -110,7 +110,7 @@ def _positive(size: float) -> bool:
 def _units(model: PlantModel) -> Iterator[Finding]:
     for each in model.layout.channels:
         unit = find_unit(each.unit)
-        if unit is None and each.unit != "1":
+        if unit is None and each.unit != "1" and factor_between(each.unit, each.unit) is None:
             yield Finding(
                 "warning",
                 f"channel '{each.name}': '{each.unit}' is no unit that readers convert",

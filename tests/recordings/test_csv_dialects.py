@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.recordings.channels import ChannelMap, ChannelRule
-from savgs_ident.recordings.recording import UNITS, Campaign, Header, classify_test, find_unit
+from savgs_ident.recordings.recording import Campaign, Header, classify_test
+from savgs_ident.recordings.units import UNITS, find_unit
 
 from ..in_one_test import over
 

@@ -30,7 +30,6 @@ from savgs_ident.recordings.channels import ChannelMap, Progress
 from savgs_ident.recordings.checks_signal import DataLocation, ordinary_samples
 from savgs_ident.recordings.read import read_campaign
 from savgs_ident.recordings.recording import (
-    STANDARD_GRAVITY,
     Campaign,
     ChannelSpec,
     JointChannels,
@@ -38,6 +37,7 @@ from savgs_ident.recordings.recording import (
     Recording,
     RecordingLayout,
 )
+from savgs_ident.recordings.units import STANDARD_GRAVITY
 
 _LOW_HZ = 1.25
 """Half of the lowest resonance that a rig of this kind has, about."""
