@@ -86,8 +86,8 @@ def slopes_in(
 BATCH = 32
 """Signals that a program has room for: one for each number would have to be compiled."""
 
-BATCHED_NODES = 2**18
-"""Most values of a signal in such a program. Origin: memory; four signals along a minute of road."""
+BATCHED_NODES = 2**21
+"""Most instants of signals in such a program. Origin: memory; a minute of road has room for all of them."""
 
 
 def _batch(nodes: int) -> int:
@@ -106,15 +106,16 @@ def impose(
 
     All in SI.
     """
-    blank = nothing_imposed(model.ports, jnp.zeros(solution.mesh.layout.total))
-    batch = _batch(solution.mesh.layout.total)
+    nodes = solution.mesh.layout.total
+    ports, batch = [port.name for port in model.ports], _batch(nodes)
 
     def rows_of_some(first: int) -> NDArray[np.float64]:
         some = signals[first : first + batch]
-        stacked = {name: np.zeros((batch, *part.shape)) for name, part in blank.items()}
-        for place, (port, values) in enumerate(some):
-            stacked[port][place] = values
-        imposed = placed({name: jnp.asarray(part) for name, part in stacked.items()})
+        places, stacked = np.zeros(batch, np.int64), np.zeros((batch, nodes, 2))
+        for number, (port, values) in enumerate(some):
+            places[number] = ports.index(port)
+            stacked[number, :, : 1 if values.ndim == 1 else 2] = values.reshape(nodes, -1)
+        imposed = placed((jnp.asarray(places), jnp.asarray(stacked)))
         wanted = placed(jnp.asarray(len(some)))
         (rows,) = _answered(model, likelihood, placed(dict(p)), solution, imposed, wanted, orders)
         return np.asarray(rows)[: len(some)]
@@ -135,14 +136,30 @@ def _answer_rows(
     likelihood: Likelihood,
     p: Values,
     solution: PeriodicSolution,
-    imposed: dict[str, Array],
+    imposed: tuple[Array, Array],
     wanted: Array,
     orders: int,
 ) -> tuple[Array]:
+    """Rows of signals (b, P, 2) at the ports of these places (b,); of a force the first column counts."""
+    answer = answers(model, p, solution)
+    blank = nothing_imposed(model.ports, jnp.zeros(solution.mesh.layout.total))
+
+    def reading(given: tuple[Array, Array]) -> Array:
+        place, signal = given
+        return answer(
+            {
+                port.name: jnp.where(
+                    place == number, signal if blank[port.name].ndim == 2 else signal[:, 0], 0.0
+                )
+                for number, port in enumerate(model.ports)
+                if port.name in blank
+            }
+        )
+
     def rows(readings: Array) -> Array:
         return likelihood.rows(shown_harmonics(model, p, readings, solution, orders))
 
-    readings = along_first(answers(model, p, solution), imposed, wanted)
+    readings = along_first(reading, imposed, wanted)
     return (along_first(rows, readings, wanted, ANALYSED),)
 
 
