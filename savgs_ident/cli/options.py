@@ -99,7 +99,12 @@ FixedTolerancesOption = Annotated[
     bool, typer.Option("--fixed-tolerances", help="Hold what is known to a tolerance at its value.")
 ]
 MaxFrequencyOption = Annotated[
-    float | None, typer.Option("--max-frequency", metavar="HZ", help="Leave out faster dwells.")
+    float | None,
+    typer.Option(
+        "--max-frequency",
+        metavar="HZ",
+        help="Leave out faster dwells. In windows: compare up to this, 15 Hz by default, 40 Hz at most.",
+    ),
 ]
 OrdersOption = Annotated[int, typer.Option("--orders", min=1, help="Highest harmonic order to compare.")]
 FitOrdersOption = Annotated[int, typer.Option("--orders", min=1, help="Highest harmonic order to fit.")]

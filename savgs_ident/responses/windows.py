@@ -53,10 +53,14 @@ LEAST_S = 2.0
 """Less than this is not worth a window [s]."""
 
 LOWEST_HZ, HIGHEST_HZ = 0.4, 15.0
-"""Between these is compared [Hz]: above body and wheel a model of two masses says nothing."""
+"""Between these is compared where nothing else is asked for [Hz]: above body and wheel a model of two masses says
+nothing."""
 
 IMPOSED_HZ = 80.0
 """Up to this the inputs are imposed [Hz], or as far as they are sampled: friction feels what no mass follows."""
+
+MOST_HZ = 0.5 * IMPOSED_HZ
+"""Up to this may be compared [Hz]: what the readings show there has to come from inputs that are imposed."""
 
 NUMBERS = 1200
 """About how many numbers are compared. Origin: computing time; it rises with their cube where they share errors."""
@@ -79,11 +83,11 @@ def estimate_windows(
 
     Raises :class:`InputError` where no test is long enough, the first input does not move, or nothing is compared.
     """
-    if highest_hz < 2.0 * LOWEST_HZ:
+    if not 2.0 * LOWEST_HZ <= highest_hz <= MOST_HZ:
         raise InputError(
-            f"up to {highest_hz:g} Hz there is nothing to compare in windows",
+            f"windows cannot be compared up to {highest_hz:g} Hz",
             source="--max-frequency",
-            remedy=f"they are compared from {LOWEST_HZ:g} Hz on",
+            remedy=f"choose it from {2.0 * LOWEST_HZ:g} to {MOST_HZ:g} Hz",
         )
     still, warnings = estimate_standstill_noise(campaign)
     driven, found = inputs[0], []
@@ -91,7 +95,7 @@ def estimate_windows(
         if recording.kind not in KINDS:
             continue
         even = even_record(
-            campaign.source, recording, driven, (*inputs, *readings), still, LEAST_S, HIGHEST_HZ
+            campaign.source, recording, driven, (*inputs, *readings), still, LEAST_S, highest_hz
         )
         if isinstance(even, DataWarning):
             warnings += (even,)

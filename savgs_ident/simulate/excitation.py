@@ -303,8 +303,8 @@ def response_of_tests(
 ) -> HarmonicResponse:
     """The same; of a campaign without dwells that of its other tests, a road or a sweep, in windows.
 
-    What is compared of these begins ``lead_s`` [s] after they do. With a warning ``tests_not_used`` for roads beside
-    dwells.
+    What is compared of these begins ``lead_s`` [s] after they do, up to 15 Hz or ``max_frequency`` [Hz]. With a
+    warning ``tests_not_used`` for roads beside dwells.
     """
     if isinstance(measured, HarmonicResponse):
         return measured_response(measured, plant, orders, max_frequency, progress)
@@ -314,7 +314,7 @@ def response_of_tests(
         return replace(response, warnings=(*response.warnings, *beside))
     progress("cutting windows")
     inputs, readings = ([each.name for each in listed] for listed in (plant.inputs, plant.channels))
-    highest = HIGHEST_HZ if max_frequency is None else min(max_frequency, HIGHEST_HZ)
+    highest = HIGHEST_HZ if max_frequency is None else max_frequency
     return estimate_windows(measured.only(recorded_names(plant)), inputs, readings, highest, lead_s)
 
 

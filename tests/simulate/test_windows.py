@@ -167,6 +167,22 @@ def test_what_is_compared_lies_within_the_record_and_within_the_band() -> None:
     assert np.all(measured.part.every >= 2.0)
 
 
+def test_the_band_goes_as_far_as_it_is_asked_to_and_the_samples_reach() -> None:
+    """A linear plant shows beyond 15 Hz what its state matrix says, too."""
+    measured = estimate_windows(campaign(noise=0.0), INPUTS, READINGS, highest_hz=25.0)
+    hertz = np.flatnonzero(used(measured).any(axis=(0, 1))) * measured.spacing[0]
+    assert 24.0 < hertz[-1] <= 25.0
+    found, kept = predicted(measured), used(measured)
+    miss = np.abs(found - measured.harmonics[:, [measured.channel(name) for name in READINGS]])
+    for c in range(2):
+        size = np.sqrt(np.mean(np.abs(found[:, c][kept[:, c]]) ** 2))
+        assert np.sqrt(np.mean(miss[:, c][kept[:, c]] ** 2)) < 4e-3 * size
+    with pytest.raises(InputError, match="too slow for what is compared up to 25 Hz"):
+        estimate_windows(_thinned(campaign(), 10), INPUTS, READINGS, highest_hz=25.0)
+    with pytest.raises(InputError, match=r"up to 60 Hz.*choose it from 0\.8 to 40 Hz"):
+        estimate_windows(campaign(), INPUTS, READINGS, highest_hz=60.0)
+
+
 def test_without_a_standstill_the_noise_is_read_from_the_roughness_and_said_to_be() -> None:
     measured = estimate_windows(campaign(standstill=False), INPUTS, READINGS)
     assert [each.code for each in measured.warnings] == ["noise_assumed"]
@@ -193,7 +209,7 @@ def test_the_band_ends_where_it_is_asked_to() -> None:
     measured = estimate_windows(campaign(), INPUTS, READINGS, 5.0)
     hertz = np.flatnonzero(used(measured).any(axis=(0, 1))) * measured.spacing[0]
     assert 4.0 < hertz[-1] <= 5.0
-    with pytest.raises(InputError, match="nothing to compare"):
+    with pytest.raises(InputError, match="cannot be compared up to 0.5 Hz"):
         estimate_windows(campaign(), INPUTS, READINGS, 0.5)
 
 
@@ -233,10 +249,10 @@ def _apart(given: Campaign) -> Campaign:
     return Campaign("made", (Recording(test.name, "road", None, channels), still), (), "")
 
 
-def _thinned(given: Campaign) -> Campaign:
+def _thinned(given: Campaign, every: int = 25) -> Campaign:
     test, still = given.recordings
     channels = {
-        name: _channel(name, each.time[::25], each.values[::25]) for name, each in test.channels.items()
+        name: _channel(name, each.time[::every], each.values[::every]) for name, each in test.channels.items()
     }
     return Campaign("made", (Recording(test.name, "road", None, channels), still), (), "")
 
