@@ -209,7 +209,7 @@ def test_the_band_ends_where_it_is_asked_to() -> None:
     measured = estimate_windows(campaign(), INPUTS, READINGS, 5.0)
     hertz = np.flatnonzero(used(measured).any(axis=(0, 1))) * measured.spacing[0]
     assert 4.0 < hertz[-1] <= 5.0
-    with pytest.raises(InputError, match="cannot be compared up to 0.5 Hz"):
+    with pytest.raises(InputError, match=r"cannot be compared up to 0\.5 Hz"):
         estimate_windows(campaign(), INPUTS, READINGS, 0.5)
 
 
