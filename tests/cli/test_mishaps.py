@@ -159,7 +159,7 @@ REFUSED = {
         lambda table: table.drop(columns=[ACCEL, DEFLECTION]), "neither body_accel nor susp_deflection"
     ),
     "no time": Mishap(lambda table: table.drop(columns=TIME), "no column is the time"),
-    "an unknown unit": Mishap(headed(DEFLECTION, "susp_deflection [furlong]"), "unknown unit 'furlong'"),
+    "an unknown unit": Mishap(headed(DEFLECTION, "susp_deflection [zorch]"), "unknown unit 'zorch'"),
     "a unit of something else": Mishap(headed(DEFLECTION, "susp_deflection [V]"), "'V' is a voltage"),
     "an angle": Mishap(headed(DEFLECTION, "susp_deflection [rad]"), "'rad' is an angle"),
     "a column twice": Mishap(

@@ -264,7 +264,8 @@ def test_the_motion_of_python_control_is_the_free_vibration(tmp_path: Path) -> N
 
 
 @pytest.mark.skipif(find_spec("fmpy") is None or shutil.which("gcc") is None, reason="needs FMPy and gcc")
-@pytest.mark.parametrize("name", ["two_mass", pytest.param("axis", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["two_mass", "axis"])
 def test_the_fmu_is_valid_and_moves_as_the_plant(name: str, tmp_path: Path) -> None:
     import fmpy
     from fmpy.validation import validate_fmu

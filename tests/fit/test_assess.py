@@ -56,6 +56,7 @@ def test_a_model_that_errs_little_misses_little(bench: Bench) -> None:
     assert "no more than small errors of any model" in verdict.sentences[0]
 
 
+@pytest.mark.slow
 def test_what_is_not_explained_is_in_the_errors(bench: Bench) -> None:
     """An error as large as all that is missed, along one parameter, is one standard error."""
     data = bench.predicted(TRUTH) + bench.noise(4)

@@ -90,7 +90,7 @@ CASES: dict[str, tuple[str, Build, str]] = {
         lambda s, csv: b"time [s],a,b\n0,1,2\n1,2,3\n",
         "no column is known: found.*'a'",
     ),
-    "unknown unit": (NAME, _replaced(b"road_height [m]", b"road_height [furlong]"), "unknown unit 'furlong'"),
+    "unknown unit": (NAME, _replaced(b"road_height [m]", b"road_height [zorch]"), "unknown unit 'zorch'"),
     "unit of something else": (NAME, _replaced(b"road_height [m]", b"road_height [s]"), "'s' is a time"),
     "unit of the time": (NAME, _replaced(b"time [s]", b"time [m]"), "channel 'time': unit 'm' is a length"),
     "mm called m": (NAME, _scaled("susp_deflection", 1e3), "channel 'susp_deflection'.*not possible.*mm"),
@@ -263,8 +263,8 @@ MAPS = {
     "absent column": ('[channels.road_height]\ncolumn = "cam"', "names column 'cam'.*the columns are time"),
     "absent time": ('[time]\ncolumn = "tick"', "names column 'tick'"),
     "unknown unit": (
-        '[channels.road_height]\ncolumn = "road_height"\nunit = "parsec"',
-        "channel 'road_height': unknown unit 'parsec'",
+        '[channels.road_height]\ncolumn = "road_height"\nunit = "zorch"',
+        "channel 'road_height': unknown unit 'zorch'",
     ),
 }
 

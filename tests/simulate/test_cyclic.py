@@ -95,6 +95,7 @@ def test_one_factorisation_serves_many_right_sides() -> None:
         assert found == pytest.approx(wanted, rel=1e-9, abs=1e-10 * max(np.max(np.abs(wanted)), 1e-300))
 
 
+@pytest.mark.slow
 def test_dwells_do_not_see_each_other() -> None:
     layout = Layout((2 * CHUNK, CHUNK, 3 * CHUNK))
     steps, right = _draw(5, layout, 4, 0.99)

@@ -253,6 +253,7 @@ def test_the_solved_rates_leave_no_residual(simtr: Bench) -> None:
     assert np.max(np.abs(left)) < 1e-6
 
 
+@pytest.mark.slow
 def test_static_equilibrium_holds_and_carries_the_weight(simtr: Bench) -> None:
     p, model = simtr.p, simtr.model
     equilibrium = jax.jit(lambda angle: static_equilibrium(model, p, angle, jnp.zeros(()), section_curves(p)))

@@ -170,6 +170,7 @@ def test_what_road_brings_is_lost_or_stored() -> None:
     assert all(done[name] < -1e-4 * size for name in ("damper", "tyre", "guide"))
 
 
+@pytest.mark.slow
 def test_the_solved_rates_leave_no_residual() -> None:
     found = _moved()
     at = jax.jit(jax.vmap(lambda m, s, sd, u: PLANT.residual(P, m, s, sd, u)))

@@ -170,6 +170,7 @@ def _assert_same(name: str, values: tuple[np.ndarray, ...]) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-13)
 
 
+@pytest.mark.slow
 @over("name", CASES)
 def test_it_says_what_jax_says(name: str) -> None:
     """At random values, and where functions change: ends, whole and half numbers, zeros of either sign, ties."""
