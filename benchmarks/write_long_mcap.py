@@ -20,7 +20,7 @@ _DWELL_S = 60.0
 _PAUSE_S = 0.5
 _FREQUENCIES_HZ = (0.5, 1.0, 1.5, 2.0, 2.35, 2.75, 3.5, 4.5, 6.0)
 _ROAD_M = 0.01375
-_UNITS = {
+UNITS = {
     "road_height": "m",
     "sprung_accel": "m/s^2",
     "susp_deflection": "m",
@@ -80,7 +80,7 @@ def _dwells(minutes: float) -> Iterator[tuple[float, float]]:
 
 
 def _channels(writer: Writer) -> tuple[int, int]:
-    properties = {name: {"type": "number", "description": unit} for name, unit in _UNITS.items()}
+    properties = {name: {"type": "number", "description": unit} for name, unit in UNITS.items()}
     daq = writer.register_schema(
         "rig.Daq", "jsonschema", json.dumps({"type": "object", "properties": properties}).encode()
     )

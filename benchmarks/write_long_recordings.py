@@ -18,18 +18,11 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.write_long_mcap import UNITS
+
 RATE_HZ = 1000.0
 
-_UNITS = {
-    "road_height": "m",
-    "sprung_accel": "m/s^2",
-    "susp_deflection": "m",
-    "link_angle": "rad",
-    "link_velocity": "rad/s",
-    "motor_current": "A",
-    "oil_temperature": "degC",
-    "supply_voltage": "V",
-}
+_UNITS = {**UNITS, "oil_temperature": "degC", "supply_voltage": "V"}
 _SIZES = {"road_height": 0.01, "sprung_accel": 1.0, "susp_deflection": 0.008, "link_velocity": 0.01}
 _NAME = "road_class_c"
 

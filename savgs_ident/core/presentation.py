@@ -77,6 +77,17 @@ class Origin:
         """The command as it was typed, quotes left out."""
         return " ".join(self.command)
 
+    @property
+    def record(self) -> dict[str, object]:
+        """From which command, data and model a result comes, as JSON has it."""
+        return {
+            "command": self.command,
+            "data": self.data,
+            "data_sha256": self.data_sha256,
+            "model": self.model,
+            "versions": self.versions,
+        }
+
     def with_command(self, command: Sequence[str]) -> "Origin":
         """The same of a result that this command line made."""
         return replace(self, command=tuple(command))

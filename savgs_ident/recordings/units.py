@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from math import isfinite, pi
+from tokenize import TokenError
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -88,20 +89,28 @@ _NUMBERED = re.compile(r"\d{3}|[^A-Za-z^0-9-]-?\d+\s*\^|\d\s*\^|\)\s*\^")
 """What no unit needs: numbers of three digits, and powers of anything but a name."""
 
 
+_NO_UNIT = (
+    ArithmeticError, AssertionError, AttributeError, LookupError, SyntaxError, TokenError, TypeError, ValueError,
+)  # fmt: skip
+"""What Pint's parser and its arithmetic raise besides Pint's own errors, at a text that is no unit."""
+
+
 def factor_between(text: str, si: str) -> float | None:
     """How many of the unit ``si`` one of the unit ``text`` is, by Pint.
 
     None where it knows either not, where they measure different things, and where one counts from elsewhere, as
     degrees Celsius do against kelvin.
     """
+    # Only here: Pint takes a second to load.
+    from pint.errors import PintError
+
     registry = _registry()
     texts = [_plain(each) for each in (text, si)]
     if any(len(each) > _LONGEST or not _WRITTEN.fullmatch(each) or _NUMBERED.search(each) for each in texts):
         return None
     try:
         one, nothing = (registry.Quantity(value, texts[0]).to(texts[1]).magnitude for value in (1.0, 0.0))
-    # What a text may raise is no part of Pint's interface: parsers of units raise what Python's own raises.
-    except Exception:
+    except (PintError, *_NO_UNIT):
         return None
     found = float(one)
     return found if nothing == 0.0 and isfinite(found) and found > 0.0 else None
@@ -115,7 +124,6 @@ def _plain(text: str) -> str:
 
 @cache
 def _registry() -> "pint.UnitRegistry[float]":
-    # Only here: it takes a second to load.
     import pint
 
     return pint.UnitRegistry()

@@ -69,14 +69,7 @@ def diagnosis_record(diagnosis: Diagnosis, origin: Origin) -> dict[str, object]:
 
 
 def _provenance(origin: Origin) -> dict[str, object]:
-    return {
-        "command": origin.command,
-        "data": origin.data,
-        "data_sha256": origin.data_sha256,
-        "model": origin.model,
-        "versions": origin.versions,
-        "warnings": [warning_record(warning) for warning in origin.warnings],
-    }
+    return {**origin.record, "warnings": [warning_record(warning) for warning in origin.warnings]}
 
 
 def _where(diagnosis: Diagnosis) -> dict[str, object]:

@@ -41,13 +41,7 @@ def posterior_record(posterior: Posterior, origin: Origin) -> dict[str, object]:
         "correlation": _correlation(posterior),
         "nuisance": [each.name for each in posterior.of_role("nuisance")],
         "effects": posterior.effects,
-        "origin": {
-            "command": origin.command,
-            "data": origin.data,
-            "data_sha256": origin.data_sha256,
-            "model": origin.model,
-            "versions": origin.versions,
-        },
+        "origin": origin.record,
         "warnings": [warning_record(warning) for warning in origin.warnings],
     }
 
