@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
+from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.small_root import jacobian, solve_dense
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import (
@@ -57,11 +58,13 @@ def sensitivities_with_states(
     Rows are in the units of their readings, ``typical`` in SI.
     """
     signals, steps = _evenly(model, p, solution)
-    fields = []
-    for effect, given in zip(effects, typical, strict=True):
-        there = placed(dict(p) | as_values(given))
-        along = np.asarray(_marched(effect, there, signals, steps))
-        fields.append((effect.port.name, _at_nodes(along, solution)))
+
+    def field(one: tuple[Effect, Mapping[str, float]]) -> tuple[str, NDArray[np.float64]]:
+        effect, given = one
+        along = np.asarray(_marched(effect, placed(dict(p) | as_values(given)), signals, steps))
+        return effect.port.name, _at_nodes(along, solution)
+
+    fields = in_parallel(field, zip(effects, typical, strict=True))
     return impose(model, likelihood, orders, p, solution, fields)
 
 

@@ -7,11 +7,13 @@ taken away from all, too, which says how well it can be spared.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from math import log
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.thresholds import DecisionConstants
@@ -23,9 +25,9 @@ from savgs_ident.effects.learned_functions import (
     interactions_at,
 )
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, find_map_again
-from savgs_ident.inference.laplace import linearised_optimum, log_evidence
+from savgs_ident.inference.laplace import LinearisedOptimum, linearised_optimum, log_evidence
 from savgs_ident.inference.observations import Term
-from savgs_ident.inference.prior import Linear, bounds_of
+from savgs_ident.inference.prior import bounds_of
 
 
 class FittedFunctions(NamedTuple):
@@ -88,16 +90,64 @@ class FamilyAlone(NamedTuple):
     start: Mapping[str, float]
 
 
+@dataclass(frozen=True)
+class _FirstOrder:
+    """Fits without some coordinates, to first order about a fit: its slopes serve them all."""
+
+    search: Search
+    mode: LaplaceFit
+
+    @cached_property
+    def _missed(self) -> NDArray[np.float64]:
+        return self.search.missed(self.mode.prediction)
+
+    @cached_property
+    def _slopes(self) -> NDArray[np.float64]:
+        return self.search.turned(self.mode.slopes)
+
+    def _kept(self, gone: Collection[str]) -> NDArray[np.bool_]:
+        return np.array([each.name not in gone for each in self.mode.coordinates])
+
+    def _wider(self, functions: Collection[str], width: float) -> NDArray[np.float64]:
+        return np.array([width if each.name in functions else 1.0 for each in self.mode.coordinates])
+
+    def _optimum(self, kept: NDArray[np.bool_], wider: NDArray[np.float64]) -> LinearisedOptimum:
+        without = self._missed + self._slopes[:, ~kept] @ self.mode.x[~kept]
+        lower, upper = (each[kept] / wider[kept] for each in bounds_of(self.mode.coordinates))
+        slopes, here = self._slopes[:, kept] * wider[kept], self.mode.x[kept] / wider[kept]
+        near, rows = self.mode.noise_scales, self.search.rows
+        return linearised_optimum(rows, without, slopes, here, (lower, upper), scales=near)
+
+    def log_evidence(
+        self, gone: Collection[str], functions: Collection[str] = (), width: float = 1.0
+    ) -> float:
+        """Log evidence with the coordinates that are ``gone`` at zero.
+
+        The coefficients of the ``functions`` have a prior that is ``width`` times as wide as in the fit.
+        """
+        kept = self._kept(gone)
+        top = self._optimum(kept, self._wider(functions, width))
+        coordinates = (each for each, keep in zip(self.mode.coordinates, kept, strict=True) if keep)
+        return log_evidence(top.value, top.precision, tuple(coordinates))
+
+    def best(self, gone: Collection[str], functions: Collection[str], width: float) -> dict[str, float]:
+        """The best point [SI] there, by name."""
+        kept, wider = self._kept(gone), self._wider(functions, width)
+        x = np.zeros(kept.size)
+        x[kept] = self._optimum(kept, wider).x * wider[kept]
+        there = zip(self.mode.coordinates, x, kept, strict=True)
+        return {each.name: each.value(float(x)) for each, x, keep in there if keep}
+
+
 def families_alone(
     search: Search, mode: LaplaceFit, port: Port, constants: DecisionConstants
 ) -> dict[Family, FamilyAlone]:
     """Each family's functions without those of the others, to first order about the fit."""
-    seen = {each.name for each in mode.coordinates}
-    found = {}
+    about, seen, found = _FirstOrder(search, mode), {each.name for each in mode.coordinates}, {}
     for family in dict.fromkeys(each.family for each in functions_at(port)):
         mine = tuple(name for name in coefficients_of(port, family) if name in seen)
         if mine:
-            found[family] = _needed(search, mode, port, mine, mine, constants)
+            found[family] = _needed(about, port, mine, mine, constants)
     return found
 
 
@@ -188,7 +238,7 @@ def _fitted(
         ):
             return best
         best, near = fitted, mode.prediction.warm_start
-        found = _needed(search, mode, port, mine, fitted.functions, constants)
+        found = _needed(_FirstOrder(search, mode), port, mine, fitted.functions, constants)
         if len(found.functions) == len(fitted.functions) and found.width == 1.0:
             return best
 
@@ -201,8 +251,9 @@ def _some_of(term: Term, found: FamilyAlone) -> Term:
 
 def families_spared(search: Search, mode: LaplaceFit, port: Port) -> dict[Family, float]:
     """Minus the log evidence of the law without the functions of each family."""
+    about = _FirstOrder(search, mode)
     gone = {each.family: coefficients_of(port, each.family) for each in functions_at(port)}
-    return {family: -_alone(search, mode, names, (), 1.0, 0.0).weight for family, names in gone.items()}
+    return {family: -about.log_evidence(names) for family, names in gone.items()}
 
 
 def _log_prior(
@@ -218,8 +269,7 @@ def _log_prior(
 
 
 def _needed(
-    search: Search,
-    mode: LaplaceFit,
+    about: _FirstOrder,
     port: Port,
     family: tuple[str, ...],
     first: tuple[str, ...],
@@ -228,50 +278,32 @@ def _needed(
     """Those of a family's functions, among the ``first``, without which the law is less probable; one at least."""
     of_all = set(coefficients_at(port))
 
-    def alone(functions: tuple[str, ...], width: float) -> FamilyAlone:
+    def alone(functions: tuple[str, ...], width: float) -> _Weighed:
         log_prior = _log_prior(functions, family, port, constants)
-        return _alone(search, mode, of_all.difference(functions), functions, width, log_prior)
+        weight = about.log_evidence(of_all.difference(functions), functions, width) + log_prior
+        return _Weighed(weight, functions, width, log_prior)
 
-    def at_its_width(functions: tuple[str, ...]) -> FamilyAlone:
-        tried = (alone(functions, width) for width in constants.family_widths)
-        return max(tried, key=lambda each: each.weight)
+    def at_its_width(functions: tuple[str, ...]) -> _Weighed:
+        return max(alone(functions, width) for width in constants.family_widths)
 
     # Of functions that do nearly the same, one alone is needed: the best may lie beyond worse ones.
     found = [at_its_width(first)]
     while len(found[-1].functions) > 1:
         left = found[-1].functions
-        fewer = [alone(tuple(each for each in left if each != gone), found[-1].width) for gone in left]
-        found.append(max(fewer, key=lambda each: each.weight))
+        found.append(
+            max(alone(tuple(each for each in left if each != gone), found[-1].width) for gone in left)
+        )
     # One alone that calibration nearly takes up is far larger than all of them together seem to be.
     found += [at_its_width((name,)) for name in first]
-    return at_its_width(max(found, key=lambda each: each.weight).functions)
+    weight, functions, width, log_prior = at_its_width(max(found).functions)
+    start = about.best(of_all.difference(functions), functions, width)
+    return FamilyAlone(functions, width, weight, log_prior, start)
 
 
-def _alone(
-    search: Search,
-    mode: LaplaceFit,
-    gone: Collection[str],
-    functions: tuple[str, ...],
-    width: float,
-    log_prior: float,
-) -> FamilyAlone:
-    """The fit with the coordinates that are ``gone`` at zero, to first order.
+class _Weighed(NamedTuple):
+    """Functions of one family alone, by their weight; see :class:`FamilyAlone`."""
 
-    The coefficients of the ``functions`` have a prior that is ``width`` times as wide as in the fit.
-    """
-    kept = np.array([each.name not in gone for each in mode.coordinates])
-    missed, slopes = search.missed(mode.prediction), search.turned(mode.slopes)
-    coordinates = tuple(
-        replace(each, scale=width * each.scale)
-        if each.name in functions and isinstance(each, Linear)
-        else each
-        for each, keep in zip(mode.coordinates, kept, strict=True)
-        if keep
-    )
-    wider = np.array([width if each.name in functions else 1.0 for each in coordinates])
-    without = missed + slopes[:, ~kept] @ mode.x[~kept]
-    here = mode.x[kept] / wider
-    top = linearised_optimum(search.rows, without, slopes[:, kept] * wider, here, bounds_of(coordinates))
-    start = {each.name: each.value(float(x)) for each, x in zip(coordinates, top.x, strict=True)}
-    evidence = log_evidence(top.value, top.precision, coordinates)
-    return FamilyAlone(functions, width, evidence + log_prior, log_prior, start)
+    weight: float
+    functions: tuple[str, ...]
+    width: float
+    log_prior: float

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
+from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.diagnosis.effect_sensitivities import marched_contact, marched_effect
 from savgs_ident.diagnosis.localisation import Localisation
@@ -106,7 +107,7 @@ def _drawn(
     near = None if nearest is None else force_of(nearest, nearest.values)
     if law is None or force is None:
         return None, [], near
-    erring = (force_of(law, values) for values in law.erring)
+    erring = in_parallel(lambda values: force_of(law, values), law.erring)
     return force, [each - force for each in erring if each is not None], near
 
 

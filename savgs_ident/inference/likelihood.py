@@ -249,7 +249,13 @@ def _maximum_from(data: Data, residual: NDArray[np.float64], noise: float, discr
     short where residuals far exceed the noise, and Fisher's, which is long there, halved until the density rises.
     Without that, Fisher's scoring swings to and fro where the noise is understated.
     """
-    rows = _Rows(residual**2, data.variance, data.discrepancy_scale**2, data.scales)
+    rows = _Rows(
+        residual**2,
+        data.variance,
+        data.discrepancy_scale**2,
+        float(np.sum(np.log(data.variance))),
+        data.scales,
+    )
     point = (log(noise), discrepancy**2 if rows.discrepancy_scale.any() else 0.0)
     value, converged = _density(rows, point), False
     for _ in range(_ROUNDS):
@@ -277,12 +283,21 @@ def _maximum_from(data: Data, residual: NDArray[np.float64], noise: float, discr
 
 
 class _Rows(NamedTuple):
-    """Squares (m,) of residuals, of the noise's deviations and of what a relative discrepancy of one does; priors."""
+    """Squares (m,) of residuals, of the noise's deviations and of what a relative discrepancy of one does.
+
+    And the sum of the logarithms of the noise's, and the priors.
+    """
 
     residual: NDArray[np.float64]
     noise: NDArray[np.float64]
     discrepancy_scale: NDArray[np.float64]
+    log_noise: float
     scales: Scales
+
+    def spread(self, point: "_Point") -> NDArray[np.float64]:
+        """The variance (m,) at a point."""
+        found: NDArray[np.float64] = exp(2.0 * point[0]) * self.noise + point[1] * self.discrepancy_scale
+        return found
 
 
 _Point = tuple[float, float]
@@ -291,25 +306,29 @@ _Point = tuple[float, float]
 
 def _steps(rows: _Rows, point: _Point) -> tuple[list[_Point], float]:
     """Newton's step, where the density is concave, and Fisher's; and the rise that they promise at most."""
-    trust, width = rows.scales.noise_trust, rows.scales.discrepancy
-    noise = exp(2.0 * point[0]) * rows.noise
-    spread = noise + point[1] * rows.discrepancy_scale
-    # Derivatives of the logarithm of the variance by either coordinate.
-    by = np.stack([2.0 * noise / spread, rows.discrepancy_scale / spread])
-    relative = rows.residual / spread
-    slope = 0.5 * by @ (relative - 1.0)
-    gradient = float(slope[0]) - point[0] / trust**2, float(slope[1]) - 0.5 / width**2
-    fisher, newton = 0.5 * by @ by.T, (by * (relative - 0.5)) @ by.T
-    newton[0, 0] -= 2.0 * slope[0]
+    trust, width, miss = rows.scales.noise_trust, rows.scales.discrepancy, point[1]
+    per_spread = 1.0 / rows.spread(point)
+    relative = rows.residual * per_spread - 1.0
+    by = rows.discrepancy_scale * per_spread
+    curved = by * (relative + 0.5)
+    # Of the logarithm of the variance, the derivative by the discrepancy is ``by``, that by the noise scale is
+    # 2 (1 - miss by): noise and discrepancy are all of the variance. So every sum over the rows is made of a few.
+    m, all_relative, all_by = relative.size, float(relative.sum()), float(by.sum())
+    by_relative, by_by, by_curved = float(by @ relative), float(by @ by), float(by @ curved)
+    noise_slope = all_relative - miss * by_relative
+    gradient = noise_slope - point[0] / trust**2, 0.5 * by_relative - 0.5 / width**2
+    all_curved, once_curved = all_relative + 0.5 * m, float(curved.sum())
+    fisher = 2.0 * (m - 2.0 * miss * all_by + miss**2 * by_by), all_by - miss * by_by, 0.5 * by_by
+    newton = (
+        4.0 * (all_curved - 2.0 * miss * once_curved + miss**2 * by_curved) - 2.0 * noise_slope,
+        2.0 * (once_curved - miss * by_curved),
+        by_curved,
+    )
     # No discrepancy is the least one: there it is held.
     held = point[1] == 0.0 and gradient[1] <= 0.0
     found, promised = [], 0.0
-    for curvature in (newton, fisher):
-        own, both, other = (
-            float(curvature[0, 0]) + 1.0 / trust**2,
-            float(curvature[0, 1]),
-            float(curvature[1, 1]),
-        )
+    for curvature, both, other in (newton, fisher):
+        own = curvature + 1.0 / trust**2
         determinant = own * other - both**2
         if held and own > 0.0:
             along, square = gradient[0] / own, 0.0
@@ -325,8 +344,6 @@ def _steps(rows: _Rows, point: _Point) -> tuple[list[_Point], float]:
 
 
 def _density(rows: _Rows, point: _Point) -> float:
-    spread = exp(2.0 * point[0]) * rows.noise + point[1] * rows.discrepancy_scale
-    data = -0.5 * float(np.sum(rows.residual / spread + np.log(spread / rows.noise)))
-    return (
-        data - 0.5 * (point[0] / rows.scales.noise_trust) ** 2 - 0.5 * point[1] / rows.scales.discrepancy**2
-    )
+    spread, scales = rows.spread(point), rows.scales
+    data = float(rows.residual @ (1.0 / spread)) + float(np.log(spread).sum()) - rows.log_noise
+    return -0.5 * (data + (point[0] / scales.noise_trust) ** 2 + point[1] / scales.discrepancy**2)

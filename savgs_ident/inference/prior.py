@@ -65,7 +65,7 @@ class AbstractCoordinate:
     def bounds(self) -> tuple[float, float]:
         """The coordinates of the bounds [1]."""
 
-    @property
+    @cached_property
     def halved(self) -> bool:
         """Whether the prior begins at its own centre."""
         return 0.0 in self.bounds

@@ -55,17 +55,25 @@ def apply_nodes(left: Matrices, right: Vectors) -> Vectors:
     return reduce(jnp.add, [left[:, j] * right[j] for j in range(left.shape[1])])
 
 
-def solve_nodes(matrix: Matrices, right: Matrices) -> Matrices:
-    """Solve small systems of any units at every node by Gaussian elimination without pivoting.
+def invert_nodes(matrix: Matrices) -> Matrices:
+    """Inverses of small matrices of any units at every node, by blocks and without pivoting.
 
-    For matrices with a dominant diagonal (mass matrices; I - h J with a small step h).
+    For matrices with a dominant diagonal (mass matrices; I - h J with a small step h). Of products of blocks the
+    compiler makes long vectors; an elimination row by row takes more than twice as long.
     """
     size = matrix.shape[0]
-    rows = [jnp.concatenate([matrix[i], right[i]], axis=0) for i in range(size)]
-    for i in range(size):
-        pivot = rows[i] / rows[i][i]
-        rows = [pivot if j == i else rows[j] - rows[j][i] * pivot for j in range(size)]
-    return jnp.stack([row[size:] for row in rows])
+    if size == 1:
+        return 1.0 / matrix
+    if size == 2:
+        (a, b), (c, d) = matrix
+        return jnp.stack([jnp.stack([d, -b]), jnp.stack([-c, a])]) / (a * d - b * c)
+    half = size // 2
+    first = invert_nodes(matrix[:half, :half])
+    left = multiply_nodes(matrix[half:, :half], first)
+    last = invert_nodes(matrix[half:, half:] - multiply_nodes(left, matrix[:half, half:]))
+    right = -multiply_nodes(multiply_nodes(first, matrix[:half, half:]), last)
+    upper = jnp.concatenate([first - multiply_nodes(right, left), right], axis=1)
+    return jnp.concatenate([upper, jnp.concatenate([-multiply_nodes(last, left), last], axis=1)])
 
 
 class CyclicFactors(NamedTuple):
@@ -147,13 +155,13 @@ class Trajectory(NamedTuple):
 class Linearised(NamedTuple):
     """A trajectory's linearisation, ready to solve for any right side.
 
-    ``imbalance`` is -(dr/dy)^-1 r, (k, P); ``slope`` is dy/dx, (k, m, P); ``mass`` dr/dy;
-    ``inverse`` A^-1. Rows are in the units of the residual (SI), columns in those of x and y.
+    ``imbalance`` is -(dr/dy)^-1 r, (k, P); ``slope`` is dy/dx, (k, m, P); ``per_residual`` (dr/dy)^-1;
+    ``inverse`` A^-1. Residuals, x and y are in SI.
     """
 
     imbalance: Nodes
     slope: Float[Array, "k m P"]
-    mass: Float[Array, "k k P"]
+    per_residual: Float[Array, "k k P"]
     inverse: Float[Array, "m m P"]
     factors: CyclicFactors
 
@@ -166,7 +174,7 @@ def blank_linearised(model: AbstractPlant, layout: Layout) -> Linearised:
     return Linearised(
         imbalance=jnp.zeros((inner, nodes)),
         slope=jnp.zeros((inner, size, nodes)),
-        mass=jnp.zeros((inner, inner, nodes)),
+        per_residual=jnp.zeros((inner, inner, nodes)),
         inverse=jnp.zeros((size, size, nodes)),
         factors=CyclicFactors(
             steps=jnp.zeros((size, size, nodes)),
@@ -234,19 +242,32 @@ def linearise(
     """Linearise residual and steps about a trajectory; ``steps`` [s] from each node to the next."""
     parts = (*at.x, *at.y)
     residual, jacobian = _residual_and_columns(lambda *z: residual_at_nodes(model, p, prepared, z, u), parts)
-    size = at.x.shape[0]
-    mass = jacobian[:, size:]
-    right = -jnp.concatenate([jacobian[:, :size], residual[:, None]], axis=1)
-    solved = solve_nodes(mass, right)
-    slope, imbalance = solved[:, :size], solved[:, size]
-    n = len(model.coordinates)
-    kinematic = jnp.broadcast_to(jnp.eye(n, size, k=n)[:, :, None], (n, *slope.shape[1:]))
-    flow = jnp.concatenate([kinematic, slope])
-    weight = implicitness(model)[:, None]
-    eye = jnp.broadcast_to(jnp.eye(size)[:, :, None], flow.shape)
-    inverse = solve_nodes(eye - steps[layout.preceding] * weight * flow, eye)
-    matrices = multiply_nodes(eye + steps * (1.0 - weight) * flow, inverse)
-    return Linearised(imbalance, slope, mass, inverse, factorise_recurrence(layout, matrices))
+    size, n = at.x.shape[0], len(model.coordinates)
+    per_residual = invert_nodes(jacobian[:, size:])
+    slope = -multiply_nodes(per_residual, jacobian[:, :size])
+    imbalance = -apply_nodes(per_residual, residual)
+    weight, before = implicitness(model)[:, None], steps[layout.preceding]
+    inverse = _inverse_of_step(before * weight, slope, n)
+    # B_n is A_n but for the step and its share: B_n A_n^-1 follows without a product.
+    ratio = steps * (1.0 - weight) / (before * weight)
+    matrices = inverse + ratio * (inverse - jnp.eye(size)[:, :, None])
+    return Linearised(imbalance, slope, per_residual, inverse, factorise_recurrence(layout, matrices))
+
+
+def _inverse_of_step(share: Float[Array, "m 1 P"], slope: Float[Array, "k m P"], n: int) -> Matrices:
+    """A^-1 for steps times the weight of their far end [s], of a plant with n coordinates.
+
+    The rate of a coordinate is a speed: only the other k rows are inverted.
+    """
+    inner = slope.shape[0]
+    late, eye = share[n:], jnp.eye(inner)[:, :, None]
+    by_place, by_rest = late * slope[:, :n], late * slope[:, n:]
+    through = jnp.concatenate([share[:n, 0] * by_place, jnp.zeros_like(by_rest[:, n:])], axis=1)
+    rest = invert_nodes(eye - by_rest - through)
+    by_place = multiply_nodes(rest, by_place)
+    places = jnp.eye(n)[:, :, None] + share[:n] * by_place[:n]
+    upper = jnp.concatenate([places, share[:n] * rest[:n]], axis=1)
+    return jnp.concatenate([upper, jnp.concatenate([by_place, rest], axis=1)])
 
 
 def step_defects(

@@ -21,6 +21,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -171,8 +172,23 @@ def placed(tree: Any) -> Any:
     What a cached program gives is bound to a device. A program that takes such arrays together with others is
     compiled once for every combination in which they come; if all are bound there is only one.
     """
-    arrays, rest = eqx.partition(tree, eqx.is_array)
-    return eqx.combine(jax.device_put(arrays, jax.devices()[0]), rest)
+    leaves, structure = jax.tree.flatten(tree)
+    free = [
+        place
+        for place, leaf in enumerate(leaves)
+        if eqx.is_array(leaf) and not getattr(leaf, "committed", False)
+    ]
+    if free:
+        for place, bound in zip(free, _binding()([leaves[place] for place in free]), strict=True):
+            leaves[place] = bound
+    return jax.tree.unflatten(structure, leaves)
+
+
+@cache
+def _binding() -> Callable[[list[Array]], list[Array]]:
+    """A program that gives what it takes: to put many numbers somewhere one by one takes several times as long."""
+    device = jax.sharding.SingleDeviceSharding(jax.devices()[0])
+    return jax.jit(list, out_shardings=device)
 
 
 def _read(file: Path) -> export.Exported | None:

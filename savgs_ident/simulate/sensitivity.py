@@ -19,10 +19,10 @@ from savgs_ident.effects.composition import nothing_imposed
 from savgs_ident.plants.base import AbstractPlant, AtPorts
 from savgs_ident.simulate.collocation import (
     Trajectory,
+    apply_nodes,
     node_motion,
     residual_at_nodes,
     solve_linearised,
-    solve_nodes,
     step_defects,
 )
 from savgs_ident.simulate.excitation import inputs_at, signals_at
@@ -180,7 +180,7 @@ def linear_response(
     still, n = Trajectory(jnp.zeros_like(at.x), jnp.zeros_like(at.y)), len(model.coordinates)
 
     def respond(change: Float[Array, "k P"]) -> Trajectory:
-        imbalance = -solve_nodes(lin.mass, change[:, None])[:, 0]
+        imbalance = -apply_nodes(lin.per_residual, change)
         rate = jnp.concatenate([jnp.zeros_like(at.x[n : 2 * n]), imbalance])
         return solve_linearised(layout, lin, step_defects(model, still, rate, layout, steps), imbalance)
 

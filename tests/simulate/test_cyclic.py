@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from jaxtyping import Array
 from numpy.typing import NDArray
 
+from savgs_ident.plants.quarter_car.plant import QuarterCar
 from savgs_ident.simulate import collocation
 from savgs_ident.simulate.mesh import CHUNK, Layout
+from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
 
 LAYOUTS = (
     Layout((CHUNK,)),
@@ -34,7 +36,7 @@ def _solve_many(layout: Layout, steps: Array, rights: Array) -> Array:
     return jax.lax.map(lambda right: collocation.solve_recurrence(layout, factors, right), rights)
 
 
-_solve_nodes = jax.jit(collocation.solve_nodes)
+_invert_nodes = jax.jit(collocation.invert_nodes)
 
 
 def _dense(layout: Layout, steps: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -107,14 +109,13 @@ def test_dwells_do_not_see_each_other() -> None:
         np.testing.assert_allclose(whole[:, mine], single, rtol=1e-13, atol=1e-12)
 
 
-@given(seed=st.integers(0, 2**32 - 1), size=st.sampled_from((2, 3, 5)))
-def test_small_systems_with_a_dominant_diagonal(seed: int, size: int) -> None:
+@given(seed=st.integers(0, 2**32 - 1), size=st.sampled_from((1, 2, 3, 5, 7)))
+def test_inverses_of_small_matrices_with_a_dominant_diagonal(seed: int, size: int) -> None:
     rng = np.random.default_rng(seed)
     matrix = rng.uniform(-1.0, 1.0, (size, size, 40))
     matrix[np.arange(size), np.arange(size)] += 2.0 * size * rng.choice([-1.0, 1.0], (size, 40))
-    right = rng.standard_normal((size, 3, 40))
-    found = np.asarray(_solve_nodes(matrix, right))
-    wanted = np.linalg.solve(np.moveaxis(matrix, -1, 0), np.moveaxis(right, -1, 0))
+    found = np.asarray(_invert_nodes(matrix))
+    wanted = np.linalg.inv(np.moveaxis(matrix, -1, 0))
     np.testing.assert_allclose(np.moveaxis(found, -1, 0), wanted, rtol=1e-11, atol=1e-12)
 
 
@@ -133,3 +134,22 @@ def test_products_are_taken_node_by_node() -> None:
         rtol=1e-13,
         atol=1e-14,
     )
+
+
+def test_steps_of_a_sticking_motion_are_those_of_its_rates(
+    friction: QuarterCar, programme: PeriodicSolution
+) -> None:
+    """A_n and B_n put together entry by entry, for states that slip and others, on nodes that are not even."""
+    lin, layout = programme.linearised, programme.mesh.layout
+    size, n = programme.trajectory.x.shape[0], len(friction.coordinates)
+    flow = np.concatenate([np.zeros((n, size, layout.total)), np.asarray(lin.slope)])
+    flow[np.arange(n), n + np.arange(n)] = 1.0
+    weight = np.asarray(collocation.implicitness(friction))[:, None]
+    assert {*weight.ravel()} == {0.5, 1.0}
+    steps, eye = np.asarray(node_steps(programme.excitation, programme.mesh)), np.eye(size)[:, :, None]
+    far = np.moveaxis(eye - steps[layout.preceding] * weight * flow, -1, 0)
+    near = np.moveaxis(eye + steps * (1.0 - weight) * flow, -1, 0)
+    inverse = np.moveaxis(np.asarray(lin.inverse), -1, 0)
+    assert inverse @ far == pytest.approx(np.broadcast_to(np.eye(size), far.shape), abs=1e-8)
+    products = np.moveaxis(np.asarray(lin.factors.steps), -1, 0)
+    assert products @ far == pytest.approx(near, rel=1e-8, abs=1e-8 * np.max(np.abs(near)))
