@@ -73,6 +73,7 @@ class DwellProblem(AbstractProblem):
             found on finitely many nodes.
         recorded: when each test was recorded, in any unit of time; the tests are in that order where empty.
         beyond: what drifts do to all rows beyond first order [unit of each], (m,); None where nothing drifts.
+        beside: what else was recorded in each test [its unit], (D,) by name; NaN where it was not.
     """
 
     excitation: Excitation = field(kw_only=True)
@@ -82,6 +83,7 @@ class DwellProblem(AbstractProblem):
     corrections: Mapping[tuple[str, ...], NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
     recorded: tuple[float, ...] = field(default=(), kw_only=True)
     beyond: NDArray[np.float64] | None = field(default=None, kw_only=True)
+    beside: Mapping[str, NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
 
     @cached_property
     def layout(self) -> Layout:
@@ -376,5 +378,6 @@ def dwell_problem(
         models=tuple(models),
         constants=constants,
         recorded=tuple(measured.times.tolist()),
+        beside=measured.beside,
     )
     return problem, likelihood.data

@@ -2,9 +2,9 @@
 
 A regime is a part of what was recorded. Within the cycle it is a third of the instants of every test, by the speed,
 the displacement or the load at a port, or the half in which the port moves in one direction; among tests it is a
-third of them, by frequency or by the size of the response. Regimes of which nine tenths coincide in a campaign cannot
-be distinguished by it and are one: where the port moves like a sine, the instants of high speed are those of small
-stroke.
+third of them, by frequency, by the size of the response, or by what was recorded beside, as a temperature of the oil.
+Regimes of which nine tenths coincide in a campaign cannot be distinguished by it and are one: where the port moves
+like a sine, the instants of high speed are those of small stroke.
 
 For a regime R of a residual waveform w (test d, channel c, instant i) the statistic is
 
@@ -23,11 +23,12 @@ a misfit: errors are drawn with no more than the prior's 95 % quantile. Errors t
 what a model may have, not what it must have, and have regimes of their own: a drift of the friction is greatest in
 slow tests. So there are two references, with them and without, and the p-value is the larger one of both.
 
-The last regime is a drift: in every test the residual is projected on the slope in each identified parameter, and the
-coefficients are regressed on the time at which the tests were recorded. It must be a trend, and more than errors of
-the background look like: the largest |t| of the regressions is held against the draws without shared errors, the
-largest trend in standard deviations of the rows against those with them. Drifts that the background tolerates are
-left out of both: what is tolerated is no reason to call an effect missing, but it is where the model fails.
+The last regimes are drifts: in every test the residual is projected on the slope in each identified parameter, and
+the coefficients are regressed on the time at which the tests were recorded, and on what was recorded beside, as the
+temperature of a damper's oil. It must be a trend, and more than errors of the background look like: the largest |t|
+of the regressions is held against the draws without shared errors, the largest trend in standard deviations of the
+rows against those with them. Drifts that the background tolerates are left out of both: what is tolerated is no
+reason to call an effect missing, but it is where the model fails.
 
 Source: Holm 1979, A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6(2).
 """
@@ -72,6 +73,7 @@ class Cycles:
         velocity: at the port that is looked at, (D, I).
         displacement: there, (D, I).
         load: of the port that carries most, (D, I); None where none carries anything.
+        beside: what else was recorded in each test [its unit], (D,) by name.
         frequency: of the tests [Hz], (D,).
         recorded: when each test of the data was recorded, in any unit of time, (t,).
     """
@@ -82,6 +84,12 @@ class Cycles:
     frequency: Array
     recorded: Array
     load: Array | None = field(default=None)
+    beside: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def known_beside(self) -> dict[str, Array]:
+        """What else was recorded in all tests."""
+        return {name: values for name, values in self.beside.items() if np.all(np.isfinite(values))}
 
 
 def find_regimes(
@@ -113,12 +121,13 @@ def find_regimes(
         without = drawn_residuals(data, fit, draws, source=steady, constants=constants)
     columns = [n for n, each in enumerate(fit.coordinates) if each.name in free or not free]
     rows = np.concatenate([residual, *without, noise])
-    trend = None
-    if data.tests >= constants.fewest_trend_tests:
-        trend = _trend(data, fit, rows, fit.slopes[:, columns], cycles.recorded)
-    if trend is not None:
+    drifts = _drifts(cycles, constants.same_regime_share)
+    for name, over in drifts.items() if data.tests >= constants.fewest_trend_tests else ():
+        trend = _trend(data, fit, rows, fit.slopes[:, columns], over)
+        if trend is None:
+            continue
         some = len(rows) - len(noise)
-        names.append(_drift_name(cycles, constants.same_regime_share))
+        names.append(name)
         p_values.append(
             max(_p_values(trend.size[:some], len(without))[0], _p_values(trend.t[:some], len(without))[-1])
         )
@@ -217,6 +226,7 @@ def _masks(cycles: Cycles, data: Data) -> Iterator[tuple[str, Mask]]:
     for names, values in (
         (("slow tests", "fast tests"), cycles.frequency),
         (("small response", "large response"), relative),
+        *(((f"low {name}", f"high {name}"), values) for name, values in cycles.known_beside.items()),
     ):
         for name, mask in _thirds(*names, values[None]):
             yield name, np.broadcast_to(mask.T, shape)
@@ -276,10 +286,10 @@ class _Trend(NamedTuple):
 
 
 def _trend(data: Data, fit: LaplaceFit, rows: Array, slopes: Array, recorded: Array) -> _Trend | None:
-    """Linear trends over time in residuals ``rows`` (S, m) [unit of each row].
+    """Linear trends over time, or what was recorded beside, (t,), in residuals ``rows`` (S, m) [unit of each row].
 
-    ``slopes`` (m, q) [unit of each row] are the directions whose coefficients are regressed. None where all tests
-    were recorded at one time, or see none of the directions.
+    ``slopes`` (m, q) [unit of each row] are the directions whose coefficients are regressed. None where it is the
+    same in all tests, or these see none of the directions.
     """
     if np.ptp(recorded) == 0.0:
         return None
@@ -309,13 +319,30 @@ def _gap_of_trend(cycles: Cycles, data: Data, trend: Array, noise: Array) -> flo
     return _percent(cycles, data, found - floor, np.ones(floor.shape, bool))
 
 
-def _drift_name(cycles: Cycles, least: float) -> str:
-    """A drift; with a warning where the tests were recorded in the order of their frequencies."""
-    if cycles.frequency.size < 3:
-        return "drift over time"
-    both = np.stack([np.argsort(np.argsort(each)) for each in (cycles.recorded, cycles.frequency)])
-    alike = abs(float(np.asarray(np.corrcoef(both))[0, 1])) >= least
-    return "drift over time or frequency" if alike else "drift over time"
+def _drifts(cycles: Cycles, least: float) -> dict[str, Array]:
+    """What a drift may be over, by name: the time, and what was recorded beside in all tests.
+
+    Those that put the tests in nearly the same order, or in that of their frequencies, have one name.
+    """
+    found: list[tuple[list[str], Array]] = []
+    for name, over in {"time": cycles.recorded, **cycles.known_beside}.items():
+        for names, other in found:
+            if _alike(over, other, least):
+                names.append(name)
+                break
+        else:
+            found.append(([name], over))
+    for names, over in found:
+        names += ["frequency"] if _alike(over, cycles.frequency, least) else []
+    return {f"drift over {' or '.join(names)}": over for names, over in found}
+
+
+def _alike(one: Array, other: Array, least: float) -> bool:
+    """Whether the tests are in nearly the same order, or in the opposite one, by either."""
+    if one.size != other.size or one.size < 3:
+        return False
+    both = np.stack([np.argsort(np.argsort(each)) for each in (one, other)])
+    return abs(float(np.asarray(np.corrcoef(both))[0, 1])) >= least
 
 
 def dwell_cycles(problem: "DwellProblem", fit: LaplaceFit) -> Cycles:
@@ -345,4 +372,5 @@ def dwell_cycles(problem: "DwellProblem", fit: LaplaceFit) -> Cycles:
         load=over_cycle(max(loads, key=lambda each: float(np.abs(each).mean()))) if loads else None,
         frequency=np.asarray(problem.excitation.frequency),
         recorded=problem.times,
+        beside=problem.beside,
     )

@@ -24,6 +24,10 @@ channel where the names do not say it::
     topic  = "/joint_states"
     field  = "position[single_link]"    # by joint name, or position[0]
 
+    [free.oil_temperature]      # none of the plant's: any name that the plant has no channel of
+    column = "T_oil"
+    unit   = "degC"             # of the values, as they stand; any that there is, "1" for a number
+
     [time]
     column = "clock"            # CSV
     unit   = "ms"
@@ -36,12 +40,13 @@ channel where the names do not say it::
 
 import tomllib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.recording import Recording, RecordingLayout
+from savgs_ident.recordings.recording import ChannelSpec, Recording, RecordingLayout, normalise
+from savgs_ident.recordings.units import is_unit
 
 FILE_NAME = "channels.toml"
 CLOCKS = ("header", "log", "publish")
@@ -85,18 +90,22 @@ def read_channel_map(path: Path | str, layout: RecordingLayout) -> ChannelMap:
         raise InputError(f"cannot be read: {error.strerror}", source=path, remedy="check the path") from error
     except (ValueError, RecursionError) as error:
         raise InputError(f"is not TOML: {error}", source=path, remedy="mend the line it names") from error
-    _only(content, ("channels", "time", "tests"), path, "table")
+    _only(content, ("channels", "free", "time", "tests"), path, "table")
     time = _table(content, "time", path)
     _only(time, ("column", "unit", "clock"), path, "key of [time]")
     tests = _table(content, "tests", path)
     _only(tests, ("column", "topic"), path, "key of [tests]")
-    channels = _table(content, "channels", path)
+    channels, beside = _table(content, "channels", path), _table(content, "free", path)
+    free = {name: _table(beside, name, path) for name in beside}
+    every = tuple(_free_channel(name, layout, table, path) for name, table in free.items())
+    extended = replace(layout, channels=(*layout.channels, *every))
     clock = _text(time, "clock", path)
     if clock is not None and clock not in CLOCKS:
         raise InputError(f"clock '{clock}' is not known", source=path, remedy="choose " + ", ".join(CLOCKS))
+    rules = [_rule(name, layout, _table(channels, name, path), path) for name in channels]
     return ChannelMap(
-        layout,
-        rules=tuple(_rule(name, layout, _table(channels, name, path), path) for name in channels),
+        extended,
+        rules=(*rules, *(_rule(name, extended, table, path) for name, table in free.items())),
         time_column=_text(time, "column", path),
         time_unit=_text(time, "unit", path),
         clock=clock,
@@ -104,6 +113,27 @@ def read_channel_map(path: Path | str, layout: RecordingLayout) -> ChannelMap:
         test_topic=_text(tests, "topic", path),
         source=str(path),
     )
+
+
+def _free_channel(
+    name: str, layout: RecordingLayout, table: dict[str, object], path: Path | str
+) -> ChannelSpec:
+    if layout.canonical_name(name) is not None or normalise(name) != name:
+        raise InputError(
+            f"'{name}' is the plant's own, or has more than small letters, digits and underscores",
+            source=path,
+            channel=name,
+            remedy="give it another name, or map it under [channels]",
+        )
+    unit = _text(table, "unit", path)
+    if unit is None or not (unit == "1" or is_unit(unit)):
+        raise InputError(
+            "has no unit" if unit is None else f"unknown unit '{unit}'",
+            source=path,
+            channel=name,
+            remedy='write one, as unit = "degC", or unit = "1" for a number',
+        )
+    return ChannelSpec(name, unit, "recorded beside", free=True)
 
 
 def _rule(name: str, layout: RecordingLayout, table: dict[str, object], path: Path | str) -> ChannelRule:

@@ -49,7 +49,7 @@ def read_campaign(
     """Read and check everything at ``path``.
 
     ``path`` is a CSV (plain or gzipped) or MCAP file, or a folder of such files, each with a test or several.
-    ``layout`` says which channels the tests of the plant have.
+    ``layout`` says which channels the tests of the plant have; a map may have free ones besides.
     ``channel_map`` is a map, or the path of one; without it, a ``channels.toml`` beside the file (or in the
     folder) is used if there is one. ``progress`` is called with the fraction read, 0 to 1.
 
@@ -69,9 +69,9 @@ def read_campaign(
             remedy="check the path and its permissions",
         ) from error
     _check_unique(files, readings)
-    recordings, found = _screen_all(files, layout, readings)
+    recordings, found = _screen_all(files, the_map.layout, readings)
     reported = tuple(warning for reading in readings for warning in reading.warnings)
-    return Campaign(str(path), recordings, (*reported, *found), digest, layout)
+    return Campaign(str(path), recordings, (*reported, *found), digest, the_map.layout)
 
 
 def _map_for(path: Path, layout: RecordingLayout, channel_map: ChannelMap | Path | str | None) -> ChannelMap:

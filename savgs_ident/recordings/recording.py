@@ -81,6 +81,7 @@ class ChannelSpec:
         largest: magnitude [``unit``] beyond which a value is in another unit.
         suspect: what such a value is likely to be in.
         short: heading of a narrow column.
+        free: whether it is none of the plant's, but was recorded beside, as a temperature of the oil.
     """
 
     name: str
@@ -90,6 +91,7 @@ class ChannelSpec:
     largest: float = inf
     suspect: str = "another unit"
     short: str = ""
+    free: bool = False
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,11 @@ class RecordingLayout:
     def names(self) -> tuple[str, ...]:
         """Names of the channels."""
         return tuple(each.name for each in self.channels)
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of those that are none of the plant's."""
+        return tuple(each.name for each in self.channels if each.free)
 
     @cached_property
     def specs(self) -> Mapping[str, ChannelSpec]:
@@ -282,6 +289,11 @@ class Campaign:
     def start(self) -> float | None:
         """When the first test began [s since 1970, UTC]; None if no clock has a date."""
         return min((each.start for each in self.recordings if each.start is not None), default=None)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all channels that were recorded."""
+        return tuple(dict.fromkeys(name for each in self.recordings for name in each.channels))
 
     def only(self, channels: Collection[str]) -> "Campaign":
         """The same tests with no other channels than these."""

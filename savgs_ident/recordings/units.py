@@ -104,16 +104,32 @@ def factor_between(text: str, si: str) -> float | None:
     # Only here: Pint takes a second to load.
     from pint.errors import PintError
 
-    registry = _registry()
-    texts = [_plain(each) for each in (text, si)]
-    if any(len(each) > _LONGEST or not _WRITTEN.fullmatch(each) or _NUMBERED.search(each) for each in texts):
+    unit, nothing, wanted = _quantity(1.0, text), _quantity(0.0, text), _quantity(1.0, si)
+    if unit is None or nothing is None or wanted is None:
         return None
     try:
-        one, nothing = (registry.Quantity(value, texts[0]).to(texts[1]).magnitude for value in (1.0, 0.0))
+        found, begin = (float(each.to(wanted.units).magnitude) for each in (unit, nothing))
     except (PintError, *_NO_UNIT):
         return None
-    found = float(one)
-    return found if nothing == 0.0 and isfinite(found) and found > 0.0 else None
+    return found if begin == 0.0 and isfinite(found) and found > 0.0 else None
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that the table has or Pint knows; degrees Celsius are one, too."""
+    return find_unit(text) is not None or _quantity(1.0, text) is not None
+
+
+def _quantity(value: float, text: str) -> "pint.Quantity[float] | None":
+    """So many of the unit ``text``; None where Pint does not know it."""
+    from pint.errors import PintError
+
+    plain = _plain(text)
+    if len(plain) > _LONGEST or not _WRITTEN.fullmatch(plain) or _NUMBERED.search(plain):
+        return None
+    try:
+        return _registry().Quantity(value, plain)
+    except (PintError, *_NO_UNIT):
+        return None
 
 
 def _plain(text: str) -> str:

@@ -9,7 +9,8 @@ within half a period of mid-record, at which the fundamental of the driven input
 dwell and of its fit follow at the end; their findings are warnings of the response.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +61,8 @@ def estimate_response(campaign: Campaign, orders: int = 15, driven: str = "") ->
     """
     if orders < 1:
         raise InputError(f"orders is {orders}", source="orders", remedy="ask for at least order 1")
-    driven = driven or campaign.layout.driven
+    driven, recorded = driven or campaign.layout.driven, campaign
+    campaign = campaign.only({*campaign.names} - {*campaign.layout.free})
     fits, groups, warnings = _fit_all(campaign, orders, {}, driven)
     if not fits:
         raise _no_dwell(campaign, warnings)
@@ -70,7 +72,20 @@ def estimate_response(campaign: Campaign, orders: int = 15, driven: str = "") ->
     for test, fit in fits.items():
         warnings += check_steady(campaign.source, test, groups[test], fit)
     warnings += clock_warnings + check_noise(campaign, fits) + check_folding(campaign.source, fits)
-    return _assemble(campaign, fits, orders, warnings, driven)
+    response = _assemble(campaign, fits, orders, warnings, driven)
+    return replace(response, beside=_means_beside(recorded, response.tests))
+
+
+def _means_beside(campaign: Campaign, tests: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    """Means of the free channels in each test [their units], (D,) by name; NaN where there is none."""
+    recordings = {each.name: each.channels for each in campaign.recordings}
+
+    def mean(test: str, name: str) -> float:
+        channel = recordings[test].get(name)
+        values = np.zeros(0) if channel is None else channel.values[np.isfinite(channel.values)]
+        return float(values.mean()) if values.size else np.nan
+
+    return {name: np.array([mean(test, name) for test in tests]) for name in campaign.layout.free}
 
 
 def _fit_all(

@@ -11,8 +11,8 @@ function with the same orders, so that a steep flank, which needs many orders, i
 Noise in the harmonics biases a measured peak-to-peak upwards; :func:`unbiased_peak_to_peak` subtracts that bias.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -60,6 +60,8 @@ class HarmonicResponse:
             its place among them in the campaign [1]; None where neither is known.
         part: of each test that is compared: there the ``harmonics`` of readings are those of :func:`compared_share`
             times the reading, at every so many-th order; those of inputs are not. None for dwells, which repeat.
+        beside: mean of what was recorded beside the plant's channels in each dwell [its unit], (D,) by name; NaN
+            where it was not.
     """
 
     tests: tuple[str, ...]
@@ -77,6 +79,7 @@ class HarmonicResponse:
     covariance_dof: NDArray[np.float64] | None = None
     recorded: NDArray[np.float64] | None = None
     part: ComparedPart | None = None
+    beside: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for value in vars(self).values():

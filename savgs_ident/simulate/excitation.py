@@ -261,6 +261,7 @@ def only_tests(response: HarmonicResponse, kept: NDArray[np.int64]) -> HarmonicR
         covariance_dof=None if dof is None else dof[kept],
         recorded=None if recorded is None else recorded[kept],
         part=None if response.part is None else ComparedPart(*(each[kept] for each in response.part)),
+        beside={name: each[kept] for name, each in response.beside.items()},
         **{name: getattr(response, name)[kept] for name in _FIELDS},
     )
 
@@ -289,7 +290,7 @@ def measured_response(
     if isinstance(measured, HarmonicResponse):
         return up_to_frequency(measured, max_frequency)
     progress("estimating responses")
-    only = measured.only(recorded_names(plant))
+    only = measured.only((*recorded_names(plant), *measured.layout.free))
     return up_to_frequency(estimate_response(only, orders, plant.inputs[0].name), max_frequency)
 
 

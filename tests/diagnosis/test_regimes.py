@@ -1,6 +1,7 @@
 """Regimes: a misfit is found where it was put, and nowhere where there is none."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -86,6 +87,20 @@ def test_a_slope_that_fades_is_found_as_a_drift() -> None:
     ]
 
 
+def test_a_slope_that_follows_a_temperature_is_found_as_a_drift_over_it() -> None:
+    warm = np.array([31.0, 24.0, 28.0, 33.0, 22.0, 27.0])
+    there = -0.02 * np.repeat(warm - warm.mean(), PLANT.points) * PLANT.x
+    data = _with(draw(PLANT, {}, NOISE, seed=3), there)
+    fit, cycles = _fitted(data), replace(_cycles(), beside={"oil": warm, "strain": np.full(6, np.nan)})
+    found = _significant(find_regimes(cycles, data, fit))
+    assert found["drift over oil"] == pytest.approx(100.0 * 0.02 * np.std(warm), rel=0.15)
+    assert "drift over time" not in found
+    assert not any("strain" in each.name for each in find_regimes(cycles, data, fit))
+    # Where it only rises, it cannot be told from the time.
+    rising = replace(cycles, beside={"oil": 20.0 + RECORDED})
+    assert "drift over time or oil" in [each.name for each in find_regimes(rising, data, fit)]
+
+
 @pytest.mark.slow
 def test_data_of_the_error_model_have_no_regime_more_often_than_the_level_says() -> None:
     """Noise and discrepancy of the fitted sizes, a parameter from its prior: 200 campaigns, level 5 %."""
@@ -152,9 +167,9 @@ def test_holm_corrects_the_smallest_by_all_and_keeps_the_order() -> None:
     assert holm(np.array([])) == ()
 
 
-def _regimes_of(damping: np.ndarray) -> dict[str, float]:
+def _regimes_of(damping: np.ndarray, oil: np.ndarray | None = None) -> dict[str, float]:
     """Those of the two masses in which the misfit is concentrated, recalibrated with the background."""
-    response = fading_campaign(damping, ORDER)
+    response = replace(fading_campaign(damping, ORDER), beside={} if oil is None else {"oil": oil})
     settings = PeriodicSettings(nodes=64, adaptations=0)
     problem, data = dwell_problem(
         response, TwoMass(), PARAMETERS, {}, free=("k", "c"), orders=3, settings=settings
@@ -173,3 +188,12 @@ def test_a_damping_that_fades_over_the_campaign_is_found_as_a_drift() -> None:
     assert "drift over time" in fading
     assert fading["drift over time"] > 1.0
     assert not steady
+
+
+@pytest.mark.slow
+def test_a_damping_that_follows_the_temperature_of_its_oil_is_found_as_a_drift_over_it() -> None:
+    oil = np.array([25.0, 31.0, 22.0, 36.0, 28.0, 20.0, 33.0, 30.0])
+    with as_users_have_it():
+        found = _regimes_of(PARAMETERS["c"].value * (1.1 - 0.2 * (oil - 20.0) / 16.0), oil)
+    assert found["drift over oil"] > 1.0
+    assert "drift over time" not in found
