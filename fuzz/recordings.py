@@ -39,6 +39,10 @@ unit = "mm"
 scale = 1.02
 offset = -12.5
 
+[free.oil_temperature]
+column = "oil"
+unit = "degC"
+
 [time]
 column = "clock"
 unit = "ms"
@@ -149,9 +153,9 @@ def _of_ros() -> tuple[dict[str, Topic], list[Message]]:
 
 def channel_map() -> Original:
     """A map that names every channel, beside a campaign that needs it."""
-    header = "condition,clock,road_height [m],ACC_3,pot,link_angle [rad]\n"
+    header = "condition,clock,road_height [m],ACC_3,pot,link_angle [rad],oil\n"
     body = "".join(
-        f"dwell_2.00Hz,{1000.0 * time},{road},{-accel / 9.80665},{1000.0 * deflection},{angle}\n"
+        f"dwell_2.00Hz,{1000.0 * time},{road},{-accel / 9.80665},{1000.0 * deflection},{angle},{40.0 + time}\n"
         for time, road, accel, deflection, angle in _signals().tolist()
     )
     return Original((_MAP.encode(),), {"campaign.csv": (header + body).encode()})
@@ -205,7 +209,7 @@ def read_table(path: Path) -> object:
 def read_map(path: Path) -> object:
     """The map, and the campaign beside it as it says."""
     found = read_channel_map(path, RIG_LAYOUT)
-    return found, load_campaign(path.parent / "campaign.csv", found)
+    return found.rules, load_campaign(path.parent / "campaign.csv", found)
 
 
 def read_road_file(path: Path) -> object:

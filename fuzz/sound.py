@@ -11,8 +11,7 @@ import control
 import numpy as np
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
-from savgs_ident.recordings.recording import Campaign, Recording
+from savgs_ident.recordings.recording import Campaign, Recording, RecordingLayout
 
 _BOUNDS = ("lower", "upper")
 
@@ -54,15 +53,15 @@ def _campaign_faults(campaign: Campaign) -> Iterator[str]:
     if not campaign.recordings:
         yield "the campaign has no recording"
     for recording in campaign.recordings:
-        yield from _recording_faults(recording)
+        yield from _recording_faults(recording, campaign.layout)
 
 
-def _recording_faults(recording: Recording) -> Iterator[str]:
+def _recording_faults(recording: Recording, layout: RecordingLayout) -> Iterator[str]:
     frequency = recording.frequency_hz
     if frequency is not None and not 0.0 < frequency < np.inf:
         yield f"the frequency of '{recording.name}' is {frequency}"
     for name, channel in recording.channels.items():
-        if channel.unit != RIG_LAYOUT.si_unit(name):
+        if channel.unit != layout.si_unit(name):
             yield f"'{name}' is in {channel.unit}"
         if channel.time.shape != channel.values.shape:
             yield f"'{name}' has {channel.values.size} values at {channel.time.size} times"
