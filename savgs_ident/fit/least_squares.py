@@ -37,7 +37,13 @@ from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import Problem, ProblemSettings, Quantity, Task, plan_task
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.periodic import PeriodicSettings, adapt, simulate_periodic
+from savgs_ident.simulate.periodic import (
+    PeriodicSettings,
+    PeriodicSolution,
+    adapt,
+    simulate_periodic,
+    solve_on_mesh,
+)
 from savgs_ident.simulate.readings import harmonics
 
 
@@ -177,11 +183,13 @@ def fit_least_squares(
     free: tuple[str, ...],
     settings: FitSettings | None = None,
     origin: Origin = NO_ORIGIN,
+    motion: PeriodicSolution | None = None,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit ``free`` parameters of a model to a measured response.
 
-    ``origin`` is that of the result; ``progress`` is called with what is being done. Raises :class:`InputError` for
+    ``origin`` is that of the result; ``motion`` is that of the model as given in the same tests, where it is known
+    already; ``progress`` is called with what is being done. Raises :class:`InputError` for
     names that do not exist or that the model does not use, and for a response that cannot be used. Look at
     ``trusted`` of the result.
     """
@@ -191,7 +199,7 @@ def fit_least_squares(
     problem = task.problem
 
     report("solving the model as given")
-    first = simulate_periodic(problem.model, problem.fixed, task.excitation, task.settings.periodic)
+    first = _as_given(task, motion)
     as_given = np.asarray(harmonics(problem.model, problem.fixed, first, problem.orders))
     report("preparing the fit")
     minimiser = Minimiser(problem)
@@ -217,6 +225,17 @@ def fit_least_squares(
     verdict = assess(task, minimiser, best._replace(jacobian=information), explained, report)
     wall_s = time.perf_counter() - began
     return assemble_fit(task, Outcome(as_given, tuple(tried), best, covariance, own, verdict, wall_s), origin)
+
+
+def _as_given(task: Task, motion: PeriodicSolution | None) -> PeriodicSolution:
+    """The motion of the model before the fit, from one that is known where that leads to it."""
+    problem, periodic = task.problem, task.settings.periodic
+    if motion is not None:
+        mesh, start = motion.mesh, motion.trajectory
+        near = solve_on_mesh(problem.model, problem.fixed, task.excitation, mesh, start, periodic.iterations)
+        if all(each.ok for each in near.status()):
+            return near
+    return simulate_periodic(problem.model, problem.fixed, task.excitation, periodic)
 
 
 def _silent(line: str) -> None:

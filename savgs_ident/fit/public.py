@@ -32,7 +32,7 @@ from savgs_ident.simulate.excitation import (
     campaign_of,
     measured_excitation,
 )
-from savgs_ident.simulate.forgetting import forgetful_response
+from savgs_ident.simulate.forgetting import forgetful_motion, forgetful_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.simulate.public import (
     SimulatedResponse,
@@ -133,7 +133,7 @@ def fit_with(
     use_persistent_cache()
     drawing = model.before
     names = drawing.free(free)
-    response = forgetful_response(measured, drawing, settings.orders, max_frequency, progress)
+    response, motion = forgetful_motion(measured, drawing, settings.orders, max_frequency, progress)
     drawing, resized = sized_to(drawing, response) if drawing.effects else (drawing, ())
     if response.part is not None and settings.quantity == "peak_to_peak":
         raise InputError(
@@ -147,7 +147,7 @@ def fit_with(
     # as long, and on cores that are free they gain a tenth of a second.
     with threadpool_limits(1, "blas"):
         return fit_least_squares(
-            response, drawing, free=names, settings=settings, origin=origin, progress=progress
+            response, drawing, free=names, settings=settings, origin=origin, motion=motion, progress=progress
         )
 
 

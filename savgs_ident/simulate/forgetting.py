@@ -38,25 +38,42 @@ def forgetful_response(
     left out for it remembers: friction may stick through its beginning. Raises :class:`InputError` if nothing can be
     compared, or the model has no motion in any window or forgets in none.
     """
+    return forgetful_motion(measured, model, orders, max_frequency, progress)[0]
+
+
+def forgetful_motion(
+    measured: Measurements,
+    model: Model,
+    orders: int,
+    max_frequency: float | None = None,
+    progress: Progress = no_progress,
+) -> tuple[HarmonicResponse, PeriodicSolution | None]:
+    """The same, and the motion of the model in the windows, where all of them are compared; None for dwells."""
     response = response_of_tests(measured, model.plant, orders, max_frequency, progress)
     if response.part is None:
-        return response
-    left, half = _left(response, model)
+        return response, None
+    left, half, motion = _left(response, model)
     if np.min(left) >= REMEMBERED and isinstance(measured, Campaign):
         lead = _longer(LEAD_S, float(np.median(half)), float(np.median(left)))
         progress(f"cutting windows of which the first {lead:.3g} s are not compared")
         response = response_of_tests(measured, model.plant, orders, max_frequency, lead_s=lead)
-        left, _ = _left(response, model)
-    return _lasting(response, left)
+        left, _, motion = _left(response, model)
+    lasting = _lasting(response, left)
+    return lasting, motion if lasting is response else None
 
 
-def _left(response: HarmonicResponse, model: Model) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What a model remembers of the beginning of each window [1], (D,): after the lead, and after half of it."""
+def _left(
+    response: HarmonicResponse, model: Model
+) -> tuple[NDArray[np.float64], NDArray[np.float64], PeriodicSolution]:
+    """What a model remembers of the beginning of each window [1], (D,): after the lead, and after half of it.
+
+    And its motion.
+    """
     assert response.part is not None
     plant, p = model.build(), as_values(model.table.as_dict())
     solution = simulate_periodic(plant, p, measured_excitation(plant, response, model.table))
     begin = response.part.begin
-    return remembered(solution, begin), remembered(solution, 0.5 * begin)
+    return remembered(solution, begin), remembered(solution, 0.5 * begin), solution
 
 
 def _longer(lead: float, half: float, left: float) -> float:

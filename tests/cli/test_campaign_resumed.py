@@ -146,6 +146,7 @@ def test_a_campaign_that_cannot_be_read_is_a_failure_in_one_line(tmp_path: Path)
     assert str(path) in seen[0].reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [

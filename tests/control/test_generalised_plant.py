@@ -203,6 +203,7 @@ def _outcome(path: Path, text: str) -> ParameterTable | InputError:
         return error
 
 
+@pytest.mark.slow
 @given(start=st.integers(0, len(TEXT)), length=st.integers(0, 60), patch=st.text(max_size=20))
 def test_any_damage_gives_weights_or_an_input_error(
     tmp_path_factory: pytest.TempPathFactory, start: int, length: int, patch: str

@@ -49,6 +49,7 @@ def test_the_spectrum_of_a_road_is_that_of_its_class_at_any_speed(grade: str, sp
         assert ratio == pytest.approx(1.0, abs=4.0 / np.sqrt(parts * np.sum(inside)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("grade", GEOMETRIC_MEAN)
 def test_the_variance_is_the_integral_of_the_spectrum_over_the_band(grade: str) -> None:
     height = iso_height(grade, 20.0, 4.0 * LONG)

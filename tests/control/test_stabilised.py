@@ -118,6 +118,7 @@ def linear_errors(slopes: NDArray[np.float64], start: NDArray[np.float64]) -> ND
     return errors(lambda t, x: matrix @ x, start, 0.5, truth, (500, 1000, 2000))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("decay", [1000.0, 3000.0, 5000.0, FASTEST])
 @pytest.mark.parametrize("force", [0.0, 1.0])
 def test_beside_a_fast_decay_the_slow_part_is_as_accurate_as_alone(decay: float, force: float) -> None:

@@ -114,6 +114,7 @@ def _into_the_bounds(at: Difference, step: float) -> NDArray[np.float64]:
     return (4.0 * at(step) - at(2.0 * step) - 3.0 * at(0.0)) / (2.0 * step)
 
 
+@pytest.mark.slow
 @over("place", ["value", "null"])
 @over("effect", effects_of())
 def test_derivatives_in_its_parameters_are_those_of_differences(

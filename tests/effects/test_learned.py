@@ -329,6 +329,7 @@ def test_its_derivatives_are_those_of_differences(effect: Effect) -> None:
         assert slopes[place] == pytest.approx((moved[0] - moved[1]) / (2.0 * step), rel=1e-5, abs=1e-6)
 
 
+@pytest.mark.slow
 @each_force
 def test_casadi_computes_the_same(effect: Effect) -> None:
     numbers = _given(effect, 7.0)

@@ -47,6 +47,7 @@ def test_sizes_that_are_about_right_are_left(measured: si.HarmonicResponse) -> N
     assert warnings == ()
 
 
+@pytest.mark.slow
 def test_sizes_that_are_far_off_are_those_of_the_motion(measured: si.HarmonicResponse) -> None:
     model = si.PlantModel(Undeclared(), Undeclared.parameters)
     found, warnings = sized_to(model, measured)

@@ -136,6 +136,7 @@ def test_products_are_taken_node_by_node() -> None:
     )
 
 
+@pytest.mark.slow
 def test_steps_of_a_sticking_motion_are_those_of_its_rates(
     friction: QuarterCar, programme: PeriodicSolution
 ) -> None:

@@ -12,12 +12,13 @@ import savgs_ident as si
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import as_values
 from savgs_ident.effects.effect import generic_effects
+from savgs_ident.fit.least_squares import fit_least_squares
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
 from savgs_ident.responses.harmonic_response import TAPER, HarmonicResponse, compared_share
 from savgs_ident.responses.windows import CLOSING_S, HIGHEST_HZ, LEAD_S, estimate_windows
 from savgs_ident.simulate.excitation import SUMMED, measured_excitation, signals_at
-from savgs_ident.simulate.forgetting import REMEMBERED, forgetful_response, remembered
+from savgs_ident.simulate.forgetting import REMEMBERED, forgetful_motion, forgetful_response, remembered
 from savgs_ident.simulate.mesh import uniform_mesh, waves
 from savgs_ident.simulate.periodic import PeriodicSettings, layout_of, resolve, simulate_periodic
 from savgs_ident.simulate.readings import harmonics
@@ -393,3 +394,13 @@ def test_a_diagnosis_of_a_road_of_a_true_model_finds_nothing_missing(tmp_path: P
     page = found.to_html(tmp_path / "road.html").read_text()
     assert "2 windows of tests that do not repeat" in page
     assert list(found.figure_names) == ["gap body_accel", "gap susp_deflection", "shrink"]
+
+
+@pytest.mark.slow
+def test_a_fit_begins_with_the_motion_by_which_windows_were_judged() -> None:
+    model = _damped(2100.0)
+    response, motion = forgetful_motion(campaign(noise=0.0), model, 9)
+    assert motion is not None
+    known, anew = (fit_least_squares(response, model, free=("c",), motion=each) for each in (motion, None))
+    np.testing.assert_allclose(known.as_given, anew.as_given, rtol=1e-6, atol=1e-9)
+    assert known["c"].value == pytest.approx(anew["c"].value, rel=1e-6)

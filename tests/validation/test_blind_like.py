@@ -48,6 +48,7 @@ def bench() -> LikeBench:
     return _bench(ONE)
 
 
+@pytest.mark.slow
 def test_what_is_drawn_changes_the_response_by_what_it_says(bench: LikeBench) -> None:
     for number in (0, 1):
         answer, rows = bench._drawn(number, np.random.default_rng(number))

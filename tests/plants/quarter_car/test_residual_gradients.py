@@ -88,6 +88,7 @@ def test_every_parameter_of_the_drawing_counts_and_no_other(
     assert {name for name in rig.parameters if np.any(slopes[name] != 0.0)} == expected
 
 
+@pytest.mark.slow
 def test_derivatives_in_every_parameter_are_those_of_differences(
     rig: Rig,
     numbers: dict[str, float],
