@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.executor import in_parallel
+from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
 from savgs_ident.inference.laplace import linearised_optimum, log_evidence, precision_of
@@ -337,11 +337,16 @@ def find_map_from_both(
     goes on from where one step leads higher, and ends where it cannot come to a log density of ``least``. What
     ``start`` says of the terms holds for both.
     """
-    ascent = _Ascent(search, terms, {}, least=least)
-    points = [ascent.step(ascent.start(start, warm_start))]
-    if search.given is not None:
-        points.append(ascent.step(ascent.start({**start, **search.given.values}, search.given.warm_start)))
-    return ascent.mode(max(points, key=lambda each: each.value), steps - 1)
+    ascent, given = _Ascent(search, terms, {}, least=least), search.given
+    # The first alone: two at a time would compile the same program twice.
+    begun = ascent.start(start, warm_start)
+    if given is None:
+        return ascent.mode(ascent.step(begun), steps - 1)
+    one, other = side_by_side(
+        lambda: ascent.step(begun),
+        lambda: ascent.step(ascent.start({**start, **given.values}, given.warm_start)),
+    )
+    return ascent.mode(one if one.value >= other.value else other, steps - 1)
 
 
 def densest(
