@@ -186,8 +186,7 @@ def _assemble(
     """The record: dwells sorted by frequency, channels as recorded, time origins moved."""
     tests = tuple(sorted(fits, key=lambda test: fits[test].frequency))
     present = {name for fit in fits.values() for name in fit.channels}
-    recorded = dict.fromkeys(name for recording in campaign.recordings for name in recording.channels)
-    channels = tuple(name for name in recorded if name in present)
+    channels = tuple(name for name in campaign.names if name in present)
     shape = (len(tests), len(channels), orders + 1)
     harmonics = np.zeros(shape, dtype=np.complex128)
     covariance = np.zeros((*shape, 2, 2))
