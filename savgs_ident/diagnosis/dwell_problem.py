@@ -1,4 +1,7 @@
-"""The problem of a diagnosis on dwells: a plant, what may be missing in it, what drives it and what was measured.
+"""The problem of a diagnosis on dwells, and on roads: a plant, what may be missing in it, what drives it.
+
+Tests that do not repeat stand beside the dwells as windows (:mod:`savgs_ident.responses.windows`). These have no
+cycle, no harmonics and no frequency: what is said by those is said of the dwells, and nothing where there are none.
 
 A problem is made of a response, and so are the data:
 
@@ -62,10 +65,10 @@ ITERATIONS_AT_REST = 300
 
 @dataclass(frozen=True)
 class DwellProblem(AbstractProblem):
-    """A plant in dwells.
+    """A plant in dwells, and in windows of tests that do not repeat.
 
     Attributes:
-        excitation: the plant's inputs in the dwells.
+        excitation: the plant's inputs in the tests.
         likelihood: what is compared, as rows.
         shape: tests, channels and orders of the harmonics that the likelihood takes.
         settings: how finely to solve.
@@ -90,6 +93,11 @@ class DwellProblem(AbstractProblem):
         """How nodes share arrays."""
         return layout_of(self.excitation, self.settings)
 
+    @cached_property
+    def dwells(self) -> NDArray[np.intp]:
+        """Places of the tests that repeat."""
+        return np.setdiff1d(np.arange(self.shape[0]), self.excitation.windows)
+
     @property
     def orders(self) -> int:
         """Highest order of the harmonics."""
@@ -107,12 +115,17 @@ class DwellProblem(AbstractProblem):
         """
         model, p = self.model(()), self.values(values)
         solution = simulate_periodic(model, p, self.excitation, self.settings, self.layout)
-        status = zip(np.asarray(self.excitation.frequency), solution.status(), strict=True)
-        lost = [f"{frequency:.4g} Hz" for frequency, each in status if not each.ok]
+        lost = [d for d, each in enumerate(solution.status()) if not each.ok]
+        dwells = [f"{float(self.excitation.frequency[d]):.4g} Hz" for d in lost if d in self.dwells]
+        if dwells:
+            raise InputError(
+                "the baseline has no periodic motion at " + ", ".join(dwells),
+                remedy="leave these dwells out with --max-frequency, or mend the parameters",
+            )
         if lost:
             raise InputError(
-                "the baseline has no periodic motion at " + ", ".join(lost),
-                remedy="leave these dwells out with --max-frequency, or mend the parameters",
+                f"the baseline has no motion in {len(lost)} of the windows of tests that do not repeat",
+                remedy="mend the parameters, or leave these tests out",
             )
         return solution
 
@@ -266,7 +279,9 @@ class DwellProblem(AbstractProblem):
         return cycle_positions(self, data, rows)
 
     def regimes(self, data: Data, fit: LaplaceFit) -> tuple[Regime, ...]:
-        """In which regimes the baseline misses: of the cycle, of the tests, and over time."""
+        """In which regimes the baseline misses: of the cycle, of the dwells, over time; nothing without dwells."""
+        if not self.dwells.size:
+            return ()
         steady = without_drifts(data, len(self.free))
         return find_regimes(dwell_cycles(self, fit), data, fit, self.free, steady, constants=self.constants)
 
@@ -278,12 +293,12 @@ class DwellProblem(AbstractProblem):
         law: DrawnLaw | None,
         nearest: DrawnLaw | None,
     ) -> tuple[ForceLoop, ...]:
-        """Loops at a location for a slow, a middle and a fast test."""
+        """Loops at a location for a slow, a middle and a fast dwell."""
         return force_loops(self, self.values(values), warm_start, found, law, nearest)
 
     def next_tests(self, search: Search, one: LaplaceFit, other: LaplaceFit) -> tuple[NextTest, ...]:
-        """Dwells under other conditions that separate two hypotheses best."""
-        return next_tests(search, self, one, other)
+        """Dwells under other conditions that separate two hypotheses best; none are proposed beside a road."""
+        return () if self.excitation.windows.size else next_tests(search, self, one, other)
 
     def mistaken(self, given: NDArray[np.float64]) -> str:
         """A channel with another unit or sign than its header's, or two that were exchanged, in words."""
@@ -306,45 +321,6 @@ class DwellProblem(AbstractProblem):
         return Trajectory(jnp.concatenate([x, rest]), jnp.concatenate([y, rest]))
 
 
-@dataclass(frozen=True)
-class WindowProblem(DwellProblem):
-    """A plant in windows of tests that do not repeat: these have no cycle, no harmonics and no frequency."""
-
-    def locations(
-        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
-    ) -> list[InputLocation]:
-        """What laws at each location could do to the readings; a signal that is free has too many numbers."""
-        about = self._about(self.complete(terms), values, warm_start)
-        return input_locations(about, replace(self.constants, free_orders=0))
-
-    def gap_map(self, data: Data, rows: NDArray[np.float64]) -> tuple[MapCell, ...]:
-        """Nothing: that is by dwell and harmonic."""
-        return ()
-
-    def cycle_positions(self, data: Data, rows: NDArray[np.float64]) -> tuple[CyclePosition, ...]:
-        """Nothing: there is no cycle."""
-        return ()
-
-    def regimes(self, data: Data, fit: LaplaceFit) -> tuple[Regime, ...]:
-        """Nothing: regimes are of a cycle."""
-        return ()
-
-    def loops(
-        self,
-        values: Mapping[str, float],
-        warm_start: PeriodicSolution,
-        found: Localisation,
-        law: DrawnLaw | None,
-        nearest: DrawnLaw | None,
-    ) -> tuple[ForceLoop, ...]:
-        """Nothing: they are drawn over a period."""
-        return ()
-
-    def next_tests(self, search: Search, one: LaplaceFit, other: LaplaceFit) -> tuple[NextTest, ...]:
-        """Nothing: further dwells are proposed beside dwells."""
-        return ()
-
-
 def dwell_problem(
     measured: HarmonicResponse,
     plant: AbstractPlant,
@@ -357,15 +333,14 @@ def dwell_problem(
     models: Iterable[tuple[str, ...]] = (),
     constants: DecisionConstants = DEFAULTS,
 ) -> tuple[DwellProblem, Data]:
-    """The problem of a measured response, of dwells or in windows, and the response as data.
+    """The problem of a measured response, of dwells and windows, and the response as data.
 
     Raises :class:`InputError` for a response that cannot be used.
     """
     target = harmonic_target(measured, plant.channels, orders)
     likelihood = likelihood_of(target)
     tests, channels, kept = (int(count) for count in target.used.shape)
-    kind = DwellProblem if measured.part is None else WindowProblem
-    problem = kind(
+    problem = DwellProblem(
         plant=plant,
         parameters=parameters,
         catalogue=catalogue,

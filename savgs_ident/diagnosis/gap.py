@@ -27,7 +27,8 @@ from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.base import Excitation
 from savgs_ident.responses.harmonic_response import SweepResponse
-from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.excitation import only_driven
+from savgs_ident.simulate.periodic import layout_of, simulate_periodic
 from savgs_ident.simulate.readings import harmonics
 
 if TYPE_CHECKING:
@@ -206,7 +207,7 @@ DIFFERENTIATIONS = {"m/s^2": -1, "rad/s^2": -1, "m/s": 0, "rad/s": 0, "m": 1, "r
 
 
 def gap_map(problem: "DwellProblem", data: Data, rows: NDArray[np.float64]) -> tuple[MapCell, ...]:
-    """The gap of every harmonic that is compared.
+    """The gap of every harmonic of the dwells that is compared.
 
     ``rows`` (m,) are those that a model predicts [unit of the reading].
     """
@@ -219,6 +220,8 @@ def gap_map(problem: "DwellProblem", data: Data, rows: NDArray[np.float64]) -> t
     frequency = np.asarray(problem.excitation.frequency)
     cells = []
     for d, c, k in np.argwhere(sigma > 0.0):
+        if d not in problem.dwells:
+            continue
         size = np.abs(measured[d, c, 1]) or np.abs(measured[d, c]).max()
         percent = 100.0 * np.abs(residual[d, c, k]) / size
         cells.append(
@@ -230,15 +233,15 @@ def gap_map(problem: "DwellProblem", data: Data, rows: NDArray[np.float64]) -> t
 def cycle_positions(
     problem: "DwellProblem", data: Data, rows: NDArray[np.float64]
 ) -> tuple[CyclePosition, ...]:
-    """The gap of the waveforms at reversal, in mid-stroke and between, by channel; every test counts alike.
+    """The gap of the waveforms at reversal, in mid-stroke and between, by channel; every dwell counts alike.
 
     The cycle is that of the velocity which the plant's first channel shows; without that channel there is none.
     ``rows`` (m,) are those that a model predicts [unit of the reading].
     """
     shape, first = problem.shape, problem.plant.channels[0]
     constants = problem.constants
-    measured = problem.likelihood.harmonics(data.measured[None], shape)[0]
-    residual = problem.likelihood.harmonics((data.measured - rows)[None], shape)[0]
+    measured = problem.likelihood.harmonics(data.measured[None], shape)[0][problem.dwells]
+    residual = problem.likelihood.harmonics((data.measured - rows)[None], shape)[0][problem.dwells]
     if first.unit not in DIFFERENTIATIONS or not np.any(measured[:, 0]):
         return ()
     phase = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
@@ -287,7 +290,8 @@ def sweep_shrink(
     None where too few dwells of the campaign lie in the sweep's range. NaN for a hypothesis without motion.
     """
     fewest = problem.constants.sweep_dwells
-    frequencies = frequencies_of(np.asarray(problem.excitation.frequency), sweep, fewest)
+    dwells = only_driven(problem.excitation, problem.dwells)
+    frequencies = frequencies_of(np.asarray(dwells.frequency), sweep, fewest)
     if frequencies is None:
         return None
     inside = (sweep.frequency >= frequencies[0]) & (sweep.frequency <= frequencies[-1])
@@ -338,7 +342,8 @@ def first_harmonic(
     motion is not found. Slow motions take the places of slow dwells, which have the nodes for it: no program is
     compiled anew.
     """
-    dwells, amplitude = problem.excitation, float(np.median(sweep.input_amplitude))
+    dwells = only_driven(problem.excitation, problem.dwells)
+    layout, amplitude = layout_of(dwells, problem.settings), float(np.median(sweep.input_amplitude))
     place = np.argsort(np.argsort(np.asarray(dwells.frequency)))
     first, *others = (each.name for each in problem.plant.inputs)
     swept = {name: np.zeros(each.shape, complex) for name, each in dwells.harmonics.items()}
@@ -349,7 +354,7 @@ def first_harmonic(
         jnp.asarray(frequencies[place]), {name: jnp.asarray(each) for name, each in swept.items()}
     )
     model, p = problem.model(terms), problem.values(values)
-    solution = simulate_periodic(model, p, there, problem.settings, problem.layout)
+    solution = simulate_periodic(model, p, there, problem.settings, layout)
     if not all(status.ok for status in solution.status()):
         return None
     found = np.asarray(harmonics(model, p, solution, problem.orders), np.complex128)

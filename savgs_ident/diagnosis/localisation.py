@@ -247,9 +247,10 @@ def _left_out(
 def _free_input(
     search: Search, mode: LaplaceFit, free: Matrix, weight: NDArray[np.float64], width: float
 ) -> tuple[float, NDArray[np.float64]]:
-    """Share of the gap that inputs free in every test explain, parameters estimated anew; and the inputs.
+    """Share of the gap that inputs free in every dwell explain, parameters estimated anew; and the inputs.
 
-    The coefficients of the inputs are eliminated test by test, which leaves a system in the parameters alone.
+    The coefficients of the inputs are eliminated test by test, which leaves a system in the parameters alone. Windows
+    of tests that do not repeat have no such input, and do not count.
     """
     residual, slopes = search.residual(mode.prediction) * weight, mode.slopes * weight[:, None]
     scale = np.sqrt(np.mean((free * weight[:, None]) ** 2, axis=0))
@@ -266,12 +267,13 @@ def _free_input(
         removed_slopes[rows] -= mine @ (inverse @ slopes[rows])
     precision = np.eye(mode.x.size) + slopes.T @ removed_slopes
     step = np.linalg.solve(precision, removed_slopes.T @ residual - mode.x)
-    left = float(np.sum((removed_residual - removed_slopes @ step) ** 2))
+    acting = np.isin(search.data.test, [test for test, rows in enumerate(tests) if signal[rows].any()])
+    left = float(np.sum((removed_residual - removed_slopes @ step)[acting] ** 2))
     coefficients = np.stack(
         [
             inverse @ (residual[rows] - slopes[rows] @ step) * per_unit
             for rows, inverse in zip(tests, inverses, strict=True)
         ]
     )
-    whole = float(np.sum(residual**2))
+    whole = float(np.sum(residual[acting] ** 2))
     return (max(0.0, 1.0 - left / whole) if whole > 0.0 else 0.0), coefficients

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from savgs_ident.diagnosis.dwell_problem import DwellProblem
 
 QUANTILES = (0.1, 0.5, 0.9)
-"""The tests that have a loop, by their rank in frequency: a slow, a middle and a fast one."""
+"""The dwells that have a loop, by their rank in frequency: a slow, a middle and a fast one."""
 
 SAMPLES = 256
 """Samples of a loop."""
@@ -53,7 +53,7 @@ def force_loops(
     law: DrawnLaw | None,
     nearest: DrawnLaw | None,
 ) -> tuple[ForceLoop, ...]:
-    """Loops at a port for a slow, a middle and a fast test.
+    """Loops at a port for a slow, a middle and a fast dwell.
 
     Beside them, the ``law`` that is named with its error, and the ``nearest`` formula. ``solution`` is the motion of
     the baseline; ``p`` are its parameters, SI.
@@ -66,7 +66,9 @@ def force_loops(
     signals = ports[moving]
     motion_unit = next(each.displacement_unit for each in problem.plant.ports if each.name == moving)
     force, error, near = _drawn(problem, solution, law, nearest)
-    order = np.argsort(np.asarray(solution.excitation.frequency))
+    order = problem.dwells[np.argsort(np.asarray(solution.excitation.frequency)[problem.dwells])]
+    if not order.size:
+        return ()
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
     grid = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
     loops = []

@@ -85,8 +85,8 @@ def diagnose(
     asked = ask_dwells(model, measured, orders, max_frequency, without, constants, progress)
     response, given, settings = asked.response, asked.given, asked.settings
     campaign = campaign_of(measured)
-    # A sweep in windows is what the model is fitted to, and no test that was left out.
-    apart = None if response.part is not None else campaign
+    # Without dwells a sweep is what the model is fitted to, and no test that was left out.
+    apart = campaign if response.dwells.size else None
     sweep, found_in_sweep = (None, ()) if apart is None else first_sweep(apart, model.plant)
     plant, data = problem_of_dwells(response, given, settings)
     origin = model.origin(campaign, (*asked.warnings, *found_in_sweep)).with_command(command)

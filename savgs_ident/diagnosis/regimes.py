@@ -73,9 +73,10 @@ class Cycles:
         velocity: at the port that is looked at, (D, I).
         displacement: there, (D, I).
         load: of the port that carries most, (D, I); None where none carries anything.
-        beside: what else was recorded in each test [its unit], (D,) by name.
+        beside: what else was recorded in each test of the data [its unit], (t,) by name.
         frequency: of the tests [Hz], (D,).
         recorded: when each test of the data was recorded, in any unit of time, (t,).
+        places: of the D tests among those of the data, where they are some of them.
     """
 
     waves: Callable[[Array], Array]
@@ -85,6 +86,7 @@ class Cycles:
     recorded: Array
     load: Array | None = field(default=None)
     beside: Mapping[str, Array] = field(default_factory=dict)
+    places: NDArray[np.intp] | slice = field(default_factory=lambda: slice(None))
 
     @property
     def known_beside(self) -> dict[str, Array]:
@@ -226,7 +228,10 @@ def _masks(cycles: Cycles, data: Data) -> Iterator[tuple[str, Mask]]:
     for names, values in (
         (("slow tests", "fast tests"), cycles.frequency),
         (("small response", "large response"), relative),
-        *(((f"low {name}", f"high {name}"), values) for name, values in cycles.known_beside.items()),
+        *(
+            ((f"low {name}", f"high {name}"), values[cycles.places])
+            for name, values in cycles.known_beside.items()
+        ),
     ):
         for name, mask in _thirds(*names, values[None]):
             yield name, np.broadcast_to(mask.T, shape)
@@ -333,7 +338,7 @@ def _drifts(cycles: Cycles, least: float) -> dict[str, Array]:
         else:
             found.append(([name], over))
     for names, over in found:
-        names += ["frequency"] if _alike(over, cycles.frequency, least) else []
+        names += ["frequency"] if _alike(over[cycles.places], cycles.frequency, least) else []
     return {f"drift over {' or '.join(names)}": over for names, over in found}
 
 
@@ -353,12 +358,13 @@ def dwell_cycles(problem: "DwellProblem", fit: LaplaceFit) -> Cycles:
     """
     phase = 2.0 * np.pi * np.arange(INSTANTS) / INSTANTS
     turns = np.exp(1j * np.arange(problem.shape[2])[:, None] * phase)
+    dwells = problem.dwells
     solution = fit.prediction.warm_start
     nodes, at = solution.mesh.layout.dwell, np.asarray(solution.mesh.phase)
 
     def over_cycle(signal: object) -> Array:
         values = np.asarray(signal, np.float64)
-        tests = [nodes == test for test in range(problem.shape[0])]
+        tests = [nodes == test for test in dwells]
         return np.stack([np.interp(phase, at[each], values[each], period=2.0 * np.pi) for each in tests])
 
     seen = problem.port_signals(fit.values, solution)
@@ -366,11 +372,12 @@ def dwell_cycles(problem: "DwellProblem", fit: LaplaceFit) -> Cycles:
     loads = [np.asarray(seen[each.name].load) for each in forces if each.loaded]
     motion = seen[forces[0].name]
     return Cycles(
-        waves=lambda rows: np.real(problem.likelihood.harmonics(rows, problem.shape) @ turns),
+        waves=lambda rows: np.real(problem.likelihood.harmonics(rows, problem.shape)[:, dwells] @ turns),
         velocity=over_cycle(motion.velocity),
         displacement=over_cycle(motion.displacement),
         load=over_cycle(max(loads, key=lambda each: float(np.abs(each).mean()))) if loads else None,
-        frequency=np.asarray(problem.excitation.frequency),
+        frequency=np.asarray(problem.excitation.frequency)[dwells],
         recorded=problem.times,
         beside=problem.beside,
+        places=dwells,
     )

@@ -10,7 +10,7 @@ True
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan
 from typing import ClassVar, Literal, NamedTuple, Self
 
@@ -23,6 +23,7 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Family
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.selection import only_tests
 from savgs_ident.simulate.periodic import PeriodicSettings
 
 Kind = Literal["none", "effect", "several", "unknown"]
@@ -290,6 +291,11 @@ class Responses:
     recalibrated: NDArray[np.complex128]
     after: NDArray[np.complex128]
 
+    def of_tests(self, kept: NDArray[np.intp], orders: int) -> "Responses":
+        """Of some of the tests, orders 0..``orders``."""
+        models = (self.before, self.recalibrated, self.after)
+        return Responses(*(each[kept, :, : orders + 1] for each in models))
+
 
 @dataclass(frozen=True)
 class DriveForces:
@@ -377,6 +383,13 @@ class Diagnosis(Result):
     learned: Learned | None = None
     regimes: tuple[Regime, ...] = ()
     drifts: Mapping[str, float] = field(default_factory=dict)
+
+    def of_tests(self, kept: NDArray[np.intp]) -> "Diagnosis":
+        """With the measurement and what the three models predict of some of the tests; all else is of all of them."""
+        assert self.measured is not None
+        assert isinstance(self.responses, Responses)
+        measured = only_tests(self.measured, kept)
+        return replace(self, measured=measured, responses=self.responses.of_tests(kept, measured.orders))
 
     @property
     def trusted(self) -> bool:

@@ -206,7 +206,7 @@ def _sine_in(driven: str, excitation: Excitation, frequency: NDArray[np.float64]
 def propose_dwells(minimiser: Minimiser, best: Minimum, settings: PeriodicSettings) -> tuple[Proposal, ...]:
     """The best dwell of every family that would identify all free parameters; empty if none would."""
     excitation = best.solution.excitation
-    if excitation.part is not None:
+    if excitation.windows.size:
         # Tests that do not repeat have no amplitude and no frequency to go by.
         return ()
     free = len(minimiser.problem.free.identified)

@@ -26,6 +26,7 @@ from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.selection import only_tests
 from savgs_ident.simulate.driven_plant import motion_in, motion_of
 from savgs_ident.simulate.excitation import (
     Measurements,
@@ -135,7 +136,7 @@ def fit_with(
     names = drawing.free(free)
     response, motion = forgetful_motion(measured, drawing, settings.orders, max_frequency, progress)
     drawing, resized = sized_to(drawing, response) if drawing.effects else (drawing, ())
-    if response.part is not None and settings.quantity == "peak_to_peak":
+    if response.windows.size and settings.quantity == "peak_to_peak":
         raise InputError(
             "tests that do not repeat have no peak-to-peak values",
             source="--peak-to-peak",
@@ -165,13 +166,13 @@ def demo(progress: Progress = no_progress, *, command: Sequence[str] = ()) -> Fi
 
 @dataclass(frozen=True)
 class Comparison(Result):
-    """A model and the same without its effects, held against D measured dwells.
+    """A model and the same without its effects, held against D measured tests.
 
     Attributes:
         measured: what it is held against.
         model: the response of the model.
         frictionless: that without its effects.
-        used: which entries are compared, (D, C, orders + 1): only dwells that the model solved.
+        used: which entries are compared, (D, C, orders + 1): only tests that the model solved.
     """
 
     presenter: ClassVar[str] = "COMPARISON"
@@ -196,6 +197,17 @@ class Comparison(Result):
         """Whether all periodic motions were found."""
         return self.model.trusted and self.frictionless.trusted
 
+    def of_tests(self, kept: NDArray[np.intp]) -> "Comparison":
+        """Of some of the tests."""
+        measured = only_tests(self.measured, kept)
+        return replace(
+            self,
+            measured=measured,
+            model=self.model.of_tests(kept, measured.orders),
+            frictionless=self.frictionless.of_tests(kept, measured.orders),
+            used=self.used[kept, :, : measured.orders + 1],
+        )
+
     def between(self) -> tuple[SimulatedResponse, SimulatedResponse]:
         """Both responses at the dwells and at as many frequencies between them, for smooth curves.
 
@@ -215,8 +227,8 @@ def compare(
 ) -> Comparison:
     """Hold a model against a campaign or the response of its dwells, orders up to ``orders``; nothing is fitted.
 
-    Where there are no dwells, a road or a sweep is cut into windows. Raises :class:`InputError` for a campaign that
-    cannot be used.
+    A road is cut into windows, and where there are no dwells a sweep, too. Raises :class:`InputError` for a campaign
+    that cannot be used.
     """
     use_persistent_cache()
     response = forgetful_response(measured, model.before, orders, None, progress)

@@ -120,7 +120,7 @@ def likelihood_of(target: HarmonicTarget, scales: Scales | None = None) -> Likel
     parts = np.stack([harmonics.real, harmonics.imag], axis=-1)
     rows = np.einsum("dckij,dckj->dcki", axes, parts).ravel()[place]
     discrepancy_scale = np.repeat(
-        _discrepancy_scales(harmonics, used, target.decay)[..., None], 2, axis=-1
+        _discrepancy_scales(harmonics, used, target)[..., None], 2, axis=-1
     ).ravel()[place]
     variance = (1.0 / values).ravel()[place]
     return Likelihood(
@@ -151,15 +151,16 @@ NEAR = 1.0 / 4.0
 """Harmonics of a window to that share of the order to either side say how large a discrepancy of one is there."""
 
 
-def _discrepancy_scales(harmonics: np.ndarray, used: np.ndarray, decay: tuple[int, ...] | None) -> np.ndarray:
+def _discrepancy_scales(harmonics: np.ndarray, used: np.ndarray, target: HarmonicTarget) -> np.ndarray:
     """a_k of every harmonic; the largest compared one stands in for a first one that is not compared."""
-    sizes = np.abs(harmonics) * used
-    if decay is None:
-        return _near_sizes(sizes, used)
+    sizes, windows = np.abs(harmonics) * used, list(target.windows)
     first = np.where(used[..., 1], sizes[..., 1], sizes.max(axis=-1))
     order = np.maximum(np.arange(harmonics.shape[-1]), 1)
-    power = np.array(decay)[:, None]
-    return np.asarray(first[..., None] / (np.sqrt(2.0) * order**power))
+    power = np.array(target.decay)[:, None]
+    found = np.asarray(first[..., None] / (np.sqrt(2.0) * order**power))
+    if windows:
+        found[windows] = _near_sizes(sizes[windows], used[windows])
+    return found
 
 
 def _near_sizes(sizes: np.ndarray, used: np.ndarray) -> np.ndarray:

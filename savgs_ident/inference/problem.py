@@ -39,14 +39,15 @@ class HarmonicTarget(eqx.Module):
 
     ``whitening`` (D, C, n + 1, 2, 2) is the inverse Cholesky factor of the covariance, 0 where not
     ``used``. Harmonics are in the unit of their reading, ``whitening`` in one over it. ``decay`` (C,) is the power
-    of the order with which a discrepancy of the model falls in each channel; None for windows, where it is a share of
-    what is near it.
+    of the order with which a discrepancy of the model falls in each channel of dwells; in ``windows``, by their
+    places, it is a share of what is near it.
     """
 
     measured: Complex[Array, "D C K"]
     whitening: Float[Array, "D C K 2 2"]
     used: np.ndarray = eqx.field(static=False)
-    decay: tuple[int, ...] | None = eqx.field(static=True)
+    decay: tuple[int, ...] = eqx.field(static=True)
+    windows: tuple[int, ...] = eqx.field(static=True)
 
     def __call__(self, predicted: Complex[Array, "D C K"]) -> Float[Array, " m"]:
         """Residuals in standard deviations, (D * C * (n + 1) * 2,)."""
@@ -121,6 +122,7 @@ def harmonic_target(measured: HarmonicResponse, channels: Sequence[Channel], ord
     covariance = measured.covariance[:, places, :count]
     used = measured.valid[:, places, :count] & present[None, :, None]
     used[:, :, 0] = False
+    used[measured.dwells, :, orders + 1 :] = False
     used &= (np.linalg.det(covariance) > 0.0) & np.isfinite(covariance).all(axis=(-2, -1))
     if not used.any():
         raise InputError("no harmonic of the response can be used", remedy="record longer dwells")
@@ -131,7 +133,8 @@ def harmonic_target(measured: HarmonicResponse, channels: Sequence[Channel], ord
         jnp.asarray(harmonics),
         jnp.asarray(whitening),
         used,
-        None if measured.part is not None else tuple(each.decay for each in channels),
+        tuple(each.decay for each in channels),
+        tuple(measured.windows.tolist()),
     )
 
 

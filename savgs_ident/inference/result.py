@@ -5,7 +5,7 @@ posterior_predictive, sample_stats and observed_data; complex harmonics stand in
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
@@ -20,6 +20,7 @@ from savgs_ident.core.presentation import Result
 from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.selection import only_tests
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -134,6 +135,16 @@ class Predictive:
     used: NDArray[np.bool_]
     inside: NDArray[np.bool_]
 
+    def of_tests(self, kept: NDArray[np.intp], orders: int) -> "Predictive":
+        """Of some of the tests, orders 0..``orders``."""
+        upto = orders + 1
+        return Predictive(
+            self.model[:, kept, :, :upto],
+            self.replicated[:, kept, :, :upto],
+            self.used[kept, :, :upto],
+            self.inside[kept, :, :upto],
+        )
+
     @property
     def count_inside(self) -> tuple[int, int]:
         """How many of the compared phasors lie inside, and how many there are."""
@@ -173,6 +184,11 @@ class Posterior(Result):
     measured: HarmonicResponse
     sentences: tuple[str, ...]
     wall_s: float
+
+    def of_tests(self, kept: NDArray[np.intp]) -> "Posterior":
+        """With the measurement and the predictions of some of the tests; the draws are those from all."""
+        measured = only_tests(self.measured, kept)
+        return replace(self, measured=measured, predictive=self.predictive.of_tests(kept, measured.orders))
 
     @property
     def effects(self) -> tuple[str, ...]:

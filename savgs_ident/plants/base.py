@@ -22,7 +22,9 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Complex, Float
+from numpy.typing import NDArray
 
 from savgs_ident.core.small_root import Root, find_root
 from savgs_ident.core.values import Values
@@ -335,6 +337,12 @@ class Excitation(NamedTuple):
     def spacing(self) -> Float[Array, " D"]:
         """From one order of what sensors read to the next [Hz]."""
         return self.frequency if self.part is None else self.frequency * self.part.every
+
+    @property
+    def windows(self) -> NDArray[np.intp]:
+        """Places of the tests of which a part is compared."""
+        none = np.zeros(0, np.intp)
+        return none if self.part is None else np.flatnonzero(~self.part.repeats)
 
 
 class AbstractSource(eqx.Module):

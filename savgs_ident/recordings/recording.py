@@ -291,6 +291,14 @@ class Campaign:
         return min((each.start for each in self.recordings if each.start is not None), default=None)
 
     @property
+    def began(self) -> dict[str, float]:
+        """When each test began: its start [s since 1970, UTC] where all have one, otherwise its place among them."""
+        dated = {each.name: each.start for each in self.recordings if each.start is not None}
+        if len(dated) == len(self.recordings):
+            return dated
+        return {each.name: float(place) for place, each in enumerate(self.recordings)}
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of all channels that were recorded."""
         return tuple(dict.fromkeys(name for each in self.recordings for name in each.channels))

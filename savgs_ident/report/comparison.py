@@ -10,15 +10,20 @@ from rich.console import Group, RenderableType
 
 from savgs_ident.fit.public import Comparison
 from savgs_ident.fit.result import Gap, MeasuredPoints, OverWindows, gaps, measured_points, recorded_spectra
-from savgs_ident.report.text import channel_label, fixed, per_input_key, plain, table
+from savgs_ident.report.text import channel_label, fixed, per_input_key, plain, table, tests_counted
+from savgs_ident.responses.selection import by_kind
 
 
 def bode_record(compared: Comparison) -> dict[str, object]:
     """The JSON object of ``bode``, in SI.
 
     Of dwells it holds first harmonics per unit of the input, phase against it; of windows root mean squares over
-    them at each frequency.
+    them at each frequency, under a key of their own beside dwells.
     """
+    dwells, windows = by_kind(compared, compared.measured)
+    channels = {} if dwells is None else {"channels": _first_harmonics(dwells)}
+    if windows is not None:
+        channels["channels" if dwells is None else "channels_in_windows"] = _spectra(windows)
     return {
         "schema": 1,
         "effects": list(compared.effects),
@@ -27,7 +32,7 @@ def bode_record(compared: Comparison) -> dict[str, object]:
         "status": [status.name.lower() for status in compared.model.status],
         "converged": compared.trusted,
         "gap": {name: _gap_entry(gap) for name, gap in _gaps(compared).items()},
-        "channels": _first_harmonics(compared) if compared.measured.part is None else _spectra(compared),
+        **channels,
     }
 
 
@@ -102,10 +107,9 @@ def bode_text(compared: Comparison) -> RenderableType:
         )
         for name, gap in _gaps(compared).items()
     ]
-    tests = compared.measured.tests
-    kind = "dwells" if compared.measured.part is None else "windows"
+    measured, tests = compared.measured, compared.measured.tests
     headers = ("channel", "residual\n[%]", "noise\n[%]", "residual\n[noise sd]")
-    parts = [table(f"Residual of the model on {len(tests)} {kind} (rms)", headers, rows)]
+    parts = [table(f"Residual of the model on {tests_counted(measured)} (rms)", headers, rows)]
     failed = [test for test, status in zip(tests, compared.model.status, strict=True) if not status.ok]
     if failed:
         parts.append(plain("The model's periodic motion was not found in: " + ", ".join(failed)))

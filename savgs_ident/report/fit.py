@@ -123,7 +123,7 @@ def _dwell_records(fit: Fit) -> list[dict[str, object]]:
             "entries": entries[d],
             "channels": {
                 name: _dwell_channel(fit, d, c, sigma[d, c])
-                | _predicted_peaks(fit, identified[d, c], frictionless[d, c])
+                | (_predicted_peaks(identified[d, c], frictionless[d, c]) if d in fit.measured.dwells else {})
                 for c, name in enumerate(fit.channels)
                 if np.any(fit.used[d, c])
             },
@@ -141,16 +141,14 @@ def _dwell_channel(fit: Fit, d: int, c: int, sigma: NDArray[np.float64]) -> dict
         "peak_to_peak_sd": fit.measured.peak_to_peak_sd[d, channel],
     }
     return {
-        **(peaks if fit.measured.part is None else {}),
+        **(peaks if d in fit.measured.dwells else {}),
         "residual_rms_sigma": np.sqrt(np.mean(sigma[orders] ** 2)),
         "residual_sigma": {"order": orders, "re": sigma[orders, 0], "im": sigma[orders, 1]},
     }
 
 
-def _predicted_peaks(fit: Fit, identified: float, frictionless: float) -> dict[str, float]:
-    """Peak to peak of the model with its effects and without; nothing for windows, of which a part is compared."""
-    if fit.measured.part is not None:
-        return {}
+def _predicted_peaks(identified: float, frictionless: float) -> dict[str, float]:
+    """Peak to peak of the model with its effects and without; of windows a part is compared, which has none."""
     return {"peak_to_peak_identified": identified, "peak_to_peak_simqc": frictionless}
 
 
@@ -210,13 +208,20 @@ def _quality(fit: Fit) -> RenderableType:
 
 
 def _compared(fit: Fit) -> str:
-    tests = len(fit.measured.tests)
-    if fit.measured.part is not None:
-        hertz = np.flatnonzero(fit.used.any(axis=(0, 1))) * float(fit.measured.spacing[0])
-        return f"{hertz.size} frequencies from {hertz[0]:.2g} to {hertz[-1]:.3g} Hz of {tests} windows"
+    dwells, windows = fit.measured.dwells, fit.measured.windows
     if fit.quantity == "peak_to_peak":
-        return f"peak-to-peak values of {tests} dwells"
-    return f"harmonics of orders 1 to {fit.orders} of {tests} dwells"
+        return f"peak-to-peak values of {dwells.size} dwells"
+    compared = []
+    if dwells.size:
+        orders = np.flatnonzero(fit.used[dwells].any(axis=(0, 1)))
+        compared.append(f"harmonics of orders 1 to {orders[-1]} of {dwells.size} dwells")
+    if windows.size:
+        places = np.flatnonzero(fit.used[windows].any(axis=(0, 1)))
+        hertz = places * float(fit.measured.spacing[windows[0]])
+        compared.append(
+            f"{hertz.size} frequencies from {hertz[0]:.2g} to {hertz[-1]:.3g} Hz of {windows.size} windows"
+        )
+    return " and ".join(compared)
 
 
 def _about(fit: Identified, name: str) -> str:

@@ -15,6 +15,7 @@ from rich.console import RenderableType
 from savgs_ident.core.files import write_bytes, write_json
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.report.presenters import AbstractPresenter, Figures, Shown
+from savgs_ident.responses.selection import by_kind
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,8 +63,7 @@ class _Identified(AbstractPresenter[Shown]):
         """The model against the measurement."""
 
     def figures(self, result: Shown) -> Figures:
-        compared = self.comparison(result)
-        return {figure_name(compared): lambda: comparison_figure(compared)}
+        return comparison_figures(self.comparison(result))
 
     def write(self, result: Shown, folder: Path, progress: Progress) -> Iterator[Path]:
         yield write_json(folder / f"{self.stem}.json", self.record(result))
@@ -156,26 +156,32 @@ class _Comparison(_Identified["Comparison"]):
 
 
 def draw_comparison(comparison: "Comparison", folder: Path, progress: Progress) -> tuple[Path, ...]:
-    """Write bode.png and bode.pdf of a model against a measurement; of one in windows spectra.png and spectra.pdf."""
-    figure = comparison_figure(comparison, progress)
+    """Write the figures of a model against a measurement as PNG and PDF, and return their paths."""
+    drawn = {name: draw() for name, draw in comparison_figures(comparison, progress).items()}
     from savgs_ident.report.theme import write_figure
 
-    return write_figure(folder, figure_name(comparison), figure)
+    return tuple(path for name, figure in drawn.items() for path in write_figure(folder, name, figure))
 
 
-def figure_name(comparison: "Comparison") -> str:
-    """The name of the figure of a model against a measurement."""
-    return "bode" if comparison.measured.part is None else "spectra"
-
-
-def comparison_figure(comparison: "Comparison", progress: Progress = no_progress) -> "Figure":
-    """The Bode figure of a model against a measurement, with the model solved between the dwells; or its spectra."""
+def comparison_figures(comparison: "Comparison", progress: Progress = no_progress) -> Figures:
+    """The figures of a model against a measurement: ``bode`` of the dwells, ``spectra`` of the windows."""
     title = f"Model and measurement: {Path(comparison.origin.data).name or comparison.given.plant_name}"
-    if comparison.measured.part is not None:
-        progress("drawing")
-        from savgs_ident.report.spectra import spectra_figure
+    dwells, windows = by_kind(comparison, comparison.measured)
+    of_dwells: Figures = {} if dwells is None else {"bode": partial(_bode_figure, title, dwells, progress)}
+    if windows is None:
+        return of_dwells
+    return {**of_dwells, "spectra": partial(_spectra_figure, title, windows, progress)}
 
-        return spectra_figure(title, comparison)
+
+def _spectra_figure(title: str, comparison: "Comparison", progress: Progress) -> "Figure":
+    progress("drawing")
+    from savgs_ident.report.spectra import spectra_figure
+
+    return spectra_figure(title, comparison)
+
+
+def _bode_figure(title: str, comparison: "Comparison", progress: Progress) -> "Figure":
+    """The Bode figure of dwells, with the model solved between them."""
     progress("solving the model between the dwells")
     # Loading what draws takes as long as solving, which leaves Python free.
     with ThreadPoolExecutor(1) as pool:
@@ -229,7 +235,8 @@ class _Posterior(AbstractPresenter["Posterior"]):
         from savgs_ident.report.spectra import predicted_spectrum_figure
 
         identified = result.of_role("identified")
-        predicted = predictive_figure if result.measured.part is None else predicted_spectrum_figure
+        dwells, windows = by_kind(result, result.measured)
+        channels = [each.name for each in result.model.channels]
         return {
             "corner": lambda: corner_figure(result),
             **{f"trace {each.name}": partial(trace_figure, result, each) for each in identified},
@@ -239,8 +246,14 @@ class _Posterior(AbstractPresenter["Posterior"]):
                 if each.profile is not None
             },
             **{
-                f"predicted {each.name}": partial(predicted, result, c)
-                for c, each in enumerate(result.model.channels)
+                f"predicted {name}": partial(predictive_figure, dwells, c)
+                for c, name in enumerate(channels)
+                if dwells is not None
+            },
+            **{
+                f"predicted spectrum {name}": partial(predicted_spectrum_figure, windows, c)
+                for c, name in enumerate(channels)
+                if windows is not None
             },
         }
 
@@ -299,22 +312,24 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
         }
         if result.measured is None:
             return {"drive": lambda: drive_figure_of(result), **shrink, **loops}
-        if result.measured.part is not None:
+        dwells, windows = by_kind(result, result.measured)
+        names = [each.name for each in result.given.channels]
+        if windows is not None:
             from savgs_ident.report.diagnosis.gap_spectra import gap_spectrum_figure
 
-            known = enumerate(each.name for each in result.given.channels)
             spectra = {
-                f"gap {name}": partial(gap_spectrum_figure, result, c)
-                for c, name in known
+                f"gap spectrum {name}": partial(gap_spectrum_figure, windows, c)
+                for c, name in enumerate(names)
                 if name in result.measured.channels
             }
-            return {**spectra, **shrink}
-        names = [each.name for each in result.given.channels]
+            shrink = {**spectra, **shrink}
+        if dwells is None:
+            return shrink
         return {
             **{f"gap {name}": partial(gap_map_figure, result, name) for name in names},
             "ports": partial(report_of(result.given).ports_figure, result),
             **shrink,
-            **{f"bode {name}": partial(diagnosis_bode_figure, result, c) for c, name in enumerate(names)},
+            **{f"bode {name}": partial(diagnosis_bode_figure, dwells, c) for c, name in enumerate(names)},
             **loops,
         }
 

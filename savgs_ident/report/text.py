@@ -26,6 +26,7 @@ from savgs_ident.core.errors import DataWarning
 if TYPE_CHECKING:
     from savgs_ident.plants.model import Model
     from savgs_ident.recordings.recording import RecordingLayout
+    from savgs_ident.responses.harmonic_response import HarmonicResponse
 
 MINUS = "\u2212"
 """A minus as long as a plus."""
@@ -78,6 +79,17 @@ def _grouped(value: float, places: int) -> str:
         return (f"{MINUS}∞" if value < 0.0 else "∞") if isinf(value) else "unknown"
     text = f"{value:,.{min(max(places, 0), 12)}f}"
     return text.replace(",", _NARROW_SPACE if abs(value) >= 1e4 else "").replace("-", MINUS)
+
+
+def counted(number: int, noun: str) -> str:
+    """A number of things, in words."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def tests_counted(measured: "HarmonicResponse") -> str:
+    """How many dwells and windows there are, in words."""
+    kinds = {"dwell": measured.dwells.size, "window": measured.windows.size}
+    return " and ".join(counted(each, kind) for kind, each in kinds.items() if each)
 
 
 def percentage(share: float, places: int = 1) -> str:

@@ -216,17 +216,8 @@ def _assemble(
         periods=np.array([fits[test].periods for test in tests]),
         warnings=warnings,
         covariance_dof=dof,
-        recorded=_recorded(campaign, tests),
+        recorded=np.array([campaign.began[test] for test in tests]),
     )
-
-
-def _recorded(campaign: Campaign, tests: tuple[str, ...]) -> NDArray[np.float64]:
-    """When each test was recorded: its start [s since 1970] where all have one, otherwise its place among them."""
-    listed = [each for each in campaign.recordings if each.name in tests]
-    starts = [each.start for each in listed if each.start is not None]
-    known = starts if len(starts) == len(listed) else range(len(listed))
-    when = {each.name: float(place) for each, place in zip(listed, known, strict=True)}
-    return np.array([when[test] for test in tests])
 
 
 def _at_origin_of(lead: ChannelFit, fit: ChannelFit) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:

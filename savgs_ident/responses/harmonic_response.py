@@ -22,17 +22,29 @@ from savgs_ident.core.errors import DataWarning
 
 
 class ComparedPart(NamedTuple):
-    """The part of each of D windows in which readings are compared, and at which frequencies.
+    """The part of each of D tests in which readings are compared, and at which frequencies.
 
     Attributes:
         begin: phase at which it begins [rad], (D,).
         end: phase at which it ends [rad], (D,).
-        every: from one order of the readings to the next, in orders of the window [1], (D,).
+        every: from one order of the readings to the next, in orders of the test [1], (D,).
+
+    Of a window it is a part. Of a dwell beside windows it begins so long before the period and ends so long after it
+    (:data:`WHOLE_PERIOD`) that every instant counts alike, and every order is compared.
     """
 
     begin: NDArray[np.float64]
     end: NDArray[np.float64]
     every: NDArray[np.float64]
+
+    @property
+    def repeats(self) -> NDArray[np.bool_]:
+        """Which of the tests repeat, (D,): the dwells among them."""
+        return np.asarray(self.end - self.begin > 2.0 * np.pi)
+
+
+WHOLE_PERIOD = ComparedPart(*(np.array([each]) for each in (-10.0 * np.pi, 12.0 * np.pi, 1.0)))
+"""That of one dwell."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +71,7 @@ class HarmonicResponse:
         recorded: when each dwell was recorded, (D,): its start [s since 1970] where all dwells have one, otherwise
             its place among them in the campaign [1]; None where neither is known.
         part: of each test that is compared: there the ``harmonics`` of readings are those of :func:`compared_share`
-            times the reading, at every so many-th order; those of inputs are not. None for dwells, which repeat.
+            times the reading, at every so many-th order; those of inputs are not. None where all tests are dwells.
         beside: mean of what was recorded beside the plant's channels in each dwell [its unit], (D,) by name; NaN
             where it was not.
     """
@@ -95,6 +107,20 @@ class HarmonicResponse:
     def times(self) -> NDArray[np.float64]:
         """When each dwell was recorded, in any unit of time; their order where that is not known, (D,)."""
         return np.arange(float(len(self.tests))) if self.recorded is None else self.recorded
+
+    @property
+    def dwells(self) -> NDArray[np.intp]:
+        """Places of the tests that repeat."""
+        return np.flatnonzero(self._repeats)
+
+    @property
+    def windows(self) -> NDArray[np.intp]:
+        """Places of the tests that do not, and are windows of longer ones."""
+        return np.flatnonzero(~self._repeats)
+
+    @property
+    def _repeats(self) -> NDArray[np.bool_]:
+        return np.ones(len(self.tests), np.bool_) if self.part is None else self.part.repeats
 
     @property
     def spacing(self) -> NDArray[np.float64]:

@@ -18,8 +18,8 @@ share what they see of it, for the part that is compared is shorter than the win
 and every so many-th where there would be more than :data:`NUMBERS`.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from math import ceil, floor, log
 
 import numpy as np
@@ -35,6 +35,9 @@ Array = NDArray[np.float64]
 
 KINDS: tuple[TestKind, ...] = ("road", "sweep", "other")
 """The kinds of test that are cut into windows."""
+
+BESIDE_DWELLS: tuple[TestKind, ...] = ("road",)
+"""Those of them that are where there are dwells: there a sweep is kept to see what is predicted of it."""
 
 LEAD_S = 3.0
 """From the beginning of a window to what is compared of it [s].
@@ -74,8 +77,9 @@ def estimate_windows(
     readings: Sequence[str],
     highest_hz: float = HIGHEST_HZ,
     lead_s: float = LEAD_S,
+    kinds: Collection[TestKind] = KINDS,
 ) -> HarmonicResponse:
-    """The response of all tests of ``campaign`` that do not repeat, in windows.
+    """The response of all tests of ``campaign`` of these ``kinds``, which do not repeat, in windows.
 
     ``inputs`` are the channels that drive the plant, the first of which has to move; ``readings`` are what its
     sensors read. The noise is that of the standstill; where none was recorded, it is read from how rough the channels
@@ -92,7 +96,7 @@ def estimate_windows(
     still, warnings = estimate_standstill_noise(campaign)
     driven, found = inputs[0], []
     for recording in campaign.recordings:
-        if recording.kind not in KINDS:
+        if recording.kind not in kinds:
             continue
         even = even_record(
             campaign.source, recording, driven, (*inputs, *readings), still, LEAST_S, highest_hz
@@ -116,7 +120,8 @@ def estimate_windows(
         warnings += (_noise_assumed(campaign.source, assumed),)
     windows = _Windows.of(cut, lead_s, compared)
     channels = tuple(name for name in (*inputs, *readings) if any(name in each.values for each in found))
-    return windows.response(channels, set(inputs), warnings, highest_hz)
+    response = windows.response(channels, set(inputs), warnings, highest_hz)
+    return replace(response, recorded=windows.recorded(campaign))
 
 
 def _compared_s(lasting: Sequence[float], wanted: float) -> float:
@@ -274,9 +279,20 @@ class _Windows:
             noise_sd=noise,
             periods=np.ones(shape[0], np.int64),
             warnings=warnings,
-            recorded=np.arange(float(shape[0])),
             part=ComparedPart(*(np.full(shape[0], float(each)) for each in (*self.part, every))),
         )
+
+    def recorded(self, campaign: Campaign) -> Array:
+        """When what is compared in each window began, on the scale of when the tests did, (D,)."""
+        began = campaign.began
+        dated = all(each.start is not None for each in campaign.recordings)
+
+        def when(window: _Window) -> float:
+            record = window.record
+            into = window.first / record.rate + self.lead - record.before
+            return began[record.test] + (into if dated else into / (record.duration - record.before))
+
+        return np.array([when(each) for each in self.windows])
 
     def _name(self, window: _Window) -> str:
         # Rounded to what is printed, and no negative zero.

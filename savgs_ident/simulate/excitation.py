@@ -22,8 +22,9 @@ from savgs_ident.plants.base import AbstractPlant, Excitation, Input
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, SweepResponse
+from savgs_ident.responses.selection import join_tests, only_tests
 from savgs_ident.responses.sweeps import estimate_sweep_response
-from savgs_ident.responses.windows import HIGHEST_HZ, KINDS, LEAD_S, estimate_windows
+from savgs_ident.responses.windows import BESIDE_DWELLS, HIGHEST_HZ, KINDS, LEAD_S, estimate_windows
 from savgs_ident.simulate.mesh import Layout, Mesh, over_dwells, waves
 
 SUMMED = 64
@@ -197,6 +198,24 @@ def measured_excitation(
     return Excitation(jnp.asarray(measured.frequency), harmonics, part)
 
 
+def only_driven(excitation: Excitation, kept: NDArray[np.intp]) -> Excitation:
+    """What drives the plant in some of the tests; as in dwells where they all are."""
+    if excitation.part is None:
+        harmonics = {name: each[kept] for name, each in excitation.harmonics.items()}
+        return Excitation(excitation.frequency[kept], harmonics)
+    part = ComparedPart(*(np.asarray(each)[kept] for each in excitation.part))
+    harmonics = {name: _that_move(each[kept]) for name, each in excitation.harmonics.items()}
+    if part.repeats.all():
+        return Excitation(excitation.frequency[kept], harmonics)
+    return Excitation(excitation.frequency[kept], harmonics, cast(Any, ComparedPart)(*map(jnp.asarray, part)))
+
+
+def _that_move(harmonics: Array) -> Array:
+    """Up to the highest order (D, K) that is not zero in every test; the first is kept."""
+    highest = np.flatnonzero(np.asarray(harmonics).any(axis=0)).max(initial=0)
+    return harmonics[:, : max(int(highest), 1) + 1]
+
+
 def _recorded(given: Input, measured: HarmonicResponse, table: ParameterTable) -> NDArray[np.complex128]:
     rest = table[given.rest].value if given.rest else 0.0
     if given.name not in measured.channels:
@@ -218,15 +237,11 @@ def _recorded(given: Input, measured: HarmonicResponse, table: ParameterTable) -
         harmonics[~valid[:, 0], 0] = rest
     else:
         harmonics[:, 0] = 0.0
-    # A window is long: its orders are a few tenths of a hertz apart.
-    highest = given.orders if measured.part is None else None
-    return harmonics if highest is None else harmonics[:, : highest + 1]
-
-
-_FIELDS = (
-    "frequency", "frequency_sd", "harmonics", "covariance", "valid", "peak_to_peak", "peak_to_peak_sd",
-    "noise_sd", "periods",
-)  # fmt: skip
+    if given.orders is None:
+        return harmonics
+    # A window is long: its orders are a few tenths of a hertz apart, and all of them count.
+    harmonics[measured.dwells, given.orders + 1 :] = 0.0
+    return harmonics if measured.windows.size else harmonics[:, : given.orders + 1]
 
 
 def up_to_frequency(response: HarmonicResponse, highest: float | None) -> HarmonicResponse:
@@ -250,20 +265,6 @@ def every_so_many(response: HarmonicResponse, step: int) -> HarmonicResponse:
     """Every ``step``-th dwell, the last one among them: it is the fastest."""
     count = response.frequency.size
     return only_tests(response, np.arange((count - 1) % step, count, step))
-
-
-def only_tests(response: HarmonicResponse, kept: NDArray[np.int64]) -> HarmonicResponse:
-    """Those of its tests, by their places."""
-    dof, recorded = response.covariance_dof, response.recorded
-    return replace(
-        response,
-        tests=tuple(response.tests[d] for d in kept),
-        covariance_dof=None if dof is None else dof[kept],
-        recorded=None if recorded is None else recorded[kept],
-        part=None if response.part is None else ComparedPart(*(each[kept] for each in response.part)),
-        beside={name: each[kept] for name, each in response.beside.items()},
-        **{name: getattr(response, name)[kept] for name in _FIELDS},
-    )
 
 
 Measurements = Campaign | HarmonicResponse
@@ -302,26 +303,29 @@ def response_of_tests(
     progress: Progress = no_progress,
     lead_s: float = LEAD_S,
 ) -> HarmonicResponse:
-    """The same; of a campaign without dwells that of its other tests, a road or a sweep, in windows.
+    """The same, and beside dwells that of roads, in windows; without dwells that of sweeps and other tests, too.
 
-    What is compared of these begins ``lead_s`` [s] after they do, up to 15 Hz or ``max_frequency`` [Hz]. With a
-    warning ``tests_not_used`` for roads beside dwells.
+    What is compared in windows begins ``lead_s`` [s] after they do, up to 15 Hz or ``max_frequency`` [Hz]. With a
+    warning where roads beside dwells cannot be used.
     """
     if isinstance(measured, HarmonicResponse):
         return measured_response(measured, plant, orders, max_frequency, progress)
-    if measured.of_kind("dwell") or not any(measured.of_kind(kind) for kind in KINDS):
-        response = measured_response(measured, plant, orders, max_frequency, progress)
-        beside = tuple(_not_used(measured.source, each.name) for each in measured.of_kind("road"))
-        return replace(response, warnings=(*response.warnings, *beside))
+    dwells = bool(measured.of_kind("dwell")) or not any(measured.of_kind(kind) for kind in KINDS)
+    kinds = BESIDE_DWELLS if dwells else KINDS
+    if not any(measured.of_kind(kind) for kind in kinds):
+        return measured_response(measured, plant, orders, max_frequency, progress)
+    response = measured_response(measured, plant, orders, max_frequency, progress) if dwells else None
     progress("cutting windows")
     inputs, readings = ([each.name for each in listed] for listed in (plant.inputs, plant.channels))
     highest = HIGHEST_HZ if max_frequency is None else max_frequency
-    return estimate_windows(measured.only(recorded_names(plant)), inputs, readings, highest, lead_s)
-
-
-def _not_used(source: str, test: str) -> DataWarning:
-    what = "is not used beside dwells"
-    return DataWarning("tests_not_used", what, source, test, "", None, "give it as a campaign of its own")
+    only = measured.only(recorded_names(plant))
+    try:
+        windows = estimate_windows(only, inputs, readings, highest, lead_s, kinds)
+    except InputError as error:
+        if response is None:
+            raise
+        return replace(response, warnings=(*response.warnings, error.as_warning("tests_not_used")))
+    return windows if response is None else join_tests(response, windows)
 
 
 def first_sweep(

@@ -11,8 +11,9 @@ from savgs_ident.core.values import as_values
 from savgs_ident.plants.model import Model
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.selection import only_tests
 from savgs_ident.responses.windows import LEAD_S
-from savgs_ident.simulate.excitation import Measurements, measured_excitation, only_tests, response_of_tests
+from savgs_ident.simulate.excitation import Measurements, measured_excitation, response_of_tests
 from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 
 REMEMBERED = 0.01
@@ -32,7 +33,7 @@ def forgetful_response(
     max_frequency: float | None = None,
     progress: Progress = no_progress,
 ) -> HarmonicResponse:
-    """The response that a model is compared with: dwells, else windows as long as it needs to forget their beginning.
+    """The response that a model is compared with: dwells, and windows as long as it needs to forget their beginning.
 
     ``orders`` are compared up to ``max_frequency`` [Hz]. With a warning ``window_remembers`` for each window that is
     left out for it remembers: friction may stick through its beginning. Raises :class:`InputError` if nothing can be
@@ -48,26 +49,32 @@ def forgetful_motion(
     max_frequency: float | None = None,
     progress: Progress = no_progress,
 ) -> tuple[HarmonicResponse, PeriodicSolution | None]:
-    """The same, and the motion of the model in the windows, where all of them are compared; None for dwells."""
+    """The same, and the motion of the model in all tests, where all windows are compared; None for dwells alone."""
     response = response_of_tests(measured, model.plant, orders, max_frequency, progress)
     if response.part is None:
         return response, None
     left, half, motion = _left(response, model)
-    if np.min(left) >= REMEMBERED and isinstance(measured, Campaign):
-        lead = _longer(LEAD_S, float(np.median(half)), float(np.median(left)))
-        progress(f"cutting windows of which the first {lead:.3g} s are not compared")
-        response = response_of_tests(measured, model.plant, orders, max_frequency, lead_s=lead)
-        left, _, motion = _left(response, model)
-    lasting = _lasting(response, left)
+    try:
+        if np.min(left) >= REMEMBERED and isinstance(measured, Campaign):
+            lead = _longer(LEAD_S, float(np.median(half)), float(np.median(left)))
+            progress(f"cutting windows of which the first {lead:.3g} s are not compared")
+            response = response_of_tests(measured, model.plant, orders, max_frequency, lead_s=lead)
+            left, _, motion = _left(response, model)
+        lasting = _lasting(response, left)
+    except InputError as error:
+        if not response.dwells.size:
+            raise
+        warnings = (*response.warnings, error.as_warning("tests_not_used"))
+        return replace(only_tests(response, response.dwells), warnings=warnings), None
     return lasting, motion if lasting is response else None
 
 
 def _left(
     response: HarmonicResponse, model: Model
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], PeriodicSolution]:
-    """What a model remembers of the beginning of each window [1], (D,): after the lead, and after half of it.
+    """What a model remembers of the beginning of each window [1], (w,): after the lead, and after half of it.
 
-    And its motion.
+    And its motion in all tests.
     """
     assert response.part is not None
     plant, p = model.build(), as_values(model.table.as_dict())
@@ -98,41 +105,46 @@ def _longer(lead: float, half: float, left: float) -> float:
 
 def _lasting(response: HarmonicResponse, left: NDArray[np.float64]) -> HarmonicResponse:
     """The windows of which less than :data:`REMEMBERED` is ``left``."""
-    kept = np.flatnonzero(left < REMEMBERED)
-    if kept.size == 0:
+    forgotten = left < REMEMBERED
+    if not forgotten.any():
         raise InputError(
             f"the model remembers {100.0 * np.min(left):.2g} % of how a motion began where windows are compared",
             remedy="record dwells: a plant that rings or sticks for so long is not identified from windows",
         )
-    gone = [d for d in range(left.size) if d not in kept]
+    gone = response.windows[~forgotten]
     warnings = tuple(
         DataWarning(
             "window_remembers",
-            f"is left out: the model remembers {100.0 * left[d]:.2g} % of how the motion in it began",
+            f"is left out: the model remembers {100.0 * share:.2g} % of how the motion in it began",
             test=response.tests[d],
             remedy="let the plant move for some seconds before what matters",
         )
-        for d in gone
+        for d, share in zip(gone, left[~forgotten], strict=True)
     )
-    return replace(only_tests(response, kept), warnings=(*response.warnings, *warnings)) if gone else response
+    if not gone.size:
+        return response
+    kept = np.setdiff1d(np.arange(len(response.tests)), gone)
+    return replace(only_tests(response, kept), warnings=(*response.warnings, *warnings))
 
 
 def remembered(solution: PeriodicSolution, upto: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What is left of how the motion in each window began at a phase of it [rad], (D,): a share [1], (D,).
+    """What is left of how the motion in each window began at phases (D,) [rad]: shares [1] of w windows, (w,).
 
     A deviation of the states, each in units of its largest value in the window, is followed along the linearised
     motion; the windows are of one length. Infinite where there is no motion.
     """
-    windows, nodes = len(solution.mesh.layout.counts), solution.mesh.layout.counts[0]
-    steps = np.asarray(solution.linearised.factors.steps)
+    places, layout = solution.excitation.windows, solution.mesh.layout
+    here, windows, nodes = layout.nodes_of(places), places.size, layout.counts[places[0]]
+    steps = np.asarray(solution.linearised.factors.steps)[..., here]
     by_node = np.moveaxis(steps.reshape(*steps.shape[:2], windows, nodes), (3, 2), (0, 1))
-    phase = np.asarray(solution.mesh.phase).reshape(windows, nodes)
+    phase = np.asarray(solution.mesh.phase)[here].reshape(windows, nodes)
     left = np.broadcast_to(np.eye(steps.shape[0]), by_node.shape[1:])
     for node in range(nodes):
-        before = phase[:, node] < upto
+        before = phase[:, node] < upto[places]
         left = np.where(before[:, None, None], by_node[node] @ left, left)
-    largest = np.abs(np.asarray(solution.trajectory.x)).reshape(-1, windows, nodes).max(axis=2).T
+    moved = np.abs(np.asarray(solution.trajectory.x)[:, here])
+    largest = moved.reshape(-1, windows, nodes).max(axis=2).T
     size = np.maximum(largest, np.finfo(float).tiny)
     share = np.linalg.norm(left * size[:, None, :] / size[:, :, None], axis=1).max(axis=1)
-    solved = np.array([each.ok for each in solution.status()])
+    solved = np.array([each.ok for each in solution.status()])[places]
     return np.where(solved & np.isfinite(share), share, np.inf)

@@ -11,6 +11,7 @@ A slow dwell needs more nodes than a fast one, because its reversals take the sa
 them; chunks of equal length are what the linear algebra runs over in parallel.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -45,6 +46,11 @@ class Layout:
     def dwell(self) -> NDArray[np.intp]:
         """The dwell of each node, (P,)."""
         return np.repeat(np.arange(len(self.counts)), self.counts)
+
+    def nodes_of(self, dwells: Sequence[int] | NDArray[np.intp]) -> NDArray[np.intp]:
+        """The nodes of some dwells, one dwell after the other."""
+        ranges = [np.arange(self.starts[d], self.starts[d] + self.counts[d]) for d in dwells]
+        return np.concatenate([np.zeros(0, np.intp), *ranges])
 
     @cached_property
     def following(self) -> NDArray[np.intp]:
@@ -147,6 +153,13 @@ def _multiples(angle: Float[Array, " P"], count: int) -> tuple[Float[Array, "n P
 
     nought = jnp.ones_like(angle), jnp.zeros_like(angle)
     return jax.lax.scan(turn, nought, None, length=count)[1]
+
+
+def only_dwells(mesh: Mesh, dwells: Sequence[int] | NDArray[np.intp]) -> Mesh:
+    """The nodes of some of the dwells."""
+    nodes = mesh.layout.nodes_of(dwells)
+    layout = Layout(tuple(mesh.layout.counts[d] for d in dwells))
+    return Mesh(layout, *(np.asarray(each)[nodes] for each in mesh[1:]))
 
 
 def uniform_mesh(layout: Layout) -> Mesh:

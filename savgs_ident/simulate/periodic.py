@@ -41,7 +41,7 @@ from savgs_ident.simulate.collocation import (
     solve_linearised,
     step_defects,
 )
-from savgs_ident.simulate.excitation import inputs_at, motion_scale, signals_at
+from savgs_ident.simulate.excitation import inputs_at, motion_scale, only_driven, signals_at
 from savgs_ident.simulate.march import march
 from savgs_ident.simulate.mesh import (
     CHUNK,
@@ -49,6 +49,7 @@ from savgs_ident.simulate.mesh import (
     Mesh,
     adapted_mesh,
     layout_for,
+    only_dwells,
     over_dwells,
     uniform_mesh,
 )
@@ -162,9 +163,10 @@ class PeriodicSettings:
 def layout_of(excitation: Excitation, settings: PeriodicSettings) -> Layout:
     """How many nodes each test has."""
     frequency = np.asarray(excitation.frequency)
-    if excitation.part is None:
-        return layout_for(frequency, settings.nodes, settings.slow)
-    return Layout(tuple(int(count) for count in CHUNK * np.ceil(settings.window_rate / frequency / CHUNK)))
+    counts = np.array(layout_for(frequency, settings.nodes, settings.slow).counts)
+    windows = excitation.windows
+    counts[windows] = CHUNK * np.ceil(settings.window_rate / frequency[windows] / CHUNK)
+    return Layout(tuple(counts.tolist()))
 
 
 class PeriodicSolution(eqx.Module):
@@ -260,6 +262,17 @@ def _cold_start(model: AbstractPlant, excitation: Excitation, mesh: Mesh) -> Tra
     return Trajectory(x, jnp.zeros((len(q) + len(states), x.shape[1])))
 
 
+def _with_windows_marched(
+    model: AbstractPlant, p: Values, excitation: Excitation, mesh: Mesh, start: Trajectory
+) -> Trajectory:
+    """The start of all tests, that of the windows followed in time from their first instant."""
+    windows = excitation.windows
+    theirs, nodes = only_dwells(mesh, windows), mesh.layout.nodes_of(windows)
+    first = start.x[:, mesh.layout.starts[windows]]
+    marched = march(model, p, model.prepare(p), only_driven(excitation, windows), theirs, first)
+    return Trajectory(*(known.at[:, nodes].set(new) for known, new in zip(start, marched, strict=True)))
+
+
 def _carry_over(trajectory: Trajectory, old: Mesh, new: Mesh) -> Trajectory:
     """A trajectory known on old nodes, at new ones, by linear interpolation."""
 
@@ -304,8 +317,8 @@ def simulate_periodic(
         layout = layout_of(excitation, settings)
     mesh = uniform_mesh(layout)
     start = _cold_start(model, excitation, mesh)
-    if excitation.part is not None:
-        start = march(model, p, model.prepare(p), excitation, mesh, start.x[:, layout.starts])
+    if excitation.windows.size:
+        start = _with_windows_marched(model, p, excitation, mesh, start)
     first, *later = [COARSE] * settings.adaptations + [settings.iterations]
     solution = solve_on_mesh(model, p, excitation, mesh, start, first)
     for limit in later:

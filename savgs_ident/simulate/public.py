@@ -7,7 +7,7 @@ widest gaps, for arrays of the same shape need no second compilation.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import jax
@@ -28,6 +28,7 @@ from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_pe
 from savgs_ident.simulate.excitation import (
     interpolate_excitation,
     measured_excitation,
+    only_driven,
     recorded_names,
     resting_values,
     sine_excitation,
@@ -111,6 +112,15 @@ class SimulatedResponse(Result):
     def driven(self) -> NDArray[np.complex128]:
         """First harmonics of the first input [its unit], (F,)."""
         return np.asarray(self.excitation.harmonics[self.model.plant.inputs[0].name])[:, 1]
+
+    def of_tests(self, kept: NDArray[np.intp], orders: int) -> "SimulatedResponse":
+        """Of some of the tests, orders 0..``orders``."""
+        return replace(
+            self,
+            excitation=only_driven(self.excitation, kept),
+            harmonics=self.harmonics[kept, :, : orders + 1],
+            status=tuple(self.status[d] for d in kept),
+        )
 
     def curve(self, label: str) -> ModelCurve:
         """As a curve for a figure."""

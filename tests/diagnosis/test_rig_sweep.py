@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 from typing import Any, cast
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -10,6 +11,7 @@ from scipy.integrate import solve_ivp
 from savgs_ident.diagnosis import gap as module
 from savgs_ident.diagnosis.gap import along, first_harmonic, frequencies_of, sweep_shrink
 from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
@@ -99,8 +101,9 @@ def test_where_all_dwells_lie_in_the_sweep_it_is_compared_as_far_as_they_reach()
 def test_the_gap_is_relative_to_the_response_and_leaves_out_what_no_dwell_reaches(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    excitation = SimpleNamespace(frequency=DWELLS)
-    plant = cast(Any, SimpleNamespace(excitation=excitation, channels=CHANNELS, constants=DEFAULTS))
+    excitation, dwells = Excitation(jnp.asarray(DWELLS), {}), np.arange(len(DWELLS))
+    given = {"excitation": excitation, "dwells": dwells, "channels": CHANNELS, "constants": DEFAULTS}
+    plant = cast(Any, SimpleNamespace(**given))
     sweep = _sweep()
 
     def reported(plant: Any, sweep: SweepResponse, frequencies: Any, terms: Any, values: Any) -> Any:

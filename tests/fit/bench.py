@@ -15,6 +15,7 @@ from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.selection import only_tests
 from savgs_ident.simulate.periodic import resolve, simulate_periodic
 from savgs_ident.simulate.readings import harmonics
 
@@ -31,23 +32,10 @@ TRUTH: Mapping[str, float] = {
 FEW = (1.4, 2.0, 2.35, 3.0, 4.0, 5.0, 5.5, 6.0)
 """Dwells that identify all four parameters [Hz]."""
 
-_BY_DWELL = (
-    "frequency", "frequency_sd", "harmonics", "covariance", "valid", "peak_to_peak", "peak_to_peak_sd",
-    "noise_sd", "periods",
-)  # fmt: skip
-
 
 def only(response: HarmonicResponse, dwells: NDArray[np.bool_]) -> HarmonicResponse:
     """Some dwells of a response."""
-    kept = np.flatnonzero(dwells)
-    known = None if response.covariance_dof is None else response.covariance_dof[kept]
-    return replace(
-        response,
-        tests=tuple(response.tests[place] for place in kept),
-        covariance_dof=known,
-        recorded=None if response.recorded is None else response.recorded[kept],
-        **{name: getattr(response, name)[kept] for name in _BY_DWELL},
-    )
+    return only_tests(response, np.flatnonzero(dwells))
 
 
 def true_rig(rig: Rig) -> Rig:

@@ -34,7 +34,7 @@ MEASURED = np.where(USED, _complex(), 0.0)
 @pytest.fixture(scope="module")
 def likelihood() -> Likelihood:
     whitening = np.linalg.inv(np.linalg.cholesky(COVARIANCE)) * USED[..., None, None]
-    return likelihood_of(HarmonicTarget(jnp.asarray(MEASURED), jnp.asarray(whitening), USED, (1, 2)))
+    return likelihood_of(HarmonicTarget(jnp.asarray(MEASURED), jnp.asarray(whitening), USED, (1, 2), ()))
 
 
 def _reach(dwell: int, channel: int, order: int) -> float:

@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 
 import savgs_ident as si
 from savgs_ident.responses.dwells import estimate_response
-from savgs_ident.simulate.excitation import only_tests
+from savgs_ident.responses.selection import only_tests
 
 from .conftest import Signals
 

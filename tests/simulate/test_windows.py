@@ -14,7 +14,7 @@ from savgs_ident.core.values import as_values
 from savgs_ident.effects.effect import generic_effects
 from savgs_ident.fit.least_squares import fit_least_squares
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
-from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
+from savgs_ident.recordings.recording import Campaign, Recording
 from savgs_ident.responses.harmonic_response import TAPER, HarmonicResponse, compared_share
 from savgs_ident.responses.windows import CLOSING_S, HIGHEST_HZ, LEAD_S, estimate_windows
 from savgs_ident.simulate.excitation import SUMMED, measured_excitation, signals_at
@@ -23,70 +23,9 @@ from savgs_ident.simulate.mesh import uniform_mesh, waves
 from savgs_ident.simulate.periodic import PeriodicSettings, layout_of, resolve, simulate_periodic
 from savgs_ident.simulate.readings import harmonics
 from savgs_ident.simulate.sensitivity import harmonic_sensitivities
+from tests.simulate.linear_roads import INPUTS, NOISE, RATE, READINGS, campaign, channel_of, recording_of
 
-RATE = 500.0
-NOISE = {"body_accel": 0.02, "susp_deflection": 5e-5}
 LAG_S = 0.015
-INPUTS, READINGS = ("road_height",), ("body_accel", "susp_deflection")
-
-
-def road(seconds: float, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Time [s] and height [m] of a road up to 30 Hz that begins level."""
-    time, random = np.arange(round(seconds * RATE)) / RATE, np.random.default_rng(seed)
-    frequency = np.arange(0.25, 30.0, 0.13)
-    size, phase = 2e-3 / frequency, random.uniform(0.0, 2.0 * np.pi, frequency.size)
-    height = (size * np.sin(2.0 * np.pi * frequency * time[:, None] + phase)).sum(axis=1)
-    return time, height * np.minimum(time, 1.0) ** 2
-
-
-def linear_readings(time: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Acceleration of the body [m/s^2] and deflection [m], (2, n), by the exponential of the state matrix."""
-    p = PARAMETERS.as_dict()
-    k, c, kt, ct, ms, mu = (p[name] for name in ("k", "c", "k_t", "c_t", "m_s", "m_u"))
-    # States: height and speed of the body, height of the wheel, its speed less what the tyre's damper gives it.
-    a = np.array(
-        [
-            [0.0, 1.0, 0.0, 0.0],
-            [-k / ms, -c / ms, k / ms, c / ms],
-            [0.0, 0.0, 0.0, 1.0],
-            [k / mu, c / mu, -(k + kt) / mu, -(c + ct) / mu],
-        ]
-    )
-    damped = np.array([0.0, c / ms * ct / mu, ct / mu, -(c + ct) / mu * ct / mu + kt / mu])
-    accel = a[1], c / ms * ct / mu
-    deflection = np.array([-1.0, 0.0, 1.0, 0.0]), 0.0
-    rows = np.stack([accel[0], deflection[0]])
-    direct = np.array([[accel[1]], [deflection[1]]])
-    _, seen, _ = lsim(StateSpace(a, damped[:, None], rows, direct), height, time)
-    return np.asarray(seen).T
-
-
-def _channel(name: str, time: NDArray[np.float64], values: NDArray[np.float64]) -> RecordedChannel:
-    return RecordedChannel(name, "m/s^2" if name == "body_accel" else "m", time, values)
-
-
-def campaign(
-    seconds: float = 20.0, seed: int = 0, standstill: bool = True, noise: float = 1.0, name: str = "road_c"
-) -> Campaign:
-    time, height = road(seconds, seed)
-    random = np.random.default_rng(seed + 100)
-    clean = dict(zip(READINGS, linear_readings(time, height), strict=True))
-    seen = {
-        each: values + noise * NOISE[each] * random.standard_normal(time.size)
-        for each, values in clean.items()
-    }
-    tests = [_test(name, "road", time, {"road_height": height} | seen)]
-    if standstill:
-        still = {each: max(noise, 1.0) * sd * random.standard_normal(2000) for each, sd in NOISE.items()}
-        tests.append(_test("standstill", "standstill", time[:2000], still))
-    return Campaign("made", tuple(tests), (), "")
-
-
-def _test(
-    name: str, kind: str, time: NDArray[np.float64], values: dict[str, NDArray[np.float64]]
-) -> Recording:
-    channels = {each: _channel(each, time, signal) for each, signal in values.items()}
-    return Recording(name, kind, None, channels)  # type: ignore[arg-type]
 
 
 def predicted(measured: HarmonicResponse) -> NDArray[np.complex128]:
@@ -117,7 +56,7 @@ def test_a_sensor_that_lags_shows_the_share_of_what_it_shows() -> None:
     _, late, _ = lsim(
         StateSpace([[-1.0 / LAG_S]], [[1.0 / LAG_S]], [[1.0]], [[0.0]]), accel.values, accel.time
     )
-    other = dict(test.channels) | {accel.name: _channel(accel.name, accel.time, np.ravel(late))}
+    other = dict(test.channels) | {accel.name: channel_of(accel.name, accel.time, np.ravel(late))}
     made = Campaign("made", (Recording(test.name, "road", None, other), still), (), "")
     measured = estimate_windows(made, INPUTS, READINGS)
     plant = TwoMass() + generic_effects(TwoMass.ports)["accelerometer_lag"]
@@ -191,12 +130,12 @@ def test_without_a_standstill_the_noise_is_read_from_the_roughness_and_said_to_b
         assert measured.noise_sd[:, measured.channel(name)] == pytest.approx(sd, rel=0.1)
 
 
-def test_a_window_with_a_gap_is_not_compared_in_that_channel() -> None:
+def test_a_window_with_a_gap_is_not_compared_in_thatchannel_of() -> None:
     whole = campaign()
     road_test, still = whole.recordings
     accel = road_test.channels["body_accel"]
     gap = (accel.time > 15.0) & (accel.time < 15.5)
-    holed = _channel(accel.name, accel.time[~gap], accel.values[~gap])
+    holed = channel_of(accel.name, accel.time[~gap], accel.values[~gap])
     channels = dict(road_test.channels) | {"body_accel": holed}
     test = Recording(road_test.name, "road", None, channels)
     measured = estimate_windows(Campaign("made", (test, still), (), ""), INPUTS, READINGS)
@@ -238,14 +177,14 @@ def test_what_cannot_be_cut_is_refused_with_what_to_do(made, what: str) -> None:
 def _standing(given: Campaign) -> Campaign:
     test, still = given.recordings
     level = test.channels["road_height"]
-    channels = dict(test.channels) | {"road_height": _channel("road_height", level.time, 0.0 * level.time)}
+    channels = dict(test.channels) | {"road_height": channel_of("road_height", level.time, 0.0 * level.time)}
     return Campaign("made", (Recording(test.name, "road", None, channels), still), (), "")
 
 
 def _apart(given: Campaign) -> Campaign:
     test, still = given.recordings
     accel = test.channels["body_accel"]
-    later = _channel(accel.name, accel.time + 100.0, accel.values)
+    later = channel_of(accel.name, accel.time + 100.0, accel.values)
     channels = dict(test.channels) | {accel.name: later}
     return Campaign("made", (Recording(test.name, "road", None, channels), still), (), "")
 
@@ -253,7 +192,8 @@ def _apart(given: Campaign) -> Campaign:
 def _thinned(given: Campaign, every: int = 25) -> Campaign:
     test, still = given.recordings
     channels = {
-        name: _channel(name, each.time[::every], each.values[::every]) for name, each in test.channels.items()
+        name: channel_of(name, each.time[::every], each.values[::every])
+        for name, each in test.channels.items()
     }
     return Campaign("made", (Recording(test.name, "road", None, channels), still), (), "")
 
@@ -263,7 +203,7 @@ def test_a_channel_with_a_clock_of_its_own_is_followed_as_well() -> None:
     test, still = campaign(noise=0.0).recordings
     deflection = test.channels["susp_deflection"]
     later = deflection.time[:-1] + 0.37 / RATE
-    shifted = _channel(deflection.name, later, CubicSpline(deflection.time, deflection.values)(later))
+    shifted = channel_of(deflection.name, later, CubicSpline(deflection.time, deflection.values)(later))
     other = Recording(test.name, "road", None, dict(test.channels) | {deflection.name: shifted})
     measured = estimate_windows(Campaign("made", (other, still), (), ""), INPUTS, READINGS)
     found, kept = predicted(measured), used(measured)[:, 1]
@@ -356,7 +296,7 @@ def rested(seconds: float) -> Campaign:
     count = round(seconds * RATE)
     after = np.arange(time.size + count) / RATE
     values = {name: np.concatenate([np.zeros(count), each.values]) for name, each in test.channels.items()}
-    return Campaign("made", (_test(test.name, "road", after, values), still), (), "")
+    return Campaign("made", (recording_of(test.name, "road", after, values), still), (), "")
 
 
 def test_a_test_that_begins_at_rest_is_compared_from_its_beginning() -> None:
@@ -393,7 +333,7 @@ def test_a_diagnosis_of_a_road_of_a_true_model_finds_nothing_missing(tmp_path: P
     assert found.shrink.recalibrated < 1.2 * found.shrink.floor
     page = found.to_html(tmp_path / "road.html").read_text()
     assert "2 windows of tests that do not repeat" in page
-    assert list(found.figure_names) == ["gap body_accel", "gap susp_deflection", "shrink"]
+    assert list(found.figure_names) == ["gap spectrum body_accel", "gap spectrum susp_deflection", "shrink"]
 
 
 @pytest.mark.slow

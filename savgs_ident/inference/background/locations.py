@@ -122,6 +122,14 @@ class _Seen(NamedTuple):
     constants: BackgroundConstants
 
     @property
+    def dwells(self) -> Signal:
+        """1 of each test that repeats, 0 of the others, (D,)."""
+        excitation = self.about.solution.excitation
+        found = np.ones(excitation.frequency.shape[0])
+        found[excitation.windows] = 0.0
+        return found
+
+    @property
     def angle(self) -> Signal:
         """Angle of the tests at the nodes [rad], (P,): that of the first input's first order."""
         excitation, first_input = self.about.solution.excitation, self.about.model.inputs[0].name
@@ -169,7 +177,7 @@ def _signals(name: str, ports: Sequence[Port], seen: _Seen) -> _Asked:
     port = signal_port(seen.about.model, name)
     assert port is not None
     fields = [seen.fields(where, each.values) for where, each in sets]
-    free = seen.fields(port, _waves(seen.nodes, seen.constants.free_orders))
+    free = seen.fields(port, _waves(seen))
 
     def location(columns: Signal) -> InputLocation:
         laws: list[Law] = []
@@ -249,8 +257,11 @@ def free_signal(coefficients: Signal, phase: Signal) -> Signal:
     return np.asarray(coefficients[0::2] @ np.cos(order * phase) + coefficients[1::2] @ np.sin(order * phase))
 
 
-def _waves(nodes: MeshPoints, orders: int) -> list[Signal]:
-    return [wave(order * nodes.phase) for order in range(1, orders + 1) for wave in (np.cos, np.sin)]
+def _waves(seen: _Seen) -> list[Signal]:
+    """Components of a signal that is free in every dwell: in a window it would have too many."""
+    phase, orders = seen.nodes.phase, range(1, seen.constants.free_orders + 1)
+    counted = seen.dwells[seen.nodes.dwell]
+    return [counted * wave(k * phase) for k in orders for wave in (np.cos, np.sin) if counted.any()]
 
 
 def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
@@ -271,10 +282,9 @@ def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
         mine = read[:, c]
         dynamic = np.stack([rows(mine * each) for each in sensor_filters(omega)], axis=1)
         static = np.stack([rows(each) for each in sensor_functions(mine, omega)], axis=1)
-        unit = [
-            np.where(order == k, 1.0, 0.0) * turn for k in range(1, about.orders + 1) for turn in (1.0, -1j)
-        ]
-        free = np.stack([rows(np.broadcast_to(each, mine.shape)) for each in unit], axis=1)
+        counted = seen.dwells[:, None]
+        unit = [counted * (order == k) * turn for k in range(1, about.orders + 1) for turn in (1.0, -1j)]
+        free = np.stack([rows(each) for each in unit], axis=1)
         port = next(
             each.name for each in about.model.ports if each.location == name and each.kind is PortKind.SENSOR
         )

@@ -60,7 +60,7 @@ class InputLocation:
     Attributes:
         name: its name.
         laws: that the input may follow, one of them.
-        free: change of the rows per component of a free input, in each test its own [unit of the row], (m, f).
+        free: change of the rows per component of a free input, in each dwell its own [unit of the row], (m, f).
     """
 
     name: str

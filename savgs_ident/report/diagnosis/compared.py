@@ -68,9 +68,7 @@ def first_harmonic_gap(diagnosis: Diagnosis, c: int) -> FirstHarmonicGap:
 
 
 def compared_channels(diagnosis: Diagnosis) -> tuple[int, ...]:
-    """The places of the channels whose first harmonic is compared anywhere."""
-    if diagnosis.measured is None or diagnosis.measured.part is not None:
-        return ()
+    """The places of the channels whose first harmonic is compared in any dwell; it must be one of dwells."""
     return tuple(
         c
         for c in range(len(diagnosis.given.channels))

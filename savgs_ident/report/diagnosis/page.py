@@ -32,9 +32,9 @@ from savgs_ident.report.diagnosis.text import (
     KIND_WORDS,
     alarm,
     baseline_sentence,
+    by_tests,
     closed_words,
     gap_percentage,
-    in_windows,
     port_words,
     probability_words,
     references,
@@ -121,8 +121,13 @@ def port_row(each: PortShare, diagnosis: Diagnosis) -> PortRow:
         named,
         percentage(each.share),
         _bar(each.share),
-        DASH if in_windows(diagnosis) else percentage(each.free_input_share),
+        percentage(each.free_input_share) if _has_free_inputs(diagnosis) else DASH,
     )
+
+
+def _has_free_inputs(diagnosis: Diagnosis) -> bool:
+    """Whether a signal was free in any test: it is in dwells, and along a drive's motion."""
+    return diagnosis.measured is None or diagnosis.measured.dwells.size > 0
 
 
 def shrink_table(diagnosis: Diagnosis) -> tuple[ShrinkRow, ...]:
@@ -213,7 +218,7 @@ def _number(value: float | None) -> str:
 def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
     """The page: one file, no network, nothing executed; the same diagnosis gives the same bytes."""
     shown, rest = shown_candidates(diagnosis)
-    verdict = diagnosis.verdict
+    verdict, (dwells, windows) = diagnosis.verdict, by_tests(diagnosis)
     return render_page(
         "diagnosis.html.j2",
         {
@@ -231,9 +236,10 @@ def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
             "rig_legend": report_of(diagnosis.given).legend,
             "ports": [port_row(each, diagnosis) for each in diagnosis.ports],
             "drive": drive_picture(diagnosis),
-            "windows": in_windows(diagnosis),
-            "spectra": gap_spectrum_pictures(diagnosis) if in_windows(diagnosis) else [],
-            "bode": [bode_picture(diagnosis, c) for c in compared_channels(diagnosis)],
+            "dwells": dwells is not None,
+            "windows": windows is not None,
+            "spectra": [] if windows is None else gap_spectrum_pictures(windows),
+            "bode": [] if dwells is None else [bode_picture(dwells, c) for c in compared_channels(dwells)],
             "loops": [_loop(diagnosis, each) for each in spread_loops(diagnosis.loops)],
             "lawful": any(each.law.size for each in diagnosis.loops),
             "nearest": any(each.nearest.size for each in diagnosis.loops),

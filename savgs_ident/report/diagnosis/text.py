@@ -15,6 +15,7 @@ from savgs_ident.effects.base import PortKind
 from savgs_ident.report.text import (
     DASH,
     channel_label,
+    counted,
     decimal,
     interval,
     numeral,
@@ -24,6 +25,7 @@ from savgs_ident.report.text import (
     table,
     unit_text,
 )
+from savgs_ident.responses.selection import by_kind
 
 KIND_WORDS: Mapping[str, str] = MappingProxyType(
     {"none": "nothing", "effect": "one effect", "several": "several effects", "unknown": "unknown"}
@@ -108,9 +110,9 @@ def law_label(diagnosis: Diagnosis, port: str) -> str:
     return f"law of {' + '.join(there or named)}"
 
 
-def in_windows(diagnosis: Diagnosis) -> bool:
-    """Whether it is one of tests that do not repeat."""
-    return diagnosis.measured is not None and diagnosis.measured.part is not None
+def by_tests(diagnosis: Diagnosis) -> tuple[Diagnosis | None, Diagnosis | None]:
+    """A diagnosis with its dwells, and with its windows; None where there are none, as along a drive's motion."""
+    return (None, None) if diagnosis.measured is None else by_kind(diagnosis, diagnosis.measured)
 
 
 def baseline_sentence(diagnosis: Diagnosis) -> str:
@@ -124,16 +126,15 @@ def baseline_sentence(diagnosis: Diagnosis) -> str:
             f"of motion; computed in {diagnosis.wall_s:.0f} s."
         )
     assert measured is not None
-    number = len(measured.tests)
-    if measured.part is not None:
-        return (
-            f"Baseline {diagnosis.model} with {effects}, compared with {number} windows of tests that do not repeat; "
-            f"computed in {diagnosis.wall_s:.0f} s."
-        )
-    span = f" between {measured.frequency[0]:.2f} and {measured.frequency[-1]:.2f} Hz" if number else ""
+    compared = []
+    if measured.dwells.size:
+        hertz = measured.frequency[measured.dwells]
+        compared.append(f"{counted(hertz.size, 'dwell')} between {hertz[0]:.2f} and {hertz[-1]:.2f} Hz")
+    if measured.windows.size:
+        compared.append(f"{counted(measured.windows.size, 'window')} of tests that do not repeat")
     return (
-        f"Baseline {diagnosis.model} with {effects}, compared with {number}"
-        f" {'dwell' if number == 1 else 'dwells'}{span}; computed in {diagnosis.wall_s:.0f} s."
+        f"Baseline {diagnosis.model} with {effects}, compared with {' and '.join(compared) or '0 dwells'}; "
+        f"computed in {diagnosis.wall_s:.0f} s."
     )
 
 

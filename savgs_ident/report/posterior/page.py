@@ -53,6 +53,7 @@ from savgs_ident.report.text import (
     unit_text,
     with_error,
 )
+from savgs_ident.responses.selection import by_kind
 
 _LEAST_WIDE = 1.2
 
@@ -237,10 +238,8 @@ def posterior_html(posterior: Posterior, origin: Origin) -> str:
             "traces": [_trace(posterior, each) for each in (*identified, *nuisance)],
             "profiles": _profiles(posterior),
             "predictive": predictive_sentence(posterior),
-            "windows": posterior.measured.part is not None,
-            "predicted": [predicted_picture(posterior, c) for c in _compared(posterior)],
+            "predicted": _predicted(posterior),
             "channels": [shown.title for shown in channel_labels(posterior.model).values()],
-            "inside": order_rows(posterior) if posterior.measured.part is None else octave_rows(posterior),
             "per_input": per_input_words(posterior.model),
             "checks": checks(posterior),
             "diagnostics": [diagnostic_row(each) for each in (*identified, *nuisance)],
@@ -310,27 +309,45 @@ def _profiles(posterior: Posterior) -> list[Picture]:
     return pictures
 
 
-def _compared(posterior: Posterior) -> list[int]:
-    """The channels in which anything is compared; of dwells, their first harmonics."""
-    used = (
-        posterior.predictive.used
-        if posterior.measured.part is not None
-        else posterior.predictive.used[..., 1:2]
+@dataclass(frozen=True)
+class Predicted:
+    """What is predicted of the dwells, or of the windows: by channel, and how much is inside by what."""
+
+    windows: bool
+    pictures: list[Picture]
+    inside: tuple[InsideRow, ...]
+
+
+def _predicted(posterior: Posterior) -> list[Predicted]:
+    """Of each kind of test that is compared, in the channels in which anything is; of dwells, first harmonics."""
+    dwells, windows = by_kind(posterior, posterior.measured)
+    channels, found = range(len(posterior.model.channels)), []
+    if dwells is not None:
+        first = dwells.predictive.used[..., 1]
+        pictures = [predicted_picture(dwells, c) for c in channels if first[:, c].any()]
+        found.append(Predicted(False, pictures, order_rows(dwells)))
+    if windows is not None:
+        used = windows.predictive.used
+        pictures = [predicted_spectrum_picture(windows, c) for c in channels if used[:, c].any()]
+        found.append(Predicted(True, pictures, octave_rows(windows)))
+    return found
+
+
+def predicted_spectrum_picture(posterior: Posterior, c: int) -> Picture:
+    """What is predicted for one channel in windows, against what was measured."""
+    title = tuple(channel_labels(posterior.model).values())[c].title
+    _, recorded, ends = predicted_spectrum(posterior, c)
+    within = int(np.sum((ends[0] <= recorded) & (recorded <= ends[1])))
+    words = (
+        f"Spectrum of the {title} over the windows, measured against the 95 % predictive band: at {within} of "
+        f"{recorded.size} frequencies it is inside."
     )
-    return [c for c in range(len(posterior.model.channels)) if np.any(used[:, c])]
+    return embed(predicted_spectrum_figure(posterior, c), words)
 
 
 def predicted_picture(posterior: Posterior, c: int) -> Picture:
-    """What is predicted for one channel, against what was measured."""
+    """What is predicted for one channel in dwells, against what was measured."""
     title = tuple(channel_labels(posterior.model).values())[c].title
-    if posterior.measured.part is not None:
-        _, recorded, ends = predicted_spectrum(posterior, c)
-        within = int(np.sum((ends[0] <= recorded) & (recorded <= ends[1])))
-        words = (
-            f"Spectrum of the {title} over the windows, measured against the 95 % predictive band: at {within} of "
-            f"{recorded.size} frequencies it is inside."
-        )
-        return embed(predicted_spectrum_figure(posterior, c), words)
     band = predictive_band(posterior, c)
     compared = np.isfinite(band.measured)
     words = (

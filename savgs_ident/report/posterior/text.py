@@ -15,7 +15,8 @@ from rich.console import Group, RenderableType
 from savgs_ident.fit.result import OverWindows
 from savgs_ident.inference.result import Marginal, Posterior
 from savgs_ident.report.fit import value_with_error
-from savgs_ident.report.text import DASH, count, decimal, numeral, percentage, plain, table
+from savgs_ident.report.text import DASH, count, counted, decimal, numeral, percentage, plain, table
+from savgs_ident.responses.selection import by_kind
 
 NUISANCE_WORDS: Mapping[str, str] = MappingProxyType(
     {
@@ -76,8 +77,10 @@ def scope_sentence(posterior: Posterior) -> str:
         else "; everything else was held at its value"
     )
     were = "was" if identified == 1 else "were"
-    compared = _dwells if posterior.measured.part is None else _windows
-    return f"{_counted(identified, 'parameter')} {were} identified from {compared(posterior)}{along}."
+    dwells, windows = by_kind(posterior, posterior.measured)
+    compared = [_dwells(dwells)] if dwells else []
+    compared += [_windows(windows)] if windows else []
+    return f"{counted(identified, 'parameter')} {were} identified from {' and '.join(compared)}{along}."
 
 
 def _dwells(posterior: Posterior) -> str:
@@ -85,7 +88,7 @@ def _dwells(posterior: Posterior) -> str:
     orders = np.flatnonzero(np.any(used, axis=(0, 1)))
     span = f"orders {orders[0]} to {orders[-1]}" if orders.size > 1 else f"order {' '.join(map(str, orders))}"
     return (
-        f"{_counted(len(measured.tests), 'dwell')} between {measured.frequency[0]:.2f} and "
+        f"{counted(len(measured.tests), 'dwell')} between {measured.frequency[0]:.2f} and "
         f"{measured.frequency[-1]:.2f} Hz ({np.sum(used)} harmonics, {span})"
     )
 
@@ -94,7 +97,7 @@ def _windows(posterior: Posterior) -> str:
     measured, used = posterior.measured, posterior.predictive.used
     frequency = OverWindows.of(measured, np.any(used, axis=1)).frequency
     return (
-        f"{_counted(len(measured.tests), 'window')} of tests that do not repeat ({np.sum(used)} harmonics at "
+        f"{counted(len(measured.tests), 'window')} of tests that do not repeat ({np.sum(used)} harmonics at "
         f"{frequency.size} frequencies from {frequency[0]:.2g} to {frequency[-1]:.3g} Hz)"
     )
 
@@ -240,10 +243,6 @@ def interval_words(each: Marginal) -> str:
 def _as_sentence(text: str) -> str:
     """``text`` with a capital at its head and a full stop at its end."""
     return f"{text[:1].upper()}{text[1:].rstrip('.')}."
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def posterior_text(posterior: Posterior) -> RenderableType:

@@ -1,0 +1,162 @@
+"""Dwells and roads in one campaign: each as it would be alone, and together more than either."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import savgs_ident as si
+from savgs_ident.core.values import as_values
+from savgs_ident.fit.public import compare
+from savgs_ident.inference.likelihood import likelihood_of
+from savgs_ident.inference.problem import harmonic_target
+from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.selection import by_kind, only_tests
+from savgs_ident.simulate.excitation import measured_excitation, response_of_tests
+from savgs_ident.simulate.forgetting import forgetful_motion, forgetful_response
+from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.readings import harmonics
+from tests.simulate.linear_roads import dwells_and_road
+
+MODEL = si.PlantModel(si.TwoMass(), PARAMETERS)
+ORDERS = 9
+
+
+def only_kinds(campaign: Campaign, *kinds: str) -> Campaign:
+    return replace(campaign, recordings=tuple(each for each in campaign.recordings if each.kind in kinds))
+
+
+@pytest.fixture(scope="module")
+def both() -> HarmonicResponse:
+    return response_of_tests(dwells_and_road(), MODEL.plant, ORDERS)
+
+
+@pytest.fixture(scope="module")
+def alone() -> tuple[HarmonicResponse, HarmonicResponse]:
+    made = dwells_and_road()
+    kinds = ("dwell", "road")
+    dwells, windows = (
+        response_of_tests(only_kinds(made, kind, "standstill"), MODEL.plant, ORDERS) for kind in kinds
+    )
+    return dwells, windows
+
+
+def test_dwells_out_of_both_are_the_dwells_alone(
+    both: HarmonicResponse, alone: tuple[HarmonicResponse, HarmonicResponse]
+) -> None:
+    dwells, _ = alone
+    found = only_tests(both, both.dwells)
+    assert both.dwells.size == 5
+    assert found.part is None
+    assert found.channels == dwells.channels
+    for each in fields(HarmonicResponse):
+        if isinstance(getattr(dwells, each.name), np.ndarray) and each.name != "recorded":
+            np.testing.assert_array_equal(getattr(found, each.name), getattr(dwells, each.name), each.name)
+
+
+def test_windows_out_of_both_are_the_windows_alone(
+    both: HarmonicResponse, alone: tuple[HarmonicResponse, HarmonicResponse]
+) -> None:
+    _, windows = alone
+    found = only_tests(both, both.windows)
+    assert found.tests == windows.tests
+    assert found.part is not None
+    assert windows.part is not None
+    np.testing.assert_array_equal(np.stack(found.part), np.stack(windows.part))
+    for name in ("harmonics", "covariance", "valid"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(windows, name), name)
+
+
+def test_tests_are_in_the_order_in_which_they_were_recorded(both: HarmonicResponse) -> None:
+    when = both.times
+    np.testing.assert_allclose(when[both.dwells], np.arange(5.0))
+    assert np.all(np.diff(when[both.windows]) > 0.0)
+    assert np.all((when[both.windows] > 5.0) & (when[both.windows] < 6.0))
+
+
+def test_each_kind_has_the_discrepancy_that_it_has_alone(
+    both: HarmonicResponse, alone: tuple[HarmonicResponse, HarmonicResponse]
+) -> None:
+    channels = MODEL.plant.channels
+    together = likelihood_of(harmonic_target(both, channels, ORDERS)).data
+    parts = [likelihood_of(harmonic_target(each, channels, ORDERS)).data for each in alone]
+    for name in ("measured", "variance", "discrepancy_scale"):
+        np.testing.assert_allclose(
+            getattr(together, name), np.concatenate([getattr(each, name) for each in parts]), err_msg=name
+        )
+
+
+def predicted(measured: HarmonicResponse) -> np.ndarray:
+    plant = TwoMass()
+    solution = simulate_periodic(
+        plant, as_values(PARAMETERS.as_dict()), measured_excitation(plant, measured, PARAMETERS)
+    )
+    assert all(status.ok for status in solution.status())
+    orders = harmonic_target(measured, plant.channels, ORDERS).used.shape[-1] - 1
+    return np.asarray(harmonics(plant, as_values(PARAMETERS.as_dict()), solution, orders))
+
+
+def test_a_plant_does_in_both_what_it_does_in_each(
+    both: HarmonicResponse, alone: tuple[HarmonicResponse, HarmonicResponse]
+) -> None:
+    together, (dwells, windows) = predicted(both), map(predicted, alone)
+    size = np.abs(dwells).max()
+    np.testing.assert_allclose(together[both.dwells, :, : ORDERS + 1], dwells, atol=1e-8 * size)
+    np.testing.assert_allclose(together[both.windows], windows, atol=1e-8 * np.abs(windows).max())
+
+
+def test_a_plant_that_forgets_too_slowly_is_held_against_the_dwells() -> None:
+    ringing = si.PlantModel(si.TwoMass(), PARAMETERS.with_values({"c": 50.0}))
+    found, motion = forgetful_motion(dwells_and_road(noise=0.0), ringing, ORDERS)
+    assert motion is None
+    assert found.part is None
+    assert len(found.tests) == 5
+    (warning,) = [each for each in found.warnings if each.code == "tests_not_used"]
+    assert "does not forget" in warning.what
+
+
+def test_a_road_that_is_too_short_is_left_out_with_a_warning() -> None:
+    found = forgetful_response(dwells_and_road(seconds=4.0), MODEL, ORDERS)
+    assert len(found.tests) == 5
+    assert any(each.code == "tests_not_used" for each in found.warnings)
+
+
+def test_a_comparison_shows_dwells_and_windows() -> None:
+    compared = compare(MODEL, dwells_and_road(), ORDERS)
+    assert list(compared.figure_names) == ["bode", "spectra"]
+    dwells, windows = by_kind(compared, compared.measured)
+    assert dwells is not None
+    assert windows is not None
+    assert dwells.used.sum() + windows.used.sum() == compared.used.sum()
+    record = compared.to_dict()
+    assert set(record["channels"]) == set(record["channels_in_windows"]) == {"body_accel", "susp_deflection"}
+    assert len(record["channels"]["body_accel"]["measured"]["phase_deg"]) == 5
+
+
+@pytest.mark.slow
+def test_both_together_say_more_than_either() -> None:
+    made = dwells_and_road(seed=3)
+    alone = [
+        si.fit(MODEL, only_kinds(made, kind, "standstill"), free=("k", "c")) for kind in ("dwell", "road")
+    ]
+    fit = si.fit(MODEL, made, free=("k", "c"))
+    assert fit.trusted
+    for name in ("k", "c"):
+        found = fit[name]
+        assert abs(found.value - PARAMETERS[name].value) < 4.0 * found.stderr
+        assert found.own_stderr < min(each[name].own_stderr for each in alone)
+
+
+@pytest.mark.slow
+def test_a_diagnosis_of_both_finds_nothing_missing_in_a_true_model(tmp_path: Path) -> None:
+    found = si.diagnose(MODEL, dwells_and_road(noise=3.0, seed=4))
+    assert found.verdict.kind == "none"
+    assert found.map
+    names = list(found.figure_names)
+    assert "gap body_accel" in names
+    assert "gap spectrum body_accel" in names
+    page = found.to_html(tmp_path / "both.html").read_text()
+    assert "5 dwells between 0.90 and 9.00 Hz and 2 windows of tests that do not repeat" in page
