@@ -31,7 +31,7 @@ def bode(
 ) -> int:
     """Draw the response of a model against a campaign: magnitude, phase, peak to peak, residuals. No fitting.
 
-    Of a campaign without dwells a road, a sweep or any other motion of at least six seconds is cut into windows.
+    A road of at least six seconds is cut into windows; without dwells so is a sweep or any other motion.
 
     Writes bode.png, bode.pdf and bode.json; of windows spectra.png and spectra.pdf.
 

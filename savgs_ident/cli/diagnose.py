@@ -59,7 +59,7 @@ def diagnose(
     called a gap. Every effect of the catalogue is then tested, alone and in pairs; if none explains the recordings
     the verdict is "unknown", with the port at which something is missing.
 
-    Of a campaign without dwells a road or a sweep is cut into windows.
+    A road is cut into windows, and without dwells so is a sweep.
 
     Writes diagnosis.html (the report) and diagnosis.json.
 

@@ -50,7 +50,7 @@ def fit(
 ) -> int:
     """Identify the rig from a campaign: parameters with errors, how well they fit, what the data identify.
 
-    Of a campaign without dwells a road, a sweep or any other motion of at least six seconds is cut into windows.
+    A road of at least six seconds is cut into windows; without dwells so is a sweep or any other motion.
 
     A plant with one coordinate and one input is held against the force of its drive along the measured motion then.
 

@@ -65,8 +65,8 @@ def posterior(
 ) -> int:
     """Sample the posterior of the parameters that MODEL identified: intervals, trade-offs, predictions.
 
-    Tolerances are marginalised over, the noise's scale and the model's discrepancy estimated along. Of a campaign
-    without dwells a road or a sweep is cut into windows.
+    Tolerances are marginalised over, the noise's scale and the model's discrepancy estimated along. A road is cut
+    into windows, and without dwells so is a sweep.
 
     Writes posterior.html (the report), posterior.json, posterior.nc (ArviZ inference data) and chain-emcee.h5 or
     chain-nuts.h5, from which a run that was stopped is continued with --resume.

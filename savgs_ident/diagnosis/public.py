@@ -60,7 +60,7 @@ def diagnose(
         model: the baseline, of the rig or of another plant.
         measured: the recordings, or the response of their dwells; or a measured motion, along which a plant with one
             coordinate is held against the force of its drive, as it is where recordings have no dwell. For other
-            plants a road or a sweep is cut into windows then.
+            plants a sweep is cut into windows then; a road is in any case.
         held_out: another motion, that nothing is fitted to: it is predicted, and compared.
         without: effects to leave out of the catalogue.
         orders: highest harmonic order to compare.

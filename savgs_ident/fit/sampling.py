@@ -60,8 +60,8 @@ def sample(
 
     Args:
         identified: a fit, or a model that was identified.
-        measured: the recordings, or the response of their dwells; what was fitted, if left out. Where there are no
-            dwells, a road or a sweep is cut into windows.
+        measured: the recordings, or the response of their dwells; what was fitted, if left out. A road is cut into
+            windows, and without dwells so is a sweep.
         sampler: "emcee", an ensemble of walkers, or "nuts", gradient-based trajectories.
         target_ess: effective sample size to reach for every parameter [1].
         time_limit: stop sampling after this [s].
