@@ -21,7 +21,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import joint_status
 from savgs_ident.core.values import Values
-from savgs_ident.diagnosis.effect_sensitivities import rehearse, secants_of_terms
+from savgs_ident.diagnosis.effect_sensitivities import alike_tests, rehearse, secants_of_terms
 from savgs_ident.diagnosis.gap import CyclePosition, MapCell, cycle_positions, gap_map
 from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.loops import force_loops
@@ -134,7 +134,7 @@ class DwellProblem(AbstractProblem):
         with_states = [
             self.catalogue[term.name] for term in self.candidates if self.catalogue[term.name].states
         ]
-        rehearse(self.values({}), with_states, self.shape[0])
+        rehearse(self.values({}), with_states, alike_tests(self.layout, self.excitation.windows))
 
     def refined(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution

@@ -6,7 +6,7 @@ what it would do at its port is then imposed on the linearised rig.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -34,14 +34,56 @@ from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.inference.observations import Term
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.simulate.along_motion import FORWARD, NEWTON_STEPS
+from savgs_ident.simulate.mesh import Layout
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.program_cache import placed
 
 SAMPLES = 384
-"""Instants of a period along which states are marched."""
+"""Instants of a dwell's period along which states are marched; of a window as many as it has nodes."""
 
 PERIODS = 16
-"""Periods after which they repeat: what rang at the start has died away even in a slow, slightly damped frame."""
+"""Periods of a dwell after which they repeat: what rang at the start has died away even in a slow, slightly damped
+frame."""
+
+PERIODS_OF_A_WINDOW = 2
+"""The same of a window, which is long, and compared after a lead."""
+
+
+class AlikeTests(NamedTuple):
+    """Tests along which states are marched alike: their places, instants in a period, and periods."""
+
+    places: tuple[int, ...]
+    instants: int
+    periods: int
+
+    @property
+    def grid(self) -> NDArray[np.float64]:
+        """Phases of the instants [rad], (instants,)."""
+        return 2.0 * np.pi * np.arange(self.instants) / self.instants
+
+
+def alike_tests(layout: Layout, windows: NDArray[np.intp]) -> list[AlikeTests]:
+    """The dwells, and the windows at these places, which are of one length."""
+    dwells = tuple(d for d in range(len(layout.counts)) if d not in windows)
+    found = [AlikeTests(dwells, SAMPLES, PERIODS)] if dwells else []
+    if windows.size:
+        every = tuple(windows.tolist())
+        found.append(AlikeTests(every, layout.counts[every[0]], PERIODS_OF_A_WINDOW))
+    return found
+
+
+class Even(NamedTuple):
+    """What ports see in tests that are marched alike, at even instants.
+
+    Attributes:
+        tests: the tests.
+        signals: at each force port, or the loads of what is in series, by name, (d, n) each.
+        steps: from one instant to the next [s], (d,).
+    """
+
+    tests: AlikeTests
+    signals: Mapping[str, PortSignals | Load]
+    steps: NDArray[np.float64]
 
 
 def sensitivities_with_states(
@@ -57,12 +99,11 @@ def sensitivities_with_states(
 
     Rows are in the units of their readings, ``typical`` in SI.
     """
-    signals, steps = _evenly(model, p, solution)
+    even = _evenly(model, p, solution)
 
     def field(one: tuple[Effect, Mapping[str, float]]) -> tuple[str, NDArray[np.float64]]:
         effect, given = one
-        along = np.asarray(_marched(effect, placed(dict(p) | as_values(given)), signals, steps))
-        return effect.port.name, _at_nodes(along, solution)
+        return effect.port.name, _marched(effect, placed(dict(p) | as_values(given)), even, solution)
 
     fields = in_parallel(field, zip(effects, typical, strict=True))
     return impose(model, likelihood, orders, p, solution, fields)
@@ -94,14 +135,15 @@ def secants_of_terms(
     }
 
 
-def rehearse(p: Values, effects: Sequence[Effect], tests: int) -> None:
+def rehearse(p: Values, effects: Sequence[Effect], alike: Sequence[AlikeTests]) -> None:
     """Have compiled what marches effects with states, on a rig that stands still: nothing else must wait for it."""
-    still = jnp.zeros((tests, SAMPLES))
-    steps = np.full(tests, 1.0 / SAMPLES)
-    for effect in effects:
-        gives = effect.port.kind is PortKind.SERIES
-        seen = Load(still, still) if gives else PortSignals(still, still, still, still)
-        _marched(effect, placed(dict(p)), {effect.port.name: seen}, steps)
+    for tests in alike:
+        still = jnp.zeros((len(tests.places), tests.instants))
+        steps = jnp.full(len(tests.places), 1.0 / tests.instants)
+        for effect in effects:
+            gives = effect.port.kind is PortKind.SERIES
+            seen = Load(still, still) if gives else PortSignals(still, still, still, still)
+            _march(effect, placed(dict(p)), seen, steps, tests.periods)
 
 
 def marched_effect(
@@ -111,8 +153,7 @@ def marched_effect(
 
     A force (P,) [N], or a way and its rate (P, 2).
     """
-    signals, steps = _evenly(model, p, solution)
-    return _at_nodes(np.asarray(_marched(effect, placed(dict(p)), signals, steps)), solution)
+    return _marched(effect, placed(dict(p)), _evenly(model, p, solution), solution)
 
 
 def marched_contact(
@@ -123,52 +164,59 @@ def marched_contact(
     Under the friction limits of the effect and of the model at ``p``. The bristle's anchor is marched: it is not that
     of the motion, which has limits of its own.
     """
-    signals, steps = _evenly(model, p, solution)
-    sliding = signals[effect.port.name]
-    assert isinstance(sliding, PortSignals)
     others = tuple(each for each in model.effects if each.loads_contact and each.name != effect.name)
-    marched = _march_contact((*others, effect), effect.port, placed(dict(p)), sliding, jnp.asarray(steps))
-    return _at_nodes(np.asarray(marched), solution)
+    known = placed(dict(p))
+
+    def march(each: Even) -> Array:
+        sliding = each.signals[effect.port.name]
+        assert isinstance(sliding, PortSignals)
+        steps = jnp.asarray(each.steps)
+        return _march_contact((*others, effect), effect.port, known, sliding, steps, each.tests.periods)
+
+    return _at_nodes([(each.tests, march(each)) for each in _evenly(model, p, solution)], solution)
 
 
-def _evenly(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution
-) -> tuple[dict[str, PortSignals | Load], NDArray[np.float64]]:
-    """Port signals, or loads as those of a series element, (D, SAMPLES) each, and the time steps [s], (D,)."""
+def _evenly(model: AbstractPlant, p: Values, solution: PeriodicSolution) -> list[Even]:
+    """Port signals, and loads as those of series elements, of all tests."""
     ports, carried = node_loads(model, p, solution)
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
-    grid = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
 
-    def even(values: Array) -> Array:
-        flat = np.asarray(values)
-        rows = [
-            np.interp(grid, phase[layout.dwell == dwell], flat[layout.dwell == dwell], period=2.0 * np.pi)
-            for dwell in range(len(layout.counts))
-        ]
-        return jnp.asarray(np.stack(rows))
+    def of(tests: AlikeTests) -> Even:
+        nodes = [layout.nodes_of([place]) for place in tests.places]
 
-    signals: dict[str, PortSignals | Load] = {
-        name: PortSignals(*(even(part) for part in each)) for name, each in ports.items()
-    }
-    for name, load in carried.items():
-        signals[name] = Load(even(load.total), even(load.rest))
-    return signals, 1.0 / (SAMPLES * np.asarray(solution.excitation.frequency))
+        def even(values: Array) -> Array:
+            flat = np.asarray(values)
+            rows = [np.interp(tests.grid, phase[each], flat[each], period=2.0 * np.pi) for each in nodes]
+            return jnp.asarray(np.stack(rows))
+
+        signals: dict[str, PortSignals | Load] = {
+            name: PortSignals(*(even(part) for part in each)) for name, each in ports.items()
+        }
+        for name, load in carried.items():
+            signals[name] = Load(even(load.total), even(load.rest))
+        frequency = np.asarray(solution.excitation.frequency)[list(tests.places)]
+        return Even(tests, signals, 1.0 / (tests.instants * frequency))
+
+    return [of(tests) for tests in alike_tests(layout, solution.excitation.windows)]
 
 
 def _marched(
-    effect: Effect,
-    p: Values,
-    signals: Mapping[str, PortSignals | Load],
-    steps: NDArray[np.float64],
-) -> Float[Array, "D n k"]:
-    """What the effect does at its port along the last period: a force, or a way and its rate."""
-    return _march(effect, p, signals[effect.port.name], jnp.asarray(steps))
+    effect: Effect, p: Values, even: Sequence[Even], solution: PeriodicSolution
+) -> NDArray[np.float64]:
+    """What the effect does at its port, at the nodes: a force (P,), or a way and its rate (P, 2)."""
+    port = effect.port.name
+    along = [
+        (each.tests, _march(effect, p, each.signals[port], jnp.asarray(each.steps), each.tests.periods))
+        for each in even
+    ]
+    return _at_nodes(along, solution)
 
 
 @eqx.filter_jit
 def _march(
-    effect: Effect, p: Values, signals: PortSignals | Load, steps: Float[Array, " D"]
-) -> Float[Array, "D n k"]:
+    effect: Effect, p: Values, signals: PortSignals | Load, steps: Float[Array, " d"], periods: int
+) -> Float[Array, "d n k"]:
+    """What the effect does at its port along the last period: a force, or a way and its rate."""
     weight = jnp.asarray([1.0 if state.slips else FORWARD for state in effect.states])
 
     def defect(now: Array, before: Array, at: Any, step: Array) -> Array:
@@ -186,13 +234,18 @@ def _march(
     signals = jax.tree.map(
         lambda each: each + (1.0 - weight[0]) * (jnp.roll(each, 1, axis=1) - each), signals
     )
-    return _repeat(defect, output, weight.size, signals, steps)
+    return _repeat(defect, output, weight.size, signals, steps, periods)
 
 
 @eqx.filter_jit
 def _march_contact(
-    effects: tuple[Effect, ...], port: Port, p: Values, signals: PortSignals, steps: Float[Array, " D"]
-) -> Float[Array, "D n 1"]:
+    effects: tuple[Effect, ...],
+    port: Port,
+    p: Values,
+    signals: PortSignals,
+    steps: Float[Array, " d"],
+    periods: int,
+) -> Float[Array, "d n 1"]:
     def held(now: Array, at: PortSignals) -> Bristle:
         return contact_bristle(effects, port, p, at, now[0])
 
@@ -203,7 +256,7 @@ def _march_contact(
         del before, step
         return held(now, at).force[None]
 
-    return _repeat(defect, output, 1, signals, steps)
+    return _repeat(defect, output, 1, signals, steps, periods)
 
 
 def _repeat(
@@ -211,8 +264,9 @@ def _repeat(
     output: Callable[..., Array],
     size: int,
     signals: Any,
-    steps: Float[Array, " D"],
-) -> Float[Array, "D n k"]:
+    steps: Float[Array, " d"],
+    periods: int,
+) -> Float[Array, "d n k"]:
     """``output`` along the last of several periods; ``defect`` vanishes for the state at the end of a step."""
 
     def one_dwell(signals: Any, step: Array) -> Array:
@@ -228,19 +282,19 @@ def _repeat(
             return jax.lax.scan(advance, begun, signals)
 
         # All periods are kept and the last is taken: apart from the others it would be compiled once more.
-        periods: Array = jax.lax.scan(period, jnp.zeros(size), length=PERIODS)[1]
-        return periods[-1]
+        every: Array = jax.lax.scan(period, jnp.zeros(size), length=periods)[1]
+        return every[-1]
 
     return jax.vmap(one_dwell)(signals, steps)
 
 
-def _at_nodes(along: NDArray[np.float64], solution: PeriodicSolution) -> NDArray[np.float64]:
-    """(D, SAMPLES, k) on the nodes: (P,) for a force, (P, 2) for a way."""
+def _at_nodes(along: Sequence[tuple[AlikeTests, Array]], solution: PeriodicSolution) -> NDArray[np.float64]:
+    """What is known at even instants of all tests, (d, n, k) of those alike, on the nodes: (P,) for k = 1, (P, k)."""
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
-    grid = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
-    out = np.zeros((layout.total, along.shape[2]))
-    for dwell in range(len(layout.counts)):
-        mine = layout.dwell == dwell
-        for k in range(along.shape[2]):
-            out[mine, k] = np.interp(phase[mine], grid, along[dwell, :, k], period=2.0 * np.pi)
-    return out[:, 0] if along.shape[2] == 1 else out
+    out = np.zeros((layout.total, along[0][1].shape[2]))
+    for tests, marched in along:
+        for place, values in zip(tests.places, np.asarray(marched), strict=True):
+            mine = layout.nodes_of([place])
+            for k, each in enumerate(values.T):
+                out[mine, k] = np.interp(phase[mine], tests.grid, each, period=2.0 * np.pi)
+    return out[:, 0] if out.shape[1] == 1 else out

@@ -98,7 +98,7 @@ def rate_of(signal: Signal, nodes: MeshPoints, solution: PeriodicSolution) -> Si
 
 
 INSTANTS = 256
-"""Instants of a period at which a law of a sensor's reading, or a load of a mode, is evaluated."""
+"""Instants of a period, at least, at which a law of a sensor's reading, or a load of a mode, is evaluated."""
 
 _WORDS = [each.words for each in (*OF_THE_MOTION, *OF_THE_LOAD)]
 PLAIN_FORCES = tuple(_WORDS.index(words) for words in ("tanh(v/0.01)", "v", "x"))
@@ -278,12 +278,15 @@ def prandtl_element(displacement: Signal, width: float) -> Signal:
 
 def resonance(load: Signal, natural: float, damping_ratio: float, nodes: MeshPoints) -> Signal:
     """What an oscillator of a natural frequency [Hz] makes of a load (P,)."""
-    out, grid = np.zeros_like(load), 2.0 * np.pi * np.arange(INSTANTS) / INSTANTS
+    out = np.zeros_like(load)
     for test in range(int(nodes.dwell.max()) + 1):
         rows = np.flatnonzero(nodes.dwell == test)
+        # A window is many periods of what swings, and has a node for each instant that matters.
+        instants = max(INSTANTS, rows.size)
+        grid = 2.0 * np.pi * np.arange(instants) / instants
         spectrum = np.fft.rfft(np.interp(grid, nodes.phase[rows], load[rows], period=2.0 * np.pi))
         omega = nodes.omega[rows[0]] * np.arange(spectrum.size)
         modal = relative_response(omega, 2.0 * np.pi * natural, damping_ratio)
-        answer = np.fft.irfft(spectrum * modal, INSTANTS)
+        answer = np.fft.irfft(spectrum * modal, instants)
         out[rows] = np.interp(nodes.phase[rows], grid, answer, period=2.0 * np.pi)
     return out
