@@ -52,7 +52,7 @@ def write_warnings(
         )
     if evidence.kind in ("effect", "several") and beyond <= 0.0:
         found.append(
-            "The last third of the tests, the fastest ones of dwells, left out together, is predicted no better with "
-            "what is named than without: do not use it beyond the tests that were recorded."
+            "The last third of the tests, the fastest dwells and roads, left out together, is predicted no better "
+            "with what is named than without: do not use it beyond the tests that were recorded."
         )
     return tuple(dict.fromkeys(found))

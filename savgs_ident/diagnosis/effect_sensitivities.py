@@ -72,7 +72,7 @@ def alike_tests(layout: Layout, windows: NDArray[np.intp]) -> list[AlikeTests]:
     return found
 
 
-class Even(NamedTuple):
+class EvenSignals(NamedTuple):
     """What ports see in tests that are marched alike, at even instants.
 
     Attributes:
@@ -167,7 +167,7 @@ def marched_contact(
     others = tuple(each for each in model.effects if each.loads_contact and each.name != effect.name)
     known = placed(dict(p))
 
-    def march(each: Even) -> Array:
+    def march(each: EvenSignals) -> Array:
         sliding = each.signals[effect.port.name]
         assert isinstance(sliding, PortSignals)
         steps = jnp.asarray(each.steps)
@@ -176,12 +176,12 @@ def marched_contact(
     return _at_nodes([(each.tests, march(each)) for each in _evenly(model, p, solution)], solution)
 
 
-def _evenly(model: AbstractPlant, p: Values, solution: PeriodicSolution) -> list[Even]:
+def _evenly(model: AbstractPlant, p: Values, solution: PeriodicSolution) -> list[EvenSignals]:
     """Port signals, and loads as those of series elements, of all tests."""
     ports, carried = node_loads(model, p, solution)
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
 
-    def of(tests: AlikeTests) -> Even:
+    def of(tests: AlikeTests) -> EvenSignals:
         nodes = [layout.nodes_of([place]) for place in tests.places]
 
         def even(values: Array) -> Array:
@@ -195,13 +195,13 @@ def _evenly(model: AbstractPlant, p: Values, solution: PeriodicSolution) -> list
         for name, load in carried.items():
             signals[name] = Load(even(load.total), even(load.rest))
         frequency = np.asarray(solution.excitation.frequency)[list(tests.places)]
-        return Even(tests, signals, 1.0 / (tests.instants * frequency))
+        return EvenSignals(tests, signals, 1.0 / (tests.instants * frequency))
 
     return [of(tests) for tests in alike_tests(layout, solution.excitation.windows)]
 
 
 def _marched(
-    effect: Effect, p: Values, even: Sequence[Even], solution: PeriodicSolution
+    effect: Effect, p: Values, even: Sequence[EvenSignals], solution: PeriodicSolution
 ) -> NDArray[np.float64]:
     """What the effect does at its port, at the nodes: a force (P,), or a way and its rate (P, 2)."""
     port = effect.port.name

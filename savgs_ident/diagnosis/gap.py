@@ -217,11 +217,10 @@ def gap_map(problem: "DwellProblem", data: Data, rows: NDArray[np.float64]) -> t
     squares = np.zeros(2 * int(np.prod(shape)))
     squares[problem.likelihood.place] = (data.measured - rows) ** 2 / data.variance
     sigma = np.sqrt(squares.reshape(*shape, 2).mean(axis=-1))
+    sigma[problem.excitation.windows] = 0.0
     frequency = np.asarray(problem.excitation.frequency)
     cells = []
     for d, c, k in np.argwhere(sigma > 0.0):
-        if d not in problem.dwells:
-            continue
         size = np.abs(measured[d, c, 1]) or np.abs(measured[d, c]).max()
         percent = 100.0 * np.abs(residual[d, c, k]) / size
         cells.append(
@@ -339,8 +338,8 @@ def first_harmonic(
     """First harmonic per unit of the first input at the instants of a sweep, (W, C).
 
     It follows from motions at frequencies [Hz], (D,), under the first input alone, the others at rest. None where a
-    motion is not found. Slow motions take the places of slow dwells, which have the nodes for it: no program is
-    compiled anew.
+    motion is not found. Slow motions take the places of slow dwells, which have the nodes for it: where there are
+    dwells alone no program is compiled anew.
     """
     dwells = only_driven(problem.excitation, problem.dwells)
     layout, amplitude = layout_of(dwells, problem.settings), float(np.median(sweep.input_amplitude))

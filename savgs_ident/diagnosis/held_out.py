@@ -1,7 +1,7 @@
 """Predictions of tests that a hypothesis has not seen: each is left out once, the others set the parameters.
 
-The folds are interleaved: every so many-th test. The last third of the tests, the fastest ones of a campaign of
-dwells, is left out together besides: a law that only interpolates predicts these badly.
+The folds are interleaved: every so many-th test. The last third of the tests, the fastest dwells and behind them
+windows of roads, is left out together besides: a law that only interpolates predicts these badly.
 """
 
 from collections.abc import Mapping, Sequence

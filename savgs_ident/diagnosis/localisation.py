@@ -1,9 +1,9 @@
 """Where the gap comes from: the smallest unknown input at each location of the plant that explains it.
 
-Two questions are asked of every location. How much could any input there explain, free in every test (its free-input
-share)? And how much of the tests left out does a law explain that was learned from the others (its share)? A law is a
-sum of given functions of the signals at the location, with normal coefficients; the baseline's parameters are free
-beside it, so that it gets no credit for what recalibration can do.
+Two questions are asked of every location. How much could any input there explain, free in every dwell (its
+free-input share)? And how much of the tests left out does a law explain that was learned from the others (its share)?
+A law is a sum of given functions of the signals at the location, with normal coefficients; the baseline's parameters
+are free beside it, so that it gets no credit for what recalibration can do.
 
 All is linearised about a fit: rows r + J d, coordinates with unit-normal priors, a law's coefficients normal with one
 of the widths ``law_widths``. The log evidence of a location is averaged over its laws and over the widths.
@@ -249,8 +249,8 @@ def _free_input(
 ) -> tuple[float, NDArray[np.float64]]:
     """Share of the gap that inputs free in every dwell explain, parameters estimated anew; and the inputs.
 
-    The coefficients of the inputs are eliminated test by test, which leaves a system in the parameters alone. Windows
-    of tests that do not repeat have no such input, and do not count.
+    The coefficients of the inputs are eliminated test by test, which leaves a system in the parameters alone. The
+    share is of the gap in tests where such an input does anything: windows have none.
     """
     residual, slopes = search.residual(mode.prediction) * weight, mode.slopes * weight[:, None]
     scale = np.sqrt(np.mean((free * weight[:, None]) ** 2, axis=0))

@@ -59,7 +59,7 @@ def force_loops(
     the baseline; ``p`` are its parameters, SI.
     """
     port = signal_port(problem.plant, found.name)
-    if port is None:
+    if port is None or not problem.dwells.size:
         return ()
     ports, _ = node_loads(problem.complete(()), p, solution)
     moving = motion_port(problem.plant, port)
@@ -67,8 +67,6 @@ def force_loops(
     motion_unit = next(each.displacement_unit for each in problem.plant.ports if each.name == moving)
     force, error, near = _drawn(problem, solution, law, nearest)
     order = problem.dwells[np.argsort(np.asarray(solution.excitation.frequency)[problem.dwells])]
-    if not order.size:
-        return ()
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
     grid = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
     loops = []

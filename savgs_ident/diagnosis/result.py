@@ -123,7 +123,7 @@ class PortShare:
     Attributes:
         port: name of the port.
         share: share of the gap (in squared sd) in tests left out that the law learned from the others explains.
-        free_input_share: share that any input at this port, free in every test, would explain.
+        free_input_share: share that any input at this port, free in every dwell, would explain of the gap there.
         probability: of what acts there, over all hypotheses; effects of a pair count at the port of each.
     """
 
@@ -344,7 +344,7 @@ class Diagnosis(Result):
         confusable: pairs of effects that look alike in this campaign.
         loops: inferred signals at the named port.
         responses: what the three models predict: responses of dwells, or the force of the drive.
-        measured: the dwells that they are held against; None where it is the force of the drive.
+        measured: the dwells and windows that they are held against; None where it is the force of the drive.
         converged: whether every search that the verdict stands on converged: the recalibrated baseline, the fitted
             hypothesis with the greatest weight, what is named and its refit, the learned correction.
         warnings: what a reader must know, a sentence each.

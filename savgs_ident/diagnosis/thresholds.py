@@ -244,7 +244,7 @@ class DecisionConstants(BackgroundConstants):
     """
 
     free_input_width: float = 100.0
-    """The same of an input that is free in every test: wide, so that the share that it explains is an upper bound.
+    """The same of an input that is free in every dwell: wide, so that the share that it explains is an upper bound.
 
     Origin: by choice. It changes no verdict.
     """

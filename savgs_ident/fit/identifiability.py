@@ -206,9 +206,6 @@ def _sine_in(driven: str, excitation: Excitation, frequency: NDArray[np.float64]
 def propose_dwells(minimiser: Minimiser, best: Minimum, settings: PeriodicSettings) -> tuple[Proposal, ...]:
     """The best dwell of every family that would identify all free parameters; empty if none would."""
     excitation = best.solution.excitation
-    if excitation.windows.size:
-        # Tests that do not repeat have no amplitude and no frequency to go by.
-        return ()
     free = len(minimiser.problem.free.identified)
 
     def worst(jacobian: NDArray[np.float64]) -> float:
@@ -357,7 +354,10 @@ def widened_by_misfit(chi2: float, expected: int) -> float:
 
 
 def advice_of(task: Task, minimiser: Minimiser, best: Minimum) -> tuple[str, ...]:
-    """In words, which further dwells would identify every free parameter; one sentence."""
+    """In words, which further dwells would identify every free parameter; nothing beside tests that do not repeat."""
+    if task.excitation.windows.size:
+        # Tests that do not repeat have no amplitude and no frequency to go by.
+        return ()
     proposals = propose_dwells(minimiser, best, task.settings.periodic)
     if not proposals:
         return ("No single further dwell that was considered would help.",)

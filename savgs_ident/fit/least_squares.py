@@ -109,7 +109,7 @@ def assemble_fit(task: Task, outcome: Outcome, origin: Origin) -> Fit:
         dwell_status=best.solution.status(),
         verdict=outcome.verdict,
         measured=task.measured,
-        orders=problem.orders,
+        orders=min(problem.orders, task.settings.orders) if task.measured.dwells.size else problem.orders,
         used=np.array(problem.target.used),
         predicted=np.array(harmonics(problem.model, p, best.solution, problem.orders)),
         frictionless=frictionless,

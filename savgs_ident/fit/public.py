@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from savgs_ident.core.errors import InputError
+from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.along_motion import MotionFit, fit_along_motion
@@ -32,6 +32,7 @@ from savgs_ident.simulate.excitation import (
     Measurements,
     campaign_of,
     measured_excitation,
+    response_of_tests,
 )
 from savgs_ident.simulate.forgetting import forgetful_motion, forgetful_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
@@ -61,9 +62,9 @@ def fit(
     Args:
         model: the rig, or another plant, with its effects; one that was identified before starts from what was known
             then, for its values would count the data twice.
-        measured: the recordings, or the response of their dwells. Where there are no dwells, a road or a sweep is cut
-            into windows; a plant with one coordinate and one input is held against the force of its drive along the
-            measured motion, or along one that is given.
+        measured: the recordings, or the response of their dwells. A road is cut into windows, and without dwells so
+            is a sweep; without dwells a plant with one coordinate and one input is held against the force of its
+            drive along the measured motion, or along one that is given.
         free: names of the parameters to identify; if empty the paper's four, as far as the rig has them, and what its
             further effects bring along; or those of another plant of which nothing is known but two bounds.
         held_out: another motion, that nothing is fitted to: its force is predicted, and compared.
@@ -134,14 +135,11 @@ def fit_with(
     use_persistent_cache()
     drawing = model.before
     names = drawing.free(free)
-    response, motion = forgetful_motion(measured, drawing, settings.orders, max_frequency, progress)
+    if settings.quantity == "peak_to_peak":
+        response, motion = _with_peaks(measured, drawing, settings.orders, max_frequency, progress), None
+    else:
+        response, motion = forgetful_motion(measured, drawing, settings.orders, max_frequency, progress)
     drawing, resized = sized_to(drawing, response) if drawing.effects else (drawing, ())
-    if response.windows.size and settings.quantity == "peak_to_peak":
-        raise InputError(
-            "tests that do not repeat have no peak-to-peak values",
-            source="--peak-to-peak",
-            remedy="leave it out, or record dwells",
-        )
     warnings = (*response.warnings, *resized)
     origin = model.origin(campaign_of(measured), warnings).with_command(command)
     # Beside other programs threads of the linear algebra wait for each other: its largest matrices take thirty times
@@ -150,6 +148,25 @@ def fit_with(
         return fit_least_squares(
             response, drawing, free=names, settings=settings, origin=origin, motion=motion, progress=progress
         )
+
+
+def _with_peaks(
+    measured: Measurements, model: Model, orders: int, max_frequency: float | None, progress: Progress
+) -> HarmonicResponse:
+    """The response of the dwells, which have peak-to-peak values, with a warning for what has none.
+
+    Raises :class:`InputError` where there are no dwells.
+    """
+    response = response_of_tests(measured, model.plant, orders, max_frequency, progress)
+    if not response.dwells.size:
+        raise InputError(
+            "tests that do not repeat have no peak-to-peak values",
+            source="--peak-to-peak",
+            remedy="leave it out, or record dwells",
+        )
+    what = "does not repeat, and has no peak-to-peak value: it is not used"
+    warnings = tuple(DataWarning("tests_not_used", what, test=response.tests[d]) for d in response.windows)
+    return replace(only_tests(response, response.dwells), warnings=(*response.warnings, *warnings))
 
 
 def demo(progress: Progress = no_progress, *, command: Sequence[str] = ()) -> Fit:

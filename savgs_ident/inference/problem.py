@@ -118,7 +118,8 @@ def harmonic_target(measured: HarmonicResponse, channels: Sequence[Channel], ord
     Raises :class:`InputError` if none can be used.
     """
     present, places = response_channels(measured, channels)
-    count = 1 + (min(orders, measured.orders) if measured.part is None else measured.last_compared(places))
+    recorded = [place for place, there in zip(places, present, strict=True) if there]
+    count = 1 + (min(orders, measured.orders) if measured.part is None else measured.last_compared(recorded))
     covariance = measured.covariance[:, places, :count]
     used = measured.valid[:, places, :count] & present[None, :, None]
     used[:, :, 0] = False

@@ -290,13 +290,16 @@ class Campaign:
         """When the first test began [s since 1970, UTC]; None if no clock has a date."""
         return min((each.start for each in self.recordings if each.start is not None), default=None)
 
-    @property
-    def began(self) -> dict[str, float]:
-        """When each test began: its start [s since 1970, UTC] where all have one, otherwise its place among them."""
-        dated = {each.name: each.start for each in self.recordings if each.start is not None}
-        if len(dated) == len(self.recordings):
-            return dated
-        return {each.name: float(place) for place, each in enumerate(self.recordings)}
+    def when(self, test: str, seconds: float = 0.0) -> float:
+        """When so many ``seconds`` of a test had gone by [s since 1970, UTC], where all tests are dated.
+
+        Otherwise in tests: its place among them, and the share of it that had gone by [1]. Standstills do not count.
+        """
+        moving = [each for each in self.recordings if each.kind != "standstill"]
+        place, mine = next((n, each) for n, each in enumerate(moving) if each.name == test)
+        if mine.start is not None and all(each.start is not None for each in moving):
+            return mine.start + seconds
+        return place + seconds / (mine.duration_s or 1.0)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -17,10 +17,10 @@ from savgs_ident.responses.selection import by_kind
 def bode_record(compared: Comparison) -> dict[str, object]:
     """The JSON object of ``bode``, in SI.
 
-    Of dwells it holds first harmonics per unit of the input, phase against it; of windows root mean squares over
-    them at each frequency, under a key of their own beside dwells.
+    Of dwells it holds first harmonics per unit of the input, phase against it, in the order of the tests that are
+    dwells; of windows root mean squares over them at each frequency, under a key of their own beside dwells.
     """
-    dwells, windows = by_kind(compared, compared.measured)
+    dwells, windows = by_kind(compared)
     channels = {} if dwells is None else {"channels": _first_harmonics(dwells)}
     if windows is not None:
         channels["channels" if dwells is None else "channels_in_windows"] = _spectra(windows)
@@ -29,6 +29,11 @@ def bode_record(compared: Comparison) -> dict[str, object]:
         "effects": list(compared.effects),
         "tests": compared.measured.tests,
         "frequency_hz": compared.measured.frequency,
+        "spacing_hz": compared.measured.spacing,
+        "kind": [
+            "dwell" if d in compared.measured.dwells else "window"
+            for d in range(len(compared.measured.tests))
+        ],
         "status": [status.name.lower() for status in compared.model.status],
         "converged": compared.trusted,
         "gap": {name: _gap_entry(gap) for name, gap in _gaps(compared).items()},

@@ -152,7 +152,7 @@ def _predicted_peaks(identified: float, frictionless: float) -> dict[str, float]
     return {"peak_to_peak_identified": identified, "peak_to_peak_simqc": frictionless}
 
 
-_SHOWN_DWELLS = 5
+_SHOWN_TESTS = 5
 _FAR = 2.0
 
 
@@ -165,7 +165,7 @@ def fit_text(fit: Fit) -> RenderableType:
         plain(""),
         _gap_table(fit),
         *tolerance_tables(fit),
-        *_far_dwells(fit),
+        *_far_tests(fit),
         plain("Verdict", "bold"),
         *(plain(f"- {sentence}") for sentence in _verdict(fit)),
     ]
@@ -288,8 +288,8 @@ def _shift(each: Estimate) -> float:
     return abs(each.value - each.prior) / each.prior_sd
 
 
-def _far_dwells(fit: Fit) -> list[RenderableType]:
-    """The dwells with the largest misfit, where it is large."""
+def _far_tests(fit: Fit) -> list[RenderableType]:
+    """The tests with the largest misfit, where it is large."""
     chi2 = chi2_by_dwell(fit)
     ratio = chi2 / entries_by_dwell(fit).clip(1)
     bad = [
@@ -302,14 +302,14 @@ def _far_dwells(fit: Fit) -> list[RenderableType]:
     rows = [
         (
             fit.measured.tests[d],
-            fixed(float(fit.measured.frequency[d]), 3),
+            fixed(float(fit.measured.frequency[d]) if d in fit.measured.dwells else None, 3),
             fixed(float(ratio[d]), 2),
             fit.dwell_status[d].name.lower().replace("_", " "),
         )
-        for d in bad[:_SHOWN_DWELLS]
+        for d in bad[:_SHOWN_TESTS]
     ]
-    title = f"Dwells with the largest misfit (chi2 per entry above {_FAR:g}, or not solved): {len(bad)}"
-    return [table(title, ("dwell", "f\n[Hz]", "chi2 per\nentry", "solution"), rows, texts=(0, 3))]
+    title = f"Tests with the largest misfit (chi2 per entry above {_FAR:g}, or not solved): {len(bad)}"
+    return [table(title, ("test", "f\n[Hz]", "chi2 per\nentry", "solution"), rows, texts=(0, 3))]
 
 
 def _verdict(fit: Fit) -> list[str]:

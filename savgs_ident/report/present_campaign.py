@@ -166,7 +166,7 @@ def draw_comparison(comparison: "Comparison", folder: Path, progress: Progress) 
 def comparison_figures(comparison: "Comparison", progress: Progress = no_progress) -> Figures:
     """The figures of a model against a measurement: ``bode`` of the dwells, ``spectra`` of the windows."""
     title = f"Model and measurement: {Path(comparison.origin.data).name or comparison.given.plant_name}"
-    dwells, windows = by_kind(comparison, comparison.measured)
+    dwells, windows = by_kind(comparison)
     of_dwells: Figures = {} if dwells is None else {"bode": partial(_bode_figure, title, dwells, progress)}
     if windows is None:
         return of_dwells
@@ -235,7 +235,7 @@ class _Posterior(AbstractPresenter["Posterior"]):
         from savgs_ident.report.spectra import predicted_spectrum_figure
 
         identified = result.of_role("identified")
-        dwells, windows = by_kind(result, result.measured)
+        dwells, windows = by_kind(result)
         channels = [each.name for each in result.model.channels]
         return {
             "corner": lambda: corner_figure(result),
@@ -253,7 +253,7 @@ class _Posterior(AbstractPresenter["Posterior"]):
             **{
                 f"predicted spectrum {name}": partial(predicted_spectrum_figure, windows, c)
                 for c, name in enumerate(channels)
-                if windows is not None
+                if windows is not None and windows.predictive.used[:, c].any()
             },
         }
 
@@ -312,15 +312,14 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
         }
         if result.measured is None:
             return {"drive": lambda: drive_figure_of(result), **shrink, **loops}
-        dwells, windows = by_kind(result, result.measured)
+        dwells, windows = by_kind(result)
         names = [each.name for each in result.given.channels]
         if windows is not None:
-            from savgs_ident.report.diagnosis.gap_spectra import gap_spectrum_figure
+            from savgs_ident.report.diagnosis.gap_spectra import channels_in_windows, gap_spectrum_figure
 
             spectra = {
-                f"gap spectrum {name}": partial(gap_spectrum_figure, windows, c)
-                for c, name in enumerate(names)
-                if name in result.measured.channels
+                f"gap spectrum {names[c]}": partial(gap_spectrum_figure, windows, c)
+                for c in channels_in_windows(windows)
             }
             shrink = {**spectra, **shrink}
         if dwells is None:

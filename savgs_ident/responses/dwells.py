@@ -216,7 +216,7 @@ def _assemble(
         periods=np.array([fits[test].periods for test in tests]),
         warnings=warnings,
         covariance_dof=dof,
-        recorded=np.array([campaign.began[test] for test in tests]),
+        recorded=np.array([campaign.when(test) for test in tests]),
     )
 
 

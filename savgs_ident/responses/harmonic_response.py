@@ -49,10 +49,10 @@ WHOLE_PERIOD = ComparedPart(*(np.array([each]) for each in (-10.0 * np.pi, 12.0 
 
 @dataclass(frozen=True)
 class HarmonicResponse:
-    """Harmonics of D dwells, C channels, orders 0..n.
+    """Harmonics of D tests, C channels, orders 0..n: dwells, and after them windows of tests that do not repeat.
 
     Attributes:
-        tests: names of the dwells, length D, sorted by frequency.
+        tests: names of the tests, length D, the dwells sorted by frequency.
         channels: names of the channels, length C.
         frequency: measured fundamental [Hz], (D,).
         frequency_sd: its standard deviation [Hz], (D,).
@@ -68,11 +68,11 @@ class HarmonicResponse:
             relative variance is 2 / dof. None where the covariance is known rather than estimated. A
             quadratic form weighted with the inverse of an estimated covariance is too large by
             dof / (dof - 2) on average.
-        recorded: when each dwell was recorded, (D,): its start [s since 1970] where all dwells have one, otherwise
-            its place among them in the campaign [1]; None where neither is known.
+        recorded: when each test was recorded, (D,): its start [s since 1970] where all tests but standstills have
+            one, otherwise its place among them in the campaign [1]; None where neither is known.
         part: of each test that is compared: there the ``harmonics`` of readings are those of :func:`compared_share`
             times the reading, at every so many-th order; those of inputs are not. None where all tests are dwells.
-        beside: mean of what was recorded beside the plant's channels in each dwell [its unit], (D,) by name; NaN
+        beside: mean of what was recorded beside the plant's channels in each test [its unit], (D,) by name; NaN
             where it was not.
     """
 

@@ -29,24 +29,32 @@ def only_tests(response: HarmonicResponse, kept: NDArray[np.integer]) -> Harmoni
     return _without_windows(found) if part is not None and part.repeats.all() else found
 
 
-class OfTests(Protocol):
-    """What is said of the tests of a response."""
+class SelectableResult(Protocol):
+    """A result for the tests of a response."""
+
+    @property
+    def measured(self) -> HarmonicResponse | None:
+        """The response."""
+        ...
 
     def of_tests(self, kept: NDArray[np.intp]) -> Self:
-        """The same of some of them, by their places."""
+        """The same for some of the tests, by their places."""
         ...
 
 
-Said = TypeVar("Said", bound=OfTests)
+Selected = TypeVar("Selected", bound=SelectableResult)
 
 
-def by_kind(said: Said, measured: HarmonicResponse) -> tuple[Said | None, Said | None]:
-    """What is ``said`` of the dwells, and of the windows; None where there are none."""
+def by_kind(result: Selected) -> tuple[Selected | None, Selected | None]:
+    """The result for the dwells, and for the windows; None where there are none, both without a response."""
+    measured = result.measured
+    if measured is None:
+        return None, None
     if not measured.windows.size:
-        return said, None
+        return result, None
     if not measured.dwells.size:
-        return None, said
-    return said.of_tests(measured.dwells), said.of_tests(measured.windows)
+        return None, result
+    return result.of_tests(measured.dwells), result.of_tests(measured.windows)
 
 
 def _without_windows(response: HarmonicResponse) -> HarmonicResponse:

@@ -30,6 +30,7 @@ from savgs_ident.recordings.recording import Campaign, TestKind
 from savgs_ident.responses.even_record import EvenRecord, even_record
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, compared_share
 from savgs_ident.responses.outliers import estimate_standstill_noise
+from savgs_ident.responses.selection import only_tests
 
 Array = NDArray[np.float64]
 
@@ -120,8 +121,29 @@ def estimate_windows(
         warnings += (_noise_assumed(campaign.source, assumed),)
     windows = _Windows.of(cut, lead_s, compared)
     channels = tuple(name for name in (*inputs, *readings) if any(name in each.values for each in found))
-    response = windows.response(channels, set(inputs), warnings, highest_hz)
-    return replace(response, recorded=windows.recorded(campaign))
+    response = replace(
+        windows.response(channels, set(inputs), warnings, highest_hz),
+        recorded=windows.recorded(campaign),
+        beside=windows.beside(campaign),
+    )
+    return _with_readings(campaign.source, response, readings)
+
+
+def _with_readings(source: str, response: HarmonicResponse, readings: Sequence[str]) -> HarmonicResponse:
+    """The windows in which any reading is known all along, with a warning for each of the others."""
+    places = [response.channel(name) for name in readings if name in response.channels]
+    known = response.valid[:, places].any(axis=(1, 2))
+    what = f"has {' and '.join(readings)} with gaps, or not at all"
+    remedy = "look at the sensors and their recording"
+    warnings = tuple(
+        DataWarning("window_not_used", what, source, response.tests[d], remedy=remedy)
+        for d in np.flatnonzero(~known)
+    )
+    if not known.any():
+        raise InputError(f"every window {what}", source=source, test=response.tests[0], remedy=remedy)
+    if not warnings:
+        return response
+    return replace(only_tests(response, np.flatnonzero(known)), warnings=(*response.warnings, *warnings))
 
 
 def _compared_s(lasting: Sequence[float], wanted: float) -> float:
@@ -284,19 +306,30 @@ class _Windows:
 
     def recorded(self, campaign: Campaign) -> Array:
         """When what is compared in each window began, on the scale of when the tests did, (D,)."""
-        began = campaign.began
-        dated = all(each.start is not None for each in campaign.recordings)
+        return np.array([campaign.when(each.record.test, self._begin(each)) for each in self.windows])
 
-        def when(window: _Window) -> float:
-            record = window.record
-            into = window.first / record.rate + self.lead - record.before
-            return began[record.test] + (into if dated else into / (record.duration - record.before))
+    def beside(self, campaign: Campaign) -> dict[str, Array]:
+        """Means of the free channels in what is compared of each window [their units], (D,) by name."""
+        recordings = {each.name: each.channels for each in campaign.recordings}
 
-        return np.array([when(each) for each in self.windows])
+        def mean(window: _Window, name: str) -> float:
+            channel = recordings[window.record.test].get(name)
+            if channel is None:
+                return np.nan
+            begin = window.record.start + window.first / window.record.rate + self.lead
+            here = (channel.time >= begin) & (channel.time <= begin + self.length - self.lead - CLOSING_S)
+            known = channel.values[here & np.isfinite(channel.values)]
+            return float(known.mean()) if known.size else np.nan
+
+        return {name: np.array([mean(each, name) for each in self.windows]) for name in campaign.layout.free}
+
+    def _begin(self, window: _Window) -> float:
+        """Where what is compared in a window begins [s after its test did]."""
+        return window.first / window.record.rate + self.lead - window.record.before
 
     def _name(self, window: _Window) -> str:
         # Rounded to what is printed, and no negative zero.
-        begin = round(window.first / window.record.rate + self.lead - window.record.before, 1) + 0.0
+        begin = round(self._begin(window), 1) + 0.0
         return f"{window.record.test}, {begin:.1f} to {begin + self.length - self.lead - CLOSING_S:.1f} s"
 
     def _compared(self, readings: int, highest_hz: float) -> tuple[int, NDArray[np.bool_]]:

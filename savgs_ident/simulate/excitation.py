@@ -24,7 +24,14 @@ from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, SweepResponse
 from savgs_ident.responses.selection import join_tests, only_tests
 from savgs_ident.responses.sweeps import estimate_sweep_response
-from savgs_ident.responses.windows import BESIDE_DWELLS, HIGHEST_HZ, KINDS, LEAD_S, estimate_windows
+from savgs_ident.responses.windows import (
+    BESIDE_DWELLS,
+    HIGHEST_HZ,
+    KINDS,
+    LEAD_S,
+    MOST_HZ,
+    estimate_windows,
+)
 from savgs_ident.simulate.mesh import Layout, Mesh, over_dwells, waves
 
 SUMMED = 64
@@ -204,14 +211,15 @@ def only_driven(excitation: Excitation, kept: NDArray[np.intp]) -> Excitation:
         harmonics = {name: each[kept] for name, each in excitation.harmonics.items()}
         return Excitation(excitation.frequency[kept], harmonics)
     part = ComparedPart(*(np.asarray(each)[kept] for each in excitation.part))
-    harmonics = {name: _that_move(each[kept]) for name, each in excitation.harmonics.items()}
+    harmonics = {name: each[kept] for name, each in excitation.harmonics.items()}
     if part.repeats.all():
-        return Excitation(excitation.frequency[kept], harmonics)
+        few = {name: _that_move(each) for name, each in harmonics.items()}
+        return Excitation(excitation.frequency[kept], few)
     return Excitation(excitation.frequency[kept], harmonics, cast(Any, ComparedPart)(*map(jnp.asarray, part)))
 
 
 def _that_move(harmonics: Array) -> Array:
-    """Up to the highest order (D, K) that is not zero in every test; the first is kept."""
+    """Up to the highest order (D, K) that is not zero in every test: windows have many more than dwells."""
     highest = np.flatnonzero(np.asarray(harmonics).any(axis=0)).max(initial=0)
     return harmonics[:, : max(int(highest), 1) + 1]
 
@@ -245,20 +253,20 @@ def _recorded(given: Input, measured: HarmonicResponse, table: ParameterTable) -
 
 
 def up_to_frequency(response: HarmonicResponse, highest: float | None) -> HarmonicResponse:
-    """The dwells up to ``highest`` [Hz], all of them if it is None.
+    """The dwells up to ``highest`` [Hz], all of them if it is None, and windows as they are.
 
-    Raises :class:`InputError` if none is left.
+    Raises :class:`InputError` if there are dwells and none is left.
     """
-    if highest is None:
+    if highest is None or not response.dwells.size:
         return response
-    kept = np.flatnonzero(response.frequency <= highest * (1.0 + 1e-3))
-    if kept.size == 0:
+    slow = response.dwells[response.frequency[response.dwells] <= highest * (1.0 + 1e-3)]
+    if slow.size == 0:
         raise InputError(
             f"no dwell is at {highest:g} Hz or below",
             source="--max-frequency",
             remedy=f"the slowest dwell is at {response.frequency[0]:.3g} Hz",
         )
-    return only_tests(response, kept)
+    return only_tests(response, np.concatenate([slow, response.windows]))
 
 
 def every_so_many(response: HarmonicResponse, step: int) -> HarmonicResponse:
@@ -318,7 +326,8 @@ def response_of_tests(
     progress("cutting windows")
     inputs, readings = ([each.name for each in listed] for listed in (plant.inputs, plant.channels))
     highest = HIGHEST_HZ if max_frequency is None else max_frequency
-    only = measured.only(recorded_names(plant))
+    highest = min(highest, MOST_HZ) if dwells else highest
+    only = measured.only((*recorded_names(plant), *measured.layout.free))
     try:
         windows = estimate_windows(only, inputs, readings, highest, lead_s, kinds)
     except InputError as error:

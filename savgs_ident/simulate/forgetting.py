@@ -59,6 +59,9 @@ def forgetful_motion(
             lead = _longer(LEAD_S, float(np.median(half)), float(np.median(left)))
             progress(f"cutting windows of which the first {lead:.3g} s are not compared")
             response = response_of_tests(measured, model.plant, orders, max_frequency, lead_s=lead)
+            if response.part is None:
+                # The roads are too short for that, and the dwells remain.
+                return response, None
             left, _, motion = _left(response, model)
         lasting = _lasting(response, left)
     except InputError as error:
@@ -135,6 +138,7 @@ def remembered(solution: PeriodicSolution, upto: NDArray[np.float64]) -> NDArray
     """
     places, layout = solution.excitation.windows, solution.mesh.layout
     here, windows, nodes = layout.nodes_of(places), places.size, layout.counts[places[0]]
+    assert solution.linearised is not None
     steps = np.asarray(solution.linearised.factors.steps)[..., here]
     by_node = np.moveaxis(steps.reshape(*steps.shape[:2], windows, nodes), (3, 2), (0, 1))
     phase = np.asarray(solution.mesh.phase)[here].reshape(windows, nodes)

@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 
 import savgs_ident as si
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import as_values
 from savgs_ident.fit.public import compare
 from savgs_ident.inference.likelihood import likelihood_of
 from savgs_ident.inference.problem import harmonic_target
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
-from savgs_ident.recordings.recording import Campaign
+from savgs_ident.recordings.recording import Campaign, ChannelSpec, RecordedChannel, RecordingLayout
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.selection import by_kind, only_tests
-from savgs_ident.simulate.excitation import measured_excitation, response_of_tests
+from savgs_ident.simulate.excitation import measured_excitation, response_of_tests, up_to_frequency
 from savgs_ident.simulate.forgetting import forgetful_motion, forgetful_response
 from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.readings import harmonics
@@ -99,6 +100,7 @@ def predicted(measured: HarmonicResponse) -> np.ndarray:
     return np.asarray(harmonics(plant, as_values(PARAMETERS.as_dict()), solution, orders))
 
 
+@pytest.mark.slow
 def test_a_plant_does_in_both_what_it_does_in_each(
     both: HarmonicResponse, alone: tuple[HarmonicResponse, HarmonicResponse]
 ) -> None:
@@ -127,7 +129,7 @@ def test_a_road_that_is_too_short_is_left_out_with_a_warning() -> None:
 def test_a_comparison_shows_dwells_and_windows() -> None:
     compared = compare(MODEL, dwells_and_road(), ORDERS)
     assert list(compared.figure_names) == ["bode", "spectra"]
-    dwells, windows = by_kind(compared, compared.measured)
+    dwells, windows = by_kind(compared)
     assert dwells is not None
     assert windows is not None
     assert dwells.used.sum() + windows.used.sum() == compared.used.sum()
@@ -160,3 +162,89 @@ def test_a_diagnosis_of_both_finds_nothing_missing_in_a_true_model(tmp_path: Pat
     assert "gap spectrum body_accel" in names
     page = found.to_html(tmp_path / "both.html").read_text()
     assert "5 dwells between 0.90 and 9.00 Hz and 2 windows of tests that do not repeat" in page
+
+
+def without_reading(campaign: Campaign, kind: str, *names: str) -> Campaign:
+    """The campaign whose tests of a kind lack some channels."""
+    changed = [
+        replace(each, channels={n: c for n, c in each.channels.items() if n not in names})
+        if each.kind == kind
+        else each
+        for each in campaign.recordings
+    ]
+    return replace(campaign, recordings=tuple(changed))
+
+
+@pytest.mark.slow
+def test_a_road_too_short_for_what_the_plant_remembers_is_left_out() -> None:
+    """It is long enough for the usual lead, and not for the one that is then asked for."""
+    slow = si.PlantModel(si.TwoMass(), PARAMETERS.with_values({"c": 600.0}))
+    found, motion = forgetful_motion(dwells_and_road(seconds=9.0), slow, ORDERS)
+    assert motion is None
+    assert len(found.tests) == 5
+    assert any(each.code == "tests_not_used" for each in found.warnings)
+
+
+def test_a_road_without_readings_is_left_out() -> None:
+    made = without_reading(dwells_and_road(), "road", "body_accel", "susp_deflection")
+    found = response_of_tests(made, MODEL.plant, ORDERS)
+    assert len(found.tests) == 5
+    (warning,) = [each for each in found.warnings if each.code == "tests_not_used"]
+    assert "body_accel and susp_deflection" in warning.what
+
+
+def test_a_road_may_lack_a_reading_that_the_dwells_have() -> None:
+    made = without_reading(dwells_and_road(), "road", "susp_deflection")
+    compared = compare(MODEL, made, ORDERS)
+    assert compared.used[compared.measured.dwells, 1].any()
+    assert not compared.used[compared.measured.windows, 1].any()
+    assert compared.used[compared.measured.windows, 0].any()
+    assert compared.figure("spectra").axes
+
+
+def test_no_more_is_compared_where_a_reading_was_not_recorded_at_all(both: HarmonicResponse) -> None:
+    made = dwells_and_road()
+    for kind in ("road", "dwell", "standstill"):
+        made = without_reading(made, kind, "susp_deflection")
+    less = harmonic_target(response_of_tests(made, MODEL.plant, ORDERS), MODEL.plant.channels, ORDERS)
+    assert less.used.shape == harmonic_target(both, MODEL.plant.channels, ORDERS).used.shape
+
+
+@pytest.mark.slow
+def test_peaks_are_those_of_the_dwells() -> None:
+    made = dwells_and_road()
+    dwells = si.fit(MODEL, only_kinds(made, "dwell", "standstill"), free=("k",), peak_to_peak=True)
+    fit = si.fit(MODEL, made, free=("k",), peak_to_peak=True)
+    assert fit["k"].value == pytest.approx(dwells["k"].value, rel=1e-9)
+    assert any(each.code == "tests_not_used" for each in fit.origin.warnings)
+    with pytest.raises(InputError, match="no peak-to-peak"):
+        si.fit(MODEL, only_kinds(made, "road", "standstill"), free=("k",), peak_to_peak=True)
+
+
+def test_a_frequency_limits_dwells_and_what_is_compared_in_windows() -> None:
+    found = response_of_tests(dwells_and_road(), MODEL.plant, ORDERS, max_frequency=4.0)
+    assert found.frequency[found.dwells].max() == pytest.approx(3.0, rel=1e-3)
+    places = [found.channel(each.name) for each in MODEL.plant.channels]
+    hertz = found.spacing[found.windows][:, None, None] * np.arange(found.orders + 1)
+    assert np.max(np.where(found.valid[found.windows][:, places], hertz, 0.0)) <= 4.0
+    assert response_of_tests(dwells_and_road(), MODEL.plant, ORDERS, max_frequency=50.0).windows.size
+    with pytest.raises(InputError, match=r"no dwell is at 0\.5 Hz"):
+        up_to_frequency(found, 0.5)
+
+
+def test_what_was_recorded_beside_is_known_in_windows() -> None:
+    """Oil that warms by a tenth of a degree a second in every test: the mean of what is compared of a window."""
+    made = dwells_and_road()
+    warming = []
+    for each in made.recordings:
+        time = next(iter(each.channels.values())).time
+        oil = RecordedChannel("oil_temperature", "degC", time, 20.0 + 0.1 * time)
+        warming.append(replace(each, channels={**each.channels, oil.name: oil}))
+    layout = RecordingLayout((ChannelSpec("oil_temperature", "degC", "oil", free=True),))
+    found = response_of_tests(replace(made, recordings=tuple(warming), layout=layout), MODEL.plant, ORDERS)
+    assert found.part is not None
+    oil = found.beside["oil_temperature"]
+    np.testing.assert_allclose(oil[found.dwells], 20.0 + 0.1 * 4.0, atol=1e-3)
+    ends = [float(test.split(" to ")[1].removesuffix(" s")) for test in found.tests if " to " in test]
+    compared = ((found.part.end - found.part.begin) / (2.0 * np.pi * found.frequency))[found.windows]
+    np.testing.assert_allclose(oil[found.windows], 20.0 + 0.1 * (ends - 0.5 * compared), atol=0.01)

@@ -50,7 +50,7 @@ def background_about(
     return with_background(
         data,
         about.likelihood.channel,
-        # What is free in every test is no part of it.
+        # What is free in every dwell is no part of it.
         input_locations(about, replace(constants, free_orders=0)),
         inputs=np.stack([about.rows(each) for each in (read, 1j * order * read)], axis=1),
         curves=_curves(about, constants),

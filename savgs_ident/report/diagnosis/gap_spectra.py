@@ -38,12 +38,19 @@ def gap_spectrum_figure(diagnosis: Diagnosis, c: int) -> Figure:
         return figure
 
 
+def channels_in_windows(diagnosis: Diagnosis) -> tuple[int, ...]:
+    """The places of the channels in which anything is compared in windows."""
+    measured, answers = compared_tests(diagnosis)
+    names = [each.name for each in diagnosis.given.channels]
+    used = comparable(measured, names, answers.after.shape[2] - 1)
+    return tuple(int(c) for c in np.flatnonzero(used.any(axis=(0, 2))))
+
+
 def gap_spectrum_pictures(diagnosis: Diagnosis) -> list[Picture]:
     """The figures of all channels that were recorded, with their words."""
-    measured, _ = compared_tests(diagnosis)
     pictures = []
-    for c, (name, shown) in enumerate(channel_labels(diagnosis.given).items()):
-        if name in measured.channels:
+    for c, shown in enumerate(channel_labels(diagnosis.given).values()):
+        if c in channels_in_windows(diagnosis):
             largest = [
                 f"{label} {np.max(values):.3g} %" for label, values in _gap_spectra(diagnosis, c)[2].items()
             ]

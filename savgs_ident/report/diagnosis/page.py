@@ -32,7 +32,6 @@ from savgs_ident.report.diagnosis.text import (
     KIND_WORDS,
     alarm,
     baseline_sentence,
-    by_tests,
     closed_words,
     gap_percentage,
     port_words,
@@ -52,6 +51,7 @@ from savgs_ident.report.text import (
     signed,
     unit_text,
 )
+from savgs_ident.responses.selection import by_kind
 
 _SAME = 1e-9
 
@@ -218,7 +218,7 @@ def _number(value: float | None) -> str:
 def diagnosis_html(diagnosis: Diagnosis, origin: Origin) -> str:
     """The page: one file, no network, nothing executed; the same diagnosis gives the same bytes."""
     shown, rest = shown_candidates(diagnosis)
-    verdict, (dwells, windows) = diagnosis.verdict, by_tests(diagnosis)
+    verdict, (dwells, windows) = diagnosis.verdict, by_kind(diagnosis)
     return render_page(
         "diagnosis.html.j2",
         {

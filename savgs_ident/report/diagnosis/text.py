@@ -25,7 +25,6 @@ from savgs_ident.report.text import (
     table,
     unit_text,
 )
-from savgs_ident.responses.selection import by_kind
 
 KIND_WORDS: Mapping[str, str] = MappingProxyType(
     {"none": "nothing", "effect": "one effect", "several": "several effects", "unknown": "unknown"}
@@ -108,11 +107,6 @@ def law_label(diagnosis: Diagnosis, port: str) -> str:
     named, known = diagnosis.verdict.effects, diagnosis.given.catalogue
     there = [name for name in named if name in known and known[name].port.location == port]
     return f"law of {' + '.join(there or named)}"
-
-
-def by_tests(diagnosis: Diagnosis) -> tuple[Diagnosis | None, Diagnosis | None]:
-    """A diagnosis with its dwells, and with its windows; None where there are none, as along a drive's motion."""
-    return (None, None) if diagnosis.measured is None else by_kind(diagnosis, diagnosis.measured)
 
 
 def baseline_sentence(diagnosis: Diagnosis) -> str:

@@ -320,7 +320,7 @@ class Predicted:
 
 def _predicted(posterior: Posterior) -> list[Predicted]:
     """Of each kind of test that is compared, in the channels in which anything is; of dwells, first harmonics."""
-    dwells, windows = by_kind(posterior, posterior.measured)
+    dwells, windows = by_kind(posterior)
     channels, found = range(len(posterior.model.channels)), []
     if dwells is not None:
         first = dwells.predictive.used[..., 1]

@@ -77,7 +77,7 @@ def scope_sentence(posterior: Posterior) -> str:
         else "; everything else was held at its value"
     )
     were = "was" if identified == 1 else "were"
-    dwells, windows = by_kind(posterior, posterior.measured)
+    dwells, windows = by_kind(posterior)
     compared = [_dwells(dwells)] if dwells else []
     compared += [_windows(windows)] if windows else []
     return f"{counted(identified, 'parameter')} {were} identified from {' and '.join(compared)}{along}."
