@@ -159,8 +159,7 @@ class DwellProblem(AbstractProblem):
         rows = np.asarray(rows_of(model, self.likelihood, p, solution, self.orders))
         rows = rows + self.corrections.get(terms, 0.0) + (0.0 if self.beyond is None else self.beyond)
         status = joint_status(solution.status())
-        # A search keeps scores of motions, and begins from them; what differentiates them is ten times as large.
-        return Prediction(rows, self.slopes(model, p, solution, names), status, solution.motions)
+        return Prediction(rows, self.slopes(model, p, solution, names), status, solution)
 
     def corrected(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
@@ -189,7 +188,7 @@ class DwellProblem(AbstractProblem):
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
     ) -> list[NDArray[np.float64]]:
         """First-order change of the rows per unit of each candidate's amplitudes, (tries, m, amplitudes)."""
-        model, warm_start = self.complete(terms), self._linearised(terms, values, warm_start)
+        model = self.complete(terms)
         without = [term for term in candidates if not self.catalogue[term.name].states]
         with_states = [term for term in candidates if self.catalogue[term.name].states]
         found = self._without_states(model, values, warm_start, without)
@@ -228,29 +227,20 @@ class DwellProblem(AbstractProblem):
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
     ) -> list[InputLocation]:
         """What an unknown signal at each location could do to the harmonics, about a motion with ``terms``."""
-        return input_locations(self._about(terms, values, warm_start), self.constants)
+        return input_locations(self._about(self.complete(terms), values, warm_start), self.constants)
 
     def with_background(self, data: Data, values: Mapping[str, float], warm_start: PeriodicSolution) -> Data:
         """The data with errors at every location and input, of the dampers' curves, and drifts of what is free."""
-        about = self._about((), values, warm_start)
+        about = self._about(self.complete(()), values, warm_start)
         drifts = about.slopes(self.free) * [float(about.p[name]) for name in self.free]
         return background_about(data, about, drifts, self.times, self.constants)
 
     def _about(
-        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
+        self, model: AbstractPlant, values: Mapping[str, float], warm_start: PeriodicSolution
     ) -> Linearisation:
-        model, there = self.complete(terms), self._linearised(terms, values, warm_start)
         return Linearisation(
-            model, self.complete(()), self.likelihood, self.orders, self.values(values), there
+            model, self.complete(()), self.likelihood, self.orders, self.values(values), warm_start
         )
-
-    def _linearised(
-        self, terms: tuple[str, ...], values: Mapping[str, float], motions: PeriodicSolution
-    ) -> PeriodicSolution:
-        """The motions at ``values`` [SI] with what differentiates them."""
-        if motions.linearised is not None:
-            return motions
-        return resolve(self.model(terms), placed(self.values(values)), motions, ITERATIONS)
 
     @property
     def times(self) -> NDArray[np.float64]:

@@ -18,7 +18,7 @@ What the truncation to a finite number of nodes costs shows in the solution on t
 rule is of second order. How the response changes with the parameters is in :mod:`savgs_ident.simulate.sensitivity`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -172,23 +172,17 @@ def layout_of(excitation: Excitation, settings: PeriodicSettings) -> Layout:
 class PeriodicSolution(eqx.Module):
     """Periodic motions of D dwells on P nodes, with what is needed to differentiate them.
 
-    That, ``linearised``, is most of it, and None in one that is kept as a place to begin from. ``last_step`` is the
-    last Newton step of each dwell relative to the size of its motion [1], (D,); ``travel`` is the largest
-    displacement of each coordinate for which the equations hold [its unit], (n,).
+    ``last_step`` is the last Newton step of each dwell relative to the size of its motion [1], (D,);
+    ``travel`` is the largest displacement of each coordinate for which the equations hold [its unit], (n,).
     """
 
     excitation: Excitation
     mesh: Mesh
     trajectory: Trajectory
-    linearised: Linearised | None
+    linearised: Linearised
     last_step: Float[Array, " D"]
     iterations: Int[Array, ""]
     travel: tuple[float, ...] = eqx.field(static=True)
-
-    @property
-    def motions(self) -> "PeriodicSolution":
-        """The same without what is needed to differentiate it."""
-        return replace(self, linearised=None)
 
     def status(self) -> tuple[Status, ...]:
         """How each dwell ended; a motion beyond a coordinate's travel counts as not finite."""

@@ -175,7 +175,6 @@ def linear_response(
     model: AbstractPlant, p: Values, solution: PeriodicSolution
 ) -> Callable[[Float[Array, "k P"]], Trajectory]:
     """The change of the trajectory that a change of the residual at the nodes, (k, P), brings about, in SI."""
-    assert solution.linearised is not None, "keep what differentiates a motion, or solve it again"
     lin, at, layout = solution.linearised, solution.trajectory, solution.mesh.layout
     steps = node_steps(solution.excitation, solution.mesh)
     still, n = Trajectory(jnp.zeros_like(at.x), jnp.zeros_like(at.y)), len(model.coordinates)

@@ -167,7 +167,7 @@ def node_loads(
     model: AbstractPlant, p: Values, solution: PeriodicSolution
 ) -> tuple[dict[str, PortSignals], dict[str, Load]]:
     """What the forces at each port see at the nodes, and the loads in which something may give way; (P,) each."""
-    ports, carried, _ = _at_ports(model, placed(dict(p)), solution.motions)
+    ports, carried, _ = _at_ports(model, placed(dict(p)), solution)
     whole = {
         name: Load(load.total, jnp.broadcast_to(load.rest, load.total.shape))
         for name, load in carried.items()
