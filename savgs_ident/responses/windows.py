@@ -133,14 +133,15 @@ def _with_readings(source: str, response: HarmonicResponse, readings: Sequence[s
     """The windows in which any reading is known all along, with a warning for each of the others."""
     places = [response.channel(name) for name in readings if name in response.channels]
     known = response.valid[:, places].any(axis=(1, 2))
-    what = f"has {' and '.join(readings)} with gaps, or not at all"
-    remedy = "look at the sensors and their recording"
+    names, remedy = " or ".join(readings), "look at the sensors and their recording"
+    if not known.any():
+        raise InputError(f"no window has {names} without a gap", source=source, remedy=remedy)
     warnings = tuple(
-        DataWarning("window_not_used", what, source, response.tests[d], remedy=remedy)
+        DataWarning(
+            "window_not_used", f"has no {names} without a gap", source, response.tests[d], remedy=remedy
+        )
         for d in np.flatnonzero(~known)
     )
-    if not known.any():
-        raise InputError(f"every window {what}", source=source, test=response.tests[0], remedy=remedy)
     if not warnings:
         return response
     return replace(only_tests(response, np.flatnonzero(known)), warnings=(*response.warnings, *warnings))

@@ -138,7 +138,6 @@ def remembered(solution: PeriodicSolution, upto: NDArray[np.float64]) -> NDArray
     """
     places, layout = solution.excitation.windows, solution.mesh.layout
     here, windows, nodes = layout.nodes_of(places), places.size, layout.counts[places[0]]
-    assert solution.linearised is not None
     steps = np.asarray(solution.linearised.factors.steps)[..., here]
     by_node = np.moveaxis(steps.reshape(*steps.shape[:2], windows, nodes), (3, 2), (0, 1))
     phase = np.asarray(solution.mesh.phase)[here].reshape(windows, nodes)

@@ -130,7 +130,7 @@ def test_without_a_standstill_the_noise_is_read_from_the_roughness_and_said_to_b
         assert measured.noise_sd[:, measured.channel(name)] == pytest.approx(sd, rel=0.1)
 
 
-def test_a_window_with_a_gap_is_not_compared_in_thatchannel_of() -> None:
+def test_a_window_with_a_gap_is_not_compared_in_that_channel() -> None:
     whole = campaign()
     road_test, still = whole.recordings
     accel = road_test.channels["body_accel"]
