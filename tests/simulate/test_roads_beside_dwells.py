@@ -139,17 +139,16 @@ def test_a_comparison_shows_dwells_and_windows() -> None:
 
 
 @pytest.mark.slow
-def test_both_together_say_more_than_either() -> None:
-    made = dwells_and_road(seed=3)
-    alone = [
-        si.fit(MODEL, only_kinds(made, kind, "standstill"), free=("k", "c")) for kind in ("dwell", "road")
-    ]
+def test_a_road_adds_to_what_noisy_dwells_say() -> None:
+    """Less than a road alone says of its own time: what is identified may drift, and is that of the whole campaign."""
+    made = dwells_and_road(noise=30.0, seed=3)
+    dwells = si.fit(MODEL, only_kinds(made, "dwell", "standstill"), free=("k", "c"))
     fit = si.fit(MODEL, made, free=("k", "c"))
     assert fit.trusted
     for name in ("k", "c"):
         found = fit[name]
         assert abs(found.value - PARAMETERS[name].value) < 4.0 * found.stderr
-        assert found.own_stderr < min(each[name].own_stderr for each in alone)
+        assert found.stderr < 0.7 * dwells[name].stderr
 
 
 @pytest.mark.slow
