@@ -140,7 +140,7 @@ def test_a_comparison_shows_dwells_and_windows() -> None:
 
 @pytest.mark.slow
 def test_a_road_adds_to_what_noisy_dwells_say() -> None:
-    """Less than a road alone says of its own time: what is identified may drift, and is that of the whole campaign."""
+    """Not more than a road alone says of its own time: what is identified may drift over the campaign."""
     made = dwells_and_road(noise=30.0, seed=3)
     dwells = si.fit(MODEL, only_kinds(made, "dwell", "standstill"), free=("k", "c"))
     fit = si.fit(MODEL, made, free=("k", "c"))
