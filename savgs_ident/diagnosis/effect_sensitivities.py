@@ -42,8 +42,7 @@ SAMPLES = 384
 """Instants of a dwell's period along which states are marched; of a window as many as it has nodes."""
 
 PERIODS = 16
-"""Periods of a dwell after which they repeat: what rang at the start has died away even in a slow, slightly damped
-frame."""
+"""Periods of a dwell after which they repeat: what rang at the start has died away even in a slow frame."""
 
 PERIODS_OF_A_WINDOW = 2
 """The same of a window, which is long, and compared after a lead."""
