@@ -13,11 +13,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import joint_status
 from savgs_ident.core.values import Values
@@ -30,6 +32,7 @@ from savgs_ident.diagnosis.problem import AbstractProblem, DrawnLaw, largest_wit
 from savgs_ident.diagnosis.regimes import dwell_cycles, find_regimes
 from savgs_ident.diagnosis.result import ForceLoop, NextTest, Regime, Responses
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
+from savgs_ident.effects.alternatives import Alternatives, shared_by
 from savgs_ident.effects.base import Port, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.background.imposed import node_loads, rows_of, slopes_in
@@ -50,11 +53,12 @@ from savgs_ident.simulate.periodic import (
     PeriodicSettings,
     PeriodicSolution,
     adapt,
+    blank_solution,
     layout_of,
     resolve,
     simulate_periodic,
 )
-from savgs_ident.simulate.program_cache import placed
+from savgs_ident.simulate.program_cache import done_once, placed
 
 ITERATIONS = 100
 """Most Newton steps from one point of a search to the next."""
@@ -113,7 +117,8 @@ class DwellProblem(AbstractProblem):
 
         Raises :class:`InputError` if there are none.
         """
-        model, p = self.model(()), self.values(values)
+        model, p = self.model(()), placed(self.values(values))
+        self._have_compiled(model, p)
         solution = simulate_periodic(model, p, self.excitation, self.settings, self.layout)
         lost = [d for d, each in enumerate(solution.status()) if not each.ok]
         dwells = [f"{float(self.excitation.frequency[d]):.4g} Hz" for d in lost if d in self.dwells]
@@ -141,7 +146,7 @@ class DwellProblem(AbstractProblem):
     ) -> PeriodicSolution:
         """The same motions on nodes that follow them. ``values`` are in SI."""
         return adapt(
-            self.model(terms),
+            self._solved_model(terms),
             self.values(values),
             warm_start,
             warm_start.mesh.layout,
@@ -152,7 +157,8 @@ class DwellProblem(AbstractProblem):
         self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
     ) -> Prediction:
         """Rows with ``terms`` at ``values`` [SI], with slopes in ``names``, on the nodes of ``warm_start``."""
-        model, p = self.model(terms), placed(self.values(values))
+        model, p = self._solved_model(terms), placed(self.values(values))
+        self._have_compiled(model, p)
         start = self._fitting(model, warm_start)
         new = start.x.shape != warm_start.trajectory.x.shape
         solution = resolve(model, p, warm_start, ITERATIONS_AT_REST if new else ITERATIONS, start)
@@ -169,7 +175,7 @@ class DwellProblem(AbstractProblem):
         The rule of the collocation is of second order: four thirds of what twice the nodes change. None where they do
         not lead to a motion.
         """
-        model, p, layout = self.model(terms), placed(self.values(values)), warm_start.mesh.layout
+        model, p, layout = self._solved_model(terms), placed(self.values(values)), warm_start.mesh.layout
         doubled = Layout(tuple(2 * count for count in layout.counts))
         coarse = resolve(model, p, warm_start, ITERATIONS)
         fine = adapt(model, p, coarse, doubled, self.settings.iterations)
@@ -310,6 +316,40 @@ class DwellProblem(AbstractProblem):
         """The harmonics of three models."""
         del data
         return Responses(*(self.likelihood.harmonics(each[None], self.shape)[0] for each in rows))
+
+    def complete(self, terms: Sequence[str]) -> AbstractPlant:
+        """The baseline with ``terms`` and all effects without states, in programs that serve others with states."""
+        return self._shared_model(terms) or super().complete(terms)
+
+    def _solved_model(self, terms: Sequence[str]) -> AbstractPlant:
+        """The same, or the smallest model with ``terms`` where these have a program of their own."""
+        return self._shared_model(terms) or self.model(terms)
+
+    def _shared_model(self, terms: Sequence[str]) -> AbstractPlant | None:
+        with_states = [name for name in terms if self.catalogue[name].states and name not in self.baseline]
+        shared = [self._alternatives[name] for name in with_states if name in self._alternatives]
+        if not shared or len(shared) < len(with_states):
+            return None
+        return replace(self.model(()), alternatives=tuple(shared))
+
+    @cached_property
+    def _alternatives(self) -> Mapping[str, Alternatives]:
+        """Effects that the baseline does not have, each among others with as many states."""
+        absent = (each for name, each in self.catalogue.items() if name not in self.baseline)
+        return {name: each for name, each in placed(shared_by(absent)).items() if len(each.effects) > 1}
+
+    def _have_compiled(self, model: AbstractPlant, p: Values) -> None:
+        """Have compiled what solves a model beside what gives its slopes, unless that was done.
+
+        On all cores: those who ask for the same model meanwhile wait.
+        """
+
+        def compile_both() -> None:
+            blank, some = blank_solution(model, self.excitation, self.layout), self.names[:1]
+            side_by_side(lambda: resolve(model, p, blank, 1), lambda: self.slopes(model, p, blank, some))
+
+        shapes = self.layout, self.shape, self.likelihood.measured.shape
+        done_once((jax.tree.structure(model), shapes), compile_both)
 
     def _fitting(self, model: AbstractPlant, warm_start: PeriodicSolution) -> Trajectory:
         """The motions of ``warm_start`` with as many states as ``model`` has, further ones at rest."""

@@ -59,7 +59,7 @@ class LearnedLaw:
         name: of the effect.
         port: where it acts.
         term: its coefficients as a search takes them.
-        problem: the baseline with the law as its only candidate.
+        problem: the baseline with the law, and those that share its program.
         search: that, and the data.
         mode: the best point of both.
         spans: the range of the port's signals that it knows, by name, SI.
@@ -240,11 +240,13 @@ def _begin_learning(
         return None
     effect = learned_effect(port)
     there = {name: each for name, each in problem.catalogue.items() if name in problem.baseline}
-    table = ParameterTable(effect.parameters).with_values(spans)
+    alike = {each.name: each for each in _alike(effect, problem)}
+    parameters = tuple(each for some in alike.values() for each in some.parameters)
+    table = ParameterTable(parameters).with_values(spans)
     mine = replace(
         problem,
         parameters=merge_parameters(problem.parameters, table),
-        catalogue={**there, effect.name: effect},
+        catalogue={**there, **alike},
     ).uncorrected()
     search, names = search_of(mine, data, given), coefficients_at(port)
     at_rest = mine.predict((effect.name,), base.values, (), base.prediction.warm_start)
@@ -266,6 +268,14 @@ def _begin_learning(
     blocked = _blocked_play(search, effect, blank, port, base, near, constants)
     alone = widths_alone(term, port, search, base, columns, constants)
     return _Begun(port, mine, search, spans, places, alone, FittedFunctions(term, mode), blocked)
+
+
+def _alike(effect: Effect, problem: AbstractProblem) -> list[Effect]:
+    """The learned laws of all that gives way, whose programs serve each other, if this is one of them."""
+    if effect.port.kind is not PortKind.SERIES:
+        return [effect]
+    series = (each for each in problem.plant.ports if each.kind is PortKind.SERIES and not each.resonant)
+    return [learned_effect(each) for each in series]
 
 
 def _is_impossible(law: LearnedLaw) -> bool:

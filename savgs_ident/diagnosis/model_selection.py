@@ -77,8 +77,19 @@ def recalibrate(
 
     Raises :class:`InputError` for a baseline that cannot be solved.
     """
+    found, _ = side_by_side(lambda: _recalibrated(plant, data, values, progress, constants), plant.rehearse)
+    return found
+
+
+def _recalibrated(
+    plant: AbstractProblem,
+    data: Data,
+    values: Mapping[str, float],
+    progress: Progress,
+    constants: DecisionConstants,
+) -> DiagnosisProblem:
     progress("solving the baseline")
-    warm_start, _ = side_by_side(lambda: plant.start(values), plant.rehearse)
+    warm_start = plant.start(values)
     search = search_of(plant, data)
     given = plant.predict((), values, [each.name for each in plant.nuisances], warm_start)
     progress("recalibrating the baseline")

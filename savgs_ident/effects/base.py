@@ -35,7 +35,7 @@ from typing import ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Complex, Float
+from jaxtyping import Array, Bool, Complex, Float
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values
@@ -198,13 +198,14 @@ class InternalState(NamedTuple):
 
     ``scale`` is a typical size [``unit``], for tolerances. ``slips`` marks a state that follows a
     rate-independent law (the anchor of a friction bristle): periodic solutions integrate it by backward
-    Euler, which is the exact play operator, and all others by the trapezoidal rule.
+    Euler, which is the exact play operator, and all others by the trapezoidal rule. Both are numbers of a program
+    where one state stands for those of several effects.
     """
 
     name: str
     unit: str
-    scale: float
-    slips: bool = False
+    scale: float | Float[Array, ""]
+    slips: bool | Bool[Array, ""] = False
 
 
 class Role(NamedTuple):

@@ -8,10 +8,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jaxtyping import Array, Complex, Float
+from jaxtyping import Array, Bool, Complex, Float
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
+from savgs_ident.effects.alternatives import Alternatives
 from savgs_ident.effects.base import (
     AbstractForceLaw,
     AbstractFrictionLimitLaw,
@@ -60,11 +61,20 @@ class SeriesDeflection(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """An effect with its states and their rates."""
+    """An effect with its states and their rates.
+
+    Of alternatives, which share their ``states``, the one that is ``chosen`` acts; other effects always do.
+    """
 
     effect: Effect
+    states: str
     state: Float[Array, " s"]
     rate: Float[Array, " s"]
+    chosen: Bool[Array, ""] | None = None
+
+    def acting(self, value: Array, otherwise: Array | float = 0.0) -> Array:
+        """A value if it acts."""
+        return value if self.chosen is None else jnp.where(self.chosen, value, otherwise)
 
 
 def sticking_contacts(effects: Sequence[Effect]) -> tuple[Port, ...]:
@@ -130,7 +140,7 @@ class EffectsAtInstant:
     """The effects of a plant at one instant, with parameters ``p``.
 
     ``s`` and ``sd`` are the states and their rates, (s,) [unit of each]: first ``own`` ones of the plant itself, then
-    those of the effects, in the order of :func:`states_of`;
+    those of the effects, in the order of :func:`states_of`, and of the ``alternatives``;
     ``imposed`` are signals imposed from outside, as :func:`nothing_imposed` arranges them.
 
     Attributes:
@@ -149,6 +159,7 @@ class EffectsAtInstant:
         sd: Array,
         imposed: Mapping[str, Array] | None = None,
         own: int = 0,
+        alternatives: Sequence[Alternatives] = (),
     ) -> None:
         self.p = p
         self.own, self.own_rates = s[:own], sd[:own]
@@ -165,7 +176,13 @@ class EffectsAtInstant:
         start = len(self._contacts)
         for effect in effects:
             mine = slice(start, start + len(effect.states))
-            self._parts.append(_Part(effect, s[mine], sd[mine]))
+            self._parts.append(_Part(effect, effect.name, s[mine], sd[mine]))
+            start = mine.stop
+        for number, several in enumerate(alternatives, start=1):
+            mine = slice(start, start + len(several.states))
+            for effect in several.effects:
+                shared = f"alternatives {number}", s[mine], sd[mine]
+                self._parts.append(_Part(effect, *shared, several.acts(effect)))
             start = mine.stop
 
     def _at(self, port: Port, kind: type) -> Iterator[_Part]:
@@ -178,7 +195,8 @@ class EffectsAtInstant:
         given = self._imposed.get(port.name, jnp.zeros(2))
         found = SeriesDeflection(given[0], given[1])
         for part in self._at(port, AbstractSeriesLaw):
-            found = SeriesDeflection(found.displacement + part.state[0], found.velocity + part.rate[0])
+            way, rate = part.acting(part.state[0]), part.acting(part.rate[0])
+            found = SeriesDeflection(found.displacement + way, found.velocity + rate)
         return found
 
     def carry(self, port: Port, total: Float[Array, ""], rest: Float[Array, ""]) -> None:
@@ -188,16 +206,16 @@ class EffectsAtInstant:
         """
         load = Load(total, rest)
         self.loads[port.name] = load
-        for effect, state, rate in self._at(port, AbstractSeriesLaw):
-            self._out_of_balance[effect.name] = effect.balance(self.p, load, state, rate)
+        for part in self._at(port, AbstractSeriesLaw):
+            self._leave(part, part.effect.balance(self.p, load, part.state, part.rate))
 
     def force(self, port: Port, signals: PortSignals) -> Float[Array, ""]:
         """Force of all effects at a port, that of a contact that sticks and what is imposed there included [N]."""
         self.signals[port.name] = signals
         total = self._imposed.get(port.name, jnp.zeros_like(signals.displacement))
-        for effect, state, rate in self._at(port, AbstractForceLaw):
-            total = total + effect.force(self.p, signals, state)
-            self._out_of_balance[effect.name] = rate - effect.rate(self.p, signals, state)
+        for part in self._at(port, AbstractForceLaw):
+            total = total + part.acting(part.effect.force(self.p, signals, part.state))
+            self._leave(part, part.rate - part.effect.rate(self.p, signals, part.state))
         contacts = [each.name for each in self._contacts]
         if port.name in contacts:
             place = contacts.index(port.name)
@@ -219,16 +237,21 @@ class EffectsAtInstant:
         given = self._imposed.get(port.name, jnp.zeros(2))
         value, rate = recorded.value + given[0], recorded.rate + given[1]
         turned = fundamental or Fundamental(jnp.zeros_like(value), jnp.zeros_like(value))
-        for effect, _, _ in self._at(port, AbstractInputLaw):
-            shift = effect.shift(self.p, recorded, turned)
+        for part in self._at(port, AbstractInputLaw):
+            shift = part.effect.shift(self.p, recorded, turned)
             value, rate = value + shift.value, rate + shift.rate
         return InputSignal(value, rate)
 
     def balance(self) -> Float[Array, " s"]:
         """What vanishes for the right rates of all states, in their order [unit of each, or of its rate]."""
         anchors = [self._out_of_balance[_anchor_of(port)][None] for port in self._contacts]
-        own = [self._out_of_balance[part.effect.name] for part in self._parts if part.effect.states]
-        return jnp.concatenate([*anchors, *own] or [jnp.zeros(0)])
+        own = dict.fromkeys(part.states for part in self._parts if part.effect.states)
+        balances = [self._out_of_balance[states] for states in own]
+        return jnp.concatenate([*anchors, *balances] or [jnp.zeros(0)])
+
+    def _leave(self, part: _Part, balance: Float[Array, " s"]) -> None:
+        """Record by how much the rates of the states of an effect are out of balance."""
+        self._out_of_balance[part.states] = part.acting(balance, self._out_of_balance.get(part.states, 0.0))
 
 
 def _anchor_of(port: Port) -> str:

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.small_root import Root, find_root
 from savgs_ident.core.values import Values
+from savgs_ident.effects.alternatives import Alternatives
 from savgs_ident.effects.base import (
     AbstractSensorLaw,
     Fundamental,
@@ -220,6 +221,7 @@ class AbstractPlant(eqx.Module):
     conditions: ClassVar[tuple[OperatingCondition, ...]] = SAME_OR_SCALED
     location_words: ClassVar[Mapping[str, str]] = MappingProxyType({})
     effects: tuple[Effect, ...] = eqx.field(default=(), kw_only=True)
+    alternatives: tuple[Alternatives, ...] = eqx.field(default=(), kw_only=True)
 
     @abstractmethod
     def evaluate(
@@ -272,8 +274,12 @@ class AbstractPlant(eqx.Module):
 
     @property
     def states(self) -> tuple[InternalState, ...]:
-        """Internal states: the plant's own, anchors of contacts that stick, then those of all effects in order."""
-        return (*self.own_states, *states_of(self.effects))
+        """Internal states: the plant's own, anchors of contacts that stick, then those of all effects in order.
+
+        Of alternatives, which come last, those of the one that acts.
+        """
+        alternatives = (state for each in self.alternatives for state in each.states)
+        return (*self.own_states, *states_of(self.effects), *alternatives)
 
     @property
     def sensors_have_dynamics(self) -> bool:
@@ -315,7 +321,8 @@ class AbstractPlant(eqx.Module):
         self, p: Values, motion: Motion, s: Array, sd: Array, u: Any, prepared: Any
     ) -> tuple[EffectsAtInstant, Array, Any]:
         p = self.effective(p)
-        at = EffectsAtInstant(self.effects, p, s, sd, u.imposed, len(self.own_states))
+        own = len(self.own_states)
+        at = EffectsAtInstant(self.effects, p, s, sd, u.imposed, own, self.alternatives)
         balance, loads = self.evaluate(p, motion, u, at, prepared)
         return at, balance, loads
 
@@ -374,7 +381,7 @@ def state_sizes(plant: AbstractPlant) -> tuple[float, ...]:
     """Typical sizes of x = (q, qd, s), (2 n + s,) [SI]."""
     sizes = [each.size for each in plant.coordinates]
     rates = [each.rate_size for each in plant.coordinates]
-    return (*sizes, *rates, *(state.scale for state in plant.states))
+    return (*sizes, *rates, *(float(state.scale) for state in plant.states))
 
 
 def nominal_inputs(plant: AbstractPlant, p: Values) -> Any:

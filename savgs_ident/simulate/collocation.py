@@ -226,8 +226,8 @@ def _residual_and_columns(function: Callable[..., Array], parts: tuple[Array, ..
 
 def implicitness(model: AbstractPlant) -> Float[Array, "m 1"]:
     """Weight g [1] of the far end of a step for each state."""
-    weights = [0.5] * (2 * len(model.coordinates)) + [1.0 if state.slips else 0.5 for state in model.states]
-    return jnp.asarray(weights)[:, None]
+    slips = jnp.asarray([False] * (2 * len(model.coordinates)) + [state.slips for state in model.states])
+    return jnp.where(slips, 1.0, 0.5)[:, None]
 
 
 def linearise(

@@ -19,7 +19,7 @@ rule is of second order. How the response changes with the parameters is in :mod
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import equinox as eqx
 import jax
@@ -136,7 +136,7 @@ def solve_newton(
 
     blank = blank_linearised(model, layout)
     far = jnp.full(len(layout.counts), np.finfo(np.float64).max)
-    begin = _Progress(NewtonResult(start, blank, far, jnp.array(0)), jnp.ones_like(far))
+    begin = _Progress(NewtonResult(start, blank, far, jnp.zeros((), int)), jnp.ones_like(far))
     return jax.lax.while_loop(unfinished, advance, begin).result
 
 
@@ -253,6 +253,22 @@ def solve_near(
     parts = _solve(model, p, model.prepare(p), known.excitation, known.mesh, start, *bounds)
     found = jax.tree.unflatten(newton_structure(), parts)
     return found.trajectory, jnp.max(found.last_step)
+
+
+def blank_solution(model: AbstractPlant, excitation: Excitation, layout: Layout) -> PeriodicSolution:
+    """What a solution looks like, of zeros: to have the programs compiled that take one."""
+    lin = blank_linearised(model, layout)
+    inner, size, nodes = lin.slope.shape
+    blank = PeriodicSolution(
+        excitation=excitation,
+        mesh=uniform_mesh(layout),
+        trajectory=Trajectory(jnp.zeros((size, nodes)), jnp.zeros((inner, nodes))),
+        linearised=lin,
+        last_step=jnp.zeros(len(layout.counts)),
+        iterations=jnp.zeros((), int),
+        travel=tuple(each.travel for each in model.coordinates),
+    )
+    return cast(PeriodicSolution, placed(blank))
 
 
 @eqx.filter_jit

@@ -19,13 +19,14 @@ import os
 import shutil
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import equinox as eqx
@@ -166,6 +167,23 @@ def run_cached(function: Callable[..., tuple[Array, ...]], *args: Any) -> tuple[
     return tuple(program.call(*arrays))
 
 
+_WORKING: dict[Hashable, Lock] = {}
+_DONE: set[Hashable] = set()
+
+
+def done_once(what: Hashable, work: Callable[[], object]) -> None:
+    """Do the work that gets programs compiled, the first time that it is asked for.
+
+    Threads that ask for the same while it is done wait for it: each would compile the same programs otherwise.
+    """
+    if what in _DONE:
+        return
+    with _WORKING.setdefault(what, Lock()):
+        if what not in _DONE:
+            work()
+            _DONE.add(what)
+
+
 def placed(tree: Any) -> Any:
     """``tree`` with its arrays bound to the device.
 
@@ -286,6 +304,7 @@ def make_room_for_programs(most: int = MANY_REGIONS, most_memory: int = MUCH_MEM
     """
     if mapped_regions() > most or memory_in_use() > most_memory:
         jax.clear_caches()
+        _DONE.clear()
         gc.collect()
         _give_back()
 

@@ -4,7 +4,10 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier
+from time import sleep
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,7 +20,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.small_root import solve_dense
 from savgs_ident.simulate import program_cache
-from savgs_ident.simulate.program_cache import run_cached
+from savgs_ident.simulate.program_cache import done_once, run_cached
 
 _SOLVE = """
 import jax.monitoring
@@ -119,3 +122,36 @@ def test_a_program_is_traced_once_and_again_where_its_file_is_not_whole(
         assert len(traced) == count
         np.testing.assert_allclose(solved(), wanted)
         assert len(traced) == count
+
+
+def test_work_that_several_threads_ask_for_is_done_once_and_waited_for() -> None:
+    done: list[int] = []
+    together = Barrier(4)
+
+    def ask(_: int) -> int:
+        together.wait()
+        done_once("what threads ask for", work)
+        return len(done)
+
+    def work() -> None:
+        sleep(0.2)
+        done.append(1)
+
+    with ThreadPoolExecutor(4) as pool:
+        seen = list(pool.map(ask, range(4)))
+    assert seen == [1, 1, 1, 1]
+
+
+def test_work_that_failed_is_done_again() -> None:
+    tried: list[int] = []
+
+    def work() -> None:
+        tried.append(1)
+        if len(tried) == 1:
+            raise RuntimeError("no memory")
+
+    with pytest.raises(RuntimeError, match="no memory"):
+        done_once("work that fails at first", work)
+    done_once("work that fails at first", work)
+    done_once("work that fails at first", work)
+    assert len(tried) == 2

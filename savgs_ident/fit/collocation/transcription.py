@@ -157,7 +157,7 @@ def unknowns_of(task: Task, points: Points) -> Unknowns:
         points=layout.total,
         dwells=len(layout.counts),
         coordinates=tuple((each.size, each.rate_size, each.acceleration_size) for each in at),
-        internal=tuple(state.scale for state in plant.states),
+        internal=tuple(float(state.scale) for state in plant.states),
         readings=tuple(readings),
         balances=tuple(_inertia_forces(plant, task.problem.fixed)),
     )
