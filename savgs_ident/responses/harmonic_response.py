@@ -40,7 +40,7 @@ class ComparedPart(NamedTuple):
     @property
     def repeats(self) -> NDArray[np.bool_]:
         """Which of the tests repeat, (D,): the dwells among them."""
-        return np.asarray(self.end - self.begin > 2.0 * np.pi)
+        return self.end - self.begin > 2.0 * np.pi
 
 
 WHOLE_PERIOD = ComparedPart(*(np.array([each]) for each in (-10.0 * np.pi, 12.0 * np.pi, 1.0)))

@@ -44,13 +44,19 @@ SIGNIFICANT = 4.0
 def signals_at(
     plant: AbstractPlant, excitation: Excitation, mesh: Mesh
 ) -> tuple[tuple[InputSignal, ...], Fundamental]:
-    """Value and rate of every input at the nodes of a mesh, (P,) each, and the angle of the test."""
+    """Value and rate of every input at the nodes of a mesh, (P,) each, and the angle of the test.
+
+    Nothing turns in a window of a test that does not repeat.
+    """
     dwell, phase = mesh.layout.dwell, jnp.asarray(mesh.phase)
     omega = 2.0 * jnp.pi * excitation.frequency[dwell]
     harmonics = [excitation.harmonics[each.name] for each in plant.inputs]
     first = harmonics[0]
     offset = jnp.angle(first[:, 1]) if first.shape[1] > 1 else jnp.zeros(())
-    fundamental = Fundamental(phase + jnp.broadcast_to(offset, excitation.frequency.shape)[dwell], omega)
+    turns = jnp.asarray(True if excitation.part is None else excitation.part.repeats)
+    angle = phase + jnp.broadcast_to(offset, excitation.frequency.shape)[dwell]
+    turning = jnp.broadcast_to(turns, excitation.frequency.shape)[dwell]
+    fundamental = Fundamental(jnp.where(turning, angle, 0.0), jnp.where(turning, omega, 0.0))
     signals = [
         _synthesise(each[dwell], omega, phase)
         if each.shape[1] <= SUMMED

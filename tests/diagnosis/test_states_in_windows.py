@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
 from savgs_ident.effects.effect import generic_effects
 from savgs_ident.inference.background.port_functions import mesh_points, resonance
@@ -51,6 +52,20 @@ def test_a_small_effect_does_along_a_road_what_it_is_said_to_do(case: Case, name
     done = (having.rows - without.rows)[rows] * weight
     miss = np.linalg.norm(said[rows] * weight - done) / np.linalg.norm(done)
     assert miss < 0.1
+
+
+@pytest.mark.slow
+def test_waves_of_a_cam_are_there_in_dwells_and_not_on_a_road() -> None:
+    measured = response_of_tests(dwells_and_road(), TwoMass, 9)
+    waves = generic_effects(TwoMass.ports)["road_harmonics"]
+    given = {**PARAMETERS.as_dict(), **ParameterTable(waves.parameters).as_dict()}
+    problem, _ = dwell_problem(measured, TwoMass(), PARAMETERS, {waves.name: waves}, free=("k", "c"))
+    start = problem.start(PARAMETERS.as_dict())
+    without, having = (problem.predict((), each, (), start) for each in (PARAMETERS.as_dict(), given))
+    on_the_road = np.isin(problem.likelihood.test, problem.excitation.windows)
+    change = (having.rows - without.rows) / problem.likelihood.data.discrepancy_scale
+    assert np.linalg.norm(change[~on_the_road]) > 0.1
+    assert np.abs(change[on_the_road]).max() < 1e-6
 
 
 @pytest.mark.slow
