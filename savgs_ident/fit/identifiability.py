@@ -275,7 +275,7 @@ def assess(task: Task, minimiser: Minimiser, best: Minimum, explained: bool, pro
     values = {name: float(value) for name, value in problem.parameters(best.u).items()}
     units = {name: table[name].unit for name in names}
     if not best.finite:
-        return Verdict(False, ("The fit broke down: nothing can be said about the parameters.",))
+        return Verdict(False, (BROKEN_DOWN,), explained=False)
     per_datum, missed = _chi2_per_datum(problem, best), _misfit(task, best)
     if not explained:
         return Verdict(False, (unexplained(per_datum, missed),), explained=False)
@@ -298,6 +298,13 @@ def assess(task: Task, minimiser: Minimiser, best: Minimum, explained: bool, pro
         "no more than small errors of any model; the errors of the parameters contain it."
     )
     return replace(verdict, sentences=(beyond, *verdict.sentences))
+
+
+BROKEN_DOWN = (
+    "The fit broke down: nothing can be said about the parameters. Where a model lacks something they go far to make "
+    "up for it: look for what is missing with `diagnose`."
+)
+"""What is said of a fit whose residuals or slopes are no numbers at its end."""
 
 
 def unexplained(per_datum: float, missed: float) -> str:

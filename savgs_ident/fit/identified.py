@@ -102,15 +102,15 @@ class Identified(Result):
     def doubt(self) -> str:
         """The first reason why the fit is not to be trusted; empty if it is.
 
-        Where the model does not explain the data, that steps or motions are lacking is no advice: parameters that are
-        to make up for what is missing lead far away. Nor is that something is missing where the recordings, or a
-        number, are off as by a wrong unit.
+        Where the model does not explain the data, that steps, motions or numbers are lacking is no advice: parameters
+        that are to make up for what is missing lead far away. Nor is that something is missing where the recordings,
+        or a number, are off as by a wrong unit.
         """
         if self.mistaken and not self.verdict.explained:
             return self.mistaken
         if self.far_off and (self.far_off[0].unit_taken or self.verdict.explained):
             return far_off_sentence(self.far_off[0])
-        if not self.verdict.explained and self.status in (Status.CONVERGED, Status.MAX_ITERATIONS):
+        if not self.verdict.explained:
             return UNEXPLAINED
         if not self.status.ok:
             return self.status.advice

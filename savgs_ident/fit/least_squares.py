@@ -126,7 +126,8 @@ def _estimates(task: Task, outcome: Outcome) -> tuple[tuple[Estimate, ...], np.n
     problem, best = task.problem, outcome.best
     values = problem.parameters(best.u)
     slope = np.asarray(problem.slopes(best.u))
-    sd, own = (np.sqrt(np.diag(each)) for each in (outcome.covariance, outcome.own))
+    # The part that is the campaign's own is a difference, which rounding may take below zero.
+    sd, own = (np.sqrt(np.maximum(np.diag(each), 0.0)) for each in (outcome.covariance, outcome.own))
     widths, estimates = problem.free.widths, []
     for place, name in enumerate(problem.free.names):
         known = sd[place] < INFORMED * widths[place] or name in problem.free.tolerated

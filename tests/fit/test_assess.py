@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from savgs_ident.core.status import Status
 from savgs_ident.fit.identifiability import (
     CHANCE,
     EXPLAINED,
@@ -43,6 +44,15 @@ def test_a_model_that_lacks_something_is_said_first(bench: Bench) -> None:
     assert f"chi2/dof = {excess:.3g}" in first
     assert "`diagnose`" in first
     assert not verdict.explained
+
+
+def test_a_fit_that_broke_down_explains_nothing(bench: Bench) -> None:
+    found = bench.fit(bench.predicted(TRUTH))
+    lost = found._replace(evaluation=Status.NOT_FINITE, finite=False, residual=found.residual * np.nan)
+    verdict = assess(bench.task, bench.minimiser, lost, True, silent)
+    assert not verdict.explained
+    assert not verdict.identifiable
+    assert "`diagnose`" in verdict.sentences[0]
 
 
 def test_a_model_that_errs_little_misses_little(bench: Bench) -> None:
