@@ -5,7 +5,7 @@ A location is where the ports of one name are. What may be unknown there follows
     port     a law may be any sum of functions of
     force    displacement, velocity and load of the port, or of what a contact there carries before it slides
     series   the load and its rate; where what is in series swings, of the load and of what resonances make of it
-    input    the angle of the test: the shape of the input, or its ripple
+    input    the angle of the test: the shape of the input, or its ripple; its size and time where nothing turns
     sensor   the reading and its rate, or linear filters of the reading
     number   slopes in the numbers, or forces of the masses among them; only where no other port is: elsewhere
              laws of what acts there can do the same
@@ -16,11 +16,14 @@ Each is a set of functions of its own (:mod:`.port_functions`), and an unknown s
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.core.values import Values
-from savgs_ident.effects.base import Family, Load, Port, PortKind, PortSignals
+from savgs_ident.effects.base import Family, InputSignal, Load, Port, PortKind, PortSignals
 from savgs_ident.inference.background.constants import BackgroundConstants
 from savgs_ident.inference.background.imposed import impose, node_loads, slopes_in
 from savgs_ident.inference.background.port_functions import (
@@ -29,14 +32,17 @@ from savgs_ident.inference.background.port_functions import (
     InputLocation,
     Law,
     MeshPoints,
+    Recorded,
     Signal,
     damped_functions,
     force_functions,
     input_ripple,
     input_shape,
+    input_size,
     laws_of_functions,
     mesh_points,
     rate_of,
+    recorded_beside,
     resonance,
     resonance_functions,
     sensor_filters,
@@ -44,10 +50,12 @@ from savgs_ident.inference.background.port_functions import (
     series_functions,
 )
 from savgs_ident.inference.likelihood import Likelihood
-from savgs_ident.plants.base import AbstractPlant
+from savgs_ident.plants.base import AbstractPlant, Excitation
+from savgs_ident.simulate.excitation import signals_at
+from savgs_ident.simulate.mesh import Mesh
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.program_cache import placed
-from savgs_ident.simulate.readings import harmonics
+from savgs_ident.simulate.readings import analyse, harmonics, readings_of
 
 Fields = list[tuple[str, Signal]]
 """Ports at which something is imposed, and what, at the nodes."""
@@ -136,6 +144,34 @@ class _Seen(NamedTuple):
         first = np.asarray(excitation.harmonics[first_input])[:, 1]
         return np.asarray(self.nodes.phase + np.angle(first)[self.nodes.dwell])
 
+    @property
+    def amplitude(self) -> Signal:
+        """Amplitude of the first input's first order in tests that repeat [its unit], 0 of the others, (D,)."""
+        harmonics = self.about.solution.excitation.harmonics[self.about.model.inputs[0].name]
+        return self.dwells * np.abs(np.asarray(harmonics)[:, 1])
+
+    @property
+    def mean_amplitude(self) -> float:
+        """Its mean over these [its unit]; 1 where it moves in none."""
+        return float(self.amplitude.sum() / max(self.dwells.sum(), 1.0)) or 1.0
+
+    @property
+    def size(self) -> Signal:
+        """The amplitude over its mean [1], (D,), and 1 of tests that repeat if it moves in none."""
+        return self.amplitude / self.mean_amplitude if self.amplitude.any() else self.dwells
+
+    @property
+    def recorded(self) -> Recorded:
+        """The first input in tests that do not repeat, in its mean amplitude in those that do."""
+        solution, model = self.about.solution, self.about.model
+        windows = solution.excitation.windows
+        if not windows.size:
+            nothing = np.zeros(self.nodes.phase.size)
+            return recorded_beside(nothing, nothing, self.nodes, windows)
+        signal = _first_input(model, solution.excitation, solution.mesh)
+        value, rate = (np.asarray(each) / self.mean_amplitude for each in signal)
+        return recorded_beside(value, rate, self.nodes, windows)
+
     def fields(self, port: Port, values: Sequence[Signal]) -> Fields:
         """Signals at the nodes, (P,) each, to be imposed at a port: with their rates where it is no force."""
         if port.kind is PortKind.FORCE:
@@ -208,8 +244,13 @@ def _functions(port: Port, seen: _Seen) -> Iterator[Functions]:
             yield series_functions(seen.loads[port.name])
             yield damped_functions(beyond, seen.nodes, seen.about.solution)
     elif port.kind is PortKind.INPUT:
-        yield input_shape(seen.angle, seen.nodes)
-        yield input_ripple(seen.angle, seen.constants)
+        recorded = seen.recorded
+        if recorded.beside.all():
+            yield input_size(recorded)
+            return
+        angle, size = seen.angle, seen.size[seen.nodes.dwell]
+        yield input_shape(angle, size, seen.nodes, recorded)
+        yield input_ripple(angle, size, seen.constants)
 
 
 def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> _Asked:
@@ -281,7 +322,7 @@ def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
 
         mine = read[:, c]
         dynamic = np.stack([rows(mine * each) for each in sensor_filters(omega)], axis=1)
-        static = np.stack([rows(each) for each in sensor_functions(mine, omega)], axis=1)
+        static = np.stack([rows(each) for each in _static_errors(c, mine, omega, seen)], axis=1)
         counted = seen.dwells[:, None]
         unit = [counted * (order == k) * turn for k in range(1, about.orders + 1) for turn in (1.0, -1j)]
         free = np.stack([rows(each) for each in unit], axis=1)
@@ -295,3 +336,43 @@ def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
         )
         locations.append(InputLocation(name, laws, free))
     return locations
+
+
+def _static_errors(
+    channel: int, read: NDArray[np.complex128], omega: Signal, seen: _Seen
+) -> list[NDArray[np.complex128]]:
+    """Harmonics (D, K) of functions of what a channel reads and of its rate.
+
+    Its harmonics ``read`` [its unit] and their angular frequencies [rad/s] are (D, K) each.
+    """
+    about, solution = seen.about, seen.about.solution
+    windows, dwells = solution.excitation.windows, np.flatnonzero(seen.dwells)
+    value = rate = np.zeros(seen.nodes.phase.size)
+    if windows.size:
+        value = np.asarray(_readings(about.reading, placed(dict(about.p)), solution))[:, channel]
+        rate = rate_of(value, seen.nodes, solution)
+    recorded = recorded_beside(value, rate, seen.nodes, windows)
+    functions = sensor_functions(read[dwells], omega[dwells], recorded)
+    found = np.zeros((len(functions), *read.shape), np.complex128)
+    found[:, dwells] = [each.harmonics for each in functions]
+    if windows.size:
+        along = np.zeros((value.size, len(functions)))
+        along[recorded.beside] = np.stack([each.beside for each in functions], axis=1)
+        shown = np.asarray(_analysed(jnp.asarray(along), solution, about.orders))
+        found[:, windows] = np.swapaxes(shown, 0, 1)[:, windows]
+    return list(found)
+
+
+@eqx.filter_jit
+def _first_input(model: AbstractPlant, excitation: Excitation, mesh: Mesh) -> InputSignal:
+    return signals_at(model, excitation, mesh)[0][0]
+
+
+@eqx.filter_jit
+def _readings(model: AbstractPlant, p: Values, solution: PeriodicSolution) -> Array:
+    return readings_of(model, p, solution.trajectory, solution)
+
+
+@eqx.filter_jit
+def _analysed(signals: Array, solution: PeriodicSolution, orders: int) -> Array:
+    return analyse(signals, solution.mesh, orders, solution.excitation.part)

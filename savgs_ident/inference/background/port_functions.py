@@ -97,6 +97,27 @@ def rate_of(signal: Signal, nodes: MeshPoints, solution: PeriodicSolution) -> Si
     return np.asarray(nodes.omega * (forward * behind + backward * ahead) / (ahead + behind))
 
 
+class Recorded(NamedTuple):
+    """An input, or a reading, in the tests that do not repeat.
+
+    Attributes:
+        beside: which nodes are in such a test, (P,).
+        value: what was recorded there less its mean in the test [1, or its unit], (P,), zero elsewhere.
+        rate: its rate [that of the value/s], (P,), zero elsewhere.
+    """
+
+    beside: NDArray[np.bool_]
+    value: Signal
+    rate: Signal
+
+
+def recorded_beside(values: Signal, rates: Signal, nodes: MeshPoints, windows: NDArray[np.intp]) -> Recorded:
+    """What is known at all nodes, (P,) and (P,), in the tests at the places ``windows``."""
+    beside = np.isin(nodes.dwell, windows)
+    mean = np.bincount(nodes.dwell, values) / np.bincount(nodes.dwell)
+    return Recorded(beside, beside * (values - mean[nodes.dwell]), beside * rates)
+
+
 INSTANTS = 256
 """Instants of a period, at least, at which a law of a sensor's reading, or a load of a mode, is evaluated."""
 
@@ -188,21 +209,34 @@ def resonance_functions(beyond: Signal, nodes: MeshPoints, constants: Background
     return Functions([beyond, *modes], (Family.OSCILLATOR,) * (1 + len(modes)))
 
 
-def input_shape(angle: Signal, nodes: MeshPoints) -> Functions:
+def input_shape(angle: Signal, size: Signal, nodes: MeshPoints, recorded: Recorded) -> Functions:
     """Another shape or size [1] of an input, and one that comes a moment earlier or later than recorded.
 
-    ``angle`` [rad], (P,), is that of the test.
+    ``angle`` [rad], (P,), is that of the test and ``size`` (P,) its amplitude over the mean one. In a test without
+    one, as on a road, nothing but its size and time can be other than ``recorded``.
     """
+    rate = recorded.rate / np.max(nodes.omega[~recorded.beside])
     speed = nodes.omega / np.max(nodes.omega)
-    shapes = [wave(order * angle) for order in (1, 2, 3) for wave in (np.cos, np.sin)]
+    first, *shapes = [size * wave(order * angle) for order in (1, 2, 3) for wave in (np.cos, np.sin)]
+    ahead, late = size * speed * np.cos(angle), size * speed * np.sin(angle)
     families = (Family.GAIN, Family.DYNAMICS, *(Family.SHAPE,) * 4, Family.DYNAMICS, Family.DYNAMICS)
-    return Functions([*shapes, speed * np.cos(angle), speed * np.sin(angle)], families, (0, 1))
+    return Functions([first + recorded.value, *shapes, ahead, late - rate], families, (0, 1))
 
 
-def input_ripple(angle: Signal, constants: BackgroundConstants) -> Functions:
-    """Waves [1] on an input that are shorter than those of a wrong shape; ``angle`` [rad], (P,), is the test's."""
-    waves = [wave(order * angle) for order in constants.ripple_orders for wave in (np.cos, np.sin)]
+def input_ripple(angle: Signal, size: Signal, constants: BackgroundConstants) -> Functions:
+    """Waves [1] on an input that are shorter than those of a wrong shape.
+
+    ``angle`` [rad], (P,), is the test's and ``size`` (P,) its amplitude over the mean one.
+    """
+    orders = constants.ripple_orders
+    waves = [size * wave(order * angle) for order in orders for wave in (np.cos, np.sin)]
     return Functions(waves, (Family.SHAPE,) * len(waves))
+
+
+def input_size(recorded: Recorded) -> Functions:
+    """Another size [1] of an input that never repeats, and one that comes a moment earlier or later."""
+    value, rate = (each / max(float(np.abs(each).max()), np.finfo(float).tiny) for each in recorded[1:])
+    return Functions([value, rate], (Family.GAIN, Family.DYNAMICS), (0, 1))
 
 
 def sensor_filters(omega: Signal) -> list[NDArray[np.complex128]]:
@@ -213,18 +247,40 @@ def sensor_filters(omega: Signal) -> list[NDArray[np.complex128]]:
     return [np.asarray(each, np.complex128) for each in filters(jnp.asarray(omega))]
 
 
-def sensor_functions(reading: NDArray[np.complex128], omega: Signal) -> list[NDArray[np.complex128]]:
-    """Harmonics [1] of functions of a reading and its rate.
+class SensorFunction(NamedTuple):
+    """A function of a reading and its rate [1].
 
-    They, the harmonics of the ``reading`` [its unit] and the angular frequencies ``omega`` [rad/s] are
-    (dwells, orders) each.
+    Attributes:
+        harmonics: of the tests that repeat, (dwells, orders).
+        beside: at the nodes of the others, (n,).
+    """
+
+    harmonics: NDArray[np.complex128]
+    beside: Signal
+
+
+def sensor_functions(
+    reading: NDArray[np.complex128], omega: Signal, recorded: Recorded
+) -> list[SensorFunction]:
+    """Functions of a reading and its rate.
+
+    The harmonics of the ``reading`` [its unit] in tests that repeat and their angular frequencies ``omega`` [rad/s]
+    are (dwells, orders) each; in the others it is as ``recorded``.
     """
     orders = reading.shape[1]
     instants = max(INSTANTS, 2 ** ceil(log2(4 * orders)))
     turn = np.exp(2j * np.pi * np.outer(np.arange(orders), np.arange(instants)) / instants)
     along, rate = (np.real(each[:, 1:] @ turn[1:]) for each in (reading, 1j * omega * reading))
-    found = motion_functions(along.ravel(), rate.ravel(), np.zeros(along.size))
-    return [np.fft.rfft(each.reshape(along.shape))[:, :orders] * 2.0 / instants for each in found.values]
+    values, rates = (
+        np.concatenate([dwells.ravel(), others[recorded.beside]])
+        for dwells, others in ((along, recorded.value), (rate, recorded.rate))
+    )
+    found = motion_functions(values, rates, np.zeros(values.size))
+    parts = (np.split(each, [along.size]) for each in found.values)
+    return [
+        SensorFunction(np.fft.rfft(dwells.reshape(along.shape))[:, :orders] * 2.0 / instants, others)
+        for dwells, others in parts
+    ]
 
 
 def motion_functions(
