@@ -201,6 +201,10 @@ def _number(table: dict[str, object], key: str, path: Path | str, channel: str) 
     return number
 
 
+class AbsentSignalError(InputError):
+    """A column or a topic that a map names and a file does not have."""
+
+
 Progress = Callable[[float], None]
 """Called with the share of the source that has been read, 0 to 1."""
 

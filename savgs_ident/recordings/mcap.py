@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.cdr import CdrDecoder
 from savgs_ident.recordings.channels import (
+    AbsentSignalError,
     Binding,
     ChannelMap,
     Progress,
@@ -327,7 +328,7 @@ class _TopicCollector:
     def _check_rules(self) -> None:
         for rule in self._map.rules:
             if rule.topic is not None and rule.topic not in self._columns:
-                raise InputError(
+                raise AbsentSignalError(
                     f"channels.toml names topic '{rule.topic}', the file has no message on it",
                     source=self._source,
                     channel=rule.channel,

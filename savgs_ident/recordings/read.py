@@ -13,11 +13,20 @@ Usual names and units are recognised; others are mapped in ``channels.toml`` bes
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.channels import FILE_NAME, ChannelMap, Progress, Reader, Reading, read_channel_map
+from savgs_ident.recordings.channels import (
+    FILE_NAME,
+    AbsentSignalError,
+    ChannelMap,
+    Progress,
+    Reader,
+    Reading,
+    read_channel_map,
+)
 from savgs_ident.recordings.checks import screen
 from savgs_ident.recordings.csv import CSV
 from savgs_ident.recordings.mat import MAT
@@ -90,15 +99,40 @@ def map_beside(path: Path) -> Path | None:
 
 
 def _read_files(files: Sequence[Path], channel_map: ChannelMap, progress: Progress) -> list[Reading]:
-    readings = []
+    """What the files hold. Free channels may be absent in some of them, with a warning, and not in all."""
+    readings, lacking = [], list[Mapping[str, AbsentSignalError]]()
     for index, file in enumerate(files):
 
         def report(fraction: float, index: int = index) -> None:
             progress((index + fraction) / len(files))
 
-        readings.append(choose_reader(file).read(file, channel_map, report))
+        reading, absent = _read_file(file, channel_map, report)
+        readings.append(reading)
+        lacking.append(absent)
+    for name in channel_map.layout.free:
+        if all(name in absent for absent in lacking):
+            raise lacking[0][name]
     progress(1.0)
-    return readings
+    return [
+        replace(
+            each, warnings=(*each.warnings, *(e.as_warning("free_channel_absent") for e in absent.values()))
+        )
+        for each, absent in zip(readings, lacking, strict=True)
+    ]
+
+
+def _read_file(
+    file: Path, channel_map: ChannelMap, progress: Progress
+) -> tuple[Reading, Mapping[str, AbsentSignalError]]:
+    """What a file holds, and why it lacks the free channels that it does not have, by name."""
+    try:
+        return choose_reader(file).read(file, channel_map, progress), {}
+    except AbsentSignalError as error:
+        if error.channel not in channel_map.layout.free:
+            raise
+        others = tuple(each for each in channel_map.rules if each.channel != error.channel)
+        reading, absent = _read_file(file, replace(channel_map, rules=others), progress)
+        return reading, {error.channel: error, **absent}
 
 
 def choose_reader(path: Path) -> Reader:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.channels import (
+    AbsentSignalError,
     Binding,
     ChannelMap,
     ChannelRule,
@@ -167,7 +168,7 @@ def rules_for(
 ) -> list[tuple[ChannelRule, str]]:
     """The rules of the map that name a column, each with the key of its signal.
 
-    Raises :class:`InputError` for a column that the file does not have.
+    Raises :class:`AbsentSignalError` for a column that the file does not have.
     """
     layout, found = channel_map.layout, []
     for rule in channel_map.rules:
@@ -177,7 +178,7 @@ def rules_for(
         wanted = normalise(rule.column)
         loose = [c.key for c in candidates if normalise(layout.split_header(c.text).label) == wanted]
         if not exact and not loose:
-            raise InputError(
+            raise AbsentSignalError(
                 f"channels.toml names column '{rule.column}', the file does not have it",
                 source=source,
                 channel=rule.channel,

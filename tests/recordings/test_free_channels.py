@@ -58,6 +58,19 @@ def test_where_one_was_not_recorded_it_has_no_mean(folder: Path) -> None:
     assert_array_equal(np.isnan(estimate_response(campaign).beside["oil_temperature"]), [False, True, False])
 
 
+def test_where_a_file_lacks_one_it_has_no_mean_and_that_is_said(
+    folder: Path, signals: Callable[..., Signals], csv_bytes: Callable[..., bytes]
+) -> None:
+    (folder / "channels.toml").write_text(FREE.format("degC"))
+    (folder / "dwell_2.0Hz.csv").write_bytes(csv_bytes(signals(2.0)))
+    campaign = si.load_campaign(folder)
+    assert [(each.code, each.channel) for each in campaign.warnings] == [
+        ("free_channel_absent", "oil_temperature")
+    ]
+    assert campaign.warnings[0].source.endswith("dwell_2.0Hz.csv")
+    assert_array_equal(np.isnan(estimate_response(campaign).beside["oil_temperature"]), [False, True, False])
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
