@@ -64,7 +64,12 @@ def test_a_motion_of_the_smaller_model_is_one_of_the_complete_model(
     stateful = [name for name, effect in CATALOGUE.items() if effect.states]
     assert len(stateful) > 5
     for terms in ((), *((name,) for name in stateful), (stateful[0], "rail_preload"), tuple(stateful[:2])):
-        assert plant.model(terms).states == plant.complete(terms).states
+        complete = plant.complete(terms)
+        acting = [each.effects[int(each.place)] for each in complete.alternatives]
+        alone = replace(complete, alternatives=(), effects=(*complete.effects, *acting))
+        assert plant.model(terms).states == alone.states
+        sizes = [(float(each.scale), bool(each.slips)) for each in complete.states]
+        assert sizes == [(each.scale, each.slips) for each in alone.states]
 
 
 def test_what_the_sheet_knows_is_held_against_it_though_it_is_identified(
