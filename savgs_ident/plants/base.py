@@ -204,6 +204,7 @@ class AbstractPlant(eqx.Module):
     ``conditions`` are those among which the next test is chosen; ``location_words`` say what reports call the
     locations of ports, where not by their names.
     ``own_states`` are internal states of the plant itself, as the current of a motor.
+    ``alternatives`` are further effects of which one acts each, so that solvers need one program for all of them.
     ``coordinate_type`` makes n scalars a tuple with names. :meth:`prepare`, :meth:`drive` and :meth:`cold_start` have
     defaults that serve a plant without costly kinematics; one that has them may replace these three. What exports
     offer beside the readings are its :attr:`outputs`.
