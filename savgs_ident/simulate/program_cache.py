@@ -18,6 +18,7 @@ import hashlib
 import os
 import shutil
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import suppress
@@ -26,7 +27,6 @@ from importlib.metadata import version
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import equinox as eqx
@@ -167,7 +167,7 @@ def run_cached(function: Callable[..., tuple[Array, ...]], *args: Any) -> tuple[
     return tuple(program.call(*arrays))
 
 
-_WORKING: dict[Hashable, Lock] = {}
+_WORKING: dict[Hashable, threading.Lock] = {}
 _DONE: set[Hashable] = set()
 
 
@@ -178,7 +178,7 @@ def done_once(what: Hashable, work: Callable[[], object]) -> None:
     """
     if what in _DONE:
         return
-    with _WORKING.setdefault(what, Lock()):
+    with _WORKING.setdefault(what, threading.Lock()):
         if what not in _DONE:
             work()
             _DONE.add(what)
