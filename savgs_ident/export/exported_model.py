@@ -37,7 +37,8 @@ from savgs_ident.effects.base import AbstractInputLaw, Fundamental, InputSignal
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned import learned_effect
 from savgs_ident.effects.learned_functions import functions_at
-from savgs_ident.plants.base import AbstractPlant, Motion, nominal_inputs
+from savgs_ident.plants.at_rest import nominal_inputs
+from savgs_ident.plants.base import AbstractPlant, Motion
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.simulate.linearisation import rate_name, rest_or_origin

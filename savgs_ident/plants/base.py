@@ -26,7 +26,6 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 from numpy.typing import NDArray
 
-from savgs_ident.core.small_root import Root, find_root
 from savgs_ident.core.values import Values
 from savgs_ident.effects.alternatives import Alternatives
 from savgs_ident.effects.base import (
@@ -49,9 +48,6 @@ from savgs_ident.effects.effect import Effect
 from savgs_ident.responses.harmonic_response import ComparedPart
 
 Scalar = Float[Array, ""]
-
-REST_PRECISION = 1e-9
-"""Relative precision of a state of rest; forces of 1e7 N/m leave no more."""
 
 
 @dataclass(frozen=True)
@@ -168,14 +164,6 @@ class Motion(NamedTuple):
     q: Any
     qd: Any
     qdd: Any
-
-
-class Rest(NamedTuple):
-    """Coordinates and internal states (s,) of a plant that stands still [SI], and how they were found."""
-
-    q: Any
-    s: Float[Array, " s"]
-    root: Root
 
 
 class Inputs(NamedTuple):
@@ -383,45 +371,3 @@ def state_sizes(plant: AbstractPlant) -> tuple[float, ...]:
     sizes = [each.size for each in plant.coordinates]
     rates = [each.rate_size for each in plant.coordinates]
     return (*sizes, *rates, *(float(state.scale) for state in plant.states))
-
-
-def nominal_inputs(plant: AbstractPlant, p: Values) -> Any:
-    """The inputs of a plant that stands in its nominal state."""
-
-    def still(each: Input) -> InputSignal:
-        zero = jnp.zeros((), jnp.float64)
-        return InputSignal(jnp.asarray(p[each.rest]) if each.rest else zero, zero)
-
-    return plant.drive(tuple(still(each) for each in plant.inputs))
-
-
-def standing(plant: AbstractPlant, q: Any) -> Motion:
-    """The motion of a plant that stands still at ``q`` (n scalars)."""
-    still = plant.coordinate_type(*(jnp.zeros_like(each) for each in q))
-    return Motion(q, still, still)
-
-
-def find_rest(plant: AbstractPlant, p: Values, u: Any, prepared: Any = None) -> Rest:
-    """Where the plant stands still under constant inputs ``u``; look at the status of its root.
-
-    It is the root of the residual without velocities and accelerations. Frictions carry nothing then: their internal
-    states are among the unknowns. Differentiable in everything, exactly, by the implicit function theorem.
-    """
-    n = len(plant.coordinates)
-
-    def residual(x: Array) -> Array:
-        motion = standing(plant, plant.coordinate_type(*jnp.unstack(x[:n])))
-        return plant.residual(p, motion, x[n:], jnp.zeros_like(x[n:]), u, prepared)
-
-    scale = jnp.asarray([*(each.size for each in plant.coordinates), *(each.scale for each in plant.states)])
-    # At rest a velocity among the states has nothing on the diagonal: rows have to be exchanged.
-    root = find_root(residual, jnp.zeros_like(scale), scale, REST_PRECISION, jnp.linalg.solve)
-    return Rest(plant.coordinate_type(*jnp.unstack(root.x[:n])), root.x[n:], root)
-
-
-def nominal_readings(plant: AbstractPlant, p: Values, prepared: Any = None) -> tuple[Scalar, ...]:
-    """What the sensors show where the plant stands in its nominal state: recordings count from there."""
-    u = nominal_inputs(plant, p)
-    rest = find_rest(plant, p, u, prepared)
-    still = jnp.zeros_like(rest.s)
-    return plant.read(p, standing(plant, rest.q), rest.s, still, u, prepared)

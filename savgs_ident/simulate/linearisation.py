@@ -33,7 +33,8 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.small_root import Root
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import InputSignal
-from savgs_ident.plants.base import AbstractPlant, Input, Motion, Output, Rest, find_rest, standing
+from savgs_ident.plants.at_rest import Rest, find_rest, standing
+from savgs_ident.plants.base import AbstractPlant, Input, Motion, Output
 from savgs_ident.simulate.transient import solve_rates
 
 

@@ -28,15 +28,8 @@ from numpy.typing import ArrayLike
 from savgs_ident.core.small_root import Root, find_root
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values
-from savgs_ident.plants.base import (
-    AbstractPlant,
-    AbstractSource,
-    Motion,
-    find_rest,
-    nominal_readings,
-    standing,
-    state_sizes,
-)
+from savgs_ident.plants.at_rest import find_rest, nominal_readings, standing
+from savgs_ident.plants.base import AbstractPlant, AbstractSource, Motion, state_sizes
 
 TOLERANCE = 1e-7
 """Relative tolerance of a step by default."""

@@ -29,13 +29,8 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.status import Status, joint_status
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import AbstractSensorLaw
-from savgs_ident.plants.base import (
-    AbstractPlant,
-    AbstractSource,
-    Motion,
-    nominal_readings,
-    state_sizes,
-)
+from savgs_ident.plants.at_rest import nominal_readings
+from savgs_ident.plants.base import AbstractPlant, AbstractSource, Motion, state_sizes
 from savgs_ident.plants.quarter_car.inputs import (
     ImposedLink,
     RigSource,

@@ -19,7 +19,8 @@ from savgs_ident.effects import effect
 from savgs_ident.effects.base import PortSignals
 from savgs_ident.export import public
 from savgs_ident.export.exported_model import ExportedModel
-from savgs_ident.plants.base import Excitation, find_rest, nominal_inputs, standing
+from savgs_ident.plants.at_rest import find_rest, nominal_inputs, standing
+from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.quarter_car.catalogue import build_model
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig

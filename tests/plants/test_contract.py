@@ -19,16 +19,9 @@ from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import PortKind
 from savgs_ident.effects.effect import generic_effects
+from savgs_ident.plants.at_rest import find_rest, nominal_inputs, standing
 from savgs_ident.plants.axis import Axis
-from savgs_ident.plants.base import (
-    AbstractPlant,
-    Excitation,
-    Motion,
-    find_rest,
-    nominal_inputs,
-    standing,
-    state_sizes,
-)
+from savgs_ident.plants.base import AbstractPlant, Excitation, Motion, state_sizes
 from savgs_ident.plants.profiles import ProfileSource, Sine
 from savgs_ident.plants.quarter_car.model import RigModel, load_rig
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass, closed_form

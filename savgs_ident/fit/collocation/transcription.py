@@ -38,7 +38,8 @@ from scipy.sparse import coo_array, csr_array, hstack
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
 from savgs_ident.inference.problem import Task
-from savgs_ident.plants.base import AbstractPlant, find_rest, nominal_inputs, standing
+from savgs_ident.plants.at_rest import find_rest, nominal_inputs, standing
+from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.recordings.recording import Campaign, Recording
 from savgs_ident.responses.fundamental import group_by_clock, highest_fitted_order
 from savgs_ident.responses.harmonic_response import HarmonicResponse

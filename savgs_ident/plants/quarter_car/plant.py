@@ -27,6 +27,7 @@ from savgs_ident.effects.composition import (
     EffectsAtInstant,
     SeriesDeflection,
 )
+from savgs_ident.plants.at_rest import find_rest, standing
 from savgs_ident.plants.base import (
     AbstractPlant,
     Channel,
@@ -35,8 +36,6 @@ from savgs_ident.plants.base import (
     Motion,
     OperatingCondition,
     Output,
-    find_rest,
-    standing,
 )
 from savgs_ident.plants.quarter_car.dynamics import (
     TRAVEL,
