@@ -42,7 +42,7 @@ from savgs_ident.inference.background.port_functions import (
     laws_of_functions,
     mesh_points,
     rate_of,
-    recorded_beside,
+    recorded_in_windows,
     resonance,
     resonance_functions,
     sensor_filters,
@@ -167,10 +167,18 @@ class _Seen(NamedTuple):
         windows = solution.excitation.windows
         if not windows.size:
             nothing = np.zeros(self.nodes.phase.size)
-            return recorded_beside(nothing, nothing, self.nodes, windows)
+            return recorded_in_windows(nothing, nothing, self.nodes, windows)
         signal = _first_input(model, solution.excitation, solution.mesh)
         value, rate = (np.asarray(each) / self.mean_amplitude for each in signal)
-        return recorded_beside(value, rate, self.nodes, windows)
+        return recorded_in_windows(value, rate, self.nodes, windows)
+
+    @property
+    def readings(self) -> Signal:
+        """What the sensors read at the nodes [the unit of each], (P, C); zeros where no test is in windows."""
+        about, solution = self.about, self.about.solution
+        if not solution.excitation.windows.size:
+            return np.zeros((self.nodes.phase.size, len(about.model.channels)))
+        return np.asarray(_readings(about.reading, placed(dict(about.p)), solution))
 
     def fields(self, port: Port, values: Sequence[Signal]) -> Fields:
         """Signals at the nodes, (P,) each, to be imposed at a port: with their rates where it is no force."""
@@ -245,7 +253,7 @@ def _functions(port: Port, seen: _Seen) -> Iterator[Functions]:
             yield damped_functions(beyond, seen.nodes, seen.about.solution)
     elif port.kind is PortKind.INPUT:
         recorded = seen.recorded
-        if recorded.beside.all():
+        if recorded.in_window.all():
             yield input_size(recorded)
             return
         angle, size = seen.angle, seen.size[seen.nodes.dwell]
@@ -311,7 +319,7 @@ def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
     channels = [each.name for each in about.model.channels]
     read, order = about.read(), np.arange(about.orders + 1)
     omega = 2.0 * np.pi * np.asarray(seen.about.solution.excitation.spacing)[:, None] * order
-    locations = []
+    along, locations = seen.readings, []
     for name in names:
         c = channels.index(name.removeprefix("sensor."))
 
@@ -322,7 +330,7 @@ def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
 
         mine = read[:, c]
         dynamic = np.stack([rows(mine * each) for each in sensor_filters(omega)], axis=1)
-        static = np.stack([rows(each) for each in _static_errors(c, mine, omega, seen)], axis=1)
+        static = np.stack([rows(each) for each in _static_errors(along[:, c], mine, omega, seen)], axis=1)
         counted = seen.dwells[:, None]
         unit = [counted * (order == k) * turn for k in range(1, about.orders + 1) for turn in (1.0, -1j)]
         free = np.stack([rows(each) for each in unit], axis=1)
@@ -339,25 +347,23 @@ def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
 
 
 def _static_errors(
-    channel: int, read: NDArray[np.complex128], omega: Signal, seen: _Seen
+    value: Signal, read: NDArray[np.complex128], omega: Signal, seen: _Seen
 ) -> list[NDArray[np.complex128]]:
-    """Harmonics (D, K) of functions of what a channel reads and of its rate.
+    """Harmonics (D, K) of functions of a reading and of its rate.
 
-    Its harmonics ``read`` [its unit] and their angular frequencies [rad/s] are (D, K) each.
+    Its ``value`` [its unit] is known at the nodes in windows, (P,), and its harmonics ``read`` and their angular
+    frequencies [rad/s] of all tests, (D, K) each.
     """
     about, solution = seen.about, seen.about.solution
     windows, dwells = solution.excitation.windows, np.flatnonzero(seen.dwells)
-    value = rate = np.zeros(seen.nodes.phase.size)
-    if windows.size:
-        value = np.asarray(_readings(about.reading, placed(dict(about.p)), solution))[:, channel]
-        rate = rate_of(value, seen.nodes, solution)
-    recorded = recorded_beside(value, rate, seen.nodes, windows)
+    rate = rate_of(value, seen.nodes, solution)
+    recorded = recorded_in_windows(value, rate, seen.nodes, windows)
     functions = sensor_functions(read[dwells], omega[dwells], recorded)
     found = np.zeros((len(functions), *read.shape), np.complex128)
     found[:, dwells] = [each.harmonics for each in functions]
     if windows.size:
         along = np.zeros((value.size, len(functions)))
-        along[recorded.beside] = np.stack([each.beside for each in functions], axis=1)
+        along[recorded.in_window] = np.stack([each.in_windows for each in functions], axis=1)
         shown = np.asarray(_analysed(jnp.asarray(along), solution, about.orders))
         found[:, windows] = np.swapaxes(shown, 0, 1)[:, windows]
     return list(found)

@@ -101,21 +101,23 @@ class Recorded(NamedTuple):
     """An input, or a reading, in the tests that do not repeat.
 
     Attributes:
-        beside: which nodes are in such a test, (P,).
+        in_window: which nodes are in such a test, (P,).
         value: what was recorded there less its mean in the test [1, or its unit], (P,), zero elsewhere.
         rate: its rate [that of the value/s], (P,), zero elsewhere.
     """
 
-    beside: NDArray[np.bool_]
+    in_window: NDArray[np.bool_]
     value: Signal
     rate: Signal
 
 
-def recorded_beside(values: Signal, rates: Signal, nodes: MeshPoints, windows: NDArray[np.intp]) -> Recorded:
+def recorded_in_windows(
+    values: Signal, rates: Signal, nodes: MeshPoints, windows: NDArray[np.intp]
+) -> Recorded:
     """What is known at all nodes, (P,) and (P,), in the tests at the places ``windows``."""
-    beside = np.isin(nodes.dwell, windows)
+    inside = np.isin(nodes.dwell, windows)
     mean = np.bincount(nodes.dwell, values) / np.bincount(nodes.dwell)
-    return Recorded(beside, beside * (values - mean[nodes.dwell]), beside * rates)
+    return Recorded(inside, inside * (values - mean[nodes.dwell]), inside * rates)
 
 
 INSTANTS = 256
@@ -215,7 +217,7 @@ def input_shape(angle: Signal, size: Signal, nodes: MeshPoints, recorded: Record
     ``angle`` [rad], (P,), is that of the test and ``size`` (P,) its amplitude over the mean one. In a test without
     one, as on a road, nothing but its size and time can be other than ``recorded``.
     """
-    rate = recorded.rate / np.max(nodes.omega[~recorded.beside])
+    rate = recorded.rate / np.max(nodes.omega[~recorded.in_window])
     speed = nodes.omega / np.max(nodes.omega)
     first, *shapes = [size * wave(order * angle) for order in (1, 2, 3) for wave in (np.cos, np.sin)]
     ahead, late = size * speed * np.cos(angle), size * speed * np.sin(angle)
@@ -252,11 +254,11 @@ class SensorFunction(NamedTuple):
 
     Attributes:
         harmonics: of the tests that repeat, (dwells, orders).
-        beside: at the nodes of the others, (n,).
+        in_windows: at the nodes of the others, (n,).
     """
 
     harmonics: NDArray[np.complex128]
-    beside: Signal
+    in_windows: Signal
 
 
 def sensor_functions(
@@ -272,7 +274,7 @@ def sensor_functions(
     turn = np.exp(2j * np.pi * np.outer(np.arange(orders), np.arange(instants)) / instants)
     along, rate = (np.real(each[:, 1:] @ turn[1:]) for each in (reading, 1j * omega * reading))
     values, rates = (
-        np.concatenate([dwells.ravel(), others[recorded.beside]])
+        np.concatenate([dwells.ravel(), others[recorded.in_window]])
         for dwells, others in ((along, recorded.value), (rate, recorded.rate))
     )
     found = motion_functions(values, rates, np.zeros(values.size))
