@@ -164,7 +164,7 @@ def _moved(
         return moved, moved
 
     ahead, carry = jax.vmap(carried)(along, now, before)
-    steps = carry, jnp.moveaxis(along_first(forced, dict(directions), wanted), 0, 2)
+    steps = carry, jnp.moveaxis(along_first(forced, dict(directions), wanted, now), 0, 2)
     return jnp.moveaxis(jax.lax.scan(advance, jnp.zeros((now.shape[1], count)), steps)[1], 2, 0)
 
 
@@ -227,7 +227,7 @@ def force_slopes(
         return jax.jvp(force, (dict(p), now), given)[1]
 
     moved = _moved(model, p, along, step, now, dict(directions), wanted)
-    slopes = along_first(slope, (dict(directions), moved), wanted)
+    slopes = along_first(slope, (dict(directions), moved), wanted, along.q)
     return NeededSlopes(Needed(_force(model, p, along, course, blank), jnp.max(left)), slopes)
 
 

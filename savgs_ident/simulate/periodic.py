@@ -59,7 +59,10 @@ TOLERANCE = 1e-7
 """Largest last Newton step, relative to the size of the motion: the error left is far smaller."""
 
 TRUST = 0.5
-"""Longest step taken at a time, relative to the size of the motion."""
+"""Longest step of the coordinates taken at a time, relative to the size of the motion.
+
+Internal states go with it as far as that takes them: what swings in resonance moves many times as far as its plant.
+"""
 
 LEAST_SHARE = 1.0 / 8.0
 """The strongest damping."""
@@ -118,17 +121,21 @@ def solve_newton(
     ``steps`` [s] lead from node to node, ``scale`` is the size of each state [its unit]; a step counts
     relative to it [1].
     """
+    coordinates = 2 * len(model.coordinates)
 
     def advance(progress: _Progress) -> _Progress:
         before = progress.result
         at = before.trajectory
         change, lin = _newton_step(model, p, prepared, at, u, layout, steps)
-        length = over_dwells(jnp.max(jnp.abs(change.x) / scale, axis=0), layout)
+        relative = jnp.abs(change.x) / scale
+        length, moved = (
+            over_dwells(jnp.max(each, axis=0), layout) for each in (relative, relative[:coordinates])
+        )
         damped = jnp.maximum(progress.share / 2.0, LEAST_SHARE)
         share = jnp.where(length > before.last_step, damped, jnp.minimum(1.0, 2.0 * progress.share))
-        taken = jnp.minimum(share, TRUST / length)[layout.dwell]
-        moved = Trajectory(at.x + taken * change.x, at.y + taken * change.y)
-        return _Progress(NewtonResult(moved, lin, length, before.iterations + 1), share)
+        taken = jnp.minimum(share, TRUST / moved)[layout.dwell]
+        there = Trajectory(at.x + taken * change.x, at.y + taken * change.y)
+        return _Progress(NewtonResult(there, lin, length, before.iterations + 1), share)
 
     def unfinished(progress: _Progress) -> Array:
         step = progress.result.last_step

@@ -109,25 +109,28 @@ def directional(
     def one(given: tuple[dict[str, Array], Array]) -> Array:
         return shown(jax.jvp(seen, (dict(p), known), given)[1])
 
-    changes = along_first(reading, (tangents, directions.changes), directions.wanted)
-    return along_first(one, (tangents, changes), directions.wanted, ANALYSED)
+    changes = along_first(reading, (tangents, directions.changes), directions.wanted, known)
+    found = jax.eval_shape(lambda: shown(seen(dict(p), known)))
+    return along_first(one, (tangents, changes), directions.wanted, found, ANALYSED)
 
 
-TOGETHER = 4
+TOGETHER = 2
 """Directions that are solved for in one pass: more of them leave the processor's nearest memory."""
 
 ANALYSED = 16
 """Directions whose harmonics are summed in one pass: one table of waves, which takes long to make, serves all."""
 
 
-def along_first(one: Callable[[Any], Any], given: Any, wanted: Array, together: int = TOGETHER) -> Any:
+def along_first(
+    one: Callable[[Any], Any], given: Any, wanted: Array, like: Any, together: int = TOGETHER
+) -> Any:
     """What ``one`` gives of each of k things ``given``, ``together`` in a pass, with a leading axis (k,).
 
-    All but the first ``wanted`` may be left zero.
+    All but the first ``wanted`` may be left zero. Each is like ``like``, in shapes and types: to find them out takes
+    as long as to trace ``one``.
     """
     size = jax.tree.leaves(given)[0].shape[0]
     width = max(1, min(together, size))
-    shapes = jax.eval_shape(lambda given: jax.vmap(one)(given), given)
 
     def some(place: Array, known: Any) -> Any:
         first = jnp.minimum(place * width, size - width)
@@ -139,7 +142,7 @@ def along_first(one: Callable[[Any], Any], given: Any, wanted: Array, together: 
         )
 
     passes = (wanted + width - 1) // width
-    blank = jax.tree.map(lambda each: jnp.zeros(each.shape, each.dtype), shapes)
+    blank = jax.tree.map(lambda each: jnp.zeros((size, *each.shape), each.dtype), like)
     return jax.lax.fori_loop(0, passes, some, blank)
 
 
@@ -151,7 +154,9 @@ def trajectory_sensitivities(
     directions = directions_of(model, p, tangents, len(names))
     moved_along = _linear_motion(model, p, solution, directions.prepared)
     given = directions.tangents, directions.changes
-    trajectories: Trajectory = along_first(lambda each: moved_along(*each), given, directions.wanted)
+    trajectories: Trajectory = along_first(
+        lambda each: moved_along(*each), given, directions.wanted, solution.trajectory
+    )
     return trajectories
 
 

@@ -155,3 +155,14 @@ def test_work_that_failed_is_done_again() -> None:
     done_once("work that fails at first", work)
     done_once("work that fails at first", work)
     assert len(tried) == 2
+
+
+def test_what_the_user_asks_of_the_compiler_stays_and_nothing_is_asked_twice(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_max_isa=SSE4_2 --xla_dump_to=there")
+    for _ in range(2):
+        program_cache.spare_the_compiler()
+        flags = os.environ["XLA_FLAGS"].split()
+        assert flags[:2] == ["--xla_cpu_max_isa=SSE4_2", "--xla_dump_to=there"]
+        assert flags[2:] in ([], ["--xla_cpu_use_fusion_emitters=false"])

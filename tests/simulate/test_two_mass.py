@@ -207,3 +207,21 @@ def test_a_motion_that_is_none_is_named(monkeypatch: pytest.MonkeyPatch) -> None
     assert simulate_transient(PLANT, ill, SWAY, TIMES, begin).status() is Status.NOT_FINITE
     monkeypatch.setattr(transient, "MOST_STEPS", 20)
     assert simulate_transient(PLANT, P, SWAY, TIMES[::128]).status() is Status.MAX_ITERATIONS
+
+
+@pytest.mark.parametrize("damping_ratio", [0.005, 0.05, 0.2])
+def test_what_swings_in_resonance_is_found_as_soon_as_what_does_not(damping_ratio: float) -> None:
+    """The plant is linear and moves by little: few steps reach the motion, however far what swings has to go."""
+    swinging = GENERIC["guide_oscillator"]
+    table = PARAMETERS + ParameterTable(swinging.parameters)
+    light = {"guide_oscillator_mass": 1e-3, "guide_oscillator_damping_ratio": damping_ratio}
+    found = simulate_periodic(
+        TwoMass() + swinging,
+        as_values(table.with_values(light).as_dict()),
+        _road(np.array([table["guide_oscillator_frequency"].value])),
+        PeriodicSettings(adaptations=0),
+    )
+    assert found.status() == (Status.CONVERGED,)
+    assert int(found.iterations) <= 5
+    body, swing = np.abs(found.trajectory.x[np.array([0, 4])]).max(axis=1)
+    assert swing / body == pytest.approx(np.hypot(1.0, 2.0 * damping_ratio) / (2.0 * damping_ratio), rel=0.01)

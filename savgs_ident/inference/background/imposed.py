@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
@@ -159,8 +160,9 @@ def _answer_rows(
     def rows(readings: Array) -> Array:
         return likelihood.rows(shown_harmonics(model, p, readings, solution, orders))
 
-    readings = along_first(reading, imposed, wanted)
-    return (along_first(rows, readings, wanted, ANALYSED),)
+    like = jax.ShapeDtypeStruct((solution.mesh.layout.total, len(model.channels)), likelihood.measured.dtype)
+    readings = along_first(reading, imposed, wanted, like)
+    return (along_first(rows, readings, wanted, likelihood.measured, ANALYSED),)
 
 
 def node_loads(

@@ -128,8 +128,8 @@ _DERIVATIVE = chebyshev.chebval(_POINTS, chebyshev.chebder(_TO_COEFFICIENTS)).T
 class Section(NamedTuple):
     """The rig at one angle of the lower wishbone.
 
-    Wheel centre (``W_y``, ``W_z``) and strut eye (``E_y``, ``E_z``) [m], roll of the upright [rad], their
-    slopes in theta_LW, and ``inertia`` (4, 3): generalised forces of inertia and weight along
+    Wheel centre (``W_y``, ``W_z``) and strut eye (``E_y``, ``E_z``) [m], cosine and sine of the upright's roll,
+    slopes of places and roll in theta_LW, and ``inertia`` (4, 3): generalised forces of inertia and weight along
     (z_s, theta_LW, y_s, phi) per unit of zdd_s + g, of thetadd and of thetad^2.
     """
 
@@ -137,7 +137,8 @@ class Section(NamedTuple):
     W_z: Float[Array, ""]
     E_y: Float[Array, ""]
     E_z: Float[Array, ""]
-    roll: Float[Array, ""]
+    cos_roll: Float[Array, ""]
+    sin_roll: Float[Array, ""]
     W_y_slope: Float[Array, ""]
     W_z_slope: Float[Array, ""]
     E_y_slope: Float[Array, ""]
@@ -162,12 +163,13 @@ def _section_of(p: Values, swing_: Swing) -> Section:
 
     columns = (inertia(one, zero, zero), inertia(zero, one, zero), inertia(zero, zero, one))
     pose, slope = swing_.pose, swing_.slope
-    places = (*pose.W, *pose.E, pose.roll_K, *slope.W, *slope.E, slope.roll_K)
-    return Section._make((*places, jnp.stack(columns, axis=1)))
+    places = (*pose.W, *pose.E, jnp.cos(pose.roll_K), jnp.sin(pose.roll_K))
+    slopes = (*slope.W, *slope.E, slope.roll_K)
+    return Section._make((*places, *slopes, jnp.stack(columns, axis=1)))
 
 
 class SectionCurves(eqx.Module):
-    """Chebyshev coefficients of all entries of a section over ``theta_LW / TRAVEL``, (22, n) [SI]."""
+    """Chebyshev coefficients of all entries of a section over ``theta_LW / TRAVEL``, (23, n) [SI]."""
 
     coefficients: Float[Array, "entries n"]
 
@@ -178,7 +180,7 @@ class SectionCurves(eqx.Module):
         while len(terms) < _NODES:
             terms.append(2.0 * ratio * terms[-1] - terms[-2])
         entries = self.coefficients @ jnp.stack(terms)
-        return Section._make((*entries[:10], entries[10:].reshape(4, 3)))
+        return Section._make((*entries[:11], entries[11:].reshape(4, 3)))
 
 
 _SHAPING = (
@@ -207,5 +209,5 @@ def _section_curves(p: Values) -> SectionCurves:
     pose, slope = jax.vmap(pose_and_slope)(jnp.asarray(TRAVEL * _POINTS))
     curvature = jax.tree.map(lambda values: jnp.tensordot(_DERIVATIVE / TRAVEL, values, axes=1), slope)
     at_nodes = jax.vmap(lambda swing_: _section_of(p, swing_))(Swing(pose, slope, curvature))
-    entries = jnp.stack([*at_nodes[:10], *at_nodes.inertia.reshape(_NODES, 12).T])
+    entries = jnp.stack([*at_nodes[:11], *at_nodes.inertia.reshape(_NODES, 12).T])
     return SectionCurves(entries @ _TO_COEFFICIENTS.T)

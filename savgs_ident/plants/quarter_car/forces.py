@@ -171,8 +171,10 @@ class Contact(NamedTuple):
 def contact(p: Values, section: Section, motion: Motion, road: Road) -> Contact:
     """Where and how the tyre meets the plate."""
     omega = motion.qd.theta_LW
-    tilt, tilt_rate = section.roll + p["tilt"], section.roll_slope * omega
-    cosine, sine = jnp.cos(tilt), jnp.sin(tilt)
+    tilt_rate, set_cosine, set_sine = section.roll_slope * omega, jnp.cos(p["tilt"]), jnp.sin(p["tilt"])
+    # The sum of two angles: the compiler would take cosine and sine anew wherever they enter.
+    cosine = section.cos_roll * set_cosine - section.sin_roll * set_sine
+    sine = section.sin_roll * set_cosine + section.cos_roll * set_sine
     height = motion.q.z_s + section.W_z - road.height
     height_rate = motion.qd.z_s + section.W_z_slope * omega - road.velocity
     length = height / cosine
