@@ -118,7 +118,9 @@ def predictive_sentence(posterior: Posterior) -> str:
     if inside < low:
         verdict = " That is fewer than chance allows: the model misses something."
     if inside > high:
-        verdict = " That is more than chance allows: the predicted spread is too wide."
+        verdict = (
+            " That is more than chance allows: the model errs by less than small errors of every model may."
+        )
     return (
         f"Of {total} measured harmonics {inside} ({percentage(inside / total)}) lie where 95 % of the repetitions"
         f" lie that the posterior predicts; for a perfect model it would be {low} to {high}.{verdict}"
