@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import equinox as eqx
 import jax
@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
 from savgs_ident.core.values import Values
-from savgs_ident.plants.base import AbstractPlant
+from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.responses.harmonic_response import ComparedPart, compared_share
 from savgs_ident.simulate.collocation import Trajectory, node_motion
 from savgs_ident.simulate.excitation import inputs_at
@@ -88,30 +88,45 @@ def harmonics_of(
 
     Each is in the unit of its reading.
     """
-    return shown_harmonics(model, p, readings_of(model, p, motions, known), known, orders)
-
-
-def shown_harmonics(
-    model: AbstractPlant, p: Values, readings: Float[Array, "P C"], known: PeriodicSolution, orders: int
-) -> Complex[Array, "D C K"]:
-    """Harmonics of what sensors show, dynamics and all, who read ``readings`` at the nodes; linear in these."""
     excitation = known.excitation
-    seen = analyse(readings, known.mesh, orders, excitation.part)
+    sensors = sensors_of(model, p, excitation, orders)
+    return shown_by(sensors, readings_of(model, p, motions, known), excitation.part, known.mesh)
+
+
+class Sensors(NamedTuple):
+    """What the sensors make of each order of each test [1], (D, C, K).
+
+    ``slope`` is its change per order [1] where a part of each period is compared and sensors have dynamics.
+    """
+
+    transfer: Complex[Array, "D C K"]
+    slope: Complex[Array, "D C K"] | None = None
+
+
+def sensors_of(model: AbstractPlant, p: Values, excitation: Excitation, orders: int) -> Sensors:
+    """The sensors of a plant in given tests, up to an order."""
+    order = jnp.arange(orders + 1, dtype=excitation.spacing.dtype)
+
+    def transfer(spacing: Float[Array, " D"]) -> Complex[Array, "D C K"]:
+        return jnp.moveaxis(model.transfers(p, spacing[:, None] * order), 0, 1)
+
     if excitation.part is None or not model.sensors_have_dynamics:
-        return seen * _sensors(model, p, excitation.spacing, orders)
+        return Sensors(transfer(excitation.spacing))
+    shown, slope = jax.jvp(transfer, (excitation.spacing,), (excitation.frequency,))
+    return Sensors(shown, slope / jnp.maximum(order, 1))
+
+
+def shown_by(
+    sensors: Sensors, readings: Float[Array, "P C"], part: ComparedPart | None, mesh: Mesh
+) -> Complex[Array, "D C K"]:
+    """Harmonics of what sensors show, dynamics and all, who read ``readings`` at the nodes; linear in both.
+
+    Nothing here is of one plant: a program of it serves all.
+    """
+    orders = sensors.transfer.shape[-1] - 1
+    seen = analyse(readings, mesh, orders, part) * sensors.transfer
+    if sensors.slope is None:
+        return seen
     # A sensor shows the past. So the share counts for what it shows, which is not what it makes of the share of the
     # truth: to first order they are apart by the slope of its response times the rate of the share.
-    shown, slope = jax.jvp(
-        lambda spacing: _sensors(model, p, spacing, orders), (excitation.spacing,), (excitation.frequency,)
-    )
-    per_order = slope / jnp.maximum(jnp.arange(orders + 1), 1)
-    changing = analyse(readings, known.mesh, orders, excitation.part, _share_rate)
-    return seen * shown + 1j * per_order * changing
-
-
-def _sensors(
-    model: AbstractPlant, p: Values, spacing: Float[Array, " D"], orders: int
-) -> Complex[Array, "D C K"]:
-    """What the sensors make of each order."""
-    order = jnp.arange(orders + 1, dtype=spacing.dtype)
-    return jnp.moveaxis(model.transfers(p, spacing[:, None] * order), 0, 1)
+    return seen + 1j * sensors.slope * analyse(readings, mesh, orders, part, _share_rate)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.values import Values
 from savgs_ident.effects.composition import nothing_imposed
 from savgs_ident.plants.base import AbstractPlant, AtPorts
+from savgs_ident.responses.harmonic_response import ComparedPart
 from savgs_ident.simulate.collocation import (
     Trajectory,
     apply_nodes,
@@ -26,8 +27,9 @@ from savgs_ident.simulate.collocation import (
     step_defects,
 )
 from savgs_ident.simulate.excitation import inputs_at, signals_at
+from savgs_ident.simulate.mesh import Mesh
 from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
-from savgs_ident.simulate.readings import readings_of, shown_harmonics
+from savgs_ident.simulate.readings import Sensors, readings_of, sensors_of, shown_by
 
 
 class Directions(NamedTuple):
@@ -83,35 +85,57 @@ def harmonic_sensitivities(
 
 
 def directional(
-    model: AbstractPlant,
-    p: Values,
-    solution: PeriodicSolution,
-    orders: int,
-    directions: Directions,
-    shown: Callable[[Array], Array] = lambda each: each,
-) -> Array:
-    """The same along k directions of the parameters, (k, ...); what is ``shown`` of each is kept."""
-    at, tangents = solution.trajectory, directions.tangents
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int, directions: Directions
+) -> Complex[Array, "k D C K"]:
+    """The same along k directions of the parameters."""
+    seen, changes = seen_along(model, p, solution, orders, directions)
+    return shown_along(seen, changes, directions.wanted, solution.excitation.part, solution.mesh)
+
+
+class Seen(NamedTuple):
+    """What sensors without dynamics read at the nodes, (P, C), each in its unit, and the sensors."""
+
+    readings: Float[Array, "P C"]
+    sensors: Sensors
+
+
+def seen_along(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int, directions: Directions
+) -> tuple[Seen, Seen]:
+    """What is seen of a motion, and its changes along k directions of the parameters, with a leading axis (k,)."""
+    at = solution.trajectory
     moved_along = _linear_motion(model, p, solution, directions.prepared)
 
-    def read(q: dict[str, Array], motions: Trajectory) -> Array:
-        return readings_of(model, q, motions, solution)
+    def see(q: dict[str, Array], motions: Trajectory) -> Seen:
+        sensors = sensors_of(model, q, solution.excitation, orders)
+        return Seen(readings_of(model, q, motions, solution), sensors)
 
-    def reading(given: tuple[dict[str, Array], Any]) -> Array:
-        change: Array = jax.jvp(read, (dict(p), at), (given[0], moved_along(*given)))[1]
-        return change
+    def change(given: tuple[dict[str, Array], Any]) -> Seen:
+        moved: Seen = jax.jvp(see, (dict(p), at), (given[0], moved_along(*given)))[1]
+        return moved
 
-    def seen(q: dict[str, Array], readings: Array) -> Array:
-        return shown_harmonics(model, q, readings, solution, orders)
+    seen, given = see(dict(p), at), (directions.tangents, directions.changes)
+    return seen, along_first(change, given, directions.wanted, seen)
 
-    known = read(dict(p), at)
 
-    def one(given: tuple[dict[str, Array], Array]) -> Array:
-        return shown(jax.jvp(seen, (dict(p), known), given)[1])
+def shown_along(
+    seen: Seen,
+    changes: Seen,
+    wanted: Array,
+    part: ComparedPart | None,
+    mesh: Mesh,
+    kept: Callable[[Array], Array] = lambda each: each,
+) -> Array:
+    """Changes of what sensors show, (k, ...), where what they see changes; what is ``kept`` of each harmonics."""
 
-    changes = along_first(reading, (tangents, directions.changes), directions.wanted, known)
-    found = jax.eval_shape(lambda: shown(seen(dict(p), known)))
-    return along_first(one, (tangents, changes), directions.wanted, found, ANALYSED)
+    def shown(each: Seen) -> Array:
+        return kept(shown_by(each.sensors, each.readings, part, mesh))
+
+    def change(given: Seen) -> Array:
+        moved: Array = jax.jvp(shown, (seen,), (given,))[1]
+        return moved
+
+    return along_first(change, changes, wanted, jax.eval_shape(shown, seen), ANALYSED)
 
 
 TOGETHER = 2

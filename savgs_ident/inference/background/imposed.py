@@ -20,49 +20,80 @@ from savgs_ident.effects.base import Load, PortSignals
 from savgs_ident.effects.composition import nothing_imposed
 from savgs_ident.inference.likelihood import Likelihood
 from savgs_ident.plants.base import AbstractPlant, AtPorts
+from savgs_ident.responses.harmonic_response import ComparedPart
+from savgs_ident.simulate.mesh import Mesh
 from savgs_ident.simulate.periodic import PeriodicSolution
 from savgs_ident.simulate.program_cache import placed, run_cached
-from savgs_ident.simulate.readings import harmonics, shown_harmonics
+from savgs_ident.simulate.readings import Sensors, readings_of, sensors_of, shown_by
 from savgs_ident.simulate.sensitivity import (
-    ANALYSED,
     TOGETHER,
     Directions,
+    Seen,
     along_first,
     answers,
-    directional,
     directions_of,
     ports_at_nodes,
+    seen_along,
+    shown_along,
     unit_tangents,
 )
 
 
-@eqx.filter_jit
 def rows_of(
     model: AbstractPlant, likelihood: Likelihood, p: Values, solution: PeriodicSolution, orders: int
 ) -> Array:
     """Rows of a motion [unit of the reading], (m,)."""
-    return likelihood.rows(harmonics(model, p, solution, orders))
+    seen = _seen(model, p, solution, orders)
+    return _rows(likelihood, seen, solution.excitation.part, solution.mesh)
 
 
 @eqx.filter_jit
-def _slopes_of(*args: Any) -> tuple[Array, ...]:
-    """Their slopes along k directions of the parameters, (k, m) [unit of the reading]."""
-    return run_cached(_directional_rows, *args)
+def _seen(model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int) -> Seen:
+    readings = readings_of(model, p, solution.trajectory, solution)
+    return Seen(readings, sensors_of(model, p, solution.excitation, orders))
 
 
-def _directional_rows(
-    model: AbstractPlant,
-    likelihood: Likelihood,
-    p: Values,
-    solution: PeriodicSolution,
-    directions: Directions,
-    orders: int,
+# Apart from what is seen: what sensors show of it is the same program for all plants.
+@eqx.filter_jit
+def _rows(likelihood: Likelihood, seen: Seen, part: ComparedPart | None, mesh: Mesh) -> Array:
+    return likelihood.rows(shown_by(seen.sensors, seen.readings, part, mesh))
+
+
+@eqx.filter_jit
+def _rows_along(*args: Any) -> tuple[Array, ...]:
+    """Changes of the rows where what is seen changes, (k, m) [unit of the reading]."""
+    return run_cached(_shown_rows, *args)
+
+
+def _shown_rows(
+    likelihood: Likelihood, seen: Seen, changes: Seen, wanted: Array, part: ComparedPart | None, mesh: Mesh
 ) -> tuple[Array]:
-    return (directional(model, p, solution, orders, directions, likelihood.rows),)
+    return (shown_along(seen, changes, wanted, part, mesh, likelihood.rows),)
 
 
-WIDTH = 52
-"""Directions that are solved for at a time: a program for each number would have to be compiled."""
+@eqx.filter_jit
+def _seen_along(*args: Any) -> tuple[Array, ...]:
+    return run_cached(_flat_seen_along, *args)
+
+
+def _flat_seen_along(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, directions: Directions, orders: int
+) -> tuple[Array, ...]:
+    return tuple(jax.tree.leaves(seen_along(model, p, solution, orders, directions)))
+
+
+def _shown(
+    likelihood: Likelihood, flat: tuple[Array, ...], wanted: Array, solution: PeriodicSolution
+) -> NDArray[np.float64]:
+    """Changes of the rows, (k, m), by the arrays of what is seen and of its changes."""
+    half = len(flat) // 2
+    seen, changes = (Seen(readings, Sensors(*sensors)) for readings, *sensors in (flat[:half], flat[half:]))
+    (rows,) = _rows_along(likelihood, seen, changes, wanted, solution.excitation.part, solution.mesh)
+    return np.asarray(rows)
+
+
+ROOM = 48
+"""Directions, or signals, that programs have room for: one for each number would have to be compiled."""
 
 
 def slopes_in(
@@ -75,24 +106,21 @@ def slopes_in(
 ) -> NDArray[np.float64]:
     """Slopes of the rows in the named parameters of ``model`` [units of the rows per SI unit], (m, n)."""
     parts = [np.zeros((0, likelihood.measured.size))]
-    for first in range(0, len(names), WIDTH):
-        some = names[first : first + WIDTH]
-        tangents = unit_tangents(p, some, WIDTH)
+    for first in range(0, len(names), ROOM):
+        some = names[first : first + ROOM]
+        tangents = unit_tangents(p, some, ROOM)
         directions = directions_of(model, p, placed(tangents), len(some))
-        (slopes,) = _slopes_of(model, likelihood, p, solution, directions, orders)
-        parts.append(np.asarray(slopes)[: len(some)])
+        flat = _seen_along(model, p, solution, directions, orders)
+        parts.append(_shown(likelihood, flat, directions.wanted, solution)[: len(some)])
     return np.concatenate(parts).T
 
 
-BATCH = 32
-"""Signals that a program has room for: one for each number would have to be compiled."""
-
-BATCHED_NODES = 2**21
-"""Most instants of signals in such a program. Origin: memory; a minute of road has room for all of them."""
+IMPOSED_NODES = 2**21
+"""Most instants of signals in such a program. Origin: memory; of a minute of road it has room for all signals."""
 
 
 def _batch(nodes: int) -> int:
-    return max(TOGETHER, min(BATCH, BATCHED_NODES // nodes // TOGETHER * TOGETHER))
+    return max(TOGETHER, min(ROOM, IMPOSED_NODES // nodes // TOGETHER * TOGETHER))
 
 
 def impose(
@@ -118,8 +146,8 @@ def impose(
             stacked[number, :, : 1 if values.ndim == 1 else 2] = values.reshape(nodes, -1)
         imposed = placed((jnp.asarray(places), jnp.asarray(stacked)))
         wanted = placed(jnp.asarray(len(some)))
-        (rows,) = _answered(model, likelihood, placed(dict(p)), solution, imposed, wanted, orders)
-        return np.asarray(rows)[: len(some)]
+        flat = _answered(model, placed(dict(p)), solution, imposed, wanted, orders)
+        return _shown(likelihood, flat, wanted, solution)[: len(some)]
 
     # The first alone: two at a time would compile the same program twice.
     first, others = range(0, len(signals), batch)[:1], range(batch, len(signals), batch)
@@ -129,19 +157,21 @@ def impose(
 
 @eqx.filter_jit
 def _answered(*args: Any) -> tuple[Array, ...]:
-    return run_cached(_answer_rows, *args)
+    return run_cached(_flat_answers, *args)
 
 
-def _answer_rows(
+def _flat_answers(
     model: AbstractPlant,
-    likelihood: Likelihood,
     p: Values,
     solution: PeriodicSolution,
     imposed: tuple[Array, Array],
     wanted: Array,
     orders: int,
-) -> tuple[Array]:
-    """Rows of signals (b, P, 2) at the ports of these places (b,); of a force the first column counts."""
+) -> tuple[Array, ...]:
+    """What is seen, and its changes by signals (b, P, 2) at the ports of these places (b,).
+
+    Of a force the first column counts. Sensors do not change.
+    """
     answer = answers(model, p, solution)
     blank = nothing_imposed(model.ports, jnp.zeros(solution.mesh.layout.total))
 
@@ -157,12 +187,10 @@ def _answer_rows(
             }
         )
 
-    def rows(readings: Array) -> Array:
-        return likelihood.rows(shown_harmonics(model, p, readings, solution, orders))
-
-    like = jax.ShapeDtypeStruct((solution.mesh.layout.total, len(model.channels)), likelihood.measured.dtype)
-    readings = along_first(reading, imposed, wanted, like)
-    return (along_first(rows, readings, wanted, likelihood.measured, ANALYSED),)
+    seen = _seen(model, p, solution, orders)
+    readings = along_first(reading, imposed, wanted, seen.readings)
+    still = jax.tree.map(lambda each: jnp.zeros((len(readings), *each.shape), each.dtype), seen.sensors)
+    return tuple(jax.tree.leaves((seen, Seen(readings, still))))
 
 
 def node_loads(
