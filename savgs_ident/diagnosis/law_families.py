@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.effects.base import Family, Port
@@ -25,7 +26,12 @@ from savgs_ident.effects.learned_functions import (
     interactions_at,
 )
 from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, find_map_again
-from savgs_ident.inference.laplace import LinearisedOptimum, linearised_optimum, log_evidence
+from savgs_ident.inference.laplace import (
+    LinearisedOptimum,
+    attainable_evidence,
+    linearised_optimum,
+    log_evidence,
+)
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import bounds_of
 
@@ -55,20 +61,21 @@ class FittedFunctions(NamedTuple):
         """Their log evidence, with the prior probability of the functions."""
         return self.mode.evidence + self.log_prior
 
-    @property
-    def attainable(self) -> float:
-        """The log evidence that some of them can hardly exceed: the likelihood at the best of all, if found."""
+    def attainable(self, search: Search, constants: DecisionConstants) -> float:
+        """The log evidence that some of them can hardly exceed: that of all at their best, if that was found."""
         if self.mode.status is Status.HOPELESS:
             return -np.inf
-        x = self.mode.x
-        return self.mode.value + 0.5 * float(x @ x) if self.mode.status.ok else np.inf
+        if not self.mode.status.ok:
+            return np.inf
+        return _FirstOrder(search, self.mode).attainable(self.functions, max(constants.family_widths))
 
     def gone_on(self, search: Search, least: float, constants: DecisionConstants) -> "FittedFunctions":
-        """The fit to its end, or until it cannot come to a log evidence of ``least``."""
+        """The fit to its end, or until neither all of them nor some can come to a log evidence of ``least``."""
         if self.mode.status is not Status.MAX_ITERATIONS:
             return self
         steps = constants.learned_steps - constants.first_learned_steps
-        mode = find_map_again(search, (self.term,), self.mode, steps, least - self.log_prior)
+        free, bound = self.functions if self.only is None else (), least - self.log_prior
+        mode = find_map_again(search, (self.term,), self.mode, steps, bound, free)
         return self._replace(mode=mode) if mode.solved else self
 
 
@@ -130,6 +137,13 @@ class _FirstOrder:
         coordinates = (each for each, keep in zip(self.mode.coordinates, kept, strict=True) if keep)
         return log_evidence(top.value, top.precision, tuple(coordinates))
 
+    def attainable(self, functions: Collection[str], width: float) -> float:
+        """The log evidence that fewer of the ``functions`` cannot exceed, if each may be ``width`` times as large."""
+        everything = self._kept(())
+        top = self._optimum(everything, self._wider(functions, width))
+        free = ~self._kept(functions)
+        return attainable_evidence(top.value, top.x, top.precision, self.mode.coordinates, free)
+
     def best(self, gone: Collection[str], functions: Collection[str], width: float) -> dict[str, float]:
         """The best point [SI] there, by name."""
         kept, wider = self._kept(gone), self._wider(functions, width)
@@ -157,28 +171,33 @@ def families_fitted(
     port: Port,
     alone: Mapping[tuple[str, ...], float],
     start: Mapping[str, float],
+    least: float,
     constants: DecisionConstants,
 ) -> tuple[dict[Family, float], list[FittedFunctions]]:
     """The log weight of each family alone, and the likely ones fitted by themselves.
 
     More than one: to first order about all functions together the families are not known well enough to take the
     first. Those functions that could be all of a law are looked for ``alone``, too, with priors so many times as
-    wide, from ``start`` [SI].
+    wide, from ``start`` [SI]. What cannot come to a log weight of ``least``, or near to all functions, is given up.
     """
     found = families_alone(search, every.mode, port, constants)
-    weights, fits = {family: each.weight for family, each in found.items()}, list[FittedFunctions]()
-    likely = sorted(found, key=lambda family: -weights[family])[: constants.likely_families]
-    for family in likely:
+    near = max(least, every.weight - constants.alarm_log_odds)
+
+    def fitted(family: Family) -> list[FittedFunctions]:
         solved = list[FittedFunctions]()
         for each in (found[family], *_by_themselves(every.term, port, family, alone, start, constants)):
             if {*each.functions} in ({*fit.functions} for fit in solved):
                 continue
-            least = max(fit.weight for fit in (every, *fits, *solved)) - constants.alarm_log_odds
-            fitted = _fitted(search, every, port, family, each, least, constants)
-            solved += [] if fitted is None else [fitted]
-        fits += solved
-        weights[family] = max((each.weight for each in solved), default=weights[family])
-    return weights, fits
+            bound = max([near, *(fit.weight - constants.alarm_log_odds for fit in solved)])
+            one = _fitted(search, every, port, family, each, bound, constants)
+            solved += [] if one is None else [one]
+        return solved
+
+    weights = {family: each.weight for family, each in found.items()}
+    likely = sorted(found, key=lambda family: -weights[family])[: constants.likely_families]
+    fits = dict(zip(likely, in_parallel(fitted, likely), strict=True))
+    weights |= {family: max(each.weight for each in some) for family, some in fits.items() if some}
+    return weights, [each for some in fits.values() for each in some]
 
 
 def _seen_of(term: Term, port: Port, family: Family) -> tuple[str, ...]:

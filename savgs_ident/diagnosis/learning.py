@@ -16,6 +16,7 @@ the most probable to first order about the baseline, for each family then the on
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import log
 from typing import Any, NamedTuple
 
@@ -99,6 +100,11 @@ class LearnedLaw:
         )
 
     @property
+    def weight(self) -> float:
+        """Its log evidence, with the prior probability of its functions."""
+        return self.mode.evidence + self.log_prior
+
+    @property
     def identified(self) -> float:
         """How many coefficients the data identify: the share of each one's prior variance that they took away."""
         coefficients = {each.name for each in self.term.amplitudes}
@@ -128,49 +134,32 @@ def learn(
     """The laws at ports, in their order; ``base`` is the recalibrated baseline.
 
     They are looked for from there and from the plant as ``given``. There is none at a port without learned law, where
-    the plant with one has no solution, or where the law is impossible. Families are told apart where a law with the
-    functions of one could be as probable as the best of all ports. What cannot come to a log evidence of ``least`` is
-    given up.
+    the plant with one has no solution, or where the law is impossible. Given up is what cannot come to a log evidence
+    of ``least``, or cannot be as probable as a law that is known: the first port's, which promises most, then of the
+    others' the one that leads after some steps.
     """
 
-    def begin(port: Port) -> _Begun | None:
+    def begin(port: Port, near: float) -> _Begun | None:
         progress(f"learning a law at {port.location} ({port.name})")
-        return _begin_learning(problem, data, base, port, constants, given, least)
+        return _begin_learning(problem, data, base, port, constants, given, near)
 
-    begun = [each for each in in_parallel(begin, ports) if each is not None]
-    fitted = _to_the_end(begun, constants, progress, least)
-    near = _as_probable_as(fitted, constants)
-
-    def finish(each: _Begun) -> LearnedLaw | None:
+    def finish(each: _Begun, near: float) -> LearnedLaw | None:
         progress(f"telling families apart at {each.port.location} ({each.port.name})")
-        return each.law(*_most_probable(each, base, near, constants))
+        ended = each.gone_on(near, constants)
+        return ended.law(*_most_probable(ended, base, near, constants))
 
-    return tuple(law for law in in_parallel(finish, fitted) if law is not None)
-
-
-def _to_the_end(
-    begun: Sequence["_Begun"], constants: DecisionConstants, progress: Progress, least: float
-) -> list["_Begun"]:
-    """What was begun, gone on with in the same order: the most probable first, until it is a possible law.
-
-    What cannot come near to that is given up.
-    """
-    found: dict[str, _Begun] = {}
-    left = sorted(begun, key=lambda each: -each.best.weight)
-    while left and not any(each.is_possible for each in found.values()):
-        first = left.pop(0)
-        progress(f"fitting a law at {first.port.location} ({first.port.name})")
-        found[first.port.name] = first.gone_on(least, constants)
-    near = max(least, _as_probable_as(tuple(found.values()), constants))
-    for each in in_parallel(lambda each: each.gone_on(near, constants), left):
-        found[each.port.name] = each
-    return [found[each.port.name] for each in begun]
-
-
-def _as_probable_as(fitted: Sequence["_Begun"], constants: DecisionConstants) -> float:
-    """The log evidence from which on a law is about as probable as the best possible one of ``fitted``."""
-    weights = [each.best.weight for each in fitted if each.is_possible]
-    return max(weights, default=-np.inf) - constants.alarm_log_odds
+    found, most = list[LearnedLaw](), -np.inf
+    for some in (ports[:1], ports[1:]):
+        near = max(least, most - constants.alarm_log_odds)
+        begun = [each for each in in_parallel(partial(begin, near=near), some) if each is not None]
+        left = sorted(begun, key=lambda each: -each.best.weight)
+        while left and left[0].best.weight > most:
+            found += [law for law in (finish(left.pop(0), near),) if law is not None]
+            most = max((law.weight for law in found), default=-np.inf)
+            near = max(least, most - constants.alarm_log_odds)
+        found += [law for law in in_parallel(partial(finish, near=near), left) if law is not None]
+    order = [each.name for each in ports]
+    return tuple(sorted(found, key=lambda law: order.index(law.port.name)))
 
 
 class _Begun(NamedTuple):
@@ -192,11 +181,6 @@ class _Begun(NamedTuple):
     def best(self) -> FittedFunctions:
         """The more probable ones."""
         return max((each for each in (self.every, self.blocked) if each), key=lambda each: each.weight)
-
-    @property
-    def is_possible(self) -> bool:
-        """Whether the more probable ones are a possible law."""
-        return self.law(self.best, {}) is not None
 
     def gone_on(self, least: float, constants: DecisionConstants) -> "_Begun":
         """Both fits to their ends, or until they cannot come to a log evidence of ``least``.
@@ -262,7 +246,8 @@ def _begin_learning(
     columns = dict(zip(names, there_now.slopes.T, strict=True))
     term = with_amplitudes(blank, effect, search, base, columns, constants)
     steps, near = constants.first_learned_steps, there_now.warm_start
-    mode = find_map_from_both(search, (term,), values, near, steps, least)
+    free = [each.name for each in term.amplitudes]
+    mode = find_map_from_both(search, (term,), values, near, steps, least, free)
     if not mode.solved:
         return None
     blocked = _blocked_play(search, effect, blank, port, base, near, constants)
@@ -297,10 +282,10 @@ def _most_probable(
     a log evidence of ``least``.
     """
     best, weights = begun.best, dict[Family, float]()
-    if begun.every.attainable > least:
+    if begun.every.attainable(begun.search, constants) > least:
         start = {**base.values, **begun.places}
         weights, fitted = families_fitted(
-            begun.search, begun.every, begun.port, begun.alone, start, constants
+            begun.search, begun.every, begun.port, begun.alone, start, least, constants
         )
         best = max((best, *fitted), key=lambda each: each.weight)
     if best.only is None:

@@ -6,7 +6,7 @@ hypothesis that misses weighs its rows by what it can explain from the first ste
 rises. At the end stands the evidence by Laplace's method.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -17,7 +17,13 @@ from numpy.typing import NDArray
 from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
-from savgs_ident.inference.laplace import linearised_optimum, log_evidence, precision_of
+from savgs_ident.inference.laplace import (
+    LinearisedOptimum,
+    attainable_evidence,
+    linearised_optimum,
+    log_evidence,
+    precision_of,
+)
 from savgs_ident.inference.likelihood import NoiseScales, noise_scales
 from savgs_ident.inference.observations import Data, Plant, Prediction, Term
 from savgs_ident.inference.prior import Coordinates, bounds_of, slopes_at, values_at
@@ -42,7 +48,7 @@ HOPE = 10.0
 
 
 def is_hopeless(value: float, promised: float, least: float) -> bool:
-    """Whether a search at a log density of ``value`` that rises by ``promised`` to first order misses ``least``."""
+    """Whether a search at a log evidence of ``value`` that rises by ``promised`` to first order misses ``least``."""
     return value + HOPE * promised < least
 
 
@@ -180,8 +186,10 @@ class _Ascent:
         held: Mapping[str, float],
         level: float = LEVEL,
         least: float = -np.inf,
+        free: Collection[str] = (),
     ):
-        self._search, self._held, self._level, self._least = search, held, level, least
+        self._search, self._held, self._level = search, held, level
+        self._least, self._free = least, frozenset(free)
         self._names = tuple(term.name for term in terms)
         self._coordinates = search.plant.nuisances + tuple(c for term in terms for c in term.coordinates)
 
@@ -211,7 +219,7 @@ class _Ascent:
         promised = top.value - point.value
         if promised < self._level:
             return point._replace(status=Status.CONVERGED if top.converged else Status.STALLED)
-        if is_hopeless(point.value, promised, self._least):
+        if is_hopeless(self._attainable(top) - promised, promised, self._least):
             return point._replace(status=Status.HOPELESS)
         there = self._at(top.x, here.warm_start)
         if there.value > point.value:
@@ -225,6 +233,10 @@ class _Ascent:
                 little = there.value < point.value + self._level
                 return there._replace(status=Status.CONVERGED) if little else there
         return point._replace(status=Status.CONVERGED if promised < ROUGH else Status.STALLED)
+
+    def _attainable(self, top: LinearisedOptimum) -> float:
+        free = np.array([each.name in self._free for each in self._coordinates], bool)
+        return attainable_evidence(top.value, top.x, top.precision, self._coordinates, free)
 
     def _shares(self, promised: float) -> list[float]:
         """Shares of a step to try in its place: those that to first order rise by as much as counts."""
@@ -314,12 +326,14 @@ def find_map_again(
     fit: LaplaceFit,
     steps: int = STEPS,
     least: float = -np.inf,
+    free: Collection[str] = (),
 ) -> LaplaceFit:
     """The mode from a ``fit`` of the same plant with the same terms: to other data, to other rows, or not at its end.
 
-    What the plant does there is known. The search ends where it cannot come to a log density of ``least``.
+    What the plant does there is known. The search ends where neither it nor one with fewer of the ``free``
+    coordinates can come to a log evidence of ``least``.
     """
-    ascent = _Ascent(search, terms, {}, least=least)
+    ascent = _Ascent(search, terms, {}, least=least, free=free)
     return ascent.mode(ascent.again(fit), steps)
 
 
@@ -330,14 +344,15 @@ def find_map_from_both(
     warm_start: Any,
     steps: int = STEPS,
     least: float = -np.inf,
+    free: Collection[str] = (),
 ) -> LaplaceFit:
     """The mode of the baseline with ``terms``, from ``start`` or from the plant as it was given.
 
     What calibration makes of a plant that lacks something may be so far from it that no step leads back. The search
-    goes on from where one step leads higher, and ends where it cannot come to a log density of ``least``. What
-    ``start`` says of the terms holds for both.
+    goes on from where one step leads higher, and ends where neither it nor one with fewer of the ``free`` coordinates
+    can come to a log evidence of ``least``. What ``start`` says of the terms holds for both.
     """
-    ascent, given = _Ascent(search, terms, {}, least=least), search.given
+    ascent, given = _Ascent(search, terms, {}, least=least, free=free), search.given
     # The first alone: two at a time would compile the same program twice.
     begun = ascent.start(start, warm_start)
     if given is None:

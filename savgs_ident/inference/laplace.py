@@ -62,6 +62,18 @@ def log_evidence(value: float, precision: Array, coordinates: Coordinates) -> fl
     return value - 0.5 * log_determinant(precision) + log(2.0) * sum(each.halved for each in coordinates)
 
 
+def attainable_evidence(
+    value: float, x: Array, precision: Array, coordinates: Coordinates, free: NDArray[np.bool_]
+) -> float:
+    """The log evidence that no choice among some coordinates can exceed: as if those that are ``free`` cost nothing.
+
+    ``value`` is the log density [1] at the mode ``x`` [1], (n,), with its ``precision``, (n, n); ``free`` is (n,).
+    Without some of them nothing fits better, and what is kept narrows its prior. With none it is the log evidence.
+    """
+    kept = tuple(each for each, spared in zip(coordinates, free, strict=True) if not spared)
+    return log_evidence(value + 0.5 * float(x[free] @ x[free]), precision[np.ix_(~free, ~free)], kept)
+
+
 class Spread(NamedTuple):
     """Covariance (n, n) of unconstrained coordinates [1]."""
 

@@ -1,11 +1,15 @@
 """The normal approximation that makes a posterior round, on posteriors whose covariance is known."""
 
+from itertools import combinations
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.inference.laplace import attainable_evidence, log_evidence, precision_of
 from savgs_ident.inference.posterior_mode import LONGEST, nuisance_scale, parameter_scale
-from savgs_ident.inference.prior import Prior, Scales
+from savgs_ident.inference.prior import Prior, Scales, sheet_coordinate
 
 from .toy import FIXED_SCALES, FREE, straight_toy
 from .toy_reference import reference_of
@@ -70,3 +74,33 @@ def test_scales_without_data_keep_their_prior() -> None:
     means, deviations = nuisance_scale(toy.likelihood, Prior(FREE), jnp.zeros(5), toy.base, nothing)
     np.testing.assert_allclose(means, 0.0, atol=1e-6)
     np.testing.assert_allclose(deviations, 1.0, rtol=0.02)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_choice_among_coordinates_comes_to_more_than_what_is_attainable_if_they_cost_nothing(
+    seed: int,
+) -> None:
+    random, kept, count = np.random.default_rng(seed), 2, 6
+    coordinates = tuple(sheet_coordinate(Parameter(name, 1.0, "1", tolerance=1.0)) for name in "abcdef")
+    slopes = random.standard_normal((20, count)) * np.geomspace(0.1, 10.0, count)
+    measured = slopes[:, :3] @ random.standard_normal(3) + random.standard_normal(20)
+
+    def fitted(chosen: list[int]) -> tuple[float, np.ndarray, np.ndarray]:
+        some = slopes[:, chosen]
+        precision = precision_of(some, np.ones(20))
+        x = np.linalg.solve(precision, some.T @ measured)
+        return -0.5 * float(np.sum((measured - some @ x) ** 2) + x @ x), x, precision
+
+    free = np.arange(count) >= kept
+    bound = attainable_evidence(*fitted(list(range(count))), coordinates, free)
+    weights = []
+    for size in range(count - kept + 1):
+        for some in combinations(range(kept, count), size):
+            value, _, precision = fitted([*range(kept), *some])
+            weights.append(log_evidence(value, precision, coordinates[: kept + size]))
+    assert max(weights) < bound
+    value, x, precision = fitted(list(range(count)))
+    none = np.zeros(count, bool)
+    assert attainable_evidence(value, x, precision, coordinates, none) == weights[-1]
+    # It says more than the likelihood alone.
+    assert bound < weights[-1] + 0.5 * np.linalg.slogdet(precision)[1] + 0.5 * float(x @ x)
