@@ -198,14 +198,14 @@ OF_THE_MOTION = (
     *(_soft_stop(gap, *side) for gap in SOFT_GAPS for side in _SIDES),
     Function("x^5", Family.STIFFNESS, lambda m: m.x**5),
     Function("x^9", Family.STIFFNESS, lambda m: m.x**9),
-    Function("v/(v^2 + 0.01)^(1/4)", Family.DAMPING, lambda m: m.v / (m.v**2 + 0.1**2) ** 0.25),
+    Function("v/(v^2 + 0.01)^(1/4)", Family.DAMPING, lambda m: m.v / jnp.sqrt(jnp.sqrt(m.v**2 + 0.1**2))),
     Function("tanh(v/w)", Family.FRICTION, lambda m: m.turned),
     Function(f"tanh(v/{SHARP:g})^2", Family.FRICTION, lambda m: m.sharp**2),
     Function("tanh(v/w)^2", Family.FRICTION, lambda m: m.turned**2),
     Function("d^2", Family.STIFFNESS, lambda m: m.d**2),
     Function("d^3", Family.STIFFNESS, lambda m: m.d**3),
     Function("d^5", Family.STIFFNESS, lambda m: m.d**5),
-    Function("v/(v^2 + 0.0001)^(1/4)", Family.DAMPING, lambda m: m.v / (m.v**2 + 0.01**2) ** 0.25),
+    Function("v/(v^2 + 0.0001)^(1/4)", Family.DAMPING, lambda m: m.v / jnp.sqrt(jnp.sqrt(m.v**2 + 0.01**2))),
 )
 """Functions of a :class:`RelativeMotion` without a past, but for those of the load."""
 
