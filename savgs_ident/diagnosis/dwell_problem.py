@@ -10,11 +10,10 @@ A problem is made of a response, and so are the data:
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,8 +45,8 @@ from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.inference.problem import harmonic_target
 from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.excitation import measured_excitation
+from savgs_ident.simulate.held_states import ITERATIONS, resolve_with_states, with_states_of
 from savgs_ident.simulate.mesh import Layout
 from savgs_ident.simulate.periodic import (
     PeriodicSettings,
@@ -59,12 +58,6 @@ from savgs_ident.simulate.periodic import (
     simulate_periodic,
 )
 from savgs_ident.simulate.program_cache import done_once, placed
-
-ITERATIONS = 100
-"""Most Newton steps from one point of a search to the next."""
-
-ITERATIONS_AT_REST = 300
-"""Most of them where states begin at rest: four new spring-sliders at the tyre needed 104 in a dwell at 0.8 Hz."""
 
 
 @dataclass(frozen=True)
@@ -159,9 +152,7 @@ class DwellProblem(AbstractProblem):
         """Rows with ``terms`` at ``values`` [SI], with slopes in ``names``, on the nodes of ``warm_start``."""
         model, p = self._solved_model(terms), placed(self.values(values))
         self._have_compiled(model, p)
-        start = self._fitting(model, warm_start)
-        new = start.x.shape != warm_start.trajectory.x.shape
-        solution = resolve(model, p, warm_start, ITERATIONS_AT_REST if new else ITERATIONS, start)
+        solution = resolve_with_states(model, p, warm_start, partial(self._signals_along, p=p))
         rows = np.asarray(rows_of(model, self.likelihood, p, solution, self.orders))
         rows = rows + self.corrections.get(terms, 0.0) + (0.0 if self.beyond is None else self.beyond)
         status = joint_status(solution.status())
@@ -351,14 +342,20 @@ class DwellProblem(AbstractProblem):
         shapes = self.layout, self.shape, self.likelihood.measured.shape
         done_once((jax.tree.structure(model), shapes), compile_both)
 
-    def _fitting(self, model: AbstractPlant, warm_start: PeriodicSolution) -> Trajectory:
-        """The motions of ``warm_start`` with as many states as ``model`` has, further ones at rest."""
-        x, y = warm_start.trajectory
-        lacking = 2 * len(model.coordinates) + len(model.states) - x.shape[0]
-        if lacking <= 0:
-            return Trajectory(x[: len(x) + lacking], y[: len(y) + lacking])
-        rest = jnp.zeros((lacking, x.shape[1]))
-        return Trajectory(jnp.concatenate([x, rest]), jnp.concatenate([y, rest]))
+    def _signals_along(self, solution: PeriodicSolution, p: Values) -> Mapping[str, PortSignals]:
+        """What laws see at the force ports along a motion, of any states beyond the baseline's."""
+        bare = self.model(())
+        blank = blank_solution(bare, self.excitation, solution.mesh.layout)
+        at = with_states_of(bare, solution.trajectory)
+        # With the parameters of a law that is learned it would be compiled anew for each of them.
+        learned = {
+            each.name
+            for name, effect in self.catalogue.items()
+            if effect.holds_states and name not in self.baseline
+            for each in effect.parameters
+        }
+        known = {name: p[name] for name in p if name not in learned}
+        return node_loads(bare, known, replace(blank, mesh=solution.mesh, trajectory=at))[0]
 
 
 def dwell_problem(

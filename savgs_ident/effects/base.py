@@ -257,6 +257,17 @@ class AbstractForceLaw(AbstractLaw):
         """Time derivatives of the internal states, shape (s,) [unit of each per second]; none without states."""
         return jnp.zeros(0)
 
+    @property
+    def holds_states(self) -> bool:
+        """Whether the motion alone holds the states, between :meth:`bounds_of_states`."""
+        return False
+
+    def bounds_of_states(
+        self, v: Values, signals: PortSignals
+    ) -> tuple[Float[Array, "s *n"], Float[Array, "s *n"]]:
+        """The bounds [unit of each], lower and upper, along a motion: of the anchors of bristles."""
+        raise NotImplementedError
+
     def loads_contact(self, port: Port) -> bool:
         """Whether it adds to what a contact at a port holds before it slides, too (:meth:`limit`)."""
         return False

@@ -141,6 +141,18 @@ class Effect(eqx.Module):
         assert isinstance(self.law, AbstractForceLaw), self.name
         return self.law.rate(self._values(p), signals, state)
 
+    @property
+    def holds_states(self) -> bool:
+        """Whether the motion of its port alone holds its states."""
+        return isinstance(self.law, AbstractForceLaw) and self.law.holds_states
+
+    def bounds_of_states(
+        self, p: Values, signals: PortSignals
+    ) -> tuple[Float[Array, "s *n"], Float[Array, "s *n"]]:
+        """The bounds between which the motion holds them [unit of each], lower and upper."""
+        assert isinstance(self.law, AbstractForceLaw), self.name
+        return self.law.bounds_of_states(self._values(p), signals)
+
     def friction_limit(self, p: Values, signals: PortSignals) -> FrictionLimit:
         """Its share of what a contact holds [N]."""
         assert isinstance(self.law, AbstractFrictionLimitLaw | AbstractForceLaw), self.name

@@ -164,6 +164,18 @@ class LearnedForce(AbstractForceLaw):
         """Velocities of the anchors [m/s]."""
         return jnp.stack([each.rate for each in self._sliders(v, signals, state)])
 
+    @property
+    def holds_states(self) -> bool:
+        """They follow the motion, whatever is learned."""
+        return True
+
+    def bounds_of_states(
+        self, v: Values, signals: PortSignals
+    ) -> tuple[Float[Array, "s *n"], Float[Array, "s *n"]]:
+        """The bounds [m] of the anchors."""
+        moved, widths = signals.displacement - signals.rest, self._widths(v)
+        return jnp.stack([moved - each for each in widths]), jnp.stack([moved + each for each in widths])
+
     def loads_contact(self, port: Port) -> bool:
         """Where there is one."""
         return port.contact is not None
@@ -174,13 +186,16 @@ class LearnedForce(AbstractForceLaw):
         held = v[str(number)] * jnp.ones_like(signals.load)
         return FrictionLimit(held, held)
 
+    def _widths(self, v: Values) -> list[Array]:
+        """How far each gives before it slides [m]."""
+        return [share * self.port.displacement * v["give"] for share in STRETCHES]
+
     def _sliders(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> list[Bristle]:
         """Spring-sliders of unit friction: what they carry is a function of the motion alone."""
         one = jnp.ones_like(signals.displacement)
         limit = FrictionLimit(one, one)
         moved = signals._replace(displacement=signals.displacement - signals.rest)
-        widths = [share * self.port.displacement * v["give"] for share in STRETCHES]
-        sticks = [Presliding(one / width, one * (v["lag"] / width)) for width in widths]
+        sticks = [Presliding(one / width, one * (v["lag"] / width)) for width in self._widths(v)]
         return [bristle(stick, moved, limit, state[place]) for place, stick in enumerate(sticks)]
 
 
