@@ -24,7 +24,8 @@ from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem
 from savgs_ident.diagnosis.result import NONE
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.inference.background.shared_errors import drifts_of, time_of, with_wider_drifts
-from savgs_ident.inference.find_map import HOPE, LaplaceFit, Search, find_map, find_map_again, search_of
+from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, find_map_again, search_of
+from savgs_ident.inference.laplace import is_hopeless
 from savgs_ident.inference.observations import Data
 
 TIMES = (-1.0, -0.5, 0.0, 0.5, 1.0)
@@ -58,7 +59,8 @@ def drifting(
     data = with_wider_drifts(problem.data, len(plant.free), width)
     search, base = search_of(plant, data, problem.search.given), problem.base
     mode = find_map_again(search, (), base, 1)
-    if base.value + HOPE * (mode.value - base.value) < best - prior:
+    rise = mode.value - base.value
+    if is_hopeless(mode.evidence - rise, rise, best - prior):
         return None
     drifts, moved = _Drifts(np.zeros(len(plant.free)), np.zeros(len(plant.free))), np.inf
     for _ in range(constants.drift_rounds):

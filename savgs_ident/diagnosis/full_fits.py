@@ -25,9 +25,9 @@ from savgs_ident.inference.find_map import (
     find_map,
     find_map_from_both,
     find_map_from_several,
-    is_hopeless,
     refine,
 )
+from savgs_ident.inference.laplace import is_hopeless
 from savgs_ident.inference.observations import NumberChange, Term
 
 

@@ -20,6 +20,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.inference.laplace import (
     LinearisedOptimum,
     attainable_evidence,
+    is_hopeless,
     linearised_optimum,
     log_evidence,
     precision_of,
@@ -42,14 +43,6 @@ LEVEL = 0.1
 
 ROUGH = 2.0
 """Rise that is promised, but not found, up to which a mode is as good: friction makes the density rough."""
-
-HOPE = 10.0
-"""How many times what its next step promises a search may still rise [1]; with less to go for it is given up."""
-
-
-def is_hopeless(value: float, promised: float, least: float) -> bool:
-    """Whether a search at a log evidence of ``value`` that rises by ``promised`` to first order misses ``least``."""
-    return value + HOPE * promised < least
 
 
 @dataclass(frozen=True)

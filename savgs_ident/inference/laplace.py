@@ -74,6 +74,15 @@ def attainable_evidence(
     return log_evidence(value + 0.5 * float(x[free] @ x[free]), precision[np.ix_(~free, ~free)], kept)
 
 
+HOPE = 10.0
+"""How many times what its next step promises a search may still rise [1]; with less to go for it is given up."""
+
+
+def is_hopeless(value: float, promised: float, least: float) -> bool:
+    """Whether a search at a log evidence of ``value`` that rises by ``promised`` to first order misses ``least``."""
+    return value + HOPE * promised < least
+
+
 class Spread(NamedTuple):
     """Covariance (n, n) of unconstrained coordinates [1]."""
 
