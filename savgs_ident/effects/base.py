@@ -248,6 +248,8 @@ class AbstractForceLaw(AbstractLaw):
     """A force along the displacement of its port: force times velocity is power into the plant."""
 
     kind: ClassVar[PortKind] = PortKind.FORCE
+    holds_states: ClassVar[bool] = False
+    """Whether the motion alone holds the states, between :meth:`bounds_of_states`."""
 
     @abstractmethod
     def force(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, ""]:
@@ -257,16 +259,15 @@ class AbstractForceLaw(AbstractLaw):
         """Time derivatives of the internal states, shape (s,) [unit of each per second]; none without states."""
         return jnp.zeros(0)
 
-    @property
-    def holds_states(self) -> bool:
-        """Whether the motion alone holds the states, between :meth:`bounds_of_states`."""
-        return False
-
     def bounds_of_states(
         self, v: Values, signals: PortSignals
     ) -> tuple[Float[Array, "s *n"], Float[Array, "s *n"]]:
-        """The bounds [unit of each], lower and upper, along a motion: of the anchors of bristles."""
-        raise NotImplementedError
+        """Bounds [unit of each], lower and upper, that a motion alone sets to states that are anchors of bristles.
+
+        Of a law whose states do more than follow the motion there are none.
+        """
+        none = jnp.zeros((0, *jnp.shape(signals.displacement)))
+        return none, none
 
     def loads_contact(self, port: Port) -> bool:
         """Whether it adds to what a contact at a port holds before it slides, too (:meth:`limit`)."""

@@ -100,6 +100,7 @@ class LearnedForce(AbstractForceLaw):
 
     name: ClassVar[str] = "learned"
     family: ClassVar[Family] = Family.LEARNED
+    holds_states: ClassVar[bool] = True
     roles: ClassVar[tuple[Role, ...]] = _roles(
         ("middle", "stroke", "speed", "carried", "turn", "give", "gap", "fall", "lag"),
         len(
@@ -163,11 +164,6 @@ class LearnedForce(AbstractForceLaw):
     def rate(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:
         """Velocities of the anchors [m/s]."""
         return jnp.stack([each.rate for each in self._sliders(v, signals, state)])
-
-    @property
-    def holds_states(self) -> bool:
-        """They follow the motion, whatever is learned."""
-        return True
 
     def bounds_of_states(
         self, v: Values, signals: PortSignals
