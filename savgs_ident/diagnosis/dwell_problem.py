@@ -30,8 +30,8 @@ from savgs_ident.diagnosis.next_test import next_tests
 from savgs_ident.diagnosis.problem import AbstractProblem, DrawnLaw, largest_with_margin, spans_of_force
 from savgs_ident.diagnosis.regimes import dwell_cycles, find_regimes
 from savgs_ident.diagnosis.result import ForceLoop, NextTest, Regime, Responses
+from savgs_ident.diagnosis.shared_programs import SharedPrograms
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.effects.alternatives import Alternatives, shared_by
 from savgs_ident.effects.base import Port, PortKind, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.background.imposed import node_loads, rows_of, slopes_in
@@ -138,25 +138,21 @@ class DwellProblem(AbstractProblem):
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
     ) -> PeriodicSolution:
         """The same motions on nodes that follow them. ``values`` are in SI."""
-        return adapt(
-            self._solved_model(terms),
-            self.values(values),
-            warm_start,
-            warm_start.mesh.layout,
-            self.settings.iterations,
-        )
+        model, p = self._solved(terms, values)
+        return adapt(model, p, warm_start, warm_start.mesh.layout, self.settings.iterations)
 
     def predict(
         self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
     ) -> Prediction:
         """Rows with ``terms`` at ``values`` [SI], with slopes in ``names``, on the nodes of ``warm_start``."""
-        model, p = self._solved_model(terms), placed(self.values(values))
+        model, p = self._solved(terms, values)
         self._have_compiled(model, p)
         solution = resolve_with_states(model, p, warm_start, partial(self._signals_along, p=p))
         rows = np.asarray(rows_of(model, self.likelihood, p, solution, self.orders))
         rows = rows + self.corrections.get(terms, 0.0) + (0.0 if self.beyond is None else self.beyond)
         status = joint_status(solution.status())
-        return Prediction(rows, self.slopes(model, p, solution, names), status, solution)
+        slopes = self.slopes(model, p, solution, self._shared.names(terms, names))
+        return Prediction(rows, slopes, status, solution)
 
     def corrected(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
@@ -166,7 +162,7 @@ class DwellProblem(AbstractProblem):
         The rule of the collocation is of second order: four thirds of what twice the nodes change. None where they do
         not lead to a motion.
         """
-        model, p, layout = self._solved_model(terms), placed(self.values(values)), warm_start.mesh.layout
+        (model, p), layout = self._solved(terms, values), warm_start.mesh.layout
         doubled = Layout(tuple(2 * count for count in layout.counts))
         coarse = resolve(model, p, warm_start, ITERATIONS)
         fine = adapt(model, p, coarse, doubled, self.settings.iterations)
@@ -310,24 +306,27 @@ class DwellProblem(AbstractProblem):
 
     def complete(self, terms: Sequence[str]) -> AbstractPlant:
         """The baseline with ``terms`` and all effects without states, in programs that serve others with states."""
-        return self._shared_model(terms) or super().complete(terms)
+        return self._shared.with_effects(terms) or super().complete(terms)
 
-    def _solved_model(self, terms: Sequence[str]) -> AbstractPlant:
-        """The same, or the smallest model with ``terms`` where these have a program of their own."""
-        return self._shared_model(terms) or self.model(terms)
-
-    def _shared_model(self, terms: Sequence[str]) -> AbstractPlant | None:
-        with_states = [name for name in terms if self.catalogue[name].states and name not in self.baseline]
-        shared = [self._alternatives[name] for name in with_states if name in self._alternatives]
-        if not shared or len(shared) < len(with_states):
-            return None
-        return replace(self.model(()), alternatives=tuple(shared))
+    def _solved(self, terms: Sequence[str], values: Mapping[str, float]) -> tuple[AbstractPlant, Values]:
+        """The same, or the smallest model with ``terms`` where these have a program of their own; its parameters."""
+        p = self.values(values)
+        model, there = self._shared.with_force(terms, p) or (self._shared.with_effects(terms), p)
+        return model or self.model(terms), placed(there)
 
     @cached_property
-    def _alternatives(self) -> Mapping[str, Alternatives]:
-        """Effects that the baseline does not have, each among others with as many states."""
-        absent = (each for name, each in self.catalogue.items() if name not in self.baseline)
-        return {name: each for name, each in placed(shared_by(absent)).items() if len(each.effects) > 1}
+    def _shared(self) -> SharedPrograms:
+        """Models whose programs serve several hypotheses."""
+        return SharedPrograms(self.model(()), self.catalogue, self.baseline)
+
+    @cached_property
+    def _names_of_baseline(self) -> tuple[str, ...]:
+        """Names of all parameters but those of laws that hold their states and that the baseline does not have."""
+        lacking = [
+            each for name, each in self.catalogue.items() if each.holds_states and name not in self.baseline
+        ]
+        gone = {parameter.name for each in lacking for parameter in each.parameters}
+        return tuple(name for name in self.names if name not in gone)
 
     def _have_compiled(self, model: AbstractPlant, p: Values) -> None:
         """Have compiled what solves a model beside what gives its slopes, unless that was done.
@@ -336,7 +335,7 @@ class DwellProblem(AbstractProblem):
         """
 
         def compile_both() -> None:
-            blank, some = blank_solution(model, self.excitation, self.layout), self.names[:1]
+            blank, some = blank_solution(model, self.excitation, self.layout), sorted(p)[:1]
             side_by_side(lambda: resolve(model, p, blank, 1), lambda: self.slopes(model, p, blank, some))
 
         shapes = self.layout, self.shape, self.likelihood.measured.shape
@@ -348,13 +347,7 @@ class DwellProblem(AbstractProblem):
         blank = blank_solution(bare, self.excitation, solution.mesh.layout)
         at = with_states_of(bare, solution.trajectory)
         # With the parameters of a law that is learned it would be compiled anew for each of them.
-        learned = {
-            each.name
-            for name, effect in self.catalogue.items()
-            if effect.holds_states and name not in self.baseline
-            for each in effect.parameters
-        }
-        known = {name: p[name] for name in p if name not in learned}
+        known = {name: p[name] for name in self._names_of_baseline}
         return node_loads(bare, known, replace(blank, mesh=solution.mesh, trajectory=at))[0]
 
 

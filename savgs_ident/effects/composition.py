@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Complex, Float
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.values import Values
-from savgs_ident.effects.alternatives import Alternatives
+from savgs_ident.effects.alternatives import Alternatives, AtOnePort, Push
 from savgs_ident.effects.base import (
     AbstractForceLaw,
     AbstractFrictionLimitLaw,
@@ -51,6 +51,15 @@ def nothing_imposed(ports: Iterable[Port], like: Float[Array, "*n"]) -> dict[str
     both = (*like.shape, 2)
     shapes = {PortKind.FORCE: like.shape, PortKind.SERIES: both, PortKind.INPUT: both}
     return {port.name: jnp.zeros(shapes[port.kind], like.dtype) for port in ports if port.kind in shapes}
+
+
+class _AtOnePort(NamedTuple):
+    """A force law at one of several ports, with its states and their rates."""
+
+    law: AtOnePort
+    states: str
+    state: Float[Array, " s"]
+    rate: Float[Array, " s"]
 
 
 class SeriesDeflection(NamedTuple):
@@ -124,15 +133,22 @@ def sensor_transfer(
 
 
 def contact_bristle(
-    effects: Sequence[Effect], port: Port, p: Values, signals: PortSignals, anchor: Float[Array, ""]
+    effects: Sequence[Effect],
+    port: Port,
+    p: Values,
+    signals: PortSignals,
+    anchor: Float[Array, ""],
+    beside: Iterable[FrictionLimit] = (),
 ) -> Bristle:
-    """The bristle of the contact at a port, in state ``anchor``, under the friction limits of all effects there."""
+    """The bristle of the contact at a port, in state ``anchor``, under the friction limits of all effects there.
+
+    And under those ``beside`` [N].
+    """
     assert port.contact is not None
     up, down = jnp.zeros_like(signals.load), jnp.zeros_like(signals.load)
-    for effect in effects:
-        if effect.loads_contact and effect.port.name == port.name:
-            share = effect.friction_limit(p, signals)
-            up, down = up + share.against_up, down + share.against_down
+    there = (each for each in effects if each.loads_contact and each.port.name == port.name)
+    for share in (*(each.friction_limit(p, signals) for each in there), *beside):
+        up, down = up + share.against_up, down + share.against_down
     return bristle(Presliding(*(p[name] for name in port.contact)), signals, FrictionLimit(up, down), anchor)
 
 
@@ -159,7 +175,7 @@ class EffectsAtInstant:
         sd: Array,
         imposed: Mapping[str, Array] | None = None,
         own: int = 0,
-        alternatives: Sequence[Alternatives] = (),
+        alternatives: Sequence[Alternatives | AtOnePort] = (),
     ) -> None:
         self.p = p
         self.own, self.own_rates = s[:own], sd[:own]
@@ -171,19 +187,26 @@ class EffectsAtInstant:
         self._s, self._sd = s, sd
         self.forces: dict[str, Array] = {}
         self._effects = effects
+        self._pushes: dict[str, list[Push]] = {}
         self._out_of_balance: dict[str, Array] = {}
         self._parts: list[_Part] = []
+        self._at_one_port: list[_AtOnePort] = []
+        self._order: list[str] = []
         start = len(self._contacts)
         for effect in effects:
             mine = slice(start, start + len(effect.states))
             self._parts.append(_Part(effect, effect.name, s[mine], sd[mine]))
+            self._order += [effect.name] if effect.states else []
             start = mine.stop
         for number, several in enumerate(alternatives, start=1):
             mine = slice(start, start + len(several.states))
-            for effect in several.effects:
-                shared = f"alternatives {number}", s[mine], sd[mine]
-                self._parts.append(_Part(effect, *shared, several.acts(effect)))
+            shared = f"alternatives {number}", s[mine], sd[mine]
+            self._order.append(shared[0])
             start = mine.stop
+            if isinstance(several, AtOnePort):
+                self._at_one_port.append(_AtOnePort(several, *shared))
+            else:
+                self._parts += [_Part(each, *shared, several.acts(each)) for each in several.effects]
 
     def _at(self, port: Port, kind: type) -> Iterator[_Part]:
         for part in self._parts:
@@ -216,14 +239,28 @@ class EffectsAtInstant:
         for part in self._at(port, AbstractForceLaw):
             total = total + part.acting(part.effect.force(self.p, signals, part.state))
             self._leave(part, part.rate - part.effect.rate(self.p, signals, part.state))
+        pushes = self._pushes.get(port.name, [])
+        total = sum((each.force for each in pushes), total)
         contacts = [each.name for each in self._contacts]
         if port.name in contacts:
-            place = contacts.index(port.name)
-            held = contact_bristle(self._effects, port, self.p, signals, self._s[place])
+            place, beside = contacts.index(port.name), [each.limit for each in pushes]
+            held = contact_bristle(self._effects, port, self.p, signals, self._s[place], beside)
             total = total + held.force
             self._out_of_balance[_anchor_of(port)] = self._sd[place] - held.rate
         self.forces[port.name] = total
         return total
+
+    @property
+    def lacks_forces(self) -> bool:
+        """Whether laws that act at one of several ports wait for what these see; :meth:`push` has them act."""
+        return bool(self._at_one_port)
+
+    def push(self) -> None:
+        """Have laws that act at one of several ports act there, by what these saw without them."""
+        for each in self._at_one_port:
+            for name, push in each.law.push(self.p, self.signals, each.state).items():
+                self._pushes.setdefault(name, []).append(push)
+                self._out_of_balance[each.states] = each.rate - push.rate
 
     def report(self, port: Port, whole: Float[Array, ""]) -> None:
         """Record the whole force at a port, the plant's own element included, for whoever draws it."""
@@ -245,8 +282,7 @@ class EffectsAtInstant:
     def balance(self) -> Float[Array, " s"]:
         """What vanishes for the right rates of all states, in their order [unit of each, or of its rate]."""
         anchors = [self._out_of_balance[_anchor_of(port)][None] for port in self._contacts]
-        own = dict.fromkeys(part.states for part in self._parts if part.effect.states)
-        balances = [self._out_of_balance[states] for states in own]
+        balances = [self._out_of_balance[states] for states in self._order]
         return jnp.concatenate([*anchors, *balances] or [jnp.zeros(0)])
 
     def _leave(self, part: _Part, balance: Float[Array, " s"]) -> None:

@@ -14,8 +14,8 @@ gives it, the law vanishes. The functions are held at the edge of what was seen 
 nothing about what lies beyond.
 """
 
-from collections.abc import Callable, Mapping
-from typing import ClassVar
+from collections.abc import Callable, Iterable, Mapping
+from typing import ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -25,6 +25,7 @@ from jaxtyping import Array, Complex, Float
 
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values
+from savgs_ident.effects.alternatives import AtOnePort
 from savgs_ident.effects.base import (
     SETTLING,
     AbstractForceLaw,
@@ -71,6 +72,9 @@ from savgs_ident.effects.learned_functions import (
     what_gives,
 )
 
+ANYWHERE = Port("anywhere", PortKind.FORCE, "anywhere", loaded=True, contact=("stiffness", "damping"))
+"""A force port that has the functions of all force ports; it is none of a plant's."""
+
 BLOCKED_AS = 8
 """Exponent with which a play is blocked at its ends [1]."""
 
@@ -102,7 +106,7 @@ class LearnedForce(AbstractForceLaw):
     family: ClassVar[Family] = Family.LEARNED
     holds_states: ClassVar[bool] = True
     roles: ClassVar[tuple[Role, ...]] = _roles(
-        ("middle", "stroke", "speed", "carried", "turn", "give", "gap", "fall", "lag"),
+        ("middle", "stroke", "speed", "carried", "typical", "turn", "give", "gap", "fall", "lag"),
         len(
             (
                 *OF_THE_MOTION,
@@ -131,6 +135,7 @@ class LearnedForce(AbstractForceLaw):
             "stroke": Parameter("stroke", 1.0, unit, lower=SMALLEST, about="largest displacement from there"),
             "speed": Parameter("speed", 1.0, f"{unit}/s", lower=SMALLEST, about="largest velocity seen"),
             "carried": carried if port.loaded else 1.0,
+            "typical": port.displacement,
             "turn": Parameter("turn", TURN, "1", lower=0.1 * TURN, upper=10.0 * TURN, about=turn),
             "give": Parameter("give", 1.0, "1", lower=0.05, upper=5.0, about=give),
             "gap": Parameter("gap", GAP, "1", lower=0.02, upper=0.9, about=gap),
@@ -184,7 +189,7 @@ class LearnedForce(AbstractForceLaw):
 
     def _widths(self, v: Values) -> list[Array]:
         """How far each gives before it slides [m]."""
-        return [share * self.port.displacement * v["give"] for share in STRETCHES]
+        return [share * v["typical"] * v["give"] for share in STRETCHES]
 
     def _sliders(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> list[Bristle]:
         """Spring-sliders of unit friction: what they carry is a function of the motion alone."""
@@ -289,6 +294,47 @@ class LearnedTransfer(AbstractSensorLaw):
         found = filters(2.0 * jnp.pi * frequency)
         real, imaginary = (_sum(v, [part(each) for each in found]) for part in (jnp.real, jnp.imag))
         return lax.complex(1.0 + real, imaginary)
+
+
+class SharedForce(NamedTuple):
+    """A learned force at one of several ports.
+
+    Attributes:
+        law: as programs have it that serve all these ports.
+        numbers: by the name of each number of such a program, the name of the effect's own, or a number [SI].
+    """
+
+    law: AtOnePort
+    numbers: Mapping[str, str | float]
+
+    def values(self, p: Values) -> Values:
+        """The parameters with the effect's own under the names of the program, SI."""
+        own, gone = self.numbers.items(), set(self.numbers.values())
+        there = {name: p[each] if isinstance(each, str) else jnp.asarray(each, float) for name, each in own}
+        return {name: value for name, value in p.items() if name not in gone} | there
+
+    def names(self, given: Iterable[str]) -> list[str]:
+        """The names that the program has for the ``given`` ones."""
+        theirs = {each: name for name, each in self.numbers.items()}
+        return [theirs.get(each, each) for each in given]
+
+
+def shared_force(effect: Effect, ports: Iterable[Port]) -> SharedForce:
+    """The learned force of an ``effect`` as one that may act at any of the force ``ports``."""
+    forces = tuple(each for each in ports if each.kind is PortKind.FORCE)
+    own, here = dict(effect.numbers), functions_at(effect.port)
+    # A function has another number where the port has others before it, and none where the port lacks it.
+    theirs = {
+        str(number): own[str(here.index(each) + 1)] if each in here else 0.0
+        for number, each in enumerate(functions_at(ANYWHERE), start=1)
+    }
+    names = {role: f"{ANYWHERE.name}_{role}" for role in own}
+    law = typical_effect(ANYWHERE.name, ANYWHERE, LearnedForce(ANYWHERE), names)
+    place = [each.name for each in forces].index(effect.port.name)
+    return SharedForce(
+        AtOnePort(law, forces, jnp.asarray(place)),
+        {names[role]: theirs.get(role, given) for role, given in own.items()},
+    )
 
 
 _Law = LearnedForce | LearnedCompliance | LearnedInput | LearnedTransfer

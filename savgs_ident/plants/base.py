@@ -27,7 +27,7 @@ from jaxtyping import Array, Complex, Float
 from numpy.typing import NDArray
 
 from savgs_ident.core.values import Values
-from savgs_ident.effects.alternatives import Alternatives
+from savgs_ident.effects.alternatives import Alternatives, AtOnePort
 from savgs_ident.effects.base import (
     AbstractSensorLaw,
     Fundamental,
@@ -210,7 +210,7 @@ class AbstractPlant(eqx.Module):
     conditions: ClassVar[tuple[OperatingCondition, ...]] = SAME_OR_SCALED
     location_words: ClassVar[Mapping[str, str]] = MappingProxyType({})
     effects: tuple[Effect, ...] = eqx.field(default=(), kw_only=True)
-    alternatives: tuple[Alternatives, ...] = eqx.field(default=(), kw_only=True)
+    alternatives: tuple[Alternatives | AtOnePort, ...] = eqx.field(default=(), kw_only=True)
 
     @abstractmethod
     def evaluate(
@@ -312,6 +312,9 @@ class AbstractPlant(eqx.Module):
         p = self.effective(p)
         own = len(self.own_states)
         at = EffectsAtInstant(self.effects, p, s, sd, u.imposed, own, self.alternatives)
+        if at.lacks_forces:
+            self.evaluate(p, motion, u, at, prepared)
+            at.push()
         balance, loads = self.evaluate(p, motion, u, at, prepared)
         return at, balance, loads
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.status import Status, joint_status
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import CREEP, DRAG_TIME, PortSignals
+from savgs_ident.effects.effect import Effect
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.simulate.collocation import Trajectory
 from savgs_ident.simulate.mesh import Layout, Mesh, over_dwells
@@ -51,7 +52,7 @@ def resolve_with_states(
     ``signals_along`` says what the force ports see along a motion, at its nodes, by the name of the port, in SI.
     """
     start = with_states_of(model, known.trajectory)
-    if not any(effect.holds_states for effect in model.effects):
+    if not any(effect.holds_states for effect in _acting(model)):
         new = start.x.shape != known.trajectory.x.shape
         return resolve(model, p, known, ITERATIONS_AT_REST if new else ITERATIONS, start)
     solution = replace(known, trajectory=start)
@@ -82,14 +83,18 @@ def with_held_states(
     """
     x = solution.trajectory.x
     steps, first = node_steps(solution.excitation, solution.mesh), len(x)
-    first -= sum(len(each.states) for each in model.alternatives)
-    for effect in reversed(model.effects):
+    for effect in reversed(_acting(model)):
         first -= len(effect.states)
         if effect.holds_states:
             mine = slice(first, first + len(effect.states))
             bounds = effect.bounds_of_states(p, signals[effect.port.name])
             x = x.at[mine].set(_held(x[mine], *bounds, steps, solution.mesh))
     return solution.trajectory._replace(x=x)
+
+
+def _acting(model: AbstractPlant) -> tuple[Effect, ...]:
+    """All effects that act, those with states in the order of these."""
+    return (*model.effects, *(each.acting for each in model.alternatives))
 
 
 @eqx.filter_jit

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.values import as_values
 from savgs_ident.effects.base import CREEP, DRAG_TIME, PortSignals
-from savgs_ident.effects.learned import learned_effect
+from savgs_ident.effects.learned import learned_effect, shared_force
 from savgs_ident.effects.learned_functions import STRETCHES
 from savgs_ident.inference.background.imposed import node_loads
 from savgs_ident.plants.base import Excitation
@@ -92,6 +92,17 @@ def test_other_widths_and_a_friction_lead_to_the_motion_that_is_found_from_rest(
     assert all(status.ok for each in (from_rest, found) for status in each.status())
     assert np.max(np.abs(np.asarray(found.trajectory.x - null.trajectory.x)[0])) > 1e-4
     np.testing.assert_allclose(found.trajectory.x, from_rest.trajectory.x, atol=1e-9)
+
+
+def test_a_law_at_one_of_several_ports_is_solved_as_that_at_its_port(known: PeriodicSolution) -> None:
+    shared = shared_force(LAW, TwoMass.ports)
+    assert len(shared.law.ports) > 1
+    plant = replace(BARE, alternatives=(shared.law,))
+    alone = resolve_with_states(MODEL, LEARNED, known, _signals_along)
+    found = resolve_with_states(plant, shared.values(LEARNED), known, _signals_along)
+    assert all(status.ok for each in (alone, found) for status in each.status())
+    np.testing.assert_allclose(found.trajectory.x, alone.trajectory.x, atol=1e-10)
+    assert int(found.iterations) == int(alone.iterations)
 
 
 @given(
