@@ -2,7 +2,7 @@
 
 import savgs_ident as si
 
-FORCE, SERIES, INPUT, SENSOR = (getattr(si.PortKind, kind) for kind in ("FORCE", "SERIES", "INPUT", "SENSOR"))
+FORCE, INPUT, SENSOR = (getattr(si.PortKind, kind) for kind in ("FORCE", "INPUT", "SENSOR"))
 STICKS = ("k_pre", "c_pre")
 GUIDE = si.Port("guide", FORCE, "guide", "height of the body", displacement=0.02, force=1.0, contact=STICKS)
 SPRING = si.Port("spring", FORCE, "suspension", "deflection of the suspension", force=1.0)

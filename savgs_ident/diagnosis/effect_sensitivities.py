@@ -20,6 +20,7 @@ from savgs_ident.core.small_root import jacobian, solve_dense
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import (
     AbstractForceLaw,
+    AbstractLaw,
     AbstractSeriesLaw,
     Bristle,
     Load,
@@ -102,7 +103,7 @@ def sensitivities_with_states(
 
     def field(one: tuple[Effect, Mapping[str, float]]) -> tuple[str, NDArray[np.float64]]:
         effect, given = one
-        return effect.port.name, _marched(effect, placed(dict(p) | as_values(given)), even, solution)
+        return effect.port.name, _marched(effect, dict(p) | as_values(given), even, solution)
 
     fields = in_parallel(field, zip(effects, typical, strict=True))
     return impose(model, likelihood, orders, p, solution, fields)
@@ -138,11 +139,10 @@ def rehearse(p: Values, effects: Sequence[Effect], alike: Sequence[AlikeTests]) 
     """Have compiled what marches effects with states, on a rig that stands still: nothing else must wait for it."""
     for tests in alike:
         still = jnp.zeros((len(tests.places), tests.instants))
-        steps = jnp.full(len(tests.places), 1.0 / tests.instants)
         for effect in effects:
             gives = effect.port.kind is PortKind.SERIES
             seen = Load(still, still) if gives else PortSignals(still, still, still, still)
-            _march(effect, placed(dict(p)), seen, steps, tests.periods)
+            _march_along(effect, p, EvenSignals(tests, {effect.port.name: seen}, np.ones(len(tests.places))))
 
 
 def marched_effect(
@@ -152,7 +152,7 @@ def marched_effect(
 
     A force (P,) [N], or a way and its rate (P, 2).
     """
-    return _marched(effect, placed(dict(p)), _evenly(model, p, solution), solution)
+    return _marched(effect, p, _evenly(model, p, solution), solution)
 
 
 def marched_contact(
@@ -203,30 +203,39 @@ def _marched(
     effect: Effect, p: Values, even: Sequence[EvenSignals], solution: PeriodicSolution
 ) -> NDArray[np.float64]:
     """What the effect does at its port, at the nodes: a force (P,), or a way and its rate (P, 2)."""
-    port = effect.port.name
-    along = [
-        (each.tests, _march(effect, p, each.signals[port], jnp.asarray(each.steps), each.tests.periods))
-        for each in even
-    ]
-    return _at_nodes(along, solution)
+    return _at_nodes([(each.tests, _march_along(effect, p, each)) for each in even], solution)
 
 
+def _march_along(effect: Effect, p: Values, even: EvenSignals) -> Float[Array, "d n k"]:
+    """The same along the last period of tests that are marched alike, (d, n, k)."""
+    weight = np.array([1.0 if state.slips else FORWARD for state in effect.states])
+    numbers, weights, steps = placed((effect.by_role(p), jnp.asarray(weight), jnp.asarray(even.steps)))
+    marched = _march(effect.law, numbers, even.signals[effect.port.name], steps, weights, even.tests.periods)
+    return marched * effect.port.sense if isinstance(effect.law, AbstractForceLaw) else marched
+
+
+# A law and not an effect: one program serves all ports where it stands.
 @eqx.filter_jit
 def _march(
-    effect: Effect, p: Values, signals: PortSignals | Load, steps: Float[Array, " d"], periods: int
+    law: AbstractLaw,
+    v: Values,
+    signals: PortSignals | Load,
+    steps: Float[Array, " d"],
+    weight: Float[Array, " s"],
+    periods: int,
 ) -> Float[Array, "d n k"]:
-    """What the effect does at its port along the last period: a force, or a way and its rate."""
-    weight = jnp.asarray([1.0 if state.slips else FORWARD for state in effect.states])
+    """What a law does along the last period: a force, or a way and its rate."""
 
     def defect(now: Array, before: Array, at: Any, step: Array) -> Array:
         rate, state = (now - before) / step, weight * now + (1.0 - weight) * before
-        if isinstance(effect.law, AbstractSeriesLaw):
-            return effect.balance(p, at, state, rate)
-        return rate - effect.rate(p, at, state)
+        if isinstance(law, AbstractSeriesLaw):
+            return law.balance(v, at, state, rate)
+        assert isinstance(law, AbstractForceLaw), law.name
+        return rate - law.rate(v, at, state)
 
     def output(now: Array, before: Array, at: Any, step: Array) -> Array:
-        if isinstance(effect.law, AbstractForceLaw):
-            return effect.force(p, at, now)[None]
+        if isinstance(law, AbstractForceLaw):
+            return law.force(v, at, now)[None]
         return jnp.stack([now[0], (now[0] - before[0]) / step])
 
     # A step ends at an instant, and sees the port as it is on the way there.

@@ -134,12 +134,12 @@ class Effect(eqx.Module):
     def force(self, p: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, ""]:
         """Its force in the sense of the port [the port's unit], with parameters ``p``."""
         assert isinstance(self.law, AbstractForceLaw), self.name
-        return self.port.sense * self.law.force(self._values(p), signals, state)
+        return self.port.sense * self.law.force(self.by_role(p), signals, state)
 
     def rate(self, p: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:
         """Time derivatives of its states where it is a force, (s,) [unit of each per second]."""
         assert isinstance(self.law, AbstractForceLaw), self.name
-        return self.law.rate(self._values(p), signals, state)
+        return self.law.rate(self.by_role(p), signals, state)
 
     @property
     def holds_states(self) -> bool:
@@ -151,34 +151,34 @@ class Effect(eqx.Module):
     ) -> tuple[Float[Array, "s *n"], Float[Array, "s *n"]]:
         """The bounds between which the motion holds them [unit of each], lower and upper."""
         assert isinstance(self.law, AbstractForceLaw), self.name
-        return self.law.bounds_of_states(self._values(p), signals)
+        return self.law.bounds_of_states(self.by_role(p), signals)
 
     def friction_limit(self, p: Values, signals: PortSignals) -> FrictionLimit:
         """Its share of what a contact holds [N]."""
         assert isinstance(self.law, AbstractFrictionLimitLaw | AbstractForceLaw), self.name
-        return self.law.limit(self._values(p), signals)
+        return self.law.limit(self.by_role(p), signals)
 
     def balance(
         self, p: Values, load: Load, state: Float[Array, " s"], rate: Float[Array, " s"]
     ) -> Float[Array, " s"]:
         """What vanishes for the right rates where it gives way, (s,) [unit of each state]."""
         assert isinstance(self.law, AbstractSeriesLaw), self.name
-        return self.law.balance(self._values(p), load, state, rate)
+        return self.law.balance(self.by_role(p), load, state, rate)
 
     def changes(self, p: Values) -> Mapping[str, Float[Array, ""]]:
         """The plant's number that it changes, by name, SI."""
         assert isinstance(self.law, AbstractNumberLaw), self.name
-        return {str(self.number): self.law.changed(self._values(p))}
+        return {str(self.number): self.law.changed(self.by_role(p))}
 
     def shift(self, p: Values, signal: InputSignal, fundamental: Fundamental) -> InputSignal:
         """What comes on top of a recorded input, value and rate."""
         assert isinstance(self.law, AbstractInputLaw), self.name
-        return self.law.shift(self._values(p), signal, fundamental)
+        return self.law.shift(self.by_role(p), signal, fundamental)
 
     def transfer(self, p: Values, frequency: Float[Array, "*f"]) -> Complex[Array, "*f"]:
         """Reading over truth of the sensor at frequencies [Hz]."""
         assert isinstance(self.law, AbstractSensorLaw), self.name
-        return self.law.transfer(self._values(p), frequency)
+        return self.law.transfer(self.by_role(p), frequency)
 
     def sized(self, port: Port) -> "Effect":
         """The effect with the typical numbers that its law has for the sizes of ``port``, in place of its own port's.
@@ -201,10 +201,11 @@ class Effect(eqx.Module):
         resized = tuple(own[each.name] for each in self.parameters)
         return replace(self, port=port, parameters=resized, numbers=tuple(numbers))
 
-    def _values(self, p: Values) -> Values:
-        """The law's numbers by role."""
+    def by_role(self, p: Values) -> Values:
+        """The law's numbers by role, SI."""
         return {
-            role: p[given] if isinstance(given, str) else jnp.asarray(given) for role, given in self.numbers
+            role: p[given] if isinstance(given, str) else jnp.asarray(given, float)
+            for role, given in self.numbers
         }
 
 

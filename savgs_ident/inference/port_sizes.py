@@ -3,20 +3,22 @@
 A plant declares how far, how fast and how strongly things typically move at its ports, and laws take their own sizes
 from that: how wide a prior is, where a search begins, how far a stop is away. Where a declared size is far from the
 recorded motion, or was left at its default, a stop would stand in the way of the baseline, and a friction would hold
-it fast. A force that matters is one that changes the readings by :data:`SHARE` of themselves.
+it fast. A force, or a deflection, that matters is one that changes the readings by :data:`SHARE` of themselves.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.effects.base import Port, PortKind
+from savgs_ident.effects.base import Load, Port, PortKind, PortSignals
 from savgs_ident.inference.background.imposed import impose, node_loads
+from savgs_ident.inference.background.port_functions import mesh_points, rate_of
 from savgs_ident.inference.likelihood import likelihood_of
 from savgs_ident.inference.problem import harmonic_target
 from savgs_ident.plants.base import AbstractPlant
@@ -36,7 +38,7 @@ FAR = 10.0
 """Factor by which a size is declared too large, or a velocity too small, where it is not believed."""
 
 WEAK = 100.0
-"""The same of a force that is declared too small: weak ones are looked for, too."""
+"""The same of a force, or of a deflection, that is declared too small: weak ones are looked for, too."""
 
 
 def sized_to(model: Model, measured: HarmonicResponse) -> tuple[Model, tuple[DataWarning, ...]]:
@@ -47,27 +49,50 @@ def sized_to(model: Model, measured: HarmonicResponse) -> tuple[Model, tuple[Dat
     if not isinstance(model, PlantModel):
         return model, ()
     bare, p = replace(model.build(), effects=()), as_values(model.table.as_dict())
-    ports = [port for port in bare.ports if port.kind is PortKind.FORCE]
+    ports = [port for port in bare.ports if port.kind in (PortKind.FORCE, PortKind.SERIES)]
     solution = simulate_periodic(bare, p, measured_excitation(bare, measured, model.table))
     if not ports or not all(each.ok for each in solution.status()):
         return model, ()
-    seen, _ = node_loads(bare, p, solution)
-    reached = {port.name: _largest(seen[port.name].displacement) for port in ports}
-    fast = {port.name: _largest(seen[port.name].velocity) for port in ports}
-    moving = [port for port in ports if min(reached[port.name], fast[port.name]) > 0.0]
-    pushes = [(port.name, np.asarray(seen[port.name].velocity) / fast[port.name]) for port in moving]
-    changes = _changes_by(bare, p, measured, solution, pushes)
-    resized = {}
-    for port, change in zip(moving, changes, strict=True):
-        force = SHARE / change if change > 0.0 else port.force
-        found = _sized(port, reached[port.name], fast[port.name], force)
-        if found != port:
-            resized[port.name] = found
+    signals, loads = node_loads(bare, p, solution)
+    asked = [*_forces(ports, signals), *_ways(ports, loads, solution)]
+    changes = _changes_by(bare, p, measured, solution, [(each.port.name, each.signal) for each in asked])
+    found = [each.sized(SHARE / change) for each, change in zip(asked, changes, strict=True) if change > 0.0]
+    declared = {port.name: port for port in ports}
+    resized = {port.name: port for port in found if port != declared[port.name]}
     if not resized:
         return model, ()
-    return model.sized(resized), tuple(
-        _warning(port, resized[port.name]) for port in moving if port.name in resized
-    )
+    return model.sized(resized), tuple(_warning(declared[name], port) for name, port in resized.items())
+
+
+class _Asked(NamedTuple):
+    """A signal of size one that is imposed at a port, and the port as it is where so much of it matters."""
+
+    port: Port
+    signal: NDArray[np.float64]
+    sized: Callable[[float], Port]
+
+
+def _forces(ports: Sequence[Port], signals: Mapping[str, PortSignals]) -> Iterator[_Asked]:
+    """A force along the velocity at every force port where something moves."""
+    for port in ports:
+        if port.kind is PortKind.FORCE:
+            seen = signals[port.name]
+            reached, fast = _largest(seen.displacement), _largest(seen.velocity)
+            if min(reached, fast) > 0.0:
+                yield _Asked(port, np.asarray(seen.velocity) / fast, partial(_sized, port, reached, fast))
+
+
+def _ways(ports: Sequence[Port], loads: Mapping[str, Load], solution: PeriodicSolution) -> Iterator[_Asked]:
+    """What gives way along the load at every series port where it changes."""
+    for port in ports:
+        if port.kind is PortKind.SERIES:
+            load = np.asarray(loads[port.name].beyond_rest)
+            carried = _largest(load)
+            if carried > 0.0:
+                way = load / carried
+                rate = rate_of(way, mesh_points(solution), solution)
+                sized = partial(_sized_to_give, port, carried, _largest(rate))
+                yield _Asked(port, np.stack([way, rate], axis=1), sized)
 
 
 def _largest(signal: Any) -> float:
@@ -105,6 +130,20 @@ def _sized(port: Port, displacement: float, velocity: float, force: float) -> Po
         else displacement,
         velocity=port.velocity if velocity / FAR < port.velocity < FAR * velocity else velocity,
         force=port.force if force / WEAK < port.force < FAR * force else force,
+    )
+
+
+def _sized_to_give(port: Port, carried: float, rate: float, displacement: float) -> Port:
+    """The same of a series port, by the load that it carries and by how far it gives way where that matters.
+
+    ``rate`` is the largest velocity over the displacement [1/s].
+    """
+    small, large = displacement / WEAK, FAR * displacement
+    return replace(
+        port,
+        displacement=port.displacement if small < port.displacement < large else displacement,
+        velocity=port.velocity if small < port.velocity / rate < large else rate * displacement,
+        force=port.force if carried / FAR < port.force < FAR * carried else carried,
     )
 
 

@@ -1,12 +1,16 @@
 """The rig as a plant: slopes, columns of effects at their null, signals imposed at ports."""
 
 from dataclasses import replace
+from typing import Any
 
+import jax
 import numpy as np
 import pytest
 
+from savgs_ident.diagnosis import effect_sensitivities
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.effect_sensitivities import marched_effect
+from savgs_ident.effects.base import AbstractLaw
 from savgs_ident.inference.background.imposed import impose, node_loads
 from savgs_ident.inference.background.locations import free_signal
 from savgs_ident.inference.background.port_functions import mesh_points
@@ -79,6 +83,28 @@ def test_what_the_sheet_knows_is_held_against_it_though_it_is_identified(
     assert known["c_sd"] == sheet_coordinate(rig.parameters["c_sd"])
     centre, tolerance = rig.parameters["c_sd"].value, rig.parameters["c_sd"].tolerance
     assert float(known["c_sd"].value(1.0)) == pytest.approx(centre + tolerance)
+
+
+@pytest.mark.slow
+def test_what_was_rehearsed_is_what_scores_ask_for(
+    plant_and_data: Case, start: PeriodicSolution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Numbers of another type or shape, or of a law that was not rehearsed, would be compiled once more."""
+    plant, _ = plant_and_data
+    asked = list[tuple[object, ...]]()
+
+    def march(law: AbstractLaw, *arguments: Any) -> Any:
+        asked.append((type(law), *map(jax.typeof, jax.tree.leaves(arguments[:-1])), arguments[-1]))
+        return marched(law, *arguments)
+
+    marched = effect_sensitivities._march
+    monkeypatch.setattr(effect_sensitivities, "_march", march)
+    plant.rehearse()
+    rehearsed, with_states = set(asked), [each for each in CATALOGUE.values() if each.states]
+    asked.clear()
+    plant.sensitivities((), {}, start, [_term(plant, each.name) for each in with_states])
+    assert set(asked) == rehearsed
+    assert len(rehearsed) == len({type(each.law) for each in with_states}) < len(with_states)
 
 
 @pytest.mark.slow
