@@ -9,7 +9,13 @@ from matplotlib.patches import Rectangle
 
 from savgs_ident.report.text import decimal
 from savgs_ident.report.theme import BLUE, GREY, INK, ORANGE, new_figure, printable, styled
-from savgs_ident.validation.blind_rates import Reliability, confusion_of, reliability_by_level, reliability_of
+from savgs_ident.validation.blind_rates import (
+    LEFT_ALONE,
+    Reliability,
+    confusion_of,
+    reliability_by_level,
+    reliability_of,
+)
 from savgs_ident.validation.blind_score import Level, Score
 from savgs_ident.validation.foreign_laws import TRIAL_EFFECTS
 
@@ -32,12 +38,13 @@ def confusion_figure(scores: Sequence[Score]) -> Figure:
             for column, verdict in enumerate(verdicts):
                 count = int(counts[row, column])
                 if count == 0:
-                    if truth == verdict:
+                    if verdict == truth:
                         axes.plot(column, row, ".", color=GREY, markersize=3)
                     continue
-                shade = (_RIGHT if truth == verdict else _WRONG)(count / most)
+                right = verdict in (truth, LEFT_ALONE)
+                shade = (_RIGHT if right else _WRONG)(count / most)
                 axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, color=shade, linewidth=0.0))
-                dark = count > 0.6 * most and truth == verdict
+                dark = count > 0.6 * most and right
                 axes.text(column, row, str(count), ha="center", va="center", color="white" if dark else INK)
         axes.set_xticks(range(len(verdicts)), [printable(name) for name in verdicts], rotation=90)
         axes.set_yticks(range(len(truths)), [printable(name) for name in truths])

@@ -22,6 +22,8 @@ Z = 1.959964
 """Standard deviations of a 95 % interval."""
 
 NOTHING, TWO, OTHERS, UNKNOWN = "nothing", "both of two", "other effects", "unknown"
+LEFT_ALONE = "too little to see"
+"""The verdict on effects of which calibration leaves too little, that does not name them or anything instead."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,8 @@ def verdict_of(score: Score) -> str:
 
     A foreign effect whose family is named counts as named.
     """
+    if score.left_alone:
+        return LEFT_ALONE
     several = TWO if score.both_named else OTHERS
     if score.kind == "foreign" and score.family_right:
         return truth_of(score)
@@ -158,7 +162,7 @@ def verdict_of(score: Score) -> str:
 def confusion_of(scores: Sequence[Score], order: Sequence[str]) -> Confusion:
     """The confusion matrix, effects in the given order and then others, those that appear nowhere left out."""
     truths, verdicts = ({name_of(score) for score in scores} for name_of in (truth_of, verdict_of))
-    ends = (TWO, OTHERS, UNKNOWN, FAILED)
+    ends = (TWO, LEFT_ALONE, OTHERS, UNKNOWN, FAILED)
     others = sorted((truths | verdicts) - {NOTHING, *ends, *order})
     effects = [*(name for name in order if name in truths | verdicts), *others]
     rows = [name for name in (NOTHING, *effects, TWO, UNKNOWN) if name in truths]

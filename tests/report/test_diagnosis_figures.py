@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from numpy.testing import assert_allclose
 
 from savgs_ident.diagnosis.gap import MapCell
-from savgs_ident.diagnosis.result import Diagnosis
+from savgs_ident.diagnosis.result import Diagnosis, DriveForces
 from savgs_ident.effects.base import PortKind
 from savgs_ident.plants.model import PlantModel
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
@@ -31,7 +31,7 @@ from savgs_ident.report.diagnosis.figures import (
     shrink_figure,
     shrink_rows,
 )
-from savgs_ident.report.diagnosis.loop_figures import MOST_LOOPS, force_figure, spread_loops
+from savgs_ident.report.diagnosis.loop_figures import MOST_LOOPS, force_figure, loop_time, spread_loops
 from savgs_ident.report.diagnosis.text import law_label
 from savgs_ident.report.html import embed
 
@@ -299,3 +299,12 @@ def test_names_in_figures_are_neither_formulas_nor_missing_glyphs(diagnosis: Dia
         assert embed(figure, "hostile").width > 300
     texts = [text.get_text() for text in figures[0].axes[0].texts]
     assert "<b>$\\frac{1}{0}$\\x1b\\u6f22\\ud800</b>" in texts
+
+
+def test_a_loop_says_of_which_test_it_is_or_of_how_much_of_a_motion(by_kind: dict[str, Diagnosis]) -> None:
+    diagnosis = by_kind["effect"]
+    loop = diagnosis.loops[0]
+    assert loop_time(diagnosis, loop) == "at 0.5 Hz"
+    still = np.zeros(3)
+    along = replace(diagnosis, responses=DriveForces("motion.mat", *([still] * 6)))
+    assert loop_time(along, replace(loop, frequency_hz=1.0 / 24.84)) == "over the first 24.8 s"

@@ -7,16 +7,19 @@ from typing import Any
 import pytest
 
 from savgs_ident.report.blind import blind_html, blind_record, blind_text
-from savgs_ident.report.blind_figures import reliability_figure
+from savgs_ident.report.blind_figures import confusion_figure, reliability_figure
 from savgs_ident.validation.blind_answer import Answer, SmallErrors
 from savgs_ident.validation.blind_marks import failed, port_in_question, score_of
 from savgs_ident.validation.blind_rates import (
     EDGES,
+    LEFT_ALONE,
     confusion_of,
     median_closed,
     rates_of,
     reliability_by_level,
     reliability_of,
+    truth_of,
+    verdict_of,
 )
 from savgs_ident.validation.blind_score import Score, is_right, said_right, score_from
 from savgs_ident.validation.foreign_laws import FOREIGN
@@ -147,6 +150,14 @@ def test_what_calibration_hides_may_be_left_alone_and_not_be_put_elsewhere(
     assert (right.port_right, right.family_right) == (True, True)
     rates = rates_of([alone, wrong, right])
     assert (rates["hidden_left_alone"].count, rates["hidden_left_alone"].total) == (1, 3)
+    assert (verdict_of(alone), verdict_of(right)) == (LEFT_ALONE, truth_of(right))
+    (axes,) = confusion_figure([alone, wrong]).axes
+    columns = [label.get_text() for label in axes.get_xticklabels()]
+    blue = {
+        columns[round(cell.get_x() + 0.5)]: cell.get_facecolor()[2] > cell.get_facecolor()[0]
+        for cell in axes.patches
+    }
+    assert blue == {LEFT_ALONE: True, verdict_of(wrong): False}
     assert (rates["port_right"].count, rates["port_right"].total) == (1, 2)
     assert rates["closed_by_effect_90"].total == 2
     assert median_closed([alone, right]) == 0.4

@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.candidates import WITHIN
-from savgs_ident.diagnosis.result import Diagnosis, ForceLoop
+from savgs_ident.diagnosis.result import Diagnosis, DriveForces, ForceLoop
 from savgs_ident.report.diagnosis.text import law_label, port_words
 from savgs_ident.report.text import unit_text
 from savgs_ident.report.theme import BLUE, INK, ORANGE, new_figure, printable, styled
@@ -39,6 +39,13 @@ def spread_loops(loops: tuple[ForceLoop, ...]) -> tuple[ForceLoop, ...]:
     return tuple(loops[place] for place in chosen)
 
 
+def loop_time(diagnosis: Diagnosis, loop: ForceLoop) -> str:
+    """Of which test a loop is, or of how much of a motion that was followed from its beginning."""
+    if isinstance(diagnosis.responses, DriveForces):
+        return f"over the first {1.0 / loop.frequency_hz:.3g} s"
+    return f"at {loop.frequency_hz:.3g} Hz"
+
+
 def force_figure(diagnosis: Diagnosis, loop: ForceLoop) -> Figure:
     """One loop over velocity (left) and displacement (right), beside the law of the named effects.
 
@@ -53,7 +60,7 @@ def force_figure(diagnosis: Diagnosis, loop: ForceLoop) -> Figure:
         places = {"left": 0.15, "right": 0.97, "bottom": 0.165, "top": top, "wspace": 0.1}
         left, right = figure.subplots(1, 2, sharey=True, gridspec_kw=places)
         figure.suptitle(
-            printable(f"{port_words(diagnosis, loop.port)} at {loop.frequency_hz:.3g} Hz"),
+            printable(f"{port_words(diagnosis, loop.port)} {loop_time(diagnosis, loop)}"),
             y=0.985,
             fontsize=10.0,
             fontweight="bold",

@@ -27,7 +27,7 @@ from savgs_ident.report.diagnosis.figures import (
 )
 from savgs_ident.report.diagnosis.gap_spectra import gap_spectrum_pictures
 from savgs_ident.report.diagnosis.hypotheses import candidate_row, named_hypotheses, nested_bars
-from savgs_ident.report.diagnosis.loop_figures import force_figure, spread_loops
+from savgs_ident.report.diagnosis.loop_figures import force_figure, loop_time, spread_loops
 from savgs_ident.report.diagnosis.text import (
     KIND_WORDS,
     alarm,
@@ -321,8 +321,8 @@ def _rig(diagnosis: Diagnosis) -> Picture:
 def _loop(diagnosis: Diagnosis, loop: ForceLoop) -> Picture:
     largest = float(np.max(np.abs(loop.inferred), initial=0.0))
     words = (
-        f"Signal inferred at the {port_words(diagnosis, loop.port)} over velocity and displacement at"
-        f" {loop.frequency_hz:.3g} Hz; it reaches {largest:.3g} {loop.unit}."
+        f"Signal inferred at the {port_words(diagnosis, loop.port)} over velocity and displacement"
+        f" {loop_time(diagnosis, loop)}; it reaches {largest:.3g} {loop.unit}."
     )
     return embed(force_figure(diagnosis, loop), words)
 
