@@ -94,16 +94,21 @@ def estimates_among(mode: LaplaceFit, names: Collection[str]) -> tuple[Estimate,
     return tuple(found)
 
 
+BEYOND_REASON = 1e3
+"""So many typical sizes of an effect are no size that it could have. Origin: by choice."""
+
+
 def not_judgeable_of(findings: Findings, constants: DecisionConstants = DEFAULTS) -> tuple[NotJudgeable, ...]:
     """Effects that this campaign could not have shown at any size that they may have."""
     found = []
     for score in findings.scores:
         amplitude = score.term.amplitudes[0]
         room = max(abs(amplitude.upper - amplitude.centre), abs(amplitude.lower - amplitude.centre))
-        if score.smallest > min(
-            room, constants.assessable_sizes * amplitude.scale / constants.amplitude_width
-        ):
-            found.append(NotJudgeable(score.term.name, amplitude.name, float(score.smallest), amplitude.unit))
+        typical = amplitude.scale / constants.amplitude_width
+        if score.smallest > min(room, constants.assessable_sizes * typical):
+            possible = score.smallest <= min(room, BEYOND_REASON * typical)
+            smallest = float(score.smallest) if possible else np.inf
+            found.append(NotJudgeable(score.term.name, amplitude.name, smallest, amplitude.unit))
     return tuple(found)
 
 

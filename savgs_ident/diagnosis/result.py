@@ -234,7 +234,7 @@ class NextTest:
 class NotJudgeable:
     """An effect that this campaign cannot show, and the smallest size of its parameter that it could have shown.
 
-    It is in ``unit``, SI.
+    It is in ``unit``, SI; infinite where no size that the effect may have would do.
     """
 
     effect: str

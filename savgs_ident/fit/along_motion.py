@@ -10,7 +10,7 @@ a parameter (:func:`savgs_ident.fit.identifiability.weighed_by_misfit`).
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from savgs_ident.fit.identifiability import (
     EXPLAINED,
     INFORMED,
     MATERIAL_MISFIT,
+    at_bounds,
     unexplained,
     verdict_of,
     widened_by_misfit,
@@ -121,6 +122,8 @@ def fit_along_motion(
     chi2, dof = float(residual @ residual), data.measured.size - len(free)
     estimates, covariance = _estimates(mode, model, free, chi2, motion.noise)
     verdict = _verdict(estimates, covariance, len(free), chi2, dof, relative_miss(data.measured, predicted))
+    ended = at_bounds((table[name] for name in free), mode.values)
+    verdict = replace(verdict, sentences=(*verdict.sentences, *ended))
     apart = None if held_out is None else _apart(problem, held_out, mode)
     return MotionFit(
         estimated=model.with_values({each.name: each.value for each in estimates}),

@@ -37,14 +37,17 @@ def is_driven(plant: AbstractPlant | type[AbstractPlant]) -> bool:
     return plant.inputs[0].unit not in (unit, f"{unit}/s", f"{unit}/s^2")
 
 
+def is_held_against_drive(campaign: Campaign, model: Model) -> bool:
+    """Whether a model is held against the force of its drive along the motions of a campaign."""
+    return is_driven(model.plant) and not campaign.of_kind("dwell") and bool(_reading(model.plant))
+
+
 def motion_in(campaign: Campaign, model: Model) -> DrivenMotion | None:
     """The motions along which a model is held against its drive; None where that is not how it is held.
 
     Raises :class:`InputError` as :func:`motion_of` does.
     """
-    if not is_driven(model.plant) or campaign.of_kind("dwell") or not _reading(model.plant):
-        return None
-    return motion_of(campaign, model)
+    return motion_of(campaign, model) if is_held_against_drive(campaign, model) else None
 
 
 def motion_of(campaign: Campaign, model: Model) -> DrivenMotion:

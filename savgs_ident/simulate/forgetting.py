@@ -13,6 +13,7 @@ from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.selection import only_tests
 from savgs_ident.responses.windows import LEAD_S
+from savgs_ident.simulate.driven_plant import is_held_against_drive
 from savgs_ident.simulate.excitation import Measurements, measured_excitation, response_of_tests
 from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 
@@ -39,7 +40,17 @@ def forgetful_response(
     left out for it remembers: friction may stick through its beginning. Raises :class:`InputError` if nothing can be
     compared, or the model has no motion in any window or forgets in none.
     """
-    return forgetful_motion(measured, model, orders, max_frequency, progress)[0]
+    try:
+        return forgetful_motion(measured, model, orders, max_frequency, progress)[0]
+    except InputError as error:
+        if isinstance(measured, Campaign) and is_held_against_drive(measured, model):
+            raise InputError(
+                f"the recordings are of a motion along which the drive's force is compared; as windows of tests that "
+                f"a model is driven through they do not serve: {error.what}",
+                source=error.source or measured.source,
+                remedy="`fit` and `diagnose` serve them; for other commands record dwells",
+            ) from error
+        raise
 
 
 def forgetful_motion(

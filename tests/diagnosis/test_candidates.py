@@ -1,6 +1,7 @@
 """Hypotheses as a report shows them, and which formulas are tried beside a learned law."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,13 +12,15 @@ from hypothesis import strategies as st
 
 from savgs_ident.core.presentation import no_progress
 from savgs_ident.diagnosis import model_selection
-from savgs_ident.diagnosis.candidates import joint_sigma
+from savgs_ident.diagnosis.candidates import joint_sigma, not_judgeable_of
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
 from savgs_ident.diagnosis.findings import Findings
 from savgs_ident.diagnosis.result import Hypothesis, PortFamily
 from savgs_ident.diagnosis.score_test import Score
+from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.effects.base import Family, Port
 from savgs_ident.inference.observations import Term
+from savgs_ident.inference.prior import Linear
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.ports import CARCASS, PORTS, STRUT
 
@@ -125,3 +128,16 @@ def test_laws_are_weighed_against_two_effects_wherever_one_formula_explains_all(
     findings = Findings(_mode(0.0), (), (_mode(60.0, *best), *singles))
     assert model_selection._laws_instead_of_two(problem, findings, findings.modes[0], no_progress) == ()
     assert learned == ([] if ports is None else [ports])
+
+
+@pytest.mark.parametrize(("smallest", "said"), [(0.4, None), (3.0, 3.0), (1e6, np.inf)])
+def test_an_effect_that_no_campaign_shows_has_a_smallest_size_that_it_could_have(
+    smallest: float, said: float | None
+) -> None:
+    """Of a typical size of 0.1, ten of which may be looked for."""
+    amplitude = Linear("offset", "N m", 0.0, 0.1 * DEFAULTS.amplitude_width)
+    score = replace(
+        _score(1.0, 1.0, 0.0), term=Term("amplifier_offset", "drive", (amplitude,), ()), smallest=smallest
+    )
+    found = not_judgeable_of(SimpleNamespace(scores=(score,)))  # type: ignore[arg-type]
+    assert [each.smallest for each in found] == ([] if said is None else [said])

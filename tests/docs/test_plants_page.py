@@ -1,7 +1,12 @@
 """docs/plants.md: the file that it shows is the one that is shipped, and its commands are those of the program."""
 
 import re
+from itertools import product
 from pathlib import Path
+
+from savgs_ident.effects.base import Port, PortKind
+from savgs_ident.effects.effect import LAWS
+from savgs_ident.effects.laws.stribeck import Stribeck
 
 from ..cli.command_rows import COMMANDS
 
@@ -27,6 +32,22 @@ def test_the_commands_of_the_page_on_hardware_are_those_of_the_program() -> None
     typed = _commands(HARDWARE)
     assert {words[1] for words in typed} == {"fit", "diagnose"}
     _are_known(typed)
+
+
+def test_its_table_of_laws_says_where_they_can_act() -> None:
+    rows = re.findall(
+        r"^\| (`viscous`.*|`friction`.*|`preload`.*|`saturating.*|`coulomb`.*) \| (.*) \|$", PAGE, re.M
+    )
+    by_where = {where: set(re.findall(r"`(\w+)`", laws)) for laws, where in rows}
+    sticks = ("k_pre", "c_pre")
+    for contact, loaded in product((None, sticks), (False, True)):
+        port = Port("p", PortKind.FORCE, "p", contact=contact, loaded=loaded)
+        said = set(by_where["any"])
+        said |= by_where["with a `contact`"] if contact else by_where["without a `contact`"]
+        said |= by_where["`loaded`"] if loaded else set()
+        said |= by_where["with a `contact`, and `loaded`"] if contact and loaded else set()
+        assert said == {law.name for law in LAWS if law.suits(port)}
+    assert Stribeck().typical(Port("p", PortKind.FORCE, "p"))["coefficient"] == 0.03
 
 
 def _commands(page: str) -> list[list[str]]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import savgs_ident as si
+from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.core.values import as_values
 from savgs_ident.fit.along_motion import MotionFit
 from savgs_ident.responses.driven_motion import DrivenMotion, driven_motion
@@ -99,6 +100,28 @@ def test_the_identified_model_is_written_and_fits_as_well(tmp_path: Path) -> Non
     assert again.table["mass"].value == pytest.approx(fit["mass"].value, rel=1e-9)
     refitted = si.fit(again, motion)
     assert refitted["mass"].value == pytest.approx(fit["mass"].value, rel=1e-3)
+
+
+def test_a_value_at_its_bound_is_said_to_be_there() -> None:
+    motion, model = _needed(TRUTH, 3), axis_with(*TEXTBOOK)
+    mass = replace(model.table["mass"], value=50.0, upper=0.9 * TRUTH["mass"])
+    fit = si.fit(model.with_parameters(merge_parameters(ParameterTable((mass,)), model.table)), motion)
+    (said,) = [each for each in fit.verdict.sentences if "bound" in each]
+    assert said.startswith("mass ended at its upper bound, 72 kg")
+    assert not [each for each in _fit(motion, *TEXTBOOK).verdict.sentences if "bound" in each]
+
+
+def test_other_commands_say_who_serves_a_measured_motion(tmp_path: Path) -> None:
+    motion = recorded_axis({"coulomb": 12.0}, 3)
+    rows = np.stack([motion.time, motion.force, motion.position], axis=1)
+    header = "time [s],drive_force [N],position [m]"
+    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header=header, comments="")
+    model = axis_with("guide_preload")
+    campaign = si.load_campaign(tmp_path / "run.csv", layout=model.layout)
+    assert isinstance(si.fit(model, campaign), MotionFit)
+    for command in (si.compare, si.sample):
+        with pytest.raises(si.InputError, match="`fit` and `diagnose` serve them"):
+            command(model, campaign)
 
 
 def test_options_that_mean_nothing_along_a_motion_are_refused() -> None:

@@ -6,7 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from savgs_ident.fit.identifiability import LARGEST_SD, confounded_groups, known_combination, verdict_of
+from savgs_ident.core.parameter import Parameter
+from savgs_ident.fit.identifiability import (
+    LARGEST_SD,
+    at_bounds,
+    confounded_groups,
+    known_combination,
+    verdict_of,
+)
 from savgs_ident.inference.laplace import LARGEST_SPREAD, spread_of
 
 NAMES = ("mu_r", "mu_t", "ydot_Hth", "c_sd")
@@ -130,3 +137,15 @@ def test_a_jacobian_that_is_not_finite_says_nothing_of_any_parameter() -> None:
     jacobian = np.eye(3)
     jacobian[1, 2] = np.nan
     np.testing.assert_allclose(spread_of(jacobian).sd, LARGEST_SPREAD)
+
+
+def test_a_value_near_a_bound_is_at_it_and_one_near_zero_is_not() -> None:
+    rise = Parameter("rise", 0.1, "1", lower=0.0, upper=5.0)
+    shift = Parameter("shift", 0.0, "m", lower=-0.2, upper=0.2)
+    free = Parameter("free", 1.0, "kg")
+    every = (rise, shift, free)
+    assert at_bounds(every, {"rise": 1e-9, "shift": 0.1, "free": 1e9}) == ()
+    (one,) = at_bounds(every, {"rise": 4.97, "shift": 0.0, "free": 1.0})
+    assert one.startswith("rise ended at its upper bound, 5: ")
+    (other,) = at_bounds(every, {"rise": 1.0, "shift": -0.1999, "free": 1.0})
+    assert other.startswith("shift ended at its lower bound, -0.2 m: ")

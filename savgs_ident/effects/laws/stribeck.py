@@ -17,6 +17,9 @@ from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import AbstractFrictionLimitLaw, FrictionLimit, Port, PortSignals, Role
 
+COEFFICIENT = 0.03
+"""Friction over load to which the rise refers where a plant names no coefficient of its own: a greased guide's."""
+
 
 class Stribeck(AbstractFrictionLimitLaw):
     """More friction at low speed than at high speed."""
@@ -28,9 +31,10 @@ class Stribeck(AbstractFrictionLimitLaw):
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
         """A tenth of a coefficient of three hundredths, at a quarter of the typical velocity."""
         speed, unit = port.velocity / 4.0, f"{port.displacement_unit}/s"
+        about = f"rise of friction at rest, over that of a coefficient of {COEFFICIENT:g}"
         return {
-            "coefficient": 0.03,
-            "rise": Parameter("rise", 0.1, "1", lower=0.0, upper=5.0, about="rise of friction at rest"),
+            "coefficient": COEFFICIENT,
+            "rise": Parameter("rise", 0.1, "1", lower=0.0, upper=5.0, about=about),
             "velocity": Parameter(
                 "velocity", speed, unit, lower=speed / 40.0, upper=12.0 * speed, about="Stribeck velocity"
             ),

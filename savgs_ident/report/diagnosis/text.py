@@ -267,11 +267,13 @@ def _gap(diagnosis: Diagnosis) -> RenderableType:
 
 
 def _ports(diagnosis: Diagnosis) -> list[RenderableType]:
+    # What is named may explain little to first order: a friction that sticks for most of the time, say.
+    largest, named = diagnosis.ports[:_SHOWN_PORTS], diagnosis.verdict.ports
+    beside = [each for each in diagnosis.ports[_SHOWN_PORTS:] if each.port in named]
     shown = [
-        f"{port_words(diagnosis, each.port)} {percentage(each.share, 0)}"
-        for each in diagnosis.ports[:_SHOWN_PORTS]
+        f"{port_words(diagnosis, each.port)} {percentage(each.share, 0)}" for each in (*largest, *beside)
     ]
-    text = "Share of the recalibrated gap explained by a law at one port: "
+    text = "Share of the recalibrated gap explained by a law at one port, to first order: "
     return [plain(f"{text}{', '.join(shown)}."), plain("")] if shown else []
 
 
