@@ -1,5 +1,6 @@
 """What a dwell's estimate does with clocks, time origins, scales, foldings and unusable input."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -334,3 +335,27 @@ def test_dwells_are_sorted_and_the_signal_to_noise_is_as_designed(synthetic: Any
     expected = 2.0 / (0.05 * np.sqrt(4.0 / (6.4 * 200.0)))
     assert ratio[:, response.channel("sprung_accel"), 1] == pytest.approx(expected, rel=0.25)
     assert np.all(ratio[~response.valid] == 0.0)
+
+
+def test_a_dwell_that_rings_at_another_frequency_at_first_is_called_unsteady(
+    synthetic: Any, bus: Any
+) -> None:
+    """As one that begins at rest does: the fundamental is what it is, and S/N alone falls."""
+    dwell = synthetic.dwell(np.random.default_rng(23), bus, 2.2, 6.4)
+
+    def ringing(size: float) -> Callable[[RecordedChannel], RecordedChannel]:
+        def with_ringing(channel: RecordedChannel) -> RecordedChannel:
+            ring = np.exp(-channel.time / 0.8) * np.sin(2.0 * np.pi * 1.37 * channel.time)
+            return replace(channel, values=channel.values + size * np.ptp(channel.values) * ring)
+
+        return with_ringing
+
+    def unsteady(size: float) -> list[str]:
+        rung = change(dwell, sprung_accel=ringing(size))
+        found = estimate_response(synthetic.campaign(rung)).warnings
+        return [
+            each.channel for each in found if each.code == "not_steady" and "does not repeat" in each.what
+        ]
+
+    assert unsteady(0.4) == ["sprung_accel"]
+    assert unsteady(0.001) == unsteady(0.0) == []
