@@ -40,17 +40,7 @@ def forgetful_response(
     left out for it remembers: friction may stick through its beginning. Raises :class:`InputError` if nothing can be
     compared, or the model has no motion in any window or forgets in none.
     """
-    try:
-        return forgetful_motion(measured, model, orders, max_frequency, progress)[0]
-    except InputError as error:
-        if isinstance(measured, Campaign) and is_held_against_drive(measured, model):
-            raise InputError(
-                f"the recordings are of a motion along which the drive's force is compared; as windows of tests that "
-                f"a model is driven through they do not serve: {error.what}",
-                source=error.source or measured.source,
-                remedy="`fit` and `diagnose` serve them; for other commands record dwells",
-            ) from error
-        raise
+    return forgetful_motion(measured, model, orders, max_frequency, progress)[0]
 
 
 def forgetful_motion(
@@ -61,6 +51,22 @@ def forgetful_motion(
     progress: Progress = no_progress,
 ) -> tuple[HarmonicResponse, PeriodicSolution | None]:
     """The same, and the motion of the model in all tests, where all windows are compared; None for dwells alone."""
+    try:
+        return _forgetful(measured, model, orders, max_frequency, progress)
+    except InputError as error:
+        if isinstance(measured, Campaign) and is_held_against_drive(measured, model):
+            raise InputError(
+                "the recordings are of a motion along which the drive's force is compared; as windows of tests that "
+                f"a model is driven through they do not serve: {error.what}",
+                source=error.source or measured.source,
+                remedy="`fit` and `diagnose` serve them; for other commands record dwells",
+            ) from error
+        raise
+
+
+def _forgetful(
+    measured: Measurements, model: Model, orders: int, max_frequency: float | None, progress: Progress
+) -> tuple[HarmonicResponse, PeriodicSolution | None]:
     response = response_of_tests(measured, model.plant, orders, max_frequency, progress)
     if response.part is None:
         return response, None
