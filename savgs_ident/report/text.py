@@ -17,7 +17,7 @@ from math import floor, isfinite, isinf, log10
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from rich.console import Group, RenderableType
+from rich.console import Group, JustifyMethod, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -150,14 +150,22 @@ def data_warnings(warnings: Sequence[DataWarning]) -> list[Text]:
     return shown
 
 
+LONGEST_NAME = 32
+"""Longest text in the first column of a table that is never broken into lines."""
+
+
 def table(
     title: str, headers: Sequence[str], rows: Iterable[Sequence[object]], texts: Sequence[int] = (0,)
 ) -> RenderableType:
     """A table; the columns whose numbers are in ``texts`` hold texts and stand to the left."""
     grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    lines = [*rows]
+    # A name is found again by searching for it: other columns make room for one of usual length.
+    whole = 0 in texts and all(len(str(row[0])) <= LONGEST_NAME for row in lines)
     for index, header in enumerate(headers):
-        grid.add_column(plain(header), justify="left" if index in texts else "right", overflow="fold")
-    for row in rows:
+        justify: JustifyMethod = "left" if index in texts else "right"
+        grid.add_column(plain(header), justify=justify, overflow="fold", no_wrap=whole and index == 0)
+    for row in lines:
         grid.add_row(*(plain(cell) for cell in row))
     return Group(plain(title, "bold"), grid, plain(""))
 
