@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progress
 from savgs_ident.core.transforms import known_to_tolerance
-from savgs_ident.fit.estimate import Estimate
+from savgs_ident.fit.estimate import Estimate, at_bounds
 from savgs_ident.fit.identifiability import (
     EXPLAINED,
     INFORMED,
     MATERIAL_MISFIT,
-    at_bounds,
     unexplained,
     verdict_of,
     widened_by_misfit,

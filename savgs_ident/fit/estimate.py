@@ -1,8 +1,12 @@
-"""One estimated parameter: its value with errors, and whether it can be believed beside its sheet."""
+"""Estimated parameters: values with errors, and whether one can be believed beside its sheet and its bounds."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
+
+from savgs_ident.core.parameter import Parameter
 
 FAR_OFF = 5.0
 """Standard deviations from its sheet at which a number is not believed: by chance it is there once in two million."""
@@ -73,3 +77,23 @@ def far_off_sentence(each: Estimate) -> str:
         f"{each.name} would have to be {each.value:.4g} {each.unit} where the sheet has {each.prior:.4g}, "
         f"{each.tolerances_off:.0f} tolerances off: {start}{cause}"
     )
+
+
+AT_A_BOUND = 0.01
+"""By which share of a bound a value is off that is at it: a search comes near to a bound and does not reach it."""
+
+
+def at_bounds(parameters: Iterable[Parameter], values: Mapping[str, float]) -> tuple[str, ...]:
+    """Which ``values`` [SI] ended at a bound of their parameters, in words; a bound of zero is left out."""
+    ends = ((each, ("lower", each.lower), ("upper", each.upper)) for each in parameters)
+    return tuple(
+        f"{each.name} ended at its {side} bound, {_with_unit(bound, each.unit)}: it would go further, or makes up "
+        "for something."
+        for each, *both in ends
+        for side, bound in both
+        if bound and isfinite(bound) and abs(values[each.name] - bound) <= AT_A_BOUND * abs(bound)
+    )
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"

@@ -8,9 +8,8 @@ sensitivities of candidates, faster and slower dwells and other amplitudes with 
 added to the information of the fit.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import isfinite
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -18,8 +17,8 @@ import numpy as np
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.presentation import Progress
+from savgs_ident.fit.estimate import at_bounds
 from savgs_ident.fit.identified import Verdict
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import comparable, gaps
@@ -274,16 +273,22 @@ def assess(task: Task, minimiser: Minimiser, best: Minimum, explained: bool, pro
     """What the data say of the free parameters at ``best``, whose Jacobian is that of all that is known there."""
     if not best.finite:
         return Verdict(False, (BROKEN_DOWN,), explained=False)
-    verdict = _verdict(task, minimiser, best, explained, progress)
     values = {name: float(value) for name, value in task.problem.parameters(best.u).items()}
+    verdict = _verdict(task, minimiser, best, values, explained, progress)
     ended = at_bounds((task.table[name] for name in task.problem.free.identified), values)
     return replace(verdict, sentences=(*verdict.sentences, *ended))
 
 
-def _verdict(task: Task, minimiser: Minimiser, best: Minimum, explained: bool, progress: Progress) -> Verdict:
+def _verdict(
+    task: Task,
+    minimiser: Minimiser,
+    best: Minimum,
+    values: Mapping[str, float],
+    explained: bool,
+    progress: Progress,
+) -> Verdict:
     problem, table = task.problem, task.table
     names = problem.free.identified
-    values = {name: float(value) for name, value in problem.parameters(best.u).items()}
     units = {name: table[name].unit for name in names}
     per_datum, missed = _chi2_per_datum(problem, best), _misfit(task, best)
     if not explained:
@@ -323,23 +328,6 @@ def unexplained(per_datum: float, missed: float) -> str:
         f"noise (chi2/dof = {per_datum:.3g}). Look for what is missing with `diagnose`. Until then the parameters "
         "make up for it; their errors contain what is not explained."
     )
-
-
-AT_A_BOUND = 0.01
-"""By which share of a bound a value is off that is at it: a search comes near to a bound and does not reach it."""
-
-
-def at_bounds(parameters: Iterable[Parameter], values: Mapping[str, float]) -> tuple[str, ...]:
-    """Which ``values`` [SI] ended at a bound of their parameters, in words; a bound of zero is left out."""
-    found = []
-    for each in parameters:
-        for side, bound in (("lower", each.lower), ("upper", each.upper)):
-            if bound and isfinite(bound) and abs(values[each.name] - bound) <= AT_A_BOUND * abs(bound):
-                size = f"{bound:.3g}" if each.unit == "1" else f"{bound:.3g} {each.unit}"
-                found.append(
-                    f"{each.name} ended at its {side} bound, {size}: it would go further, or makes up for something."
-                )
-    return tuple(found)
 
 
 def _rows_of(problem: Problem, best: Minimum) -> np.ndarray:
@@ -398,7 +386,7 @@ def advice_of(task: Task, minimiser: Minimiser, best: Minimum) -> tuple[str, ...
     return (f"What would identify every free parameter: {tests}.",)
 
 
-def _log_covariance(problem: Problem, best: Minimum, values: dict[str, float]) -> np.ndarray:
+def _log_covariance(problem: Problem, best: Minimum, values: Mapping[str, float]) -> np.ndarray:
     """Covariance of the logarithms of the free parameters."""
     count = len(problem.free.identified)
     slope = np.asarray(problem.slopes(best.u))[:count]

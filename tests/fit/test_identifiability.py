@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import Parameter
+from savgs_ident.fit.estimate import at_bounds
 from savgs_ident.fit.identifiability import (
     LARGEST_SD,
-    at_bounds,
     confounded_groups,
     known_combination,
     verdict_of,
