@@ -223,6 +223,7 @@ class AbstractPlant(eqx.Module):
 
         ``p`` are the parameters with all changes by effects made. ``acting`` is asked for the effects' forces at
         every force port, for the deflections at every series port, and given the load that each of these carries.
+        An instant may be evaluated twice, first without a force that then acts.
         """
 
     @abstractmethod
