@@ -3,7 +3,9 @@
 Least squares takes all misfit for noise. Where a damper's table is half a per cent off, where friction falls as oil
 becomes warm, or a recorded road is half a per mille wrong, that is no noise: many rows share it, and parameters
 follow it. So the fit ends at the maximum of the same density as a posterior has, with the background of small errors
-(:mod:`savgs_ident.inference.background`), the scale of the noise and the size of the background estimated along.
+(:mod:`savgs_ident.inference.background`), the scale of the noise and the size of the background estimated along. Its
+errors are those over all sizes that the data allow: that none is the most probable size does not say that there are
+no errors.
 
 What the background cannot carry, errors at the ports of several times the material size, is something missing. Then
 this is no better an answer than least squares is.
@@ -20,7 +22,7 @@ from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.inference.background.shared_errors import drifts_of
 from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
-from savgs_ident.inference.laplace import linearised_optimum
+from savgs_ident.inference.laplace import covariance_over_discrepancies, linearised_optimum
 from savgs_ident.inference.likelihood import likelihood_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.posterior_mode import (
@@ -109,9 +111,12 @@ def fit_with_errors(
     if not there.evaluation.ok:
         return None
     scale = np.outer(widths, widths)
+    covariance = covariance_over_discrepancies(
+        search.rows, search.missed(found.prediction), search.turned(found.slopes), found.x, found.noise_scales
+    )
     return FitWithErrors(
         best=there._replace(status=found.status),
-        covariance=scale * found.covariance(),
+        covariance=scale * covariance,
         own=scale * _own_covariance(found, data, len(drifting)),
     )
 

@@ -16,7 +16,9 @@ meaningful.
 
 The best point of a linearised hypothesis (:func:`linearised_optimum`), rows r + J d with a unit-normal prior on x + d
 and bounds on it, depends on the rows' variance, noise scale and discrepancy included, and these on how far the rows
-miss there (:func:`savgs_ident.inference.likelihood.noise_scales`): the two are found in turn.
+miss there (:func:`savgs_ident.inference.likelihood.noise_scales`): the two are found in turn. Errors for the best
+discrepancy alone are too small where that is zero and a larger one nearly as probable; those over all of them
+(:func:`covariance_over_discrepancies`) are not.
 """
 
 from math import log
@@ -113,6 +115,34 @@ def spread_of(jacobian: Array) -> Spread:
     """The spread for residuals of unit variance with ``jacobian`` (m, n), priors among the rows."""
     axes = principal_axes(jacobian, LARGEST_SPREAD)
     return Spread(axes @ axes.T)
+
+
+_DISCREPANCIES = np.concatenate([[0.0], np.geomspace(1e-5, 30.0, 120)])
+"""Discrepancies over which errors are averaged [scales of the prior]."""
+
+
+def covariance_over_discrepancies(
+    data: Data, residual: Array, slopes: Array, x: Array, scales: NoiseScales
+) -> Array:
+    """Covariance (n, n) of coordinates about ``x`` (n,) [1], whatever the discrepancy is that the data allow.
+
+    For residuals (measured - predicted, m) with slopes (m, n) of the prediction at ``x``, the best point for the
+    noise scale and the discrepancy of ``scales``; ``data`` are independent rows, in their units. Each discrepancy has
+    a best point and a covariance of its own. As probable as it is by rows and prior together, it counts with both.
+    """
+    value, moments = [], []
+    for discrepancy in _DISCREPANCIES * data.scales.discrepancy:
+        spread = scales.noise**2 * data.variance + (discrepancy * data.discrepancy_scale) ** 2
+        precision = precision_of(slopes, spread)
+        step = np.linalg.solve(precision, (slopes.T / spread) @ residual - x)
+        left, there = residual - slopes @ step, x + step
+        density = float(np.sum(left**2 / spread + np.log(spread)) + there @ there)
+        value.append(
+            -0.5 * (density + (discrepancy / data.scales.discrepancy) ** 2 + log_determinant(precision))
+        )
+        moments.append(np.linalg.inv(precision) + np.outer(step, step))
+    weight = np.exp(np.array(value) - max(value)) * np.gradient(_DISCREPANCIES)
+    return np.asarray(np.tensordot(weight / weight.sum(), np.stack(moments), axes=1))
 
 
 _LINEAR_ROUNDS = 50

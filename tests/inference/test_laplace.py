@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.inference.laplace import attainable_evidence, log_evidence, precision_of
+from savgs_ident.inference.laplace import (
+    LinearisedOptimum,
+    attainable_evidence,
+    covariance_over_discrepancies,
+    linearised_optimum,
+    log_evidence,
+    precision_of,
+)
+from savgs_ident.inference.observations import Data
 from savgs_ident.inference.posterior_mode import LONGEST, nuisance_scale, parameter_scale
 from savgs_ident.inference.prior import Prior, Scales, sheet_coordinate
 
@@ -104,3 +112,70 @@ def test_no_choice_among_coordinates_comes_to_more_than_what_is_attainable_if_th
     assert attainable_evidence(value, x, precision, coordinates, none) == weights[-1]
     # It says more than the likelihood alone.
     assert bound < weights[-1] + 0.5 * np.linalg.slogdet(precision)[1] + 0.5 * float(x @ x)
+
+
+ANYWHERE = (np.full(2, -np.inf), np.full(2, np.inf))
+
+
+def _few_rows(discrepancy_scale: float) -> Data:
+    """Rows of noise one, twelve of them, that a discrepancy of one changes by so much."""
+    twelve = np.ones(12)
+    return Data(
+        np.zeros(12),
+        twelve,
+        discrepancy_scale * twelve,
+        np.zeros(12, np.intp),
+        Scales(1e-6, discrepancy=0.002),
+    )
+
+
+def _best(data: Data, residual: np.ndarray, slopes: np.ndarray) -> LinearisedOptimum:
+    return linearised_optimum(data, residual, slopes, np.zeros(2), ANYWHERE)
+
+
+def test_where_nothing_can_be_a_discrepancy_the_covariance_is_that_of_the_best_point() -> None:
+    random = np.random.default_rng(1)
+    data, slopes, residual = _few_rows(0.0), random.standard_normal((12, 2)), random.standard_normal(12)
+    best = _best(data, residual, slopes)
+    found = covariance_over_discrepancies(data, residual - slopes @ best.x, slopes, best.x, best.noise_scales)
+    np.testing.assert_allclose(found, np.linalg.inv(best.precision), rtol=1e-6)
+
+
+def test_the_covariance_over_discrepancies_is_that_of_brute_force() -> None:
+    """The posterior of both coordinates and the discrepancy on a grid of points, for one set of rows."""
+    random = np.random.default_rng(3)
+    data, slopes = _few_rows(1000.0), random.standard_normal((12, 2))
+    residual = slopes @ [0.5, -1.0] + random.standard_normal(12)
+    best = _best(data, residual, slopes)
+    found = covariance_over_discrepancies(data, residual - slopes @ best.x, slopes, best.x, best.noise_scales)
+    axis, misses = np.linspace(-5.0, 5.0, 81), np.linspace(0.0, 0.012, 121)
+    one, other, miss = np.meshgrid(axis, axis, misses, indexing="ij")
+    spread = best.noise_scales.noise**2 + (1000.0 * miss) ** 2
+    squares = sum(
+        (row - slope[0] * one - slope[1] * other) ** 2 for row, slope in zip(residual, slopes, strict=True)
+    )
+    logs = -0.5 * (squares / spread + 12.0 * np.log(spread) + one**2 + other**2 + (miss / 0.002) ** 2)
+    mass = np.exp(logs - logs.max())
+    mass[:, :, 0] *= 0.5
+    off = np.stack([one - best.x[0], other - best.x[1]]).reshape(2, -1)
+    expected = (off * mass.ravel()) @ off.T / mass.sum()
+    np.testing.assert_allclose(found, expected, rtol=0.01)
+
+
+def test_errors_over_all_discrepancies_hold_the_truth_as_often_as_they_say() -> None:
+    """Rows that share an error of a size from its prior: where the best size is zero, its errors are too small."""
+    random, slopes = np.random.default_rng(5), np.random.default_rng(6).standard_normal((12, 2))
+    data = _few_rows(3000.0)
+    over_all, at_best = [], []
+    for _ in range(400):
+        truth, miss = random.standard_normal(2), 0.002 * abs(random.standard_normal())
+        residual = slopes @ truth + np.hypot(1.0, 3000.0 * miss) * random.standard_normal(12)
+        best = _best(data, residual, slopes)
+        found = covariance_over_discrepancies(
+            data, residual - slopes @ best.x, slopes, best.x, best.noise_scales
+        )
+        off = (best.x - truth) ** 2
+        over_all.append(off / np.diag(found))
+        at_best.append(off / np.diag(np.linalg.inv(best.precision)))
+    assert np.mean(over_all) == pytest.approx(1.0, abs=0.12)
+    assert np.mean(at_best) > 1.2
