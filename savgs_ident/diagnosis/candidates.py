@@ -58,7 +58,7 @@ def candidates_of(
                 heldout_gain=float(gain),
                 gain_beyond=float(beyond),
                 share_closed=closed,
-                parameters=() if mode is None or hypothesis.flexible else estimates_of(mode, scores),
+                parameters=() if mode is None or hypothesis.flexible else estimates_of(search, mode, scores),
                 refitted=mode is not None,
                 ports=tuple(dict.fromkeys(each.port for each in there)),
                 families=tuple(dict.fromkeys(each.family.value for each in there)),
@@ -78,14 +78,16 @@ def joint_sigma(scores: Sequence[Score], constants: DecisionConstants = DEFAULTS
     return max(float(sigma.max()), sqrt(max(float(sigma @ independent @ sigma), 0.0)))
 
 
-def estimates_of(mode: LaplaceFit, scores: Mapping[str, Score]) -> tuple[Estimate, ...]:
+def estimates_of(search: Search, mode: LaplaceFit, scores: Mapping[str, Score]) -> tuple[Estimate, ...]:
     """The parameters of a hypothesis's terms with their 95 % intervals."""
-    return estimates_among(mode, {c.name for name in mode.terms for c in scores[name].term.coordinates})
+    return estimates_among(
+        search, mode, {c.name for name in mode.terms for c in scores[name].term.coordinates}
+    )
 
 
-def estimates_among(mode: LaplaceFit, names: Collection[str]) -> tuple[Estimate, ...]:
+def estimates_among(search: Search, mode: LaplaceFit, names: Collection[str]) -> tuple[Estimate, ...]:
     """The named parameters of a hypothesis with their 95 % intervals."""
-    sd = np.sqrt(np.diag(mode.covariance()))
+    sd = np.sqrt(np.diag(search.covariance(mode)))
     found = []
     for each, x, s in zip(mode.coordinates, mode.x.tolist(), sd.tolist(), strict=True):
         if each.name in names:

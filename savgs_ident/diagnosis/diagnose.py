@@ -254,7 +254,7 @@ def _concluded(
         given=given,
         parameters=base.values,
         identified=model.fit.values,
-        intervals=estimates_among(model.fit, plant.free),
+        intervals=estimates_among(found.problem.search, model.fit, plant.free),
         verdict=verdict,
         ports=_port_shares(evidence, candidates),
         map=plant.gap_map(data, recalibrated),
@@ -272,7 +272,7 @@ def _concluded(
         measured=measured,
         converged=all(each.status.ok for each in _decisive_fits(problem, selected, evidence, found.law)),
         warnings=write_warnings(found.problem, evidence, model.fit, beyond),
-        learned=None if found.law is None else _offered(found.law),
+        learned=None if found.law is None else _offered(found.problem, found.law),
         drifts=problem.drifts,
         wall_s=time.perf_counter() - began,
         origin=origin,
@@ -305,9 +305,11 @@ def _decisive_fits(
     return [each for each in (*fits, None if law is None else law.mode) if each is not None]
 
 
-def _offered(law: LearnedLaw) -> Learned:
+def _offered(problem: DiagnosisProblem, law: LearnedLaw) -> Learned:
     every = {name: Estimate(name, 0.0, 0.0, 0.0, unit) for name, unit in law.units.items()}
-    fitted = {each.name: each for each in estimates_among(law.mode, coefficients_at(law.port))}
+    fitted = {
+        each.name: each for each in estimates_among(problem.search, law.mode, coefficients_at(law.port))
+    }
     return Learned(law.name, law.port.location, tuple((every | fitted).values()), law.values)
 
 
@@ -332,7 +334,7 @@ def _loops(
     effects = [problem.plant.catalogue[name] for name in model.hypothesis.effects]
     effects += [] if law is None else [law.effect]
     here = next((each for each in effects if each.port.location == found.name), None)
-    drawn = None if here is None else drawn_law(here, values, model.fit)
+    drawn = None if here is None else drawn_law(here, values, model.fit, problem.search)
     if law is not None:
         fits = (each for each in evidence.findings.modes if each.terms and each.terms == verdict.effects)
         formula = next(fits, None)

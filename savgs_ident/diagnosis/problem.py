@@ -112,11 +112,11 @@ class DrawnLaw:
     erring: tuple[Mapping[str, float], ...] = ()
 
 
-def drawn_law(effect: Effect, values: Mapping[str, float], fit: LaplaceFit) -> DrawnLaw:
+def drawn_law(effect: Effect, values: Mapping[str, float], fit: LaplaceFit, search: Search) -> DrawnLaw:
     """The law of an effect with the errors that a ``fit`` leaves its numbers; ``values`` [SI] are all parameters."""
     own = {each.name for each in effect.parameters}
     mine = np.array([each.name in own for each in fit.coordinates], bool)
-    spread = np.linalg.cholesky(fit.covariance()[np.ix_(mine, mine)])
+    spread = np.linalg.cholesky(search.covariance(fit)[np.ix_(mine, mine)])
     lower, upper = bounds_of(fit.coordinates)
     erring = []
     for error in spread.T:

@@ -22,7 +22,7 @@ from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.inference.background.shared_errors import drifts_of
 from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
-from savgs_ident.inference.laplace import covariance_over_discrepancies, linearised_optimum
+from savgs_ident.inference.laplace import linearised_optimum
 from savgs_ident.inference.likelihood import likelihood_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.posterior_mode import (
@@ -111,12 +111,9 @@ def fit_with_errors(
     if not there.evaluation.ok:
         return None
     scale = np.outer(widths, widths)
-    covariance = covariance_over_discrepancies(
-        search.rows, search.missed(found.prediction), search.turned(found.slopes), found.x, found.noise_scales
-    )
     return FitWithErrors(
         best=there._replace(status=found.status),
-        covariance=scale * covariance,
+        covariance=scale * search.covariance(found),
         own=scale * _own_covariance(found, data, len(drifting)),
     )
 

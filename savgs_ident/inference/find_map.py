@@ -20,6 +20,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.inference.laplace import (
     LinearisedOptimum,
     attainable_evidence,
+    covariance_over_discrepancies,
     is_hopeless,
     linearised_optimum,
     log_evidence,
@@ -86,7 +87,7 @@ class LaplaceFit:
         return values_at(self.coordinates, self.x)
 
     def covariance(self) -> Array:
-        """Covariance of the coordinates [1], (n, n)."""
+        """Covariance of the coordinates [1], (n, n), for the noise scale and the discrepancy at the mode."""
         return np.asarray(np.linalg.inv(self.precision), np.float64)
 
 
@@ -131,6 +132,16 @@ class Search:
     def missed(self, prediction: Prediction) -> Array:
         """Measured less predicted, as independent rows."""
         return self.turned(self.residual(prediction))
+
+    def covariance(self, fit: "LaplaceFit") -> Array:
+        """Covariance of a fit's coordinates [1], (n, n), over all discrepancies that the data allow.
+
+        NaN where the plant was not solved.
+        """
+        if not fit.solved:
+            return np.full((fit.x.size, fit.x.size), np.nan)
+        missed, slopes = self.missed(fit.prediction), self.turned(fit.slopes)
+        return covariance_over_discrepancies(self.rows, missed, slopes, fit.x, fit.noise_scales)
 
     def tolerated_errors(self, fit: "LaplaceFit") -> Array:
         """The most probable errors within tolerances beside a fit, in their widths [1], (t,)."""

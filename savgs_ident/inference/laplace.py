@@ -129,18 +129,25 @@ def covariance_over_discrepancies(
     For residuals (measured - predicted, m) with slopes (m, n) of the prediction at ``x``, the best point for the
     noise scale and the discrepancy of ``scales``; ``data`` are independent rows, in their units. Each discrepancy has
     a best point and a covariance of its own. As probable as it is by rows and prior together, it counts with both.
+    What a bound keeps from moving at the best point is kept there from as much.
     """
-    value, moments = [], []
-    for discrepancy in _DISCREPANCIES * data.scales.discrepancy:
-        spread = scales.noise**2 * data.variance + (discrepancy * data.discrepancy_scale) ** 2
+
+    def normal(spread: Array) -> tuple[Array, Array]:
         precision = precision_of(slopes, spread)
         step = np.linalg.solve(precision, (slopes.T / spread) @ residual - x)
-        left, there = residual - slopes @ step, x + step
-        density = float(np.sum(left**2 / spread + np.log(spread)) + there @ there)
-        value.append(
-            -0.5 * (density + (discrepancy / data.scales.discrepancy) ** 2 + log_determinant(precision))
-        )
-        moments.append(np.linalg.inv(precision) + np.outer(step, step))
+        return np.asarray(step), precision
+
+    kept, _ = normal(scales.spread)
+    value, moments = [], []
+    for size in _DISCREPANCIES:
+        miss = size * data.scales.discrepancy * data.discrepancy_scale
+        spread = scales.noise**2 * data.variance + miss**2
+        top, precision = normal(spread)
+        moved = top - kept
+        left, there = residual - slopes @ moved, x + moved
+        density = float(np.sum(left**2 / spread + np.log(spread)) + there @ there) + size**2
+        value.append(-0.5 * (density + log_determinant(precision)))
+        moments.append(np.linalg.inv(precision) + np.outer(moved, moved))
     weight = np.exp(np.array(value) - max(value)) * np.gradient(_DISCREPANCIES)
     return np.asarray(np.tensordot(weight / weight.sum(), np.stack(moments), axes=1))
 
