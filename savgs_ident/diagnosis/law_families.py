@@ -25,7 +25,7 @@ from savgs_ident.effects.learned_functions import (
     functions_at,
     interactions_at,
 )
-from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, find_map_again
+from savgs_ident.inference.find_map import SEARCH_LEVEL, LaplaceFit, Search, find_map, find_map_again
 from savgs_ident.inference.laplace import (
     LinearisedOptimum,
     attainable_evidence,
@@ -75,7 +75,7 @@ class FittedFunctions(NamedTuple):
             return self
         steps = constants.learned_steps - constants.first_learned_steps
         free, bound = self.functions if self.only is None else (), least - self.log_prior
-        mode = find_map_again(search, (self.term,), self.mode, steps, bound, free)
+        mode = find_map_again(search, (self.term,), self.mode, steps, bound, free, SEARCH_LEVEL)
         return self._replace(mode=mode) if mode.solved else self
 
 
@@ -246,9 +246,10 @@ def _fitted(
     near = every.mode.prediction.warm_start
     while True:
         term = _some_of(term, found)
-        first = find_map(search, (term,), found.start, near, 1)
+        mode = find_map(search, (term,), found.start, near, 1)
         steps, bound = constants.learned_steps - 1, least - found.log_prior
-        mode = find_map_again(search, (term,), first, steps, bound) if first.solved else first
+        if mode.solved:
+            mode = find_map_again(search, (term,), mode, steps, bound, level=SEARCH_LEVEL)
         fitted = FittedFunctions(term, mode, found.log_prior, family)
         if (
             mode.status is Status.HOPELESS

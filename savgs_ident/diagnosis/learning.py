@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from savgs_ident.core.executor import in_parallel
+from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out
@@ -136,7 +136,7 @@ def learn(
     They are looked for from there and from the plant as ``given``. There is none at a port without learned law, where
     the plant with one has no solution, or where the law is impossible. Given up is what cannot come to a log evidence
     of ``least``, or cannot be as probable as a law that is known: the first port's, which promises most, then of the
-    others' the one that leads after some steps.
+    others' the one that leads after some steps. The others are begun while the first is gone on with.
     """
 
     def begin(port: Port, near: float) -> _Begun | None:
@@ -148,16 +148,24 @@ def learn(
         ended = each.gone_on(near, constants)
         return ended.law(*_most_probable(ended, base, near, constants))
 
-    found, most = list[LearnedLaw](), -np.inf
-    for some in (ports[:1], ports[1:]):
-        near = max(least, most - constants.alarm_log_odds)
-        begun = [each for each in in_parallel(partial(begin, near=near), some) if each is not None]
-        left = sorted(begun, key=lambda each: -each.best.weight)
-        while left and left[0].best.weight > most:
-            found += [law for law in (finish(left.pop(0), near),) if law is not None]
-            most = max((law.weight for law in found), default=-np.inf)
-            near = max(least, most - constants.alarm_log_odds)
-        found += [law for law in in_parallel(partial(finish, near=near), left) if law is not None]
+    def begun(some: Sequence[Port], near: float) -> list[_Begun]:
+        return [each for each in in_parallel(partial(begin, near=near), some) if each is not None]
+
+    def near_to(weights: Sequence[float]) -> float:
+        return max(least, max(weights, default=-np.inf) - constants.alarm_log_odds)
+
+    first = begun(ports[:1], least)
+    laws, left = side_by_side(
+        lambda: [finish(each, least) for each in first],
+        lambda: begun(ports[1:], near_to([each.best.weight for each in first])),
+    )
+    found = [law for law in laws if law is not None]
+    left = sorted(left, key=lambda each: -each.best.weight)
+    while left and left[0].best.weight > max((law.weight for law in found), default=-np.inf):
+        law = finish(left.pop(0), near_to([each.weight for each in found]))
+        found += [] if law is None else [law]
+    near = near_to([law.weight for law in found])
+    found += [law for law in in_parallel(partial(finish, near=near), left) if law is not None]
     order = [each.name for each in ports]
     return tuple(sorted(found, key=lambda law: order.index(law.port.name)))
 
@@ -183,12 +191,13 @@ class _Begun(NamedTuple):
         return max((each for each in (self.every, self.blocked) if each), key=lambda each: each.weight)
 
     def gone_on(self, least: float, constants: DecisionConstants) -> "_Begun":
-        """Both fits to their ends, or until they cannot come to a log evidence of ``least``.
+        """Both fits to their ends, or until they cannot come to a log evidence of ``least``, or near to the other.
 
         A play that is impossible leaves the port its other laws.
         """
         both = [each for each in (self.every, self.blocked) if each]
-        every, *blocked = in_parallel(lambda each: each.gone_on(self.search, least, constants), both)
+        bound = max(least, self.best.weight - constants.alarm_log_odds)
+        every, *blocked = in_parallel(lambda each: each.gone_on(self.search, bound, constants), both)
         possible = [each for each in blocked if self.law(each, {}) is not None]
         return self._replace(every=every, blocked=possible[0] if possible else None)
 

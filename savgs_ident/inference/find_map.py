@@ -42,6 +42,9 @@ slopes say."""
 LEVEL = 0.1
 """Rise of the log density below which the mode is found: that which a step promises, or which it finds."""
 
+SEARCH_LEVEL = 0.5
+"""The same where one of many hypotheses is looked for: those that are compared are refined (:func:`refine`)."""
+
 ROUGH = 2.0
 """Rise that is promised, but not found, up to which a mode is as good: friction makes the density rough."""
 
@@ -331,13 +334,14 @@ def find_map_again(
     steps: int = STEPS,
     least: float = -np.inf,
     free: Collection[str] = (),
+    level: float = LEVEL,
 ) -> LaplaceFit:
     """The mode from a ``fit`` of the same plant with the same terms: to other data, to other rows, or not at its end.
 
     What the plant does there is known. The search ends where neither it nor one with fewer of the ``free``
     coordinates can come to a log evidence of ``least``.
     """
-    ascent = _Ascent(search, terms, {}, least=least, free=free)
+    ascent = _Ascent(search, terms, {}, level, least, free)
     return ascent.mode(ascent.again(fit), steps)
 
 
@@ -356,7 +360,7 @@ def find_map_from_both(
     goes on from where one step leads higher, and ends where neither it nor one with fewer of the ``free`` coordinates
     can come to a log evidence of ``least``. What ``start`` says of the terms holds for both.
     """
-    ascent, given = _Ascent(search, terms, {}, least=least, free=free), search.given
+    ascent, given = _Ascent(search, terms, {}, SEARCH_LEVEL, least, free), search.given
     # The first alone: two at a time would compile the same program twice.
     begun = ascent.start(start, warm_start)
     if given is None:
@@ -400,7 +404,7 @@ def find_map_from_several(
 
     After the ``first`` steps from each, so many as are ``going_on`` are followed to their end: the highest ones.
     """
-    ascent = _Ascent(search, terms, {})
+    ascent = _Ascent(search, terms, {}, SEARCH_LEVEL)
 
     def begun(start: Mapping[str, float]) -> _Point:
         point = ascent.start(start, warm_start)
