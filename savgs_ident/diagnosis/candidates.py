@@ -19,7 +19,7 @@ from savgs_ident.diagnosis.result import (
 from savgs_ident.diagnosis.score_test import Score, cosine
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import WeighedHypothesis, probabilities
-from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 
 WITHIN = 1.959964
 """Standard deviations of a 95 % interval."""

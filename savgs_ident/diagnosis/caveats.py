@@ -2,7 +2,7 @@
 
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem
 from savgs_ident.diagnosis.result import Hypothesis
-from savgs_ident.inference.find_map import LaplaceFit
+from savgs_ident.inference.laplace_fit import LaplaceFit
 
 
 def write_warnings(

@@ -22,7 +22,8 @@ from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, NextTest
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import UnknownEvidence, WeighedHypothesis
-from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 
 FurtherRecording = Callable[[AbstractProblem, Sequence[ModelPoint]], FurtherShrink | None]
 """Predicts a recording that takes no part, by two or three models: as given, recalibrated, with what is named."""

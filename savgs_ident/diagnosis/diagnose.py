@@ -55,7 +55,7 @@ from savgs_ident.diagnosis.result import (
 from savgs_ident.diagnosis.verdict import indistinguishable, most_probable
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned_functions import coefficients_at
-from savgs_ident.inference.find_map import LaplaceFit
+from savgs_ident.inference.laplace_fit import LaplaceFit
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model

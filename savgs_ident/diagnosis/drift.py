@@ -24,8 +24,9 @@ from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem
 from savgs_ident.diagnosis.result import NONE
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.inference.background.shared_errors import drifts_of, time_of, with_wider_drifts
-from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, find_map_again, search_of
+from savgs_ident.inference.find_map import find_map, find_map_again
 from savgs_ident.inference.laplace import is_hopeless
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search, search_of
 from savgs_ident.inference.observations import Data
 
 TIMES = (-1.0, -0.5, 0.0, 0.5, 1.0)

@@ -38,7 +38,7 @@ from savgs_ident.inference.background.imposed import node_loads, rows_of, slopes
 from savgs_ident.inference.background.locations import Linearisation, input_locations
 from savgs_ident.inference.background.port_functions import InputLocation
 from savgs_ident.inference.background.shared_errors import background_about, without_drifts
-from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of
 from savgs_ident.inference.likely_mistake import likely_mistake
 from savgs_ident.inference.observations import Data, Prediction, Term

@@ -31,7 +31,7 @@ from savgs_ident.diagnosis.verdict import (
 )
 from savgs_ident.effects.base import Family, Port
 from savgs_ident.effects.effect import families_of
-from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Term
 
 

@@ -9,7 +9,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import Score
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 
 
 class LostHypothesis(NamedTuple):

@@ -19,8 +19,6 @@ from savgs_ident.diagnosis.score_test import (
 )
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.inference.find_map import (
-    LaplaceFit,
-    Search,
     densest,
     find_map,
     find_map_from_both,
@@ -28,6 +26,7 @@ from savgs_ident.inference.find_map import (
     refine,
 )
 from savgs_ident.inference.laplace import is_hopeless
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.observations import NumberChange, Term
 
 

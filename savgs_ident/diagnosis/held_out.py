@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.inference.find_map import STEPS, LaplaceFit, Search, find_map_again
+from savgs_ident.inference.find_map import STEPS, find_map_again
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.likelihood import NoiseScales
 from savgs_ident.inference.observations import Data, Plant, Prediction, Term
 from savgs_ident.inference.prior import Coordinates

@@ -25,13 +25,14 @@ from savgs_ident.effects.learned_functions import (
     functions_at,
     interactions_at,
 )
-from savgs_ident.inference.find_map import SEARCH_LEVEL, LaplaceFit, Search, find_map, find_map_again
+from savgs_ident.inference.find_map import SEARCH_LEVEL, find_map, find_map_again
 from savgs_ident.inference.laplace import (
     LinearisedOptimum,
     attainable_evidence,
     linearised_optimum,
     log_evidence,
 )
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import bounds_of
 

@@ -40,14 +40,8 @@ from savgs_ident.effects.learned_functions import (
     coefficients_of,
     what_gives,
 )
-from savgs_ident.inference.find_map import (
-    LaplaceFit,
-    Search,
-    Start,
-    find_map,
-    find_map_from_both,
-    search_of,
-)
+from savgs_ident.inference.find_map import find_map, find_map_from_both
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search, Start, search_of
 from savgs_ident.inference.observations import Data, Term
 from savgs_ident.inference.prior import Logarithmic
 

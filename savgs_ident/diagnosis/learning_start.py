@@ -16,7 +16,7 @@ from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.effects.base import Port
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned_functions import alone_at, placed_at
-from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import Linear
 

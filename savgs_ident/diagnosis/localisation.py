@@ -21,8 +21,8 @@ from savgs_ident.diagnosis.held_out import HeldOut, predict_left_out
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import Family
 from savgs_ident.inference.background.port_functions import InputLocation, Matrix
-from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.laplace import linearised_optimum, log_evidence
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.likelihood import NoiseScales
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import bounds_of

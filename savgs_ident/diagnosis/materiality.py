@@ -15,7 +15,8 @@ from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import Amplitudes
 from savgs_ident.diagnosis.verdict import Change, without_immaterial_members
 from savgs_ident.inference.background.shared_errors import relative_change
-from savgs_ident.inference.find_map import LaplaceFit, find_map
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import LaplaceFit
 
 
 def immaterial(

@@ -62,7 +62,8 @@ from savgs_ident.diagnosis.verdict import (
     weigh,
 )
 from savgs_ident.effects.base import Port, PortKind
-from savgs_ident.inference.find_map import LaplaceFit, Start, find_map, find_map_again, refine, search_of
+from savgs_ident.inference.find_map import find_map, find_map_again, refine
+from savgs_ident.inference.laplace_fit import LaplaceFit, Start, search_of
 from savgs_ident.inference.observations import Data
 
 

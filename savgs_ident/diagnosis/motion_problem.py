@@ -37,7 +37,7 @@ from savgs_ident.inference.background.port_functions import (
     prandtl_element,
 )
 from savgs_ident.inference.drive_force import force_data, force_rows, relative_miss, relative_noise
-from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.plants.base import AbstractPlant, AtPorts
 from savgs_ident.responses.driven_motion import DrivenMotion

@@ -13,7 +13,7 @@ from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Verdict
 from savgs_ident.diagnosis.thresholds import DecisionConstants
 from savgs_ident.diagnosis.verdict import alarm_odds, most_probable, probabilities
 from savgs_ident.effects.base import Family
-from savgs_ident.inference.find_map import LaplaceFit
+from savgs_ident.inference.laplace_fit import LaplaceFit
 
 
 def write_verdict(

@@ -18,7 +18,7 @@ from savgs_ident.core.executor import in_parallel
 from savgs_ident.diagnosis.findings import hypothesis_of
 from savgs_ident.diagnosis.result import NextTest
 from savgs_ident.effects.base import AbstractInputLaw
-from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.observations import Prediction
 from savgs_ident.inference.prior import slopes_at
 from savgs_ident.plants.base import Excitation, OperatingCondition

@@ -33,7 +33,7 @@ from savgs_ident.effects.base import AbstractFrictionLimitLaw, Port, PortSignals
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned_functions import SMALLEST
 from savgs_ident.inference.background.port_functions import InputLocation
-from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, NumberChange, Prediction, Term
 from savgs_ident.inference.prior import (
     Coordinates,

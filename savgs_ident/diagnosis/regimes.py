@@ -43,7 +43,7 @@ from numpy.typing import NDArray
 from savgs_ident.diagnosis.result import Regime
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.effects.base import PortKind
-from savgs_ident.inference.find_map import LaplaceFit
+from savgs_ident.inference.laplace_fit import LaplaceFit
 from savgs_ident.inference.observations import Data
 
 if TYPE_CHECKING:

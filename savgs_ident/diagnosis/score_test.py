@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.inference.find_map import LaplaceFit, Search
 from savgs_ident.inference.laplace import LinearisedOptimum, linearised_optimum, log_evidence, precision_of
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import Coordinates, EffectCoordinates, Sheet, bounds_of
 

@@ -34,10 +34,7 @@ from savgs_ident.diagnosis.score_test import (
     score_terms,
 )
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.inference.find_map import (
-    LaplaceFit,
-    Search,
-)
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.observations import Term
 
 

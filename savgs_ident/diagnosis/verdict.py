@@ -27,7 +27,7 @@ from savgs_ident.diagnosis.findings import Findings, hypothesis_of
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Kind
 from savgs_ident.diagnosis.score_test import PriorConflict
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.inference.find_map import LaplaceFit
+from savgs_ident.inference.laplace_fit import LaplaceFit
 
 
 @dataclass(frozen=True)

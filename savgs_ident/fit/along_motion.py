@@ -30,8 +30,9 @@ from savgs_ident.fit.identifiability import (
 from savgs_ident.fit.identified import Identified, Verdict
 from savgs_ident.fit.small_errors import own_part
 from savgs_ident.inference.drive_force import DriveForce, force_data, relative_miss, relative_noise
-from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.inference.find_map import find_map
 from savgs_ident.inference.laplace import spread_of
+from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 from savgs_ident.inference.prior import sheet_coordinate, slopes_at
 from savgs_ident.inference.problem import check_free, used_parameters
 from savgs_ident.plants.model import Model

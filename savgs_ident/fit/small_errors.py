@@ -21,8 +21,9 @@ from savgs_ident.core.presentation import Progress
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.inference.background.shared_errors import drifts_of
-from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.inference.find_map import find_map
 from savgs_ident.inference.laplace import linearised_optimum
+from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 from savgs_ident.inference.likelihood import likelihood_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.posterior_mode import (

@@ -23,7 +23,8 @@ from scipy.special import logsumexp, ndtri
 
 from savgs_ident.core.status import Status
 from savgs_ident.core.transforms import FreeVector
-from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 from savgs_ident.inference.likelihood import values_of
 from savgs_ident.inference.near_mode import Surrogate
 from savgs_ident.inference.observations import Prediction, Term

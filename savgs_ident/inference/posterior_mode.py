@@ -21,8 +21,9 @@ from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status, joint_status
 from savgs_ident.inference.background.locations import Linearisation
 from savgs_ident.inference.background.shared_errors import background_about
-from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.inference.find_map import find_map
 from savgs_ident.inference.laplace import principal_axes
+from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 from savgs_ident.inference.likelihood import Likelihood, sharing_errors
 from savgs_ident.inference.near_mode import (
     Anchor,

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
-from savgs_ident.inference.find_map import find_map, refine, search_of
+from savgs_ident.inference.find_map import find_map, refine
+from savgs_ident.inference.laplace_fit import search_of
 from savgs_ident.inference.prior import bounds_of, values_at
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 

@@ -30,7 +30,8 @@ from savgs_ident.effects.base import (
     Role,
 )
 from savgs_ident.effects.effect import Effect, effect_at
-from savgs_ident.inference.find_map import find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import search_of
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model, model_parameters
 from savgs_ident.plants.quarter_car.plant import CHANNELS, QuarterCar
 from savgs_ident.plants.quarter_car.ports import DAMPER, RAIL, ROAD, SUSPENSION

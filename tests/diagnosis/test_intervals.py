@@ -10,7 +10,8 @@ from savgs_ident.diagnosis.candidates import WITHIN
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
 from savgs_ident.diagnosis.model_selection import recalibrate
 from savgs_ident.diagnosis.public import SIMTR, problem_of_dwells
-from savgs_ident.inference.find_map import LaplaceFit, find_map, refine
+from savgs_ident.inference.find_map import find_map, refine
+from savgs_ident.inference.laplace_fit import LaplaceFit
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import AbstractCoordinate
 from savgs_ident.plants.quarter_car.model import RigModel

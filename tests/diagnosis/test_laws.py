@@ -14,7 +14,8 @@ from savgs_ident.inference.background.port_functions import (
     laws_of_functions,
     sensor_filters,
 )
-from savgs_ident.inference.find_map import find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import search_of
 
 from .toy import ToyPlant, draw
 

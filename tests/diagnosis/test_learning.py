@@ -14,7 +14,8 @@ from savgs_ident.effects.base import Family, Port
 from savgs_ident.effects.learned import learned_effect
 from savgs_ident.effects.learned_functions import coefficients_at
 from savgs_ident.inference.background.imposed import rows_of
-from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
 from savgs_ident.plants.quarter_car.ports import DAMPER, RAIL

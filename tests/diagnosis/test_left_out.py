@@ -9,7 +9,8 @@ from savgs_ident.diagnosis.held_out import HeldOut, hold_out, predict_left_out, 
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.background.port_functions import InputLocation, Law
-from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search, search_of
 
 from .toy import TERMS, ToyPlant, draw
 

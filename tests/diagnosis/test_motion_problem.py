@@ -11,7 +11,8 @@ import pytest
 import savgs_ident as si
 from savgs_ident.diagnosis.motion_problem import MotionProblem, motion_problem
 from savgs_ident.effects.base import PortKind
-from savgs_ident.inference.find_map import find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import search_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.recordings.axis_recording import AxisRecording
 from savgs_ident.responses.driven_motion import SAME, driven_motion, period_of

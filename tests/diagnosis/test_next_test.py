@@ -10,7 +10,8 @@ from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.next_test import next_tests, predicted
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search, search_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.base import OperatingCondition
 from savgs_ident.plants.quarter_car.plant import CHANNELS

@@ -11,7 +11,8 @@ from scipy.integrate import quad
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.inference.find_map import find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import search_of
 from savgs_ident.inference.prior import Coordinates, sheet_coordinate
 
 from .toy import TERMS, ToyPlant, draw

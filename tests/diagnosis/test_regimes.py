@@ -11,7 +11,8 @@ from scipy.stats import binom
 from savgs_ident.diagnosis.dwell_problem import dwell_problem
 from savgs_ident.diagnosis.regimes import Cycles, find_regimes, holm
 from savgs_ident.diagnosis.result import Regime
-from savgs_ident.inference.find_map import LaplaceFit, find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import Scales
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass

@@ -15,7 +15,8 @@ from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import best_pairs, cosine, score_terms
 from savgs_ident.diagnosis.search import pairs_with, singles_among
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.inference.find_map import Search, find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import Search, search_of
 from savgs_ident.inference.likelihood import noise_scales
 from savgs_ident.inference.observations import Prediction, Term
 from savgs_ident.inference.prior import Linear

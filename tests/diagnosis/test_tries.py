@@ -12,7 +12,8 @@ from savgs_ident.diagnosis.findings import Findings, explains_all
 from savgs_ident.diagnosis.score_test import peaks_by_try, scores_by_try
 from savgs_ident.diagnosis.search import singles_among
 from savgs_ident.diagnosis.thresholds import DEFAULTS
-from savgs_ident.inference.find_map import densest, find_map, find_map_from_several, search_of
+from savgs_ident.inference.find_map import densest, find_map, find_map_from_several
+from savgs_ident.inference.laplace_fit import search_of
 from savgs_ident.inference.prior import Linear, Logarithmic
 
 from ..in_one_test import over

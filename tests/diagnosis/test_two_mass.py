@@ -15,7 +15,8 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.diagnosis.verdict import most_probable
 from savgs_ident.effects.base import Family
 from savgs_ident.effects.effect import Effect, generic_effects, typical_effect
-from savgs_ident.inference.find_map import LaplaceFit, Search, find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search, search_of
 from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.two_mass import GUIDE, PARAMETERS, SUSPENSION, TwoMass
 from savgs_ident.responses.harmonic_response import HarmonicResponse

@@ -32,7 +32,7 @@ from savgs_ident.diagnosis.verdict import (
     weigh,
     without_immaterial_members,
 )
-from savgs_ident.inference.find_map import LaplaceFit
+from savgs_ident.inference.laplace_fit import LaplaceFit
 
 from .toy import best_of
 

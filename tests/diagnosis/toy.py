@@ -19,7 +19,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.findings import Findings
 from savgs_ident.diagnosis.search import single_effects, with_pairs
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
-from savgs_ident.inference.find_map import LaplaceFit, Search
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.inference.prior import Coordinates, Linear, Logarithmic, sheet_coordinate
 

@@ -10,13 +10,8 @@ from numpy.typing import NDArray
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.held_out import find_map_near
-from savgs_ident.inference.find_map import (
-    Search,
-    Start,
-    find_map,
-    find_map_from_both,
-    search_of,
-)
+from savgs_ident.inference.find_map import find_map, find_map_from_both
+from savgs_ident.inference.laplace_fit import Search, Start, search_of
 from savgs_ident.inference.observations import Prediction
 from savgs_ident.inference.prior import Coordinates, sheet_coordinate
 

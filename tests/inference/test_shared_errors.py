@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 
-from savgs_ident.inference.find_map import find_map, search_of
+from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.laplace_fit import search_of
 from savgs_ident.inference.likelihood import noise_scales
 from savgs_ident.inference.observations import Data
 
