@@ -1,4 +1,4 @@
-"""``savgs-ident fit``: identify the rig, or another plant."""
+"""``savgs-ident fit``: identify a plant, the rig or another one."""
 
 from pathlib import Path
 from typing import Annotated
@@ -48,7 +48,7 @@ def fit(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> int:
-    """Identify the rig from a campaign: parameters with errors, how well they fit, what the data identify.
+    """Identify a plant from a campaign: parameters with errors, how well they fit, what the data identify.
 
     A road of at least six seconds is cut into windows; without dwells so is a sweep or any other motion.
 

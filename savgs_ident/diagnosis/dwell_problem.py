@@ -43,6 +43,7 @@ from savgs_ident.inference.likelihood import Likelihood, likelihood_of
 from savgs_ident.inference.likely_mistake import likely_mistake
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.inference.problem import harmonic_target
+from savgs_ident.plants.at_rest import require_return
 from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.excitation import measured_excitation
@@ -116,6 +117,7 @@ class DwellProblem(AbstractProblem):
         lost = [d for d, each in enumerate(solution.status()) if not each.ok]
         dwells = [f"{float(self.excitation.frequency[d]):.4g} Hz" for d in lost if d in self.dwells]
         if dwells:
+            require_return(model, p)
             raise InputError(
                 "the baseline has no periodic motion at " + ", ".join(dwells),
                 remedy="leave these dwells out with --max-frequency, or mend the parameters",

@@ -35,6 +35,7 @@ from savgs_ident.fit.result import Fit
 from savgs_ident.fit.small_errors import FitWithErrors, fit_with_errors, own_part
 from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.problem import Problem, ProblemSettings, Quantity, Task, plan_task
+from savgs_ident.plants.at_rest import require_return
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.simulate.periodic import (
@@ -190,9 +191,9 @@ def fit_least_squares(
     """Fit ``free`` parameters of a model to a measured response.
 
     ``origin`` is that of the result; ``motion`` is that of the model as given in the same tests, where it is known
-    already; ``progress`` is called with what is being done. Raises :class:`InputError` for
-    names that do not exist or that the model does not use, and for a response that cannot be used. Look at
-    ``trusted`` of the result.
+    already; ``progress`` is called with what is being done. Raises :class:`InputError` for names that do not exist or
+    that the model does not use, for a response that cannot be used, and for a plant that may be anywhere, as no force
+    brings it back. Look at ``trusted`` of the result.
     """
     began, report = time.perf_counter(), progress or _silent
     settings = settings or FitSettings()
@@ -201,6 +202,8 @@ def fit_least_squares(
 
     report("solving the model as given")
     first = _as_given(task, motion)
+    if not any(each.ok for each in first.status()):
+        require_return(problem.model, problem.fixed)
     as_given = np.asarray(harmonics(problem.model, problem.fixed, first, problem.orders))
     report("preparing the fit")
     minimiser = Minimiser(problem)

@@ -2,9 +2,12 @@
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.small_root import Root, find_root
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import InputSignal
@@ -12,6 +15,10 @@ from savgs_ident.plants.base import AbstractPlant, Input, Motion, Scalar
 
 REST_PRECISION = 1e-9
 """Relative precision of a state of rest; forces of 1e7 N/m leave no more."""
+
+
+NO_STIFFNESS = 1e-12
+"""Stiffness over the largest one of a plant, each for typical motions, that is none [1]: what rounding leaves."""
 
 
 class Rest(NamedTuple):
@@ -62,3 +69,37 @@ def nominal_readings(plant: AbstractPlant, p: Values, prepared: Any = None) -> t
     rest = find_rest(plant, p, u, prepared)
     still = jnp.zeros_like(rest.s)
     return plant.read(p, standing(plant, rest.q), rest.s, still, u, prepared)
+
+
+def unrestrained(plant: AbstractPlant, p: Values) -> tuple[str, ...]:
+    """The coordinates of a plant that no force brings back to where it stands in its nominal state.
+
+    A periodic motion may be anywhere along them: it cannot be solved for. What holds a friction moves along.
+    """
+    u, n = nominal_inputs(plant, p), len(plant.coordinates)
+    sizes = (*(each.size for each in plant.coordinates), *(each.scale for each in plant.states))
+    size = jnp.asarray(sizes, jnp.float64)
+
+    def balance(x: Array) -> Array:
+        q, s = (size * x)[:n], (size * x)[n:]
+        motion = standing(plant, plant.coordinate_type(*jnp.unstack(q)))
+        return plant.residual(p, motion, s, jnp.zeros_like(s), u)
+
+    stiffness = np.asarray(jax.jacfwd(balance)(jnp.zeros_like(size)))
+    if not np.isfinite(stiffness).all():
+        return ()
+    largest = np.abs(stiffness).max(axis=1, keepdims=True)
+    _, strength, directions = np.linalg.svd(stiffness / np.where(largest > 0.0, largest, 1.0))
+    free = np.abs(directions[strength <= NO_STIFFNESS, :n]).max(axis=0, initial=0.0)
+    return tuple(each.name for each, share in zip(plant.coordinates, free, strict=True) if share > 1e-6)
+
+
+def require_return(plant: AbstractPlant, p: Values) -> None:
+    """Raise :class:`InputError` for a plant that may be anywhere: it has no periodic motions to compare."""
+    names = unrestrained(plant, p)
+    if names:
+        raise InputError(
+            f"no force brings {', '.join(names)} back to where it was, and a periodic motion may be anywhere",
+            remedy="give the plant the spring or the controller that holds it, or `fit` and `diagnose` a recorded "
+            "motion with the force of its drive",
+        )

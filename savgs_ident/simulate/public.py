@@ -19,6 +19,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, Result, no_progress
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import as_values
+from savgs_ident.plants.at_rest import require_return
 from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.profiles import Constant, LinearSweep, Offset, ProfileSource, SweptAngle
@@ -237,14 +238,17 @@ def simulate(
 
     A motion that was not found has its status in the result. Raises :class:`InputError` for a frequency or an
     amplitude that is not above zero, for ``orders`` below 1, where a campaign is given besides a frequency or an
-    amplitude, and where it cannot be used.
+    amplitude, and where it cannot be used; and for a plant that no force brings back to where it was.
     """
     use_persistent_cache()
     if orders < 1:
         raise InputError(f"orders is {orders}", source="orders", remedy="ask for at least order 1")
     excitation = _excitation(model, frequency, campaign, orders, amplitude)
     progress(f"solving {excitation.frequency.shape[0]} periodic motions")
-    return simulate_response(model, excitation, orders, origin=model.origin(campaign))
+    found = simulate_response(model, excitation, orders, origin=model.origin(campaign))
+    if not found.ok.any():
+        require_return(model.build(), as_values(model.table.as_dict()))
+    return found
 
 
 def simulate_sweep(

@@ -28,11 +28,13 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Progress, Result, no_progress
+from savgs_ident.core.values import as_values
 from savgs_ident.diagnosis.public import baseline_of, problem_of_dwells
 from savgs_ident.diagnosis.result import DiagnosisSettings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.prior import slopes_at, values_at
 from savgs_ident.inference.problem import check_free, used_parameters
+from savgs_ident.plants.at_rest import require_return
 from savgs_ident.plants.model import Model, PlantModel
 from savgs_ident.simulate.excitation import typical_amplitude
 from savgs_ident.simulate.program_cache import use_persistent_cache
@@ -193,6 +195,7 @@ def plan(
             progress(f"what {len(there)} dwells at {size:g} {given.plant.inputs[0].unit} would show")
             blocks.append(_block(given, settings, size, there, known, samples))
     if not blocks:
+        require_return(given.build(), as_values(given.table.as_dict()))
         raise InputError(
             "no dwell that was offered has a periodic motion", remedy="offer smaller amplitudes or others"
         )

@@ -35,6 +35,13 @@ def test_an_axis_is_driven_by_its_force() -> None:
     np.testing.assert_allclose(found.curve("axis").transfer[:, 0], wanted, rtol=1e-3)
 
 
+def test_a_carriage_without_a_spring_is_refused_with_the_reason() -> None:
+    loose = si.PlantModel(Axis(), Axis.parameters)
+    with pytest.raises(si.InputError, match="no force brings x back") as caught:
+        si.simulate(loose, (1.0, 2.0), orders=3, amplitude=100.0)
+    assert "controller" in str(caught.value)
+
+
 @pytest.mark.slow
 def test_a_slow_sweep_of_a_linear_plant_passes_through_its_closed_form() -> None:
     """At 2 Hz, 40 s after the start, but for the lag of a sweep, -i/2 dw/dt H''; the input is what was asked for."""
