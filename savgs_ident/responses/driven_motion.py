@@ -16,11 +16,16 @@ included. Its median size is taken, so that a few instants (reversals, a pulse i
 A motion that does not repeat, a drive along a road or a random signal, shows its noise by what changes from row to
 row more roughly than a force does that a motion so slow makes: the median size of third differences, in which all
 that is smooth over some rows is gone. That the noise is white is then assumed, and a warning says so.
+
+Where the plant is slower than its sensor resolves, nobody can tell which way it goes, or whether it goes at all: a
+friction there may have any force between its bounds. Such rows have as much noise as a friction may be large, all
+that inertia and a viscous friction do not explain.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +62,16 @@ SAME_AS_MEASURED = 1e-4
 UNEVEN = 0.01
 """Largest departure of a time from an even grid, in steps, up to which samples are taken as they are."""
 
+AT_REST = 3.0
+"""Speeds up to so many standard deviations of the speed's noise do not tell which way a motion goes."""
+
+SELDOM = 0.05
+"""Share of the time at rest from which on it is said."""
+
+ROUNDED, COUNTED, WHOLE = 1e-9, 10.0, 0.05
+"""How a sensor that counts is known: its changes that are more than a rounding, as a share of all that it shows, and
+up to so many counts, are whole numbers of counts to within this [1]."""
+
 _ORDER = 4
 _FEWEST = 100
 _NORMAL = 1.4826
@@ -74,7 +89,8 @@ class DrivenMotion:
         acceleration: [m/s^2], (n,).
         drive: force of the drive [N], (n,).
         period: time in which the reference repeats [s]; the whole recording where it does not.
-        noise: standard deviation of the noise of a row of force [N].
+        noise: standard deviation of the noise of a row of force where it moves [N].
+        hidden: standard deviation of what a friction may do there that the motion does not show [N], (n,).
         warnings: what is to be known of it.
         starts: places of the samples with which tests begin, several that were recorded one after the other.
 
@@ -89,6 +105,7 @@ class DrivenMotion:
     drive: NDArray[np.float64]
     period: float
     noise: float
+    hidden: NDArray[np.float64]
     warnings: tuple[DataWarning, ...] = ()
     starts: tuple[int, ...] = (0,)
 
@@ -109,6 +126,11 @@ class DrivenMotion:
     def rate(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
         """Time derivative of a signal (n,) [its unit per second]."""
         return np.concatenate([np.gradient(signal[test], self.step) for test in self._tests])
+
+    @property
+    def row_noise(self) -> NDArray[np.float64]:
+        """Standard deviation of the noise of each row of force [N], (m,), with what the motion does not show."""
+        return np.asarray(np.hypot(self.noise, self.rows(self.hidden)))
 
     @property
     def begins(self) -> NDArray[np.float64]:
@@ -136,6 +158,9 @@ class DrivenMotion:
         return np.concatenate(found)
 
 
+_SIGNALS = ("position", "velocity", "acceleration", "drive", "hidden")
+
+
 def joined(motions: Sequence[DrivenMotion], source: str) -> DrivenMotion:
     """Several motions of one plant as one, whose tests begin from rest; sampled as often as the one sampled most."""
     if len(motions) == 1:
@@ -145,9 +170,8 @@ def joined(motions: Sequence[DrivenMotion], source: str) -> DrivenMotion:
     sizes = [each.position.size for each in even]
     weights = np.array([each.row_times.size for each in motions])
     noise = float(np.sqrt(np.average([each.noise**2 for each in motions], weights=weights)))
-    position, velocity, acceleration, drive = (
-        np.concatenate([getattr(each, name) for each in even])
-        for name in ("position", "velocity", "acceleration", "drive")
+    position, velocity, acceleration, drive, hidden = (
+        np.concatenate([getattr(each, name) for each in even]) for name in _SIGNALS
     )
     return DrivenMotion(
         source,
@@ -158,6 +182,7 @@ def joined(motions: Sequence[DrivenMotion], source: str) -> DrivenMotion:
         drive,
         max(each.period for each in motions),
         noise,
+        hidden,
         _said_once([warning for each in motions for warning in each.warnings], source),
         tuple(np.cumsum([0, *sizes[:-1]]).tolist()),
     )
@@ -169,10 +194,7 @@ def _resampled(motion: DrivenMotion, step: float) -> DrivenMotion:
         return motion
     old = motion.step * np.arange(motion.position.size)
     new = np.arange(0.0, old[-1], step)
-    signals = {
-        name: np.interp(new, old, getattr(motion, name))
-        for name in ("position", "velocity", "acceleration", "drive")
-    }
+    signals = {name: np.interp(new, old, getattr(motion, name)) for name in _SIGNALS}
     return replace(motion, step=step, **signals)
 
 
@@ -217,7 +239,8 @@ def driven_motion(recording: AxisRecording) -> DrivenMotion:
             source=recording.source,
             remedy="record two cycles or more",
         )
-    return _driven(recording.source, recording.step, recording.position, recording.force, period)
+    unclear = _speed_noise_of_position(recording.position, recording.step)
+    return _driven(recording.source, recording.step, recording.position, recording.force, period, unclear)
 
 
 def recorded_motion(recording: Recording, motion: str, drive: str, source: str) -> DrivenMotion:
@@ -227,9 +250,9 @@ def recorded_motion(recording: Recording, motion: str, drive: str, source: str) 
     is too short.
     """
     step, position, force = _even(recording, motion, drive, source)
-    return _driven(
-        f"{source}, {recording.name}", step, position, force, period_of(position, SAME_AS_MEASURED)
-    )
+    period = period_of(position, SAME_AS_MEASURED)
+    unclear = _speed_noise_of_position(position, step)
+    return _driven(f"{source}, {recording.name}", step, position, force, period, unclear)
 
 
 def recorded_speed(recording: Recording, speed: str, drive: str, source: str) -> DrivenMotion:
@@ -240,7 +263,8 @@ def recorded_speed(recording: Recording, speed: str, drive: str, source: str) ->
     step, velocity, force = _even(recording, speed, drive, source)
     position = np.concatenate([[0.0], np.cumsum(0.5 * step * (velocity[1:] + velocity[:-1]))])
     period = period_of(velocity, SAME_AS_MEASURED)
-    return _driven(f"{source}, {recording.name}", step, position, force, period)
+    unclear = resolution(velocity) * np.sqrt(2.0 * _cutoff(step) * step)
+    return _driven(f"{source}, {recording.name}", step, position, force, period, unclear)
 
 
 def _even(
@@ -270,28 +294,77 @@ def _at(time: NDArray[np.float64], channel: RecordedChannel) -> NDArray[np.float
     return channel.values if same else np.interp(time, channel.time, channel.values)
 
 
+def _cutoff(step: float) -> float:
+    """Up to where the position passes [Hz]."""
+    return min(CUTOFF_HZ, SHARE_OF_RATE / step)
+
+
+def _speed_noise_of_position(position: NDArray[np.float64], step: float) -> float:
+    """Standard deviation of the noise that the speed has from that of a position, below the cutoff."""
+    return 2.0 * np.pi * resolution(position) * float(np.sqrt(2.0 * step * _cutoff(step) ** 3 / 3.0))
+
+
+def resolution(values: NDArray[np.float64]) -> float:
+    """Standard deviation of what a sensor does not resolve in values (n,), in their unit: noise, or its steps."""
+    return max(roughness(values), _step_of(values) / sqrt(12.0))
+
+
+def _step_of(values: NDArray[np.float64]) -> float:
+    """Step of a sensor that counts, from values (n,), in their unit: its changes are multiples of it; 0 otherwise."""
+    changes = np.abs(np.diff(values))
+    changes = changes[changes > ROUNDED * np.ptp(values)]
+    if not changes.size:
+        return 0.0
+    least = float(np.quantile(changes, 0.01))
+    counts = changes[changes < COUNTED * least] / least
+    return least if np.median(np.abs(counts - np.round(counts))) < WHOLE else 0.0
+
+
 def _driven(
-    source: str, step: float, measured: NDArray[np.float64], force: NDArray[np.float64], period: int | None
+    source: str,
+    step: float,
+    measured: NDArray[np.float64],
+    force: NDArray[np.float64],
+    period: int | None,
+    unclear: float,
 ) -> DrivenMotion:
-    """The motion of even samples, whose noise comes from cycles of ``period`` samples where it has any."""
+    """The motion of even samples, whose noise comes from cycles of ``period`` samples where it has any.
+
+    ``unclear`` is the standard deviation of the noise of its speed.
+    """
     if measured.size * step < 2.0 * CUT_S + _FEWEST * _samples_to_a_row(step) * step:
         raise InputError("is too short", source=source, remedy="record some seconds at least")
-    position = _low_passed(min(2.0 * CUTOFF_HZ * step, 2.0 * SHARE_OF_RATE), measured)
+    position = _low_passed(2.0 * _cutoff(step) * step, measured)
     velocity = np.gradient(position, step)
     acceleration = np.gradient(velocity, step)
+    still = np.abs(velocity) < AT_REST * unclear
+    rubs = _beyond(force, np.stack([acceleration, velocity, position, np.ones_like(position)], axis=1))
+    hidden = np.where(still, float(np.sqrt(np.mean(rubs**2))), 0.0)
+    warnings = [] if np.mean(still) < SELDOM else [_at_rest(source, float(np.mean(still)))]
     left = _beyond(force, np.stack([acceleration, velocity], axis=1))
+    signals = position, velocity, acceleration, force
     if period is not None:
         noise = _repeatability(left, period, step)
-        return DrivenMotion(source, step, position, velocity, acceleration, force, period * step, noise)
+        return DrivenMotion(source, step, *signals, period * step, noise, hidden, tuple(warnings))
     noise = roughness(_thinned(left, step))
-    warning = DataWarning(
+    assumed = DataWarning(
         "noise_assumed",
         "the motion does not repeat: its noise is taken from what is rough in the force, as if it were white",
         source=source,
         remedy="record the same motion twice, so that the noise is measured",
     )
     whole = measured.size * step
-    return DrivenMotion(source, step, position, velocity, acceleration, force, whole, noise, (warning,))
+    return DrivenMotion(source, step, *signals, whole, noise, hidden, (assumed, *warnings))
+
+
+def _at_rest(source: str, share: float) -> DataWarning:
+    return DataWarning(
+        "slower_than_resolved",
+        f"for {100.0 * share:.0f} % of the time the motion is slower than its sensor resolves: what rubs there does "
+        "not show, and hardly counts",
+        source=source,
+        remedy="measure finer, or move faster",
+    )
 
 
 def period_of(reference: NDArray[np.float64], same: float) -> int | None:

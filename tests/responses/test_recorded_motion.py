@@ -69,3 +69,50 @@ def test_what_cannot_be_used_is_refused_with_its_place() -> None:
         recorded_motion(_recording(time, True, 0.1), "velocity", "drive", "here")
     with pytest.raises(InputError, match="is too short"):
         recorded_motion(_recording(time[:100], True, 0.1), "x", "drive", "here")
+
+
+def _standing_at_times(count: float) -> tuple[Recording, NDArray[np.bool_], NDArray[np.float64]]:
+    """The same mass where it stands for a third of the time, and the friction then is whatever holds it.
+
+    Its position is read in steps of ``count`` [m]. Beside it whether it moves and at which speed [m/s], (n,) each.
+    """
+    time = np.arange(20000) / 1000.0
+    wave = np.sin(2.0 * np.pi * 0.31 * time)
+    v = np.sign(wave) * np.maximum(np.abs(wave) - 0.5, 0.0)
+    x = np.concatenate([[0.0], np.cumsum(0.5e-3 * (v[1:] + v[:-1]))])
+    held = 1.9 * np.sin(2.0 * np.pi * 1.7 * time)
+    force = 3.0 * np.gradient(v, 1e-3) + np.where(v == 0.0, held, 2.0 * np.sign(v))
+    force += 0.05 * np.random.default_rng(SEED).standard_normal(time.size)
+    channels = {
+        "x": RecordedChannel("x", "m", time, count * np.round(x / count)),
+        "drive": RecordedChannel("drive", "N", time, force),
+    }
+    return Recording("run", "other", None, channels), v != 0.0, v
+
+
+@pytest.mark.parametrize("count", [1e-5, 2e-5])
+def test_where_the_motion_does_not_show_which_way_it_goes_the_force_hardly_counts(count: float) -> None:
+    recording, moves, v = _standing_at_times(count)
+    motion = recorded_motion(recording, "x", "drive", "here")
+    assert "slower_than_resolved" in [each.code for each in motion.warnings]
+    assert np.mean(motion.hidden[~moves] > 0.0) > 0.98
+    fast = np.abs(v) > 0.3 * np.abs(v).max()
+    assert not motion.hidden[fast].any()
+    columns = np.stack([motion.rows(motion.acceleration), motion.rows(np.sign(v))], axis=1)
+    force = motion.rows(motion.drive)
+    noise = motion.row_noise
+    found, errors = _least_squares(columns / noise[:, None], force / noise)
+    truth = np.array([3.0, 2.0])
+    assert np.all(np.abs(found - truth) < 4.0 * errors)
+    assert np.all(errors < 0.02 * truth)
+    missed = force - columns @ found
+    assert np.mean((missed / noise) ** 2) < 1.2
+    assert np.mean((missed / motion.noise) ** 2) > 10.0
+
+
+def _least_squares(
+    columns: NDArray[np.float64], rows: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Estimates and their standard errors for rows of unit variance."""
+    covariance = np.linalg.inv(columns.T @ columns)
+    return covariance @ columns.T @ rows, np.sqrt(np.diag(covariance))
