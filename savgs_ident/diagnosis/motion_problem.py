@@ -310,9 +310,8 @@ class MotionProblem(AbstractProblem):
 
     def responses(self, data: Data, *rows: NDArray[np.float64]) -> DriveForces:
         """The force along the motion, measured and needed by three models."""
-        motion, (before, recalibrated, after) = self.motion, rows
-        along = motion.row_times, motion.rows(motion.velocity), data.measured
-        return DriveForces(motion.source, *along, before, recalibrated, after, motion.row_noise)
+        velocity = self.motion.rows(self.motion.velocity)
+        return DriveForces(self.motion.source, self.motion.row_times, velocity, data.measured, *rows)
 
 
 def motion_problem(

@@ -309,7 +309,6 @@ class DriveForces:
         before: the same that the baseline needs as given [N].
         recalibrated: the same of the recalibrated baseline [N].
         after: the same with what is named [N].
-        noise: standard deviation of the measured force [N].
     """
 
     source: str
@@ -319,7 +318,6 @@ class DriveForces:
     before: NDArray[np.float64]
     recalibrated: NDArray[np.float64]
     after: NDArray[np.float64]
-    noise: NDArray[np.float64]
 
 
 @dataclass(frozen=True)

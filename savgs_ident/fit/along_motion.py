@@ -118,9 +118,9 @@ def fit_along_motion(
     as_given = problem.predict((), {}, (), None).rows
     mode = find_map(search_of(problem, data), (), {}, None, progress=progress)
     predicted = mode.prediction.rows
-    residual = (data.measured - predicted) / motion.row_noise
+    residual = (data.measured - predicted) / motion.noise
     chi2, dof = float(residual @ residual), data.measured.size - len(free)
-    estimates, covariance = _estimates(mode, model, free, chi2, motion.row_noise)
+    estimates, covariance = _estimates(mode, model, free, chi2, motion.noise)
     verdict = _verdict(estimates, covariance, len(free), chi2, dof, relative_miss(data.measured, predicted))
     ended = at_bounds((table[name] for name in free), mode.values)
     verdict = replace(verdict, sentences=(*verdict.sentences, *ended))
@@ -144,13 +144,13 @@ def fit_along_motion(
 
 
 def _estimates(
-    mode: LaplaceFit, model: Model, free: tuple[str, ...], chi2: float, noise: NDArray[np.float64]
+    mode: LaplaceFit, model: Model, free: tuple[str, ...], chi2: float, noise: float
 ) -> tuple[tuple[Estimate, ...], NDArray[np.float64]]:
     """The estimates, free ones first, and their covariance [products of their units]."""
     coordinates, rows = mode.coordinates, mode.slopes.shape[0]
     priors = np.eye(len(coordinates))
     scaled, alone = (
-        spread_of(np.concatenate([mode.slopes / noise[:, None] / size, priors]))
+        spread_of(np.concatenate([mode.slopes / noise / size, priors]))
         for size in (widened_by_misfit(chi2, rows - len(free)), 1.0)
     )
     known = np.array([model.table[each.name].tolerance > 0.0 for each in coordinates])

@@ -64,7 +64,8 @@ def force_data(motion: DrivenMotion) -> Data:
     """
     force = motion.rows(motion.drive)
     size = float(np.sqrt(np.mean(force**2)))
-    return Data(force, motion.row_noise**2, np.full(force.size, size), motion.blocks)
+    variance, scale = (np.full(force.size, each) for each in (motion.noise**2, size))
+    return Data(force, variance, scale, motion.blocks)
 
 
 def relative_miss(measured: NDArray[np.float64], rows: NDArray[np.float64]) -> float:
@@ -73,8 +74,8 @@ def relative_miss(measured: NDArray[np.float64], rows: NDArray[np.float64]) -> f
 
 
 def relative_noise(motion: DrivenMotion) -> float:
-    """The noise of the rows of force, relative to them, root mean squares of both [1]."""
-    return float(np.linalg.norm(motion.row_noise) / np.linalg.norm(motion.rows(motion.drive)))
+    """The noise of a row of force, relative to the rms of the rows [1]."""
+    return motion.noise / float(np.sqrt(np.mean(motion.rows(motion.drive) ** 2)))
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,12 @@ def drive_figure(
     velocity: NDArray[np.float64],
     measured: NDArray[np.float64],
     models: Sequence[tuple[str, NDArray[np.float64]]],
-    noise: NDArray[np.float64],
+    noise: float,
     units: tuple[str, str],
 ) -> Figure:
     """Velocity, force, and force less that which each of the ``models`` needs, over ``time`` [s]; (m,) each.
 
-    The models are labels with their force, the best first. ``noise`` (m,) is the standard deviation of the force,
+    The models are labels with their force, the best first. ``noise`` is the standard deviation of the force,
     ``units`` are those of force and velocity.
     """
     shown = time <= time[0] + SHOWN_S
@@ -35,7 +35,7 @@ def drive_figure(
         above.plot(time[shown], velocity[shown], color=GREY, lw=1.2)
         above.set_ylabel(f"velocity [{units[1]}]")
         middle.plot(time[shown], measured[shown], color=INK, lw=3.2, alpha=0.35, label="measured")
-        below.fill_between(time[shown], -noise[shown], noise[shown], color=PALE, lw=0.0, zorder=0.5)
+        below.axhspan(-noise, noise, color=PALE, lw=0.0, zorder=0.5)
         for (label, force), line in zip(models, LINES, strict=False):
             middle.plot(time[shown], force[shown], label=label, **line)
             below.plot(time[shown], (measured - force)[shown], **line)

@@ -81,4 +81,4 @@ def force_figure(fit: MotionFit) -> Figure:
     models = (("identified model", fit.predicted), ("before the fit", fit.as_given))
     velocity = fit.motion.rows(fit.motion.velocity)
     units = plant.inputs[0].unit, f"{plant.coordinates[0].unit}/s"
-    return drive_figure(fit.motion.row_times, velocity, fit.measured, models, fit.motion.row_noise, units)
+    return drive_figure(fit.motion.row_times, velocity, fit.measured, models, fit.motion.noise, units)

@@ -18,12 +18,12 @@ row more roughly than a force does that a motion so slow makes: the median size 
 that is smooth over some rows is gone. That the noise is white is then assumed, and a warning says so.
 
 Where the plant is slower than its sensor resolves, nobody can tell which way it goes, or whether it goes at all: a
-friction there may have any force between its bounds. Such rows have as much noise as a friction may be large, all
-that inertia and a viscous friction do not explain.
+friction there may have any force between its bounds. Such rows are left out.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from math import sqrt
 from pathlib import Path
@@ -63,7 +63,11 @@ UNEVEN = 0.01
 """Largest departure of a time from an even grid, in steps, up to which samples are taken as they are."""
 
 AT_REST = 3.0
-"""Speeds up to so many standard deviations of the speed's noise do not tell which way a motion goes."""
+"""Speeds up to so many standard deviations of the speed's noise do not tell which way a motion goes. Origin: beyond
+three, one sample of four hundred does."""
+
+UNSEEN = 0.02
+"""Share of a row that may be of samples at rest."""
 
 SELDOM = 0.05
 """Share of the time at rest from which on it is said."""
@@ -89,8 +93,8 @@ class DrivenMotion:
         acceleration: [m/s^2], (n,).
         drive: force of the drive [N], (n,).
         period: time in which the reference repeats [s]; the whole recording where it does not.
-        noise: standard deviation of the noise of a row of force where it moves [N].
-        hidden: standard deviation of what a friction may do there that the motion does not show [N], (n,).
+        noise: standard deviation of the noise of a row of force [N].
+        still: 1 where the motion is slower than its sensor resolves, 0 elsewhere, (n,).
         warnings: what is to be known of it.
         starts: places of the samples with which tests begin, several that were recorded one after the other.
 
@@ -105,7 +109,7 @@ class DrivenMotion:
     drive: NDArray[np.float64]
     period: float
     noise: float
-    hidden: NDArray[np.float64]
+    still: NDArray[np.float64]
     warnings: tuple[DataWarning, ...] = ()
     starts: tuple[int, ...] = (0,)
 
@@ -120,17 +124,19 @@ class DrivenMotion:
         return [slice(*ends) for ends in pairwise((*self.starts, self.position.size))]
 
     def rows(self, signals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Signals (..., n) of any unit as rows, (..., m)."""
+        """Signals (..., n) of any unit as rows, (..., m): those of which no sample is still."""
+        return self._every_row(signals)[..., self._moving]
+
+    def _every_row(self, signals: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.concatenate([_thinned(signals[..., test], self.step) for test in self._tests], axis=-1)
+
+    @cached_property
+    def _moving(self) -> NDArray[np.bool_]:
+        return np.asarray(np.abs(self._every_row(self.still)) < UNSEEN)
 
     def rate(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
         """Time derivative of a signal (n,) [its unit per second]."""
         return np.concatenate([np.gradient(signal[test], self.step) for test in self._tests])
-
-    @property
-    def row_noise(self) -> NDArray[np.float64]:
-        """Standard deviation of the noise of each row of force [N], (m,), with what the motion does not show."""
-        return np.asarray(np.hypot(self.noise, self.rows(self.hidden)))
 
     @property
     def begins(self) -> NDArray[np.float64]:
@@ -144,7 +150,7 @@ class DrivenMotion:
         """Time of each row since the first sample [s], (m,), as if tests followed each other."""
         edge = round(CUT_S / self.step)
         samples = [np.arange(test.start + edge, test.stop - edge, self.every) for test in self._tests]
-        return self.step * np.concatenate(samples).astype(np.float64)
+        return self.step * np.concatenate(samples).astype(np.float64)[self._moving]
 
     @property
     def blocks(self) -> NDArray[np.intp]:
@@ -155,10 +161,11 @@ class DrivenMotion:
             rows = np.arange(len(range(test.start + edge, test.stop - edge, self.every)))
             found.append(first + (rows / max(long, 1)).astype(np.intp))
             first = int(found[-1][-1]) + 1
-        return np.concatenate(found)
+        _, there = np.unique(np.concatenate(found)[self._moving], return_inverse=True)
+        return np.asarray(there, np.intp)
 
 
-_SIGNALS = ("position", "velocity", "acceleration", "drive", "hidden")
+_SIGNALS = ("position", "velocity", "acceleration", "drive", "still")
 
 
 def joined(motions: Sequence[DrivenMotion], source: str) -> DrivenMotion:
@@ -170,7 +177,7 @@ def joined(motions: Sequence[DrivenMotion], source: str) -> DrivenMotion:
     sizes = [each.position.size for each in even]
     weights = np.array([each.row_times.size for each in motions])
     noise = float(np.sqrt(np.average([each.noise**2 for each in motions], weights=weights)))
-    position, velocity, acceleration, drive, hidden = (
+    position, velocity, acceleration, drive, still = (
         np.concatenate([getattr(each, name) for each in even]) for name in _SIGNALS
     )
     return DrivenMotion(
@@ -182,7 +189,7 @@ def joined(motions: Sequence[DrivenMotion], source: str) -> DrivenMotion:
         drive,
         max(each.period for each in motions),
         noise,
-        hidden,
+        still,
         _said_once([warning for each in motions for warning in each.warnings], source),
         tuple(np.cumsum([0, *sizes[:-1]]).tolist()),
     )
@@ -337,15 +344,13 @@ def _driven(
     position = _low_passed(2.0 * _cutoff(step) * step, measured)
     velocity = np.gradient(position, step)
     acceleration = np.gradient(velocity, step)
-    still = np.abs(velocity) < AT_REST * unclear
-    rubs = _beyond(force, np.stack([acceleration, velocity, position, np.ones_like(position)], axis=1))
-    hidden = np.where(still, float(np.sqrt(np.mean(rubs**2))), 0.0)
-    warnings = [] if np.mean(still) < SELDOM else [_at_rest(source, float(np.mean(still)))]
+    still = (np.abs(velocity) < AT_REST * unclear).astype(np.float64)
+    warnings = [] if still.mean() < SELDOM else [_at_rest(source, float(still.mean()))]
     left = _beyond(force, np.stack([acceleration, velocity], axis=1))
     signals = position, velocity, acceleration, force
     if period is not None:
         noise = _repeatability(left, period, step)
-        return DrivenMotion(source, step, *signals, period * step, noise, hidden, tuple(warnings))
+        return _moving(DrivenMotion(source, step, *signals, period * step, noise, still, tuple(warnings)))
     noise = roughness(_thinned(left, step))
     assumed = DataWarning(
         "noise_assumed",
@@ -354,14 +359,25 @@ def _driven(
         remedy="record the same motion twice, so that the noise is measured",
     )
     whole = measured.size * step
-    return DrivenMotion(source, step, *signals, whole, noise, hidden, (assumed, *warnings))
+    return _moving(DrivenMotion(source, step, *signals, whole, noise, still, (assumed, *warnings)))
+
+
+def _moving(motion: DrivenMotion) -> DrivenMotion:
+    """The motion, if it has rows in which it moves."""
+    if motion.row_times.size < _FEWEST:
+        raise InputError(
+            "is slower than its sensor resolves nearly all the time",
+            source=motion.source,
+            remedy="measure finer, or move faster",
+        )
+    return motion
 
 
 def _at_rest(source: str, share: float) -> DataWarning:
     return DataWarning(
         "slower_than_resolved",
-        f"for {100.0 * share:.0f} % of the time the motion is slower than its sensor resolves: what rubs there does "
-        "not show, and hardly counts",
+        f"for {100.0 * share:.0f} % of the time the motion is slower than its sensor resolves, so that the friction "
+        "there may be anything; left out",
         source=source,
         remedy="measure finer, or move faster",
     )

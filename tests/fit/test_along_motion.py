@@ -82,8 +82,7 @@ def test_what_lacks_its_friction_is_not_trusted_and_its_errors_contain_the_truth
 @pytest.mark.parametrize("factor", [100.0, pytest.param(0.01, marks=pytest.mark.slow)])
 def test_force_in_another_unit_gives_parameters_in_that_unit(factor: float) -> None:
     motion = _motion()
-    sizes = {name: factor * getattr(motion, name) for name in ("drive", "noise", "hidden")}
-    other = replace(motion, **sizes)
+    other = replace(motion, drive=factor * motion.drive, noise=factor * motion.noise)
     fit, scaled = _fit(motion, *TEXTBOOK), _fit(other, *TEXTBOOK)
     for name in TRUTH:
         assert scaled[name].value == pytest.approx(factor * fit[name].value, rel=1e-3)

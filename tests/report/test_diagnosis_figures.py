@@ -306,5 +306,5 @@ def test_a_loop_says_of_which_test_it_is_or_of_how_much_of_a_motion(by_kind: dic
     loop = diagnosis.loops[0]
     assert loop_time(diagnosis, loop) == "at 0.5 Hz"
     still = np.zeros(3)
-    along = replace(diagnosis, responses=DriveForces("motion.mat", *([still] * 7)))
+    along = replace(diagnosis, responses=DriveForces("motion.mat", *([still] * 6)))
     assert loop_time(along, replace(loop, frequency_hz=1.0 / 24.84)) == "over the first 24.8 s"

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.recording import RecordedChannel, Recording
-from savgs_ident.responses.driven_motion import recorded_motion
+from savgs_ident.responses.driven_motion import ROWS_HZ, recorded_motion
 
 SEED = 3
 
@@ -91,23 +91,27 @@ def _standing_at_times(count: float) -> tuple[Recording, NDArray[np.bool_], NDAr
 
 
 @pytest.mark.parametrize("count", [1e-5, 2e-5])
-def test_where_the_motion_does_not_show_which_way_it_goes_the_force_hardly_counts(count: float) -> None:
+def test_where_the_motion_does_not_show_which_way_it_goes_no_row_is_compared(count: float) -> None:
     recording, moves, v = _standing_at_times(count)
     motion = recorded_motion(recording, "x", "drive", "here")
     assert "slower_than_resolved" in [each.code for each in motion.warnings]
-    assert np.mean(motion.hidden[~moves] > 0.0) > 0.98
-    fast = np.abs(v) > 0.3 * np.abs(v).max()
-    assert not motion.hidden[fast].any()
+    assert np.mean(motion.still[~moves]) > 0.98
+    assert not motion.still[np.abs(v) > 0.3 * np.abs(v).max()].any()
     columns = np.stack([motion.rows(motion.acceleration), motion.rows(np.sign(v))], axis=1)
     force = motion.rows(motion.drive)
-    noise = motion.row_noise
-    found, errors = _least_squares(columns / noise[:, None], force / noise)
+    assert len(force) == motion.row_times.size == motion.blocks.size < 0.75 * 20.0 * ROWS_HZ
+    assert np.array_equal(np.unique(motion.blocks), np.arange(motion.blocks.max() + 1))
+    found, errors = _least_squares(columns / motion.noise, force / motion.noise)
     truth = np.array([3.0, 2.0])
     assert np.all(np.abs(found - truth) < 4.0 * errors)
     assert np.all(errors < 0.02 * truth)
-    missed = force - columns @ found
-    assert np.mean((missed / noise) ** 2) < 1.2
-    assert np.mean((missed / motion.noise) ** 2) > 10.0
+    assert np.mean(((force - columns @ found) / motion.noise) ** 2) < 1.3
+
+
+def test_what_hardly_moves_for_its_sensor_is_refused() -> None:
+    recording, _, _ = _standing_at_times(0.1)
+    with pytest.raises(InputError, match="slower than its sensor resolves nearly all the time"):
+        recorded_motion(recording, "x", "drive", "here")
 
 
 def _least_squares(

@@ -163,6 +163,7 @@ def drive_figure_of(diagnosis: Diagnosis) -> Figure:
     """The force of the drive and what is left of it; the diagnosis must be one along a motion."""
     forces = diagnosis.responses
     assert isinstance(forces, DriveForces)
+    noise = diagnosis.shrink.floor * float(np.sqrt(np.mean(forces.measured**2)))
     models = (
         (model_label(diagnosis), forces.after),
         ("recalibrated", forces.recalibrated),
@@ -170,7 +171,7 @@ def drive_figure_of(diagnosis: Diagnosis) -> Figure:
     )
     plant = diagnosis.given.plant
     units = plant.inputs[0].unit, f"{plant.coordinates[0].unit}/s"
-    return drive_figure(forces.time, forces.velocity, forces.measured, models, forces.noise, units)
+    return drive_figure(forces.time, forces.velocity, forces.measured, models, noise, units)
 
 
 def drive_words(diagnosis: Diagnosis) -> str:
