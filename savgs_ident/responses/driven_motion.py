@@ -18,7 +18,8 @@ row more roughly than a force does that a motion so slow makes: the median size 
 that is smooth over some rows is gone. That the noise is white is then assumed, and a warning says so.
 
 Where the plant is slower than its sensor resolves, nobody can tell which way it goes, or whether it goes at all: a
-friction there may have any force between its bounds. Such rows are left out.
+friction there may have any force between its bounds. Such rows are left out, but for a motion so steady that the mean
+of its speed over a longer time says which way it goes.
 """
 
 from collections.abc import Sequence
@@ -65,6 +66,9 @@ UNEVEN = 0.01
 AT_REST = 3.0
 """Speeds up to so many standard deviations of the speed's noise do not tell which way a motion goes. Origin: beyond
 three, one sample of four hundred does."""
+
+STEADY_S, STEADY_SAMPLES = 0.25, 16
+"""Time [s], and samples at least, over which a speed that changes by its noise alone is taken as one."""
 
 UNSEEN = 0.02
 """Share of a row that may be of samples at rest."""
@@ -344,7 +348,7 @@ def _driven(
     position = _low_passed(2.0 * _cutoff(step) * step, measured)
     velocity = np.gradient(position, step)
     acceleration = np.gradient(velocity, step)
-    still = (np.abs(velocity) < AT_REST * unclear).astype(np.float64)
+    still = _unresolved(velocity, unclear, step).astype(np.float64)
     warnings = [] if still.mean() < SELDOM else [_at_rest(source, float(still.mean()))]
     left = _beyond(force, np.stack([acceleration, velocity], axis=1))
     signals = position, velocity, acceleration, force
@@ -371,6 +375,19 @@ def _moving(motion: DrivenMotion) -> DrivenMotion:
             remedy="measure finer, or move faster",
         )
     return motion
+
+
+def _unresolved(velocity: NDArray[np.float64], unclear: float, step: float) -> NDArray[np.bool_]:
+    """Where a speed (n,) with noise of standard deviation ``unclear`` does not tell which way it goes, (n,)."""
+    # Takes a second to import, which a diagnosis on dwells would wait for.
+    from scipy.ndimage import uniform_filter1d
+
+    size = max(round(STEADY_S / step), STEADY_SAMPLES)
+    mean, squares = (uniform_filter1d(each, size, mode="nearest") for each in (velocity, velocity**2))
+    limit = AT_REST * unclear
+    alike = squares - mean**2 < limit**2
+    known = np.abs(mean) * np.sqrt(2.0 * _cutoff(step) * step * size) > limit
+    return np.asarray((np.abs(velocity) < limit) & ~(alike & known))
 
 
 def _at_rest(source: str, share: float) -> DataWarning:
