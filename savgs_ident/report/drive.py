@@ -1,6 +1,7 @@
 """The force of a drive along a measured motion, drawn: measured, as models need it, and what they leave."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,16 +30,22 @@ def drive_figure(
     ``units`` are those of force and velocity.
     """
     shown = time <= time[0] + SHOWN_S
+    # Lines are broken where rows are left out.
+    gaps = np.flatnonzero(np.diff(time[shown]) > 1.5 * np.median(np.diff(time))) + 1
+
+    def drawn(axes: Axes, values: NDArray[np.float64], **line: Any) -> None:
+        axes.plot(*(np.insert(each[shown], gaps, np.nan) for each in (time, values)), **line)
+
     with styled():
         figure = new_figure(9.2, 5.6)
         above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(0.5, 1.0, 1.0))
-        above.plot(time[shown], velocity[shown], color=GREY, lw=1.2)
+        drawn(above, velocity, color=GREY, lw=1.2)
         above.set_ylabel(f"velocity [{units[1]}]")
-        middle.plot(time[shown], measured[shown], color=INK, lw=3.2, alpha=0.35, label="measured")
+        drawn(middle, measured, color=INK, lw=3.2, alpha=0.35, label="measured")
         below.axhspan(-noise, noise, color=PALE, lw=0.0, zorder=0.5)
         for (label, force), line in zip(models, LINES, strict=False):
-            middle.plot(time[shown], force[shown], label=label, **line)
-            below.plot(time[shown], (measured - force)[shown], **line)
+            drawn(middle, force, label=label, **line)
+            drawn(below, measured - force, **line)
         middle.set_ylabel(f"force of the drive [{units[0]}]")
         below.set_ylabel(f"measured less\nneeded [{units[0]}]")
         below.set_xlabel("time since the first sample [s]")
