@@ -8,6 +8,7 @@ The unit stands in the header (``name [unit]``, ``name (unit)``, ``name_unit``) 
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -43,10 +44,14 @@ _MOST_REPEATS = 20
 
 def read_csv(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading:
     """Read one CSV file; raises :class:`InputError` where it is no table of measurements."""
-    source = str(path)
     text = TextBlocks(path, progress)
-    blocks = iter(text)
-    first = next(blocks, b"")
+    # What is refused half-way leaves no file open.
+    with closing(iter(text)) as blocks:
+        return _read_table(path, text, blocks, channel_map)
+
+
+def _read_table(path: Path, text: TextBlocks, blocks: Iterator[bytes], channel_map: ChannelMap) -> Reading:
+    source, first = str(path), next(blocks, b"")
     if not first:
         raise _nothing_whole(text, source)
     layout = channel_map.layout

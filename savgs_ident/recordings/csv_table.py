@@ -10,7 +10,7 @@ missing values silently. Errors name the line of a bad cell or row.
 import codecs
 import re
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -45,7 +45,7 @@ class TextBlocks:
         self.cut = ""
         self.tail = b""
 
-    def __iter__(self) -> Iterator[bytes]:
+    def __iter__(self) -> Generator[bytes, None, None]:
         with self.path.open("rb") as stream:
             zipped = stream.read(2) == GZIP_MAGIC
             stream.seek(0)

@@ -279,3 +279,14 @@ def test_broken_channel_map(
     with pytest.raises(InputError, match=message) as caught:
         load_campaign(tmp_path / NAME)
     check_refusal(tmp_path / NAME, caught.value)
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="no list of open files")
+def test_a_file_that_is_refused_half_way_is_closed(tmp_path: Path) -> None:
+    path = tmp_path / "words.csv"
+    path.write_text("only words here\n" * 3)
+    with pytest.raises(InputError) as refused:
+        load_campaign(path)
+    still_open = [each.readlink() for each in Path("/proc/self/fd").iterdir() if each.is_symlink()]
+    assert path not in still_open
+    assert refused.value.source
