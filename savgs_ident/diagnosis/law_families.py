@@ -6,7 +6,7 @@ fitted on the nonlinear plant, and what that fit does not need is taken away aga
 taken away from all, too, which says how well it can be spared.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import log
@@ -184,15 +184,24 @@ def families_fitted(
     found = families_alone(search, every.mode, port, constants)
     near = max(least, every.weight - constants.alarm_log_odds)
 
-    def fitted(family: Family) -> list[FittedFunctions]:
+    def among(
+        family: Family, starts: Sequence[FamilyAlone], known: Sequence[FittedFunctions]
+    ) -> list[FittedFunctions]:
         solved = list[FittedFunctions]()
-        for each in (found[family], *_by_themselves(every.term, port, family, alone, start, constants)):
-            if {*each.functions} in ({*fit.functions} for fit in solved):
+        for each in starts:
+            fits = [*known, *solved]
+            if {*each.functions} in ({*fit.functions} for fit in fits):
                 continue
-            bound = max([near, *(fit.weight - constants.alarm_log_odds for fit in solved)])
+            bound = max([near, *(fit.weight - constants.alarm_log_odds for fit in fits)])
             one = _fitted(search, every, port, family, each, bound, constants)
             solved += [] if one is None else [one]
         return solved
+
+    def fitted(family: Family) -> list[FittedFunctions]:
+        first = among(family, [found[family]], ())
+        groups = _by_themselves(every.term, port, family, alone, start, constants)
+        others = in_parallel(lambda starts: among(family, starts, first), groups)
+        return [*first, *(fit for some in others for fit in some)]
 
     weights = {family: each.weight for family, each in found.items()}
     likely = sorted(found, key=lambda family: -weights[family])[: constants.likely_families]
@@ -214,18 +223,20 @@ def _by_themselves(
     alone: Mapping[tuple[str, ...], float],
     start: Mapping[str, float],
     constants: DecisionConstants,
-) -> list[FamilyAlone]:
-    """Those functions of a family that could be all of it, the fewest functions first.
+) -> list[list[FamilyAlone]]:
+    """Those functions of a family that could be all of it, the fewest functions first, each with its starts.
 
     Where their prior is wider or narrower than beside all others, each is a start: the first step from the wider one
     may leave the range in which the plant is solved, and the narrower one may promise too little.
     """
     mine = _seen_of(term, port, family)
     return [
-        FamilyAlone(group, each, -np.inf, _log_prior(group, mine, port, constants), start)
+        [
+            FamilyAlone(group, each, -np.inf, _log_prior(group, mine, port, constants), start)
+            for each in dict.fromkeys((1.0, alone[group]))
+        ]
         for group in sorted(alone, key=len)
         if {*group} <= {*mine}
-        for each in dict.fromkeys((1.0, alone[group]))
     ]
 
 
