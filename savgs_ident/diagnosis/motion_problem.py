@@ -280,6 +280,7 @@ class MotionProblem(AbstractProblem):
                 inferred=((self.motion.rows(self.motion.drive) - base.rows) / gain)[start:end],
                 law=force[start:end],
                 unit=port.force_unit,
+                motion_unit=port.displacement_unit,
                 law_sd=root_sum_square([each[start:end] - force[start:end] for each in errors if each.size]),
                 nearest=self._force_of(nearest)[start:end],
             ),

@@ -192,6 +192,14 @@ def test_the_map_names_channel_units_and_dwells(diagnosis: Diagnosis) -> None:
     assert [text.get_text() for text in above.get_yticklabels()] == [str(k) for k in range(1, 10)]
 
 
+def test_turns_of_many_radians_are_drawn_in_radians(diagnosis: Diagnosis) -> None:
+    loop = diagnosis.loops[1]
+    wide = replace(loop, displacement=500.0 * loop.displacement, velocity=500.0 * loop.velocity)
+    left, right = force_figure(diagnosis, replace(wide, motion_unit="rad")).axes
+    assert (left.get_xlabel(), right.get_xlabel()) == ("velocity [rad/s]", "displacement [rad]")
+    assert_allclose(np.asarray(left.get_lines()[1].get_xdata())[:-1], wide.velocity)
+
+
 def test_a_loop_is_drawn_whole_over_velocity_and_displacement(diagnosis: Diagnosis) -> None:
     loop = diagnosis.loops[1]
     figure = force_figure(diagnosis, replace(loop, displacement=loop.displacement + 0.45))

@@ -51,8 +51,8 @@ def force_figure(diagnosis: Diagnosis, loop: ForceLoop) -> Figure:
 
     The law with its 95 % band; beside a learned one the formula of the catalogue that comes nearest.
     """
-    unit, scale = _SMALL_UNITS.get(loop.unit, (loop.unit, 1.0))
-    motion_unit, factor = _SMALL_UNITS.get(loop.motion_unit, (loop.motion_unit, 1.0))
+    unit, scale = _unit_for(loop.unit, loop.inferred)
+    motion_unit, factor = _unit_for(loop.motion_unit, loop.displacement)
     with styled():
         figure = new_figure(4.5, 3.0)
         figure.set_layout_engine("none")
@@ -83,6 +83,12 @@ def force_figure(diagnosis: Diagnosis, loop: ForceLoop) -> Figure:
         handles, labels = left.get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.55, 0.925), ncols=2)
         return figure
+
+
+def _unit_for(unit: str, values: NDArray[np.float64]) -> tuple[str, float]:
+    """The unit in which such values are drawn, and how many of it are one of theirs: smaller ones below one."""
+    small = np.ptp(values) < 1.0
+    return _SMALL_UNITS.get(unit, (unit, 1.0)) if small else (unit, 1.0)
 
 
 def _quantity(unit: str) -> str:
