@@ -26,7 +26,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +34,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.axis_recording import AxisRecording, is_axis, read_axis
 from savgs_ident.recordings.recording import RecordedChannel, Recording
+from savgs_ident.responses.resolution import NORMAL, noise_of_rate, noise_of_speed, roughness, unresolved
 
 CUTOFF_HZ = 100.0
 """The position passes up to here [Hz]."""
@@ -63,26 +63,14 @@ SAME_AS_MEASURED = 1e-4
 UNEVEN = 0.01
 """Largest departure of a time from an even grid, in steps, up to which samples are taken as they are."""
 
-AT_REST = 3.0
-"""Speeds up to so many standard deviations of the speed's noise do not tell which way a motion goes. Origin: beyond
-three, one sample of four hundred does."""
-
-STEADY_S, STEADY_SAMPLES = 0.25, 16
-"""Time [s], and samples at least, over which a speed that changes by its noise alone is taken as one."""
-
 UNSEEN = 0.02
 """Share of a row that may be of samples at rest."""
 
 SELDOM = 0.05
 """Share of the time at rest from which on it is said."""
 
-ROUNDED, COUNTED, WHOLE = 1e-9, 10.0, 0.05
-"""How a sensor that counts is known: its changes that are more than a rounding, as a share of all that it shows, and
-up to so many counts, are whole numbers of counts to within this [1]."""
-
 _ORDER = 4
 _FEWEST = 100
-_NORMAL = 1.4826
 
 
 @dataclass(frozen=True)
@@ -250,7 +238,7 @@ def driven_motion(recording: AxisRecording) -> DrivenMotion:
             source=recording.source,
             remedy="record two cycles or more",
         )
-    unclear = _speed_noise_of_position(recording.position, recording.step)
+    unclear = noise_of_rate(recording.position, recording.step, _cutoff(recording.step))
     return _driven(recording.source, recording.step, recording.position, recording.force, period, unclear)
 
 
@@ -262,7 +250,7 @@ def recorded_motion(recording: Recording, motion: str, drive: str, source: str) 
     """
     step, position, force = _even(recording, motion, drive, source)
     period = period_of(position, SAME_AS_MEASURED)
-    unclear = _speed_noise_of_position(position, step)
+    unclear = noise_of_rate(position, step, _cutoff(step))
     return _driven(f"{source}, {recording.name}", step, position, force, period, unclear)
 
 
@@ -274,7 +262,7 @@ def recorded_speed(recording: Recording, speed: str, drive: str, source: str) ->
     step, velocity, force = _even(recording, speed, drive, source)
     position = np.concatenate([[0.0], np.cumsum(0.5 * step * (velocity[1:] + velocity[:-1]))])
     period = period_of(velocity, SAME_AS_MEASURED)
-    unclear = resolution(velocity) * np.sqrt(2.0 * _cutoff(step) * step)
+    unclear = noise_of_speed(velocity, step, _cutoff(step))
     return _driven(f"{source}, {recording.name}", step, position, force, period, unclear)
 
 
@@ -310,27 +298,6 @@ def _cutoff(step: float) -> float:
     return min(CUTOFF_HZ, SHARE_OF_RATE / step)
 
 
-def _speed_noise_of_position(position: NDArray[np.float64], step: float) -> float:
-    """Standard deviation of the noise that the speed has from that of a position, below the cutoff."""
-    return 2.0 * np.pi * resolution(position) * float(np.sqrt(2.0 * step * _cutoff(step) ** 3 / 3.0))
-
-
-def resolution(values: NDArray[np.float64]) -> float:
-    """Standard deviation of what a sensor does not resolve in values (n,), in their unit: noise, or its steps."""
-    return max(roughness(values), _step_of(values) / sqrt(12.0))
-
-
-def _step_of(values: NDArray[np.float64]) -> float:
-    """Step of a sensor that counts, from values (n,), in their unit: its changes are multiples of it; 0 otherwise."""
-    changes = np.abs(np.diff(values))
-    changes = changes[changes > ROUNDED * np.ptp(values)]
-    if not changes.size:
-        return 0.0
-    least = float(np.quantile(changes, 0.01))
-    counts = changes[changes < COUNTED * least] / least
-    return least if np.median(np.abs(counts - np.round(counts))) < WHOLE else 0.0
-
-
 def _driven(
     source: str,
     step: float,
@@ -348,7 +315,7 @@ def _driven(
     position = _low_passed(2.0 * _cutoff(step) * step, measured)
     velocity = np.gradient(position, step)
     acceleration = np.gradient(velocity, step)
-    still = _unresolved(velocity, unclear, step).astype(np.float64)
+    still = unresolved(velocity, unclear, step, _cutoff(step)).astype(np.float64)
     warnings = [] if still.mean() < SELDOM else [_at_rest(source, float(still.mean()))]
     left = _beyond(force, np.stack([acceleration, velocity], axis=1))
     signals = position, velocity, acceleration, force
@@ -375,19 +342,6 @@ def _moving(motion: DrivenMotion) -> DrivenMotion:
             remedy="measure finer, or move faster",
         )
     return motion
-
-
-def _unresolved(velocity: NDArray[np.float64], unclear: float, step: float) -> NDArray[np.bool_]:
-    """Where a speed (n,) with noise of standard deviation ``unclear`` does not tell which way it goes, (n,)."""
-    # Takes a second to import, which a diagnosis on dwells would wait for.
-    from scipy.ndimage import uniform_filter1d
-
-    size = max(round(STEADY_S / step), STEADY_SAMPLES)
-    mean, squares = (uniform_filter1d(each, size, mode="nearest") for each in (velocity, velocity**2))
-    limit = AT_REST * unclear
-    alike = squares - mean**2 < limit**2
-    known = np.abs(mean) * np.sqrt(2.0 * _cutoff(step) * step * size) > limit
-    return np.asarray((np.abs(velocity) < limit) & ~(alike & known))
 
 
 def _at_rest(source: str, share: float) -> DataWarning:
@@ -430,13 +384,7 @@ def _beyond(force: NDArray[np.float64], inertial: NDArray[np.float64]) -> NDArra
 def _repeatability(left: NDArray[np.float64], period: int, step: float) -> float:
     """Standard deviation of a row's noise [N], from what does not repeat after ``period`` samples."""
     apart = _thinned(left[period:] - left[:-period], step)
-    return float(_NORMAL * np.median(np.abs(apart)) / np.sqrt(2.0))
-
-
-def roughness(rows: NDArray[np.float64]) -> float:
-    """Standard deviation of white noise in values (n,) that are smooth but for that, in their unit."""
-    # The squares of the binomial coefficients 1, 3, 3, 1 add up to 20.
-    return float(_NORMAL * np.median(np.abs(np.diff(rows, 3))) / np.sqrt(20.0))
+    return float(NORMAL * np.median(np.abs(apart)) / np.sqrt(2.0))
 
 
 def _samples_to_a_row(step: float) -> int:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning
 from savgs_ident.recordings.recording import Recording
-from savgs_ident.responses.driven_motion import roughness
+from savgs_ident.responses.resolution import roughness
 
 Array = NDArray[np.float64]
 
