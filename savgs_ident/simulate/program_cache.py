@@ -245,22 +245,24 @@ MUCH_MEMORY = 2 * 2**30
 LEAST_ROOM = 64 * 2**20
 """Space on the disk [byte] below which no programs are kept: half of one would be found in every later run."""
 
-_QUICK = {"xla_cpu_use_fusion_emitters": "false"}
-_QUICK_ON_X86 = {"xla_cpu_max_isa": "AVX2"}
-_QUICK_IS_KNOWN_TO = "0.10."
+_QUICK = {"--xla_cpu_use_fusion_emitters=false": ("0.10.",)}
+_QUICK_ON_X86 = {"--xla_cpu_max_isa=AVX2": ("0.10.", "0.11.", "0.12.")}
+"""Flags, and how the versions of jaxlib begin on which they were tried: XLA ends the process for one it lacks."""
 
 
 def spare_the_compiler() -> None:
     """Compile in half the time and memory, for the same speed of what is compiled.
 
     Wider registers than those of AVX2 are no gain where arrays come from memory, and take longer to compile for.
-    A flag that XLA does not know ends the process, hence only for versions on which it was tried.
     """
-    flags = os.environ.get("XLA_FLAGS", "")
-    if version("jaxlib").startswith(_QUICK_IS_KNOWN_TO):
-        quick = _QUICK | (_QUICK_ON_X86 if platform.machine() in ("x86_64", "AMD64") else {})
-        asked = [f"--{name}={value}" for name, value in quick.items() if name not in flags]
-        os.environ["XLA_FLAGS"] = " ".join([*flags.split(), *asked])
+    flags, compiler = os.environ.get("XLA_FLAGS", ""), version("jaxlib")
+    quick = _QUICK | (_QUICK_ON_X86 if platform.machine() in ("x86_64", "AMD64") else {})
+    asked = [
+        flag
+        for flag, tried in quick.items()
+        if compiler.startswith(tried) and flag.split("=")[0].strip("-") not in flags
+    ]
+    os.environ["XLA_FLAGS"] = " ".join([*flags.split(), *asked])
 
 
 def cache_folder() -> Path:
