@@ -153,7 +153,7 @@ class DwellProblem(AbstractProblem):
         rows = np.asarray(rows_of(model, self.likelihood, p, solution, self.orders))
         rows = rows + self.corrections.get(terms, 0.0) + (0.0 if self.beyond is None else self.beyond)
         status = joint_status(solution.status())
-        slopes = self.slopes(model, p, solution, self._shared.names(terms, names))
+        slopes = partial(self.slopes, model, p, solution, self._shared.names(terms, names))
         return Prediction(rows, slopes, status, solution)
 
     def corrected(

@@ -62,7 +62,7 @@ class _NearFit:
         self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
     ) -> Prediction:
         found = self.plant.predict(terms, values, (), warm_start)
-        return found._replace(slopes=self.fit.prediction.slopes) if names else found
+        return replace(found, find_slopes=lambda: self.fit.prediction.slopes) if names else found
 
     def refined(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any) -> Any:
         return self.plant.refined(terms, values, warm_start)

@@ -93,7 +93,7 @@ class MotionProblem(AbstractProblem):
     ) -> Prediction:
         """Force rows [N] with ``terms`` at ``values`` [SI], with slopes in ``names``."""
         found = force_rows(self.model(terms), self.values(values), self.motion, names)
-        return Prediction(found.rows, found.slopes, found.status, warm_start)
+        return Prediction(found.rows, lambda: found.slopes, found.status, warm_start)
 
     def _slopes(
         self, model: AbstractPlant, values: Mapping[str, float], names: Sequence[str]

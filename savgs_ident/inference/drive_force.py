@@ -100,7 +100,7 @@ class DriveForce:
         """Rows [N] at ``values`` [SI], with slopes in ``names``; no ``terms`` can be asked for."""
         assert not terms, terms
         found = force_rows(self.model, as_values(self.table.as_dict() | dict(values)), self.motion, names)
-        return Prediction(found.rows, found.slopes, found.status, warm_start)
+        return Prediction(found.rows, lambda: found.slopes, found.status, warm_start)
 
     def refined(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any) -> Any:
         """Nothing: the motion is known."""

@@ -91,10 +91,11 @@ class _Ascent:
 
     def density(self, values: Mapping[str, float], warm_start: Any) -> float:
         """Log density of rows and prior at ``values`` [SI], within the bounds; minus infinity without a solution."""
-        return self._without_slopes(self._coordinates_at(values), warm_start).value
+        return self.start(values, warm_start).value
 
     def step(self, point: _Point) -> _Point:
         """The point one step on; the same, with the status, where there is no step that rises."""
+        point = self._sloped(point)
         if not point.prediction.solved or point.status is not None:
             return point
         bounds = tuple(np.where(self._fixed, point.x, each) for each in bounds_of(self._coordinates))
@@ -114,9 +115,7 @@ class _Ascent:
             done = there.value < point.value + self._level and promised < ROUGH
             return there._replace(status=Status.CONVERGED) if done else there
         for share in self._shares(promised):
-            there = self._without_slopes(point.x + share * (top.x - point.x), here.warm_start)
-            if there.value > point.value:
-                there = self._at(there.x, there.prediction.warm_start)
+            there = self._at(point.x + share * (top.x - point.x), here.warm_start)
             if there.value > point.value:
                 little = there.value < point.value + self._level
                 return there._replace(status=Status.CONVERGED) if little else there
@@ -151,17 +150,17 @@ class _Ascent:
         return np.array([each.name in self._held for each in self._coordinates], bool)
 
     def _at(self, x: Array, warm_start: Any) -> _Point:
-        return self._point(x, warm_start, [each.name for each in self._coordinates])
-
-    def _without_slopes(self, x: Array, warm_start: Any) -> _Point:
-        """For its value alone: slopes take longer than the motion."""
-        return self._point(x, warm_start, [])
-
-    def _point(self, x: Array, warm_start: Any, wanted: list[str]) -> _Point:
+        wanted = [each.name for each in self._coordinates]
         found = self._search.plant.predict(self._names, values_at(self._coordinates, x), wanted, warm_start)
-        if found.solved and not (np.isfinite(found.rows).all() and np.isfinite(found.slopes).all()):
-            found = found._replace(status=Status.NOT_FINITE)
+        if found.solved and not np.isfinite(found.rows).all():
+            found = replace(found, status=Status.NOT_FINITE)
         return self._valued(x, found)
+
+    def _sloped(self, point: _Point) -> _Point:
+        """The point, which is not solved where its slopes are not finite."""
+        if not point.prediction.solved or np.isfinite(point.prediction.slopes).all():
+            return point
+        return point._replace(prediction=replace(point.prediction, status=Status.NOT_FINITE), value=-np.inf)
 
     def _valued(self, x: Array, found: Prediction) -> _Point:
         if not found.solved:
@@ -170,6 +169,7 @@ class _Ascent:
         return _Point(x, found, scales.value - 0.5 * float(x @ x))
 
     def _fit(self, point: _Point) -> LaplaceFit:
+        point = self._sloped(point)
         search, coordinates, here = self._search, self._coordinates, point.prediction
         slopes = here.slopes * slopes_at(coordinates, point.x)
         scales = noise_scales(search.rows, search.missed(here))

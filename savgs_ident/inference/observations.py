@@ -1,6 +1,6 @@
 """What a search asks of a plant, and the data that it is held against: independent rows with their noise."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
@@ -16,17 +16,26 @@ MULTIPLES = (0.4, 1.0, 2.5)
 """Shapes are tried at these multiples of their typical values, unless a term says otherwise."""
 
 
-class Prediction(NamedTuple):
-    """A plant at a point: rows (m,), their slopes in the named values (m, n), and what it starts from nearby.
+@dataclass(frozen=True)
+class Prediction:
+    """A plant at a point.
 
-    ``status`` says how the solution of the plant ended. Rows are in their own units, slopes in those per
-    unit of the value.
+    Attributes:
+        rows: what it predicts, in their own units, (m,).
+        find_slopes: what :attr:`slopes` are found with: it takes longer than the rows, and not all are asked for.
+        status: how the solution of the plant ended.
+        warm_start: what the plant starts from nearby.
     """
 
     rows: NDArray[np.float64]
-    slopes: NDArray[np.float64]
+    find_slopes: Callable[[], NDArray[np.float64]]
     status: Status
     warm_start: Any
+
+    @cached_property
+    def slopes(self) -> NDArray[np.float64]:
+        """Slopes of the rows in the named values [units of the rows per unit of the value], (m, n)."""
+        return self.find_slopes()
 
     @property
     def solved(self) -> bool:

@@ -166,7 +166,8 @@ class PosteriorPlant:
         u = problem.free.to_unconstrained(values)
         rows, slopes, solution = rows_and_slopes(problem, self.posterior.likelihood, u, warm_start)
         status = joint_status(solution.status())
-        return Prediction(rows, slopes / np.asarray(problem.slopes(u)), status, solution)
+        by_value = slopes / np.asarray(problem.slopes(u))
+        return Prediction(rows, lambda: by_value, status, solution)
 
     def refined(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution

@@ -30,7 +30,7 @@ class Plant(ToyPlant):
     def predict(self, terms: Any, values: Any, names: Any, warm_start: Any) -> Prediction:
         found = super().predict(terms, values, names, warm_start)
         status = Status.CONVERGED if values.get("a", 1.0) > 0.0 else Status.NOT_FINITE
-        return Prediction(found.rows, found.slopes, status, warm_start)
+        return Prediction(found.rows, found.find_slopes, status, warm_start)
 
 
 PLANT = Plant()

@@ -195,7 +195,7 @@ def test_what_resembles_the_right_one_leaves_little_of_the_misfit_and_does_not_e
     right = next(each for each in findings.modes if each.terms == ("bend",))
     size = NOISE * np.sign(search.residual(right.prediction))
     rows = search.data.measured - size * np.sqrt(1.0 + off**2)
-    like = replace(right, prediction=right.prediction._replace(rows=rows))
+    like = replace(right, prediction=replace(right.prediction, rows=rows))
     like = replace(like, noise_scales=noise_scales(search.rows, search.missed(like.prediction)))
     assert left_over(search, findings.base, like) < DEFAULTS.explained_share
     assert explains_all(search, findings.base, like) == all_of_it
@@ -204,8 +204,8 @@ def test_what_resembles_the_right_one_leaves_little_of_the_misfit_and_does_not_e
 def test_what_leaves_more_than_a_baseline_that_left_nothing_explains_nothing() -> None:
     search = search_of(PLANT, draw(PLANT, {"a": 1.1}, NOISE, 2))
     base = find_map(search, (), {}, None)
-    off = replace(base, prediction=base.prediction._replace(rows=base.prediction.rows + 3.0 * NOISE))
-    perfect = replace(base, prediction=base.prediction._replace(rows=search.data.measured))
+    off = replace(base, prediction=replace(base.prediction, rows=base.prediction.rows + 3.0 * NOISE))
+    perfect = replace(base, prediction=replace(base.prediction, rows=search.data.measured))
     assert left_over(search, perfect, base) == 0.0
     assert left_over(search, perfect, off) == np.inf
 
@@ -217,7 +217,7 @@ class _Breaking(ToyPlant):
         self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
     ) -> Prediction:
         found = super().predict(terms, values, names, warm_start)
-        return found._replace(status=Status.STALLED) if "twist" in terms else found
+        return replace(found, status=Status.STALLED) if "twist" in terms else found
 
     def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]

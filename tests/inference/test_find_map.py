@@ -1,6 +1,7 @@
 """The search for the mode from two starts: from where calibration ended and from the parameters as given."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.held_out import find_map_near
-from savgs_ident.inference.find_map import find_map, find_map_from_both
+from savgs_ident.inference.find_map import find_map, find_map_from_both, find_map_from_several
 from savgs_ident.inference.laplace_fit import Search, Start, search_of
 from savgs_ident.inference.observations import Prediction
 from savgs_ident.inference.prior import Coordinates, sheet_coordinate
@@ -78,6 +79,36 @@ def test_only_a_search_that_cannot_come_near_another_hypothesis_is_given_up(seed
     kept = find_map_from_both(search, (BEND,), {"w": 5.0}, None, least=least)
     assert kept.status is best.status
     np.testing.assert_array_equal(kept.x, best.x)
+
+
+class NotingPlant(WavyPlant):
+    """Notes at which numbers of waves it was predicted, and where its slopes were found."""
+
+    def __init__(self) -> None:
+        self.predicted: list[float] = []
+        self.sloped: list[float] = []
+
+    def predict(
+        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
+    ) -> Prediction:
+        found = super().predict(terms, values, names, warm_start)
+        self.predicted.append(values["w"])
+
+        def slopes() -> NDArray[np.float64]:
+            self.sloped.append(values["w"])
+            return found.slopes
+
+        return replace(found, find_slopes=slopes)
+
+
+def test_slopes_are_found_once_where_a_search_goes_on_from_and_nowhere_else() -> None:
+    plant = NotingPlant()
+    search = search_of(plant, draw(PLANT, TRUTH, 0.02, 1))
+    starts = [{"w": 5.0}, {"w": 9.0}, {"w": 17.0}]
+    found = find_map_from_several(search, (BEND,), starts, None, 1, 1)
+    assert found.status.ok
+    assert len(plant.sloped) == len(set(plant.sloped)) < len(set(plant.predicted))
+    assert {5.0, 9.0, 17.0, found.values["w"]} <= set(plant.sloped)
 
 
 class CountingPlant(WavyPlant):
