@@ -39,6 +39,7 @@ from savgs_ident.effects.base import (
 from savgs_ident.effects.laws.asymmetry import Asymmetry
 from savgs_ident.effects.laws.attached_oscillator import AttachedOscillator
 from savgs_ident.effects.laws.backlash import Backlash
+from savgs_ident.effects.laws.breakaway import Breakaway
 from savgs_ident.effects.laws.compliance import Compliance
 from savgs_ident.effects.laws.coulomb import Coulomb
 from savgs_ident.effects.laws.delay import Delay
@@ -278,6 +279,7 @@ LAWS: tuple[AbstractLaw, ...] = (
     Coulomb(),
     Preload(),
     Stribeck(),
+    Breakaway(),
     Asymmetry(),
     PreslidingFriction(),
     SaturatingFriction(),

@@ -169,6 +169,7 @@ def _port(model: PlantModel, port: Port) -> Iterator[Finding]:
                 yield _unknown(f"port '{port.name}': contact", name)
             elif table[name].unit not in units:
                 yield _other_unit(f"port '{port.name}': contact", name, table[name].unit, units[0])
+        yield from _soft(model, port)
     for number in port.numbers:
         if number.name not in table:
             yield _unknown(f"port '{port.name}': number", number.name)
@@ -194,6 +195,27 @@ def _port(model: PlantModel, port: Port) -> Iterator[Finding]:
                     "fault",
                     f"port '{port.name}': an inertia refers to '{name}', which is no force port",
                     "name force ports of the plant",
+                )
+
+
+HOLDS = 0.1
+"""Share of a typical displacement or velocity within which a contact should hold a typical friction [1]."""
+
+
+def _soft(model: PlantModel, port: Port) -> Iterator[Finding]:
+    """A contact that gives, or creeps, through much of the motion before it holds a typical friction."""
+    table = model.table
+    sizes = (port.displacement, port.displacement_unit), (port.velocity, f"{port.displacement_unit}/s")
+    for name, (size, unit), acts in zip(port.contact or (), sizes, ("spring", "damper"), strict=True):
+        if name in table and table[name].value > 0.0 and _positive(size) and _positive(port.force):
+            reached = port.force / table[name].value
+            if reached > HOLDS * size:
+                given = f"'{name}' of {table[name].value:g} {table[name].unit}"
+                yield Finding(
+                    "note",
+                    f"port '{port.name}': with {given} its contact holds a friction of {port.force:g} "
+                    f"{port.force_unit} from {reached:.2g} {unit} on, {reached / size:.0%} of the typical motion, "
+                    f"and acts like a {acts} before; a greater one sticks",
                 )
 
 

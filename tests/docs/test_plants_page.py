@@ -36,7 +36,9 @@ def test_the_commands_of_the_page_on_hardware_are_those_of_the_program() -> None
 
 def test_its_table_of_laws_says_where_they_can_act() -> None:
     rows = re.findall(
-        r"^\| (`viscous`.*|`friction`.*|`preload`.*|`saturating.*|`coulomb`.*) \| (.*) \|$", PAGE, re.M
+        r"^\| (`viscous`.*|`friction`.*|`preload`.*|`breakaway`.*|`saturating.*|`coulomb`.*) \| (.*) \|$",
+        PAGE,
+        re.M,
     )
     by_where = {where: set(re.findall(r"`(\w+)`", laws)) for laws, where in rows}
     sticks = ("k_pre", "c_pre")
@@ -46,6 +48,7 @@ def test_its_table_of_laws_says_where_they_can_act() -> None:
         said |= by_where["with a `contact`"] if contact else by_where["without a `contact`"]
         said |= by_where["`loaded`"] if loaded else set()
         said |= by_where["with a `contact`, and `loaded`"] if contact and loaded else set()
+        said |= by_where["with a `contact`, and not `loaded`"] if contact and not loaded else set()
         assert said == {law.name for law in LAWS if law.suits(port)}
     assert Stribeck().typical(Port("p", PortKind.FORCE, "p"))["coefficient"] == 0.03
 

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from jaxtyping import Array
 
 from savgs_ident.core.values import Values
-from savgs_ident.effects.base import PortSignals, Presliding, bristle
+from savgs_ident.effects.base import Port, PortKind, PortSignals, Presliding, bristle
+from savgs_ident.effects.effect import generic_effects
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE
 from savgs_ident.plants.quarter_car.kinematics import strut_length
 from savgs_ident.plants.quarter_car.rig import Rig
@@ -114,6 +115,30 @@ def test_it_falls_with_speed_either_way_whatever_the_load(slow: float, more: flo
     assert _share(slow + more, load) < _share(slow, load) or _share(slow, load) < 1e-12
     assert _share(-slow, load) == _share(slow, load)
     assert _share(slow, load) == pytest.approx(_share(slow), rel=1e-12, abs=1e-300)
+
+
+# bush_breakaway: friction without load that rises towards rest.
+
+
+@given(
+    force=st.floats(0.1, 1e3),
+    rise=st.floats(0.02, 10.0),
+    speed=st.floats(1e-3, 1.0),
+    velocity=st.floats(-2.0, 2.0),
+)
+def test_without_load_it_is_the_friction_of_fast_sliding_and_what_stribecks_law_adds_to_as_much(
+    force: float, rise: float, speed: float, velocity: float
+) -> None:
+    port = Port("bush", PortKind.FORCE, "bush", contact=("k", "c"))
+    (effect,) = (each for each in generic_effects((port,)).values() if each.law.name == "breakaway")
+    numbers = {"bush_breakaway_force": force, "bush_breakaway_rise": rise, "bush_breakaway_velocity": speed}
+    found = effect.friction_limit(as_values(numbers), signals(velocity=velocity))
+    added = STRIBECK.friction_limit(
+        as_values({"mu_r": 0.03, "stribeck_rise": rise, "stribeck_velocity": speed}),
+        signals(velocity=velocity, load=force / 0.03),
+    )
+    assert float(found.against_up) == float(found.against_down)
+    assert float(found.against_up) == pytest.approx(force + float(added.against_up), rel=1e-12)
 
 
 # rail_asymmetry: a rail that holds more one way: the mean of both stays, the two differ.

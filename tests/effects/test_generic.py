@@ -17,6 +17,7 @@ from savgs_ident.effects.laws.viscous import Viscous
 from ..in_one_test import over
 
 SLIDE = Port("slide", PortKind.FORCE, "slide", loaded=True, contact=("k_stick", "c_stick"))
+BUSH = Port("bush", PortKind.FORCE, "bush", contact=("k_stick", "c_stick"))
 SPINDLE = Port(
     "spindle",
     PortKind.FORCE,
@@ -34,7 +35,7 @@ NUT = Port("nut", PortKind.SERIES, "spindle", displacement=1e-5, velocity=1e-3, 
 MASS = Port("mass", PortKind.NUMBER, "mass", numbers=(Number("m", "kg", 2.0), Number("J", "kg m^2", 0.1)))
 DRIVE = Port("drive", PortKind.INPUT, "drive", displacement_unit="N", force_unit="N m")
 ENCODER = Port("encoder", PortKind.SENSOR, "sensor.position")
-EFFECTS = generic_effects((SLIDE, SPINDLE, BELT, NUT, MASS, DRIVE, ENCODER))
+EFFECTS = generic_effects((SLIDE, BUSH, SPINDLE, BELT, NUT, MASS, DRIVE, ENCODER))
 PLANT = {"m": 30.0, "J": 0.5, "k_stick": 1e7, "c_stick": 1e3}
 
 each_effect = over("effect", EFFECTS.values())
@@ -92,7 +93,10 @@ def test_every_law_that_needs_no_more_than_a_port_is_there() -> None:
 def test_a_contact_that_sticks_has_limits_and_a_port_that_does_not_a_bristle_of_its_own() -> None:
     at_the_slide = {effect.law.name for effect in EFFECTS.values() if effect.port == SLIDE}
     assert {"coulomb", "preload", "stribeck", "asymmetry"} <= at_the_slide
-    assert "friction" not in at_the_slide
+    assert not {"friction", "breakaway"} & at_the_slide
+    at_the_bush = {effect.law.name for effect in EFFECTS.values() if effect.port == BUSH}
+    assert {"preload", "breakaway"} <= at_the_bush
+    assert not {"coulomb", "stribeck", "asymmetry", "friction"} & at_the_bush
     assert "spindle_friction" in EFFECTS
 
 

@@ -265,6 +265,24 @@ def test_what_does_not_go_together_is_said(declared: dict[str, Any], said: str) 
     assert any(said in each for each in found), found
 
 
+@pytest.mark.parametrize(
+    ("stiffness", "damping", "acts"), [(1e5, 1e3, ()), (1e5, 2.0, ("damper",)), (1e-3, 1e3, ("spring",))]
+)
+def test_a_contact_that_holds_a_friction_late_is_said_to_act_like_what_it_is(
+    stiffness: float, damping: float, acts: tuple[str, ...]
+) -> None:
+    contact = si.Parameter("k_pre", stiffness, "N/m"), si.Parameter("c_pre", damping, "N s/m")
+    sticking = _changed(
+        ports=(replace(GUIDE, contact=("k_pre", "c_pre")), *Sound.ports[1:]),
+        parameters=si.ParameterTable((M, K, C, *contact)),
+    )
+    declared = check_declaration(si.load_plant(sticking))
+    notes = [each.what for each in declared if "its contact holds" in each.what]
+    assert len(notes) == len(acts)
+    assert all(f"acts like a {each} before" in note for each, note in zip(acts, notes, strict=True))
+    assert all("from 0.5 m/s on, 500% of the typical motion" in each for each in notes if damping == 2.0)
+
+
 @pytest.mark.slow
 def test_parameters_that_nothing_shows_and_that_nothing_tells_apart(tmp_path: Path) -> None:
     """Mass, spring and damper scale together where no force is measured; what is used nowhere moves nothing."""
