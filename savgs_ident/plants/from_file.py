@@ -114,7 +114,7 @@ def _run(file: Path) -> ModuleType:
         sys.path.append(str(file.parent))
     try:
         module = importlib.import_module(file.stem)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(
             f"cannot be run: {fault_in(file, error)}", source=file, remedy="mend it there, and try again"
         ) from error
@@ -127,7 +127,7 @@ def _run(file: Path) -> ModuleType:
     return module
 
 
-def fault_in(file: Path, error: Exception) -> str:
+def fault_in(file: Path, error: BaseException) -> str:
     """What went wrong in a file, with its line, in a sentence."""
     if isinstance(error, SyntaxError):
         return f"line {error.lineno}: {error.msg}"

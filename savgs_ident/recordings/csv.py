@@ -34,7 +34,7 @@ from savgs_ident.recordings.recording import (
     normalise,
     unix_time,
 )
-from savgs_ident.recordings.signals import rules_for
+from savgs_ident.recordings.signals import rules_for, test_of
 
 TEST_COLUMNS = ("test", "test_name", "run", "condition")
 """Usual names of the column with the test's name."""
@@ -82,7 +82,7 @@ def _read_table(path: Path, text: TextBlocks, blocks: Iterator[bytes], channel_m
         raise InputError(
             "has a header but no data", source=source, remedy="record again, or give another file"
         )
-    runs = table.runs or [(_stem(path), 0)]
+    runs = table.runs or [(test_of(path), 0)]
     columns = {position: table.take(position) for position in positions}
     # An overflow becomes infinite, which the checks report.
     with np.errstate(over="ignore", invalid="ignore"):
@@ -107,10 +107,6 @@ def _chain(body: bytes, blocks: Iterable[bytes]) -> Iterator[bytes]:
     if body:
         yield body
     yield from blocks
-
-
-def _stem(path: Path) -> str:
-    return path.name.removesuffix(".gz").rpartition(".")[0] or path.name
 
 
 def _nothing_whole(text: TextBlocks, source: str) -> InputError:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.axis_recording import LARGEST, array_names, read_arrays
 from savgs_ident.recordings.channels import ChannelMap, Progress, Reader, Reading
-from savgs_ident.recordings.signals import Signal, reading_of
+from savgs_ident.recordings.signals import Signal, reading_of, test_of
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _USER_BLOCK = 512
@@ -38,7 +38,7 @@ def read_mat(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading
             source=source,
             remedy="save each signal as a vector of its own: save('run.mat', 't', 'position', 'force')",
         )
-    return reading_of([(path.name.partition(".")[0], signals)], channel_map, source)
+    return reading_of([(test_of(path), signals)], channel_map, source)
 
 
 def _of_hdf5(path: Path) -> dict[str, NDArray[np.float64]]:

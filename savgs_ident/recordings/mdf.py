@@ -10,7 +10,7 @@ import numpy as np
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.channels import ChannelMap, Progress, Reader, Reading
-from savgs_ident.recordings.signals import Signal, reading_of
+from savgs_ident.recordings.signals import Signal, reading_of, test_of
 
 
 def read_mdf(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading:
@@ -38,7 +38,7 @@ def read_mdf(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading
         ) from error
     if not signals:
         raise InputError("holds no numbers", source=source, remedy="record again, or give another file")
-    return reading_of([(path.name.partition(".")[0], signals)], channel_map, source)
+    return reading_of([(test_of(path), signals)], channel_map, source)
 
 
 def _signals(file: Any, start: float | None, progress: Progress) -> list[Signal]:

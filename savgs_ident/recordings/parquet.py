@@ -14,7 +14,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.channels import ChannelMap, Progress, Reader, Reading
 from savgs_ident.recordings.csv import TEST_COLUMNS
 from savgs_ident.recordings.recording import normalise
-from savgs_ident.recordings.signals import Signal, reading_of
+from savgs_ident.recordings.signals import Signal, reading_of, test_of
 
 MOST_NUMBERS = 2**28
 """Most numbers that are unpacked: two gigabytes."""
@@ -62,7 +62,7 @@ def _reading(table: Any, path: Path, channel_map: ChannelMap, progress: Progress
     ]
     progress(1.0)
     if tests is None:
-        return reading_of([(path.name.partition(".")[0], signals)], channel_map, source)
+        return reading_of([(test_of(path), signals)], channel_map, source)
     if tests not in names:
         raise InputError(
             f"channels.toml names column '{tests}', the file does not have it",

@@ -12,6 +12,7 @@ A signal without a clock of its own takes that of the signal which is the time, 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,15 @@ class Signal:
     def candidate(self) -> SignalCandidate:
         """As what is bound to a channel."""
         return SignalCandidate(self.name, self.name, self.unit, self.name)
+
+
+def test_of(path: Path) -> str:
+    """The test that a file is named after: ``dwell_1.7Hz`` of ``dwell_1.7Hz.mat``.
+
+    >>> test_of(Path("dwell_1.7Hz.csv.gz")), test_of(Path("run"))
+    ('dwell_1.7Hz', 'run')
+    """
+    return path.name.removesuffix(".gz").rpartition(".")[0] or path.name
 
 
 def reading_of(

@@ -11,7 +11,7 @@ import numpy as np
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.channels import ChannelMap, Progress, Reader, Reading
-from savgs_ident.recordings.signals import Signal, reading_of, without_clash
+from savgs_ident.recordings.signals import Signal, reading_of, test_of, without_clash
 
 
 def read_tdms(path: Path, channel_map: ChannelMap, progress: Progress) -> Reading:
@@ -40,7 +40,7 @@ def read_tdms(path: Path, channel_map: ChannelMap, progress: Progress) -> Readin
         raise InputError("holds no numbers", source=source, remedy="record again, or give another file")
     if len(tests) == 1:
         # The name of a lone group says less than that of its file.
-        tests = [(path.name.partition(".")[0], tests[0][1])]
+        tests = [(test_of(path), tests[0][1])]
     return reading_of(tests, channel_map, source)
 
 

@@ -73,6 +73,7 @@ def test_one_of_several_has_to_be_named(tmp_path: Path) -> None:
         ("import savgs_ident as si\nclass A(si.TwoMass)\n", "line 2"),
         ("import savgs_ident as si\n\nx = 1 / 0\n", "line 3: ZeroDivisionError"),
         ("import no_such_library\n", "line 1: ModuleNotFoundError"),
+        ("import sys\n\nsys.exit(0)\n", "line 3: SystemExit"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_said_with_its_line(tmp_path: Path, text: str, said: str) -> None:

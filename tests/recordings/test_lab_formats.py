@@ -72,6 +72,27 @@ def test_parquet_with_tests_and_with_dates(tmp_path: Path) -> None:
     np.testing.assert_array_equal(dwell.channels["voltage"].values, VOLTS)
 
 
+@pytest.mark.parametrize("suffix", [".mat", ".parquet", ".csv"])
+def test_a_test_is_named_after_its_file_decimals_and_all(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"dwell_1.7Hz{suffix}"
+    columns = {"t [s]": TIME, "voltage [V]": VOLTS, "angle [deg]": DEGREES}
+    match suffix:
+        case ".mat":
+            savemat(path, {"t": TIME, "voltage": VOLTS, "angle": np.deg2rad(DEGREES)})
+        case ".parquet":
+            _parquet(path, columns, {})
+        case _:
+            np.savetxt(
+                path,
+                np.stack(list(columns.values()), 1),
+                delimiter=",",
+                header=",".join(columns),
+                comments="",
+            )
+    (recording,) = read_campaign(path, LAYOUT).recordings
+    assert recording.name == "dwell_1.7Hz"
+
+
 @pytest.mark.parametrize("version", ["5", "7.3"])
 def test_matlab_vectors_and_matrices(tmp_path: Path, version: str) -> None:
     path = tmp_path / "dwell_2Hz.mat"
