@@ -41,8 +41,7 @@ def write_warnings(
     ):
         if not mode.status.ok:
             found.append(f"The search for {name} did not converge: {mode.status.advice}.")
-    named_first = evidence.unknown.weight <= evidence.chosen.weight
-    if evidence.kind in ("effect", "several") and not named_first:
+    if evidence.besides:
         found.append("Something more may be missing that is too small to be identified.")
     if evidence.kind in ("effect", "several") and evidence.left_by_named > constants.reported_share:
         found.append(

@@ -13,7 +13,12 @@ from numpy.typing import NDArray
 from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
 from savgs_ident.diagnosis.candidates import confusable_of
-from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
+from savgs_ident.diagnosis.evidence import (
+    DiagnosisEvidence,
+    DiagnosisProblem,
+    FlexibleMember,
+    counted_with_more,
+)
 from savgs_ident.diagnosis.findings import hypothesis_of
 from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint, Rows, Shrink, shrinks
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out, select_in_folds
@@ -139,7 +144,8 @@ def conclude(left_out: LeftOut, values: Mapping[str, float], further: FurtherRec
         model = _corrected_model(problem, evidence, law)
         gap, by_channel = shrinks(problem.data, _left_out_rows(problem, evidence, held, model))
         apart = _predict_further(problem, evidence, law, values, further)
-    return Conclusion(problem, evidence, law, model, held, gap, by_channel, apart, left_out.next_tests)
+    counted = counted_with_more(evidence)
+    return Conclusion(problem, counted, law, model, held, gap, by_channel, apart, left_out.next_tests)
 
 
 def _member(evidence: DiagnosisEvidence) -> FlexibleMember | None:

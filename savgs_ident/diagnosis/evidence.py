@@ -6,7 +6,7 @@ said; its :class:`FlexibleMember` are learned laws as hypotheses.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from savgs_ident.diagnosis.findings import Findings
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.problem import AbstractProblem
-from savgs_ident.diagnosis.result import NONE, Hypothesis, Kind, PortFamily
+from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, Kind, PortFamily
 from savgs_ident.diagnosis.score_test import prior_conflict
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
@@ -179,6 +179,7 @@ class DiagnosisEvidence:
         immaterial: by hypothesis, the probability that it changes the response by too little to matter, if it is
             right: nothing that counts is missing then.
         insufficient: fitted hypotheses that leave much: if they are right, something unknown is missing besides.
+        besides: whether something small is more probably missing besides what is named than not.
     """
 
     findings: Findings
@@ -198,6 +199,7 @@ class DiagnosisEvidence:
     immaterial: Mapping[Hypothesis, float] = field(default_factory=dict)
     insufficient: tuple[Hypothesis, ...] = ()
     off: Mapping[str, float] = field(default_factory=dict)
+    besides: bool = False
 
     @property
     def localisation(self) -> Localisation:
@@ -286,6 +288,28 @@ class DiagnosisEvidence:
             ranked = sorted(self.localisations, key=lambda each: -each.evidence)
             likely = [each.name for each in ranked if each.evidence > here.evidence - near]
         return tuple(name for name in dict.fromkeys([*learned, *likely]) if name != port)
+
+
+def counted_with_more(evidence: DiagnosisEvidence) -> DiagnosisEvidence:
+    """The evidence of effects that are named, with what speaks for something small besides them on their side.
+
+    They are missing in either case.
+    """
+    unknown, chosen = evidence.unknown, evidence.chosen
+    if evidence.kind not in ("effect", "several") or evidence.named_law is not None:
+        return evidence
+    evidence = replace(evidence, besides=unknown.weight > chosen.weight)
+    if unknown.reason != "law beside effects":
+        return evidence
+    both = replace(chosen, weight=float(np.logaddexp(chosen.weight, unknown.weight)))
+    others = [
+        replace(each, weight=-np.inf) if each.hypothesis == UNKNOWN else each
+        for each in evidence.weighed
+        if each is not chosen
+    ]
+    return replace(
+        evidence, chosen=both, weighed=tuple(sorted((both, *others), key=lambda each: -each.weight))
+    )
 
 
 def is_better_form(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: FlexibleMember) -> bool:

@@ -8,9 +8,11 @@ import pytest
 
 from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.caveats import write_warnings
+from savgs_ident.diagnosis.evidence import counted_with_more
 from savgs_ident.diagnosis.findings import LostHypothesis
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.diagnosis.verdict import probabilities
 
 from .written_evidence import evidence_of, mode_of
 
@@ -57,6 +59,26 @@ def test_what_was_tried_together_from_the_first_is_said_so() -> None:
 
 def test_what_an_effect_does_not_explain_is_a_warning() -> None:
     evidence = evidence_of("rail_viscous", "law", {"none": 0.0, "unknown": 900.0, "rail_viscous": 700.0})
-    evidence = replace(evidence, kind="effect", left=0.0)
+    evidence = counted_with_more(replace(evidence, kind="effect", left=0.0))
     warnings = write_warnings(searched(), evidence, mode_of(0.0), 1.0)
     assert any("Something more may be missing" in each for each in warnings)
+
+
+@pytest.mark.parametrize(("besides", "warned"), [(-40.0, False), (40.0, True)])
+def test_what_is_named_is_as_probable_as_it_is_with_something_small_besides(
+    besides: float, warned: bool
+) -> None:
+    """It is missing in either case; the table of hypotheses must not call something unknown certain."""
+    weights = {"none": 0.0, "rail_viscous": 700.0, "rail_preload": 690.0, "unknown": 700.0 + besides}
+    found = evidence_of("rail_viscous", "law beside effects", weights)
+    counted = counted_with_more(replace(found, kind="effect", left=0.0))
+    chances = dict(
+        zip([str(each.hypothesis) for each in counted.weighed], probabilities(counted.weighed), strict=True)
+    )
+    assert counted.weighed[0] is counted.chosen
+    assert chances["rail_viscous"] > 0.9999
+    assert chances["unknown"] == 0.0
+    said = write_warnings(searched(), counted, mode_of(0.0), 1.0)
+    assert any("Something more may be missing" in each for each in said) == warned
+    alone = evidence_of("rail_viscous", "law", weights)
+    assert counted_with_more(replace(alone, kind="effect")).weighed == alone.weighed
