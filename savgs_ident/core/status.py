@@ -12,7 +12,7 @@ class Status(Enum):
     """How a computation ended; ``value`` is the advice to the reader of a report."""
 
     CONVERGED = "converged"
-    MAX_ITERATIONS = "stopped at the iteration limit before converging: raise the limit or start nearer"
+    MAX_ITERATIONS = "stopped at the iteration limit before converging: start from better values"
     STALLED = "no step reduced the residual: the problem is stiff or not smooth here, refine the time grid"
     HOPELESS = "given up: far below another hypothesis, and what its next step promised is little beside that"
     NOT_FINITE = "met a value that is not finite: a parameter has left the range where the model exists"
