@@ -23,7 +23,10 @@ from jaxtyping import Array, Float
 from savgs_ident.core.status import Status
 
 PRECISION = 1e-11
-"""Largest remaining Newton step at a root, relative to the typical size of its unknown."""
+"""Largest remaining Newton step at a root, relative to the typical size of its unknown, or to it where it is larger.
+
+Origin: rounding leaves some 1e-14 of an unknown, and an acceleration may be a thousand times the typical one.
+"""
 
 LIMIT = 30
 """Most iterations."""
@@ -36,7 +39,7 @@ class Root(eqx.Module):
 
     Attributes:
         x: the root, (n,), each in the unit of its unknown; NaN where it was not found.
-        step_left: the Newton step that remains there, relative to the typical sizes of the unknowns [1], ().
+        step_left: the Newton step that remains there, relative to the sizes of the unknowns [1], ().
         precision: the largest one at a root [1].
     """
 
@@ -99,9 +102,9 @@ def find_root(
 ) -> Root:
     """The root (n,) of ``function`` to which Newton's method converges from ``start``, and whether it converges.
 
-    ``scale`` (n,) is the typical size of each unknown [its unit], ``precision`` [1] that of the root in it;
-    ``solve`` must suit the function's Jacobian. The function may be closed over traced values; derivatives with
-    respect to these are exact.
+    ``scale`` (n,) is the typical size of each unknown [its unit], ``precision`` [1] that of the root in it, or in
+    itself where it is larger; ``solve`` must suit the function's Jacobian. The function may be closed over traced
+    values; derivatives with respect to these are exact.
     """
 
     def newton(function: Callable[[Vector], Vector], start: Vector) -> tuple[Vector, Float[Array, ""]]:
@@ -109,7 +112,8 @@ def find_root(
             residual, matrix = jacobian(function, now.root)
             root = now.root - solve(matrix, residual)
             # Where the same piece holds at the new point, the old matrix gives the remaining step.
-            step_left = jnp.max(jnp.abs(solve(matrix, function(root))) / scale)
+            size = jnp.maximum(scale, jnp.abs(root))
+            step_left = jnp.max(jnp.abs(solve(matrix, function(root))) / size)
             return _NewtonState(root, step_left, now.iterations + 1)
 
         def unfinished(now: _NewtonState) -> Array:

@@ -26,6 +26,14 @@ def test_a_root_and_its_slopes_are_exact() -> None:
     assert float(second(2.0 * ONE)[0, 0, 0]) == pytest.approx(-0.25 / 2.0**1.5, rel=1e-10)
 
 
+def test_a_root_far_above_its_typical_size_is_found_as_exactly_as_numbers_allow() -> None:
+    """Numbers about a million lie further apart than the precision times one."""
+    for of in np.linspace(1.9e12, 2.1e12, 20):
+        root = jax.jit(_square_root)(of * ONE)
+        assert root.status() is Status.CONVERGED
+        assert float(root.x[0]) == pytest.approx(np.sqrt(of), rel=1e-11)
+
+
 @pytest.mark.parametrize(
     ("of", "status"),
     [(2.0, Status.CONVERGED), (-2.0, Status.MAX_ITERATIONS), (np.nan, Status.NOT_FINITE)],

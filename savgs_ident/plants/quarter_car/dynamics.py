@@ -27,7 +27,7 @@ from numpy.polynomial import chebyshev
 
 from savgs_ident.core.values import Values
 from savgs_ident.plants.base import Motion
-from savgs_ident.plants.quarter_car.kinematics import Linkage, Pair, Point, linkage
+from savgs_ident.plants.quarter_car.kinematics import Linkage, Pair, Point, linkage, linkage_slope
 
 GeneralisedForce = Float[Array, "4"]
 """Along (z_s [N], theta_LW [N m], y_s [N], phi [N m])."""
@@ -50,12 +50,9 @@ class Swing(NamedTuple):
 
 def swing(p: Values, theta_LW: Float[Array, ""]) -> Swing:
     """Pose, d/dtheta and d^2/dtheta^2 of the linkage at ``theta_LW`` [rad]."""
-
-    def pose_and_slope(theta: Array) -> tuple[Linkage, Linkage]:
-        return jax.jvp(lambda angle: linkage(p, angle), (theta,), (jnp.ones_like(theta),))
-
-    (pose, slope), (_, curvature) = jax.jvp(pose_and_slope, (theta_LW,), (jnp.ones_like(theta_LW),))
-    return Swing(pose, slope, curvature)
+    at, along = (theta_LW,), (jnp.ones_like(theta_LW),)
+    slope, curvature = jax.jvp(lambda theta: linkage_slope(p, theta), at, along)
+    return Swing(linkage(p, theta_LW), slope, curvature)
 
 
 def point_force(
@@ -123,6 +120,9 @@ _POINTS = chebyshev.chebpts1(_NODES)
 _TO_COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(_POINTS, _NODES - 1))
 _DERIVATIVE = chebyshev.chebval(_POINTS, chebyshev.chebder(_TO_COEFFICIENTS)).T
 """From values at the nodes to those of the derivative of the polynomial through them."""
+_SLOPES = np.zeros((_NODES, _NODES))
+_SLOPES[:, :-1] = chebyshev.chebder(np.eye(_NODES)).T
+"""The slopes of the polynomials T_k, in terms of the polynomials: T_k' = sum over j of _SLOPES[k, j] T_j."""
 
 
 class Section(NamedTuple):
@@ -168,6 +168,22 @@ def _section_of(p: Values, swing_: Swing) -> Section:
     return Section._make((*places, *slopes, jnp.stack(columns, axis=1)))
 
 
+@jax.custom_jvp
+def _terms(ratio: Float[Array, ""]) -> Float[Array, " n"]:
+    """T_0 to T_(n-1) at ``ratio`` [1]."""
+    double, terms = 2.0 * ratio, [jnp.ones_like(ratio), ratio]
+    while len(terms) < _NODES:
+        terms.append(double * terms[-1] - terms[-2])
+    return jnp.stack(terms)
+
+
+# The recurrence, differentiated, is a tenth of a solver's program.
+@_terms.defjvp
+def _terms_and_change(at: tuple[Array], change: tuple[Array]) -> tuple[Array, Array]:
+    terms = _terms(*at)
+    return terms, jnp.asarray(_SLOPES) @ terms * change[0]
+
+
 class SectionCurves(eqx.Module):
     """Chebyshev coefficients of all entries of a section over ``theta_LW / TRAVEL``, (23, n) [SI]."""
 
@@ -175,11 +191,7 @@ class SectionCurves(eqx.Module):
 
     def __call__(self, theta_LW: Float[Array, ""]) -> Section:
         """The section at ``theta_LW`` [rad], good to about 1e-12 within :data:`TRAVEL`."""
-        ratio = theta_LW / TRAVEL
-        terms = [jnp.ones_like(ratio), ratio]
-        while len(terms) < _NODES:
-            terms.append(2.0 * ratio * terms[-1] - terms[-2])
-        entries = self.coefficients @ jnp.stack(terms)
+        entries = self.coefficients @ _terms(theta_LW / TRAVEL)
         return Section._make((*entries[:11], entries[11:].reshape(4, 3)))
 
 
@@ -203,10 +215,7 @@ def section_curves(p: Values) -> SectionCurves:
 # Compiled by itself: it is traced once for the solver and for its derivatives.
 @eqx.filter_jit
 def _section_curves(p: Values) -> SectionCurves:
-    def pose_and_slope(theta: Array) -> tuple[Linkage, Linkage]:
-        return jax.jvp(lambda angle: linkage(p, angle), (theta,), (jnp.ones_like(theta),))
-
-    pose, slope = jax.vmap(pose_and_slope)(jnp.asarray(TRAVEL * _POINTS))
+    pose, slope = jax.vmap(lambda theta: (linkage(p, theta), linkage_slope(p, theta)))(TRAVEL * _POINTS)
     curvature = jax.tree.map(lambda values: jnp.tensordot(_DERIVATIVE / TRAVEL, values, axes=1), slope)
     at_nodes = jax.vmap(lambda swing_: _section_of(p, swing_))(Swing(pose, slope, curvature))
     entries = jnp.stack([*at_nodes[:11], *at_nodes.inertia.reshape(_NODES, 12).T])

@@ -56,6 +56,11 @@ def _turn(cosine: Array, sine: Array, vector: Array) -> Array:
     return jnp.stack([cosine * vector[0] - sine * vector[1], sine * vector[0] + cosine * vector[1]])
 
 
+def _across(vector: Array) -> Array:
+    """``vector`` turned by a right angle, counter-clockwise."""
+    return jnp.stack([-vector[1], vector[0]])
+
+
 def _rotation_between(start: Array, end: Array) -> tuple[Array, Array]:
     """Cosine and sine of the rotation that takes direction ``start`` to ``end`` (equal lengths)."""
     square = start @ start
@@ -68,7 +73,43 @@ def _circles_meet(centre_1: Array, square_1: Array, centre_2: Array, square_2: A
     square = line @ line
     along = (square_1 - square_2 + square) / (2.0 * square)
     across = jnp.sqrt(square_1 / square - along**2)
-    return centre_1 + along * line + side * across * jnp.stack([-line[1], line[0]])
+    return centre_1 + along * line + side * across * _across(line)
+
+
+class _ClosedLoop(NamedTuple):
+    """The ball joints [m] where the wishbones meet the upright; cosine and sine of its roll and the upper one's."""
+
+    C: Point
+    D: Point
+    upright: Pair
+    upper: Pair
+
+
+def _lower_wishbone(p: Values, theta_LW: Array, name: str) -> Point:
+    """Where a point of the lower wishbone is."""
+    a = point(p, "A")
+    return a + _turn(jnp.cos(theta_LW), jnp.sin(theta_LW), point(p, name) - a)
+
+
+def _closed_loop(p: Values, theta_LW: Array) -> _ClosedLoop:
+    b, c, d = (point(p, name) for name in "BCD")
+    c_now = _lower_wishbone(p, theta_LW, "C")
+    crank, coupler = d - b, d - c
+    side = jnp.sign((c - b)[0] * crank[1] - (c - b)[1] * crank[0])
+    d_now = _circles_meet(b, crank @ crank, c_now, coupler @ coupler, side)
+    upright, upper = _rotation_between(coupler, d_now - c_now), _rotation_between(crank, d_now - b)
+    return _ClosedLoop(c_now, d_now, upright, upper)
+
+
+def _upright(p: Values, loop: _ClosedLoop, name: str) -> Point:
+    """Where a point of the upright is."""
+    return loop.C + _turn(*loop.upright, point(p, name) - point(p, "C"))
+
+
+def _upper_wishbone(p: Values, loop: _ClosedLoop, name: str) -> Point:
+    """Where a point of the upper wishbone is."""
+    b = point(p, "B")
+    return b + _turn(*loop.upper, point(p, name) - b)
 
 
 def linkage(p: Values, theta_LW: Float[Array, ""]) -> Linkage:
@@ -76,23 +117,46 @@ def linkage(p: Values, theta_LW: Float[Array, ""]) -> Linkage:
 
     Outside the travel in which the upright can be assembled the result is NaN, which the solvers report.
     """
-    a, b, c, d = (point(p, name) for name in "ABCD")
-    cosine, sine = jnp.cos(theta_LW), jnp.sin(theta_LW)
-    c_now = a + _turn(cosine, sine, c - a)
-    crank, coupler = d - b, d - c
-    side = jnp.sign((c - b)[0] * crank[1] - (c - b)[1] * crank[0])
-    d_now = _circles_meet(b, crank @ crank, c_now, coupler @ coupler, side)
-    cos_k, sin_k = _rotation_between(coupler, d_now - c_now)
-    cos_u, sin_u = _rotation_between(crank, d_now - b)
+    loop = _closed_loop(p, theta_LW)
+    (cos_k, sin_k), (cos_u, sin_u) = loop.upright, loop.upper
     return Linkage(
-        W=c_now + _turn(cos_k, sin_k, point(p, "W") - c),
-        E=a + _turn(cosine, sine, point(p, "E") - a),
-        cg_L=a + _turn(cosine, sine, point(p, "cg_L") - a),
-        cg_U=b + _turn(cos_u, sin_u, point(p, "cg_U") - b),
-        cg_K=c_now + _turn(cos_k, sin_k, point(p, "cg_K") - c),
+        W=_upright(p, loop, "W"),
+        E=_lower_wishbone(p, theta_LW, "E"),
+        cg_L=_lower_wishbone(p, theta_LW, "cg_L"),
+        cg_U=_upper_wishbone(p, loop, "cg_U"),
+        cg_K=_upright(p, loop, "cg_K"),
         roll_L=theta_LW,
         roll_U=jnp.arctan2(sin_u, cos_u),
         roll_K=jnp.arctan2(sin_k, cos_k),
+    )
+
+
+def linkage_slope(p: Values, theta_LW: Float[Array, ""]) -> Linkage:
+    """Slopes of the pose in ``theta_LW``: of points [m/rad], of rolls [1].
+
+    Every body turns about its pivot or carries on what moves at its end; the velocity of D is the same along C D for
+    both of its bodies.
+    """
+    a, b, loop = point(p, "A"), point(p, "B"), _closed_loop(p, theta_LW)
+    crank, coupler, moved_c = loop.D - b, loop.D - loop.C, _across(loop.C - a)
+    turn_u = (coupler @ moved_c) / (coupler @ _across(crank))
+    turn_k = _across(coupler) @ (turn_u * _across(crank) - moved_c) / (coupler @ coupler)
+
+    def on_upright(name: str) -> Point:
+        return moved_c + turn_k * _across(_upright(p, loop, name) - loop.C)
+
+    def on_lower(name: str) -> Point:
+        return _across(_lower_wishbone(p, theta_LW, name) - a)
+
+    return Linkage(
+        W=on_upright("W"),
+        E=on_lower("E"),
+        cg_L=on_lower("cg_L"),
+        cg_U=turn_u * _across(_upper_wishbone(p, loop, "cg_U") - b),
+        cg_K=on_upright("cg_K"),
+        roll_L=jnp.ones_like(turn_u),
+        roll_U=turn_u,
+        roll_K=turn_k,
     )
 
 
@@ -104,15 +168,13 @@ def crank_pin(p: Values, theta_SL: Float[Array, ""]) -> Point:
 
 def strut_length(p: Values, theta_LW: Float[Array, ""], theta_SL: Float[Array, ""]) -> Float[Array, ""]:
     """The strut's length l_SD [m] between its eye on the lower wishbone and the crank pin."""
-    a = point(p, "A")
-    eye = a + _turn(jnp.cos(theta_LW), jnp.sin(theta_LW), point(p, "E") - a)
-    span = crank_pin(p, theta_SL) - eye
+    span = crank_pin(p, theta_SL) - _lower_wishbone(p, theta_LW, "E")
     return jnp.sqrt(span @ span)
 
 
 def suspension_travel(p: Values, theta_LW: Float[Array, ""]) -> Float[Array, ""]:
     """Wheel travel relative to the sprung mass from the drawing's nominal state [m], bump positive."""
-    return linkage(p, theta_LW).W[1] - p["W_z"]
+    return _upright(p, _closed_loop(p, theta_LW), "W")[1] - p["W_z"]
 
 
 def installation_ratio(p: Values, theta_LW: Float[Array, ""], theta_SL: Float[Array, ""]) -> Float[Array, ""]:

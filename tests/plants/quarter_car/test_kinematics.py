@@ -17,6 +17,7 @@ from savgs_ident.plants.quarter_car.kinematics import (
     crank_pin,
     installation_ratio,
     linkage,
+    linkage_slope,
     point,
     strut_length,
 )
@@ -145,6 +146,20 @@ def test_derivatives_in_angles_and_hardpoints_are_those_of_differences(
         expected = _central(moved, name, 1e-4)
         found = np.asarray(_slope(as_values(moved), still | {name: np.asarray(1.0)}))
         assert found == pytest.approx(expected, abs=2e-9, rel=1e-8), name
+
+
+@jax.jit
+def _both_slopes(p: Values, angle: Array) -> tuple[Linkage, Linkage]:
+    moved = jax.jvp(lambda theta: linkage(p, theta), (angle,), (jnp.ones_like(angle),))[1]
+    return linkage_slope(p, angle), moved
+
+
+@given(angle=angles, seed=seeds)
+def test_slopes_of_the_pose_are_its_derivatives(numbers: dict[str, float], angle: float, seed: int) -> None:
+    """The bodies' turning by how their joints move is what the pose in closed form changes by."""
+    turning, moved = _both_slopes(as_values(shifted(numbers, seed)), np.asarray(angle))
+    for name, found, expected in zip(Linkage._fields, turning, moved, strict=True):
+        assert np.asarray(found) == pytest.approx(np.asarray(expected), rel=1e-11, abs=1e-12), name
 
 
 @jax.jit
