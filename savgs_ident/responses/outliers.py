@@ -9,7 +9,9 @@ is left that is an outlier (:func:`find_outliers`). A sample is one where the re
   taken no smaller than the sensor's quantisation and 1e-4 of the waveform's standard deviation,
 - stands alone: |r| exceeds a fifth of its peak, and half of the distance above, in a run of at most five samples, or
   of samples with one and the same value (a sensor that sticks or drops to zero),
-- does not recur: at the same phase of most other periods, in a sweep of those nearby, |r| is a third or less.
+- does not recur: at the same phase of most other periods, in a sweep of those nearby, |r| is a third or less; nor is
+  it more there in a few periods than chance allows, unless r is a tenth of the waveform. A flank that is shorter than
+  the time from one sample to the next is met in some periods only.
 
 Gaussian noise exceeds 8 s once in 1e15 samples. What a mechanism does, such as a step of the friction that comes
 a little early or late or has orders beyond those fitted, recurs at its phase; a transient or a rattle lasts.
@@ -30,6 +32,7 @@ from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import bdtrc
 
 from savgs_ident.core.errors import DataWarning
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording
@@ -58,6 +61,8 @@ _EDGE = 0.5
 """Share of the distance from which on neighbours of an outlier are left out with it."""
 _PHASE_SAMPLES, _RECURRING, _ABOVE_RECURRING, _ECHO = 2.5, 0.6, 3.0, 0.6
 """Reach [samples] of a phase; quantile of the other periods; how far an outlier exceeds it, less in few periods."""
+_BY_CHANCE, _SMALL = 1e-3, 0.1
+"""Probability of finding as much at one phase; largest residual of a flank, as a share of the waveform's range."""
 _PEAK_ABOVE, _LEVEL_RATIO = 5.0, 0.6
 """Peak of a run over the level that bounds it, and the ratio of one level to the next."""
 _MOST_ROUNDS = 40
@@ -191,12 +196,26 @@ def _recurs(samples: WaveformSamples, size: NDArray[np.float64], run: slice) -> 
         return True
     there = phase[peak] + shifts[:, None] + samples.drift * np.array([-1.0, 1.0])
     reach = _PHASE_SAMPLES * float(np.median(np.diff(time))) * np.array([-1.0, 1.0])
-    edges = np.searchsorted(time, np.interp(there, phase, time) + reach)
-    largest = [float(np.max(size[a:b])) for a, b in edges if b > a]
-    if not largest:
+    windows = [slice(a, b) for a, b in np.searchsorted(time, np.interp(there, phase, time) + reach) if b > a]
+    if not windows:
         return True
-    usual = float(np.quantile(largest, _RECURRING, method="lower"))
-    return bool(size[peak] < min(_ABOVE_RECURRING, _ECHO * shifts.size) * usual)
+    factor = min(_ABOVE_RECURRING, _ECHO * shifts.size)
+    largest = [float(np.max(size[window])) for window in windows]
+    if size[peak] < factor * float(np.quantile(largest, _RECURRING, method="lower")):
+        return True
+    small = bool(size[peak] < _SMALL * np.ptp(samples.values))
+    return small and _more_than_chance(size >= size[peak] / factor, windows, run)
+
+
+def _more_than_chance(alike: NDArray[np.bool_], windows: list[slice], run: slice) -> bool:
+    """Whether more of the ``windows`` hold a sample ``alike``, (N,), than by how many there are elsewhere."""
+    elsewhere = np.ones_like(alike)
+    for each in (*windows, run):
+        elsewhere[each] = False
+    share = (np.count_nonzero(alike & elsewhere) + 1) / (np.count_nonzero(elsewhere) + 1)
+    samples = max(each.stop - each.start for each in windows)
+    hits = sum(bool(np.any(alike[window])) for window in windows)
+    return float(bdtrc(hits - 1, len(windows), 1.0 - (1.0 - share) ** samples)) < _BY_CHANCE
 
 
 Outliers = Mapping[str, NDArray[np.bool_]]

@@ -106,6 +106,36 @@ def test_no_sample_of_noise_free_friction_is_an_outlier(synthetic: Any) -> None:
         assert not WARNED & {warning.code for warning in estimate_response(campaign).warnings}
 
 
+def _with(recording: Recording, change: Any) -> Recording:
+    channel = recording.channels["sprung_accel"]
+    moved = replace(channel, values=change(channel.time, channel.values))
+    return replace(recording, channels={**recording.channels, "sprung_accel": moved})
+
+
+def test_a_flank_shorter_than_the_time_between_samples_is_no_outlier(synthetic: Any) -> None:
+    """Of 52 periods a few have a sample within half a millisecond of where a friction turns round."""
+    rng = np.random.default_rng(9)
+    signals = {
+        "road_height": synthetic.road(rate=1000.0),
+        "sprung_accel": synthetic.Signal(synthetic.stepped(2.0, 1), 1000.0, synthetic.white(0.001)),
+    }
+
+    def click(time: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+        after = (6.6 * time - 0.31) % 0.5 / 6.6
+        return values + 0.1 * np.maximum(1.0 - after / 6e-4, 0.0)
+
+    def drop_out(time: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(np.arange(time.size) % 1000 == 130, values - 3.0, values)
+
+    clicking = _with(synthetic.dwell(rng, signals, 6.6, 8.0), click)
+    found = estimate_response(synthetic.campaign(clicking)).warnings
+    assert not WARNED & {warning.code for warning in found}
+    # Large ones that keep time with the drive, once a second, are a logger's.
+    dropping = _with(synthetic.dwell(rng, signals, 5.0, 8.0), drop_out)
+    found = estimate_response(synthetic.campaign(dropping)).warnings
+    assert WARNED & {warning.code for warning in found}
+
+
 @pytest.mark.parametrize(
     ("names", "share", "change"),
     [
