@@ -22,7 +22,7 @@ from savgs_ident.fit.result import (
     predicted_peak_to_peak,
     whitened,
 )
-from savgs_ident.report.text import channel_label, fixed, plain, table
+from savgs_ident.report.text import channel_label, counted, fixed, plain, table
 
 
 def fit_record(fit: Fit) -> dict[str, object]:
@@ -210,16 +210,16 @@ def _quality(fit: Fit) -> RenderableType:
 def _compared(fit: Fit) -> str:
     dwells, windows = fit.measured.dwells, fit.measured.windows
     if fit.quantity == "peak_to_peak":
-        return f"peak-to-peak values of {dwells.size} dwells"
+        return f"peak-to-peak values of {counted(dwells.size, 'dwell')}"
     compared = []
     if dwells.size:
         orders = np.flatnonzero(fit.used[dwells].any(axis=(0, 1)))
-        compared.append(f"harmonics of orders 1 to {orders[-1]} of {dwells.size} dwells")
+        compared.append(f"harmonics of orders 1 to {orders[-1]} of {counted(dwells.size, 'dwell')}")
     if windows.size:
         places = np.flatnonzero(fit.used[windows].any(axis=(0, 1)))
         hertz = places * float(fit.measured.spacing[windows[0]])
         compared.append(
-            f"{hertz.size} frequencies from {hertz[0]:.2g} to {hertz[-1]:.3g} Hz of {windows.size} windows"
+            f"{hertz.size} frequencies from {hertz[0]:.2g} to {hertz[-1]:.3g} Hz of {counted(windows.size, 'window')}"
         )
     return " and ".join(compared)
 

@@ -140,14 +140,19 @@ def data_warnings(warnings: Sequence[DataWarning]) -> list[Text]:
     """What the checks of the data found, with a heading: the first of each kind and channel, and how many more."""
     if not warnings:
         return []
-    kinds: dict[tuple[str, str], list[DataWarning]] = {}
-    for warning in warnings:
-        kinds.setdefault((warning.code, warning.channel), []).append(warning)
-    shown = [plain("Warnings about the data", "bold")]
-    for first, *others in kinds.values():
-        more = f" ({len(others)} more of this kind in this channel)" if others else ""
-        shown.append(plain(f"- {first}{more}"))
-    return shown
+    lines = first_of_each_kind([(each.code, each.channel, str(each)) for each in warnings])
+    return [plain("Warnings about the data", "bold"), *(plain(f"- {line}") for line in lines)]
+
+
+def first_of_each_kind(warnings: Iterable[tuple[str, str, str]]) -> list[str]:
+    """Of warnings, each a code, a channel and a message, the first with its code and channel, and how many more."""
+    kinds: dict[tuple[str, str], list[str]] = {}
+    for code, channel, message in warnings:
+        kinds.setdefault((code, channel), []).append(message)
+    return [
+        f"{first} ({len(others)} more of this kind in this channel)" if others else first
+        for first, *others in kinds.values()
+    ]
 
 
 LONGEST_NAME = 32

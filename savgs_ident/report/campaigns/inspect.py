@@ -18,6 +18,8 @@ from savgs_ident.core.files import warning_record
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording, RecordingLayout
 from savgs_ident.report.text import (
     ChannelLabel,
+    counted,
+    first_of_each_kind,
     fixed,
     plain,
     response_labels,
@@ -150,7 +152,7 @@ _SHOWN_WARNINGS = 20
 
 def campaign_text(record: dict[str, Any], layout: RecordingLayout) -> RenderableType:
     """Tables of channels and dwells, the other tests, and the warnings of an ``inspect`` record."""
-    parts: list[RenderableType] = [plain(f"{record['source']}: {_count(record['tests'], 'test')}", "bold")]
+    parts: list[RenderableType] = [plain(f"{record['source']}: {counted(record['tests'], 'test')}", "bold")]
     parts.append(_channel_table(record))
     if record["missing_channels"]:
         parts.append(plain("Not recorded: " + ", ".join(record["missing_channels"]) + "\n"))
@@ -159,10 +161,6 @@ def campaign_text(record: dict[str, Any], layout: RecordingLayout) -> Renderable
     parts += [plain(line) for line in _other_tests(record)]
     parts += _warnings(record["source"], record["warnings"])
     return Group(*parts)
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _channel_table(record: dict[str, Any]) -> RenderableType:
@@ -196,9 +194,9 @@ def _dwell_table(dwells: list[dict[str, Any]], layout: RecordingLayout) -> Rende
         )
         for dwell in dwells
     ]
-    headers = ["dwell", "f\n[Hz]", "periods", f"{driven.short}\n[{shown}]"]
+    headers = ["dwell", "f\n[Hz]", "periods", f"{driven.short or driven.name}\n[{shown}]"]
     for name, label in labels.items():
-        headers += [f"{layout.specs[name].short}\n[{label.unit}]", "S/N\n[1]", "order"]
+        headers += [f"{layout.specs[name].short or name}\n[{label.unit}]", "S/N\n[1]", "order"]
     title = "Dwells, peak to peak (S/N: signal-to-noise of the first harmonic; order: highest one seen)"
     return table(title, headers, rows)
 
@@ -235,14 +233,19 @@ def _other_tests(record: dict[str, Any]) -> list[str]:
 def _warnings(source: str, warnings: list[dict[str, Any]]) -> list[RenderableType]:
     if not warnings:
         return [plain("No warnings.")]
-    shown: list[RenderableType] = [plain(_count(len(warnings), "warning"), "bold")]
     # The heading names the source already.
-    shown += [
-        plain(warning["message"].replace(f"] {source}, ", "] ").replace(f"] {source}: ", "] "))
-        for warning in warnings[:_SHOWN_WARNINGS]
-    ]
-    if len(warnings) > _SHOWN_WARNINGS:
-        shown.append(plain(f"... and {len(warnings) - _SHOWN_WARNINGS} more in inspect.json"))
+    lines = first_of_each_kind(
+        (
+            each["code"],
+            each["channel"] or "",
+            each["message"].replace(f"] {source}, ", "] ").replace(f"] {source}: ", "] "),
+        )
+        for each in warnings
+    )
+    shown: list[RenderableType] = [plain(counted(len(warnings), "warning"), "bold")]
+    shown += [plain(line) for line in lines[:_SHOWN_WARNINGS]]
+    if len(lines) < len(warnings) or len(lines) > _SHOWN_WARNINGS:
+        shown.append(plain("All of them are in inspect.json."))
     return shown
 
 
