@@ -10,7 +10,7 @@ a parameter (:func:`savgs_ident.fit.identifiability.weighed_by_misfit`).
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -121,9 +121,8 @@ def fit_along_motion(
     residual = (data.measured - predicted) / motion.noise
     chi2, dof = float(residual @ residual), data.measured.size - len(free)
     estimates, covariance = _estimates(mode, model, free, chi2, motion.noise)
-    verdict = _verdict(estimates, covariance, len(free), chi2, dof, relative_miss(data.measured, predicted))
     ended = at_bounds((table[name] for name in free), mode.values)
-    verdict = replace(verdict, sentences=(*verdict.sentences, *ended))
+    verdict = _verdict(estimates, covariance, ended, chi2, dof, relative_miss(data.measured, predicted))
     apart = None if held_out is None else _apart(problem, held_out, mode)
     return MotionFit(
         estimated=model.with_values({each.name: each.value for each in estimates}),
@@ -179,7 +178,7 @@ def _estimates(
 def _verdict(
     estimates: tuple[Estimate, ...],
     covariance: NDArray[np.float64],
-    free: int,
+    ended: Mapping[str, str],
     chi2: float,
     dof: int,
     missed: float,
@@ -188,10 +187,10 @@ def _verdict(
     per_datum = chi2 / max(dof, 1)
     beyond = missed * float(np.sqrt(max(1.0 - 1.0 / max(per_datum, 1.0), 0.0)))
     if per_datum > EXPLAINED and beyond > MATERIAL_MISFIT:
-        return Verdict(False, (unexplained(per_datum, beyond),), explained=False)
-    names = tuple(each.name for each in estimates[:free])
-    values = np.array([each.value for each in estimates[:free]])
-    logarithms = covariance[:free, :free] / np.outer(values, values)
+        return Verdict(False, (unexplained(per_datum, beyond), *ended.values()), explained=False)
+    free = [each for each in estimates if each.free]
+    names, values = tuple(each.name for each in free), np.array([each.value for each in free])
+    logarithms = covariance[: len(free), : len(free)] / np.outer(values, values)
     return verdict_of(
         names,
         dict(zip(names, values.tolist(), strict=True)),
@@ -199,6 +198,7 @@ def _verdict(
         logarithms,
         {},
         (),
+        ended,
     )
 
 

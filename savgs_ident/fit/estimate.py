@@ -83,17 +83,18 @@ AT_A_BOUND = 0.01
 """By which share of a bound a value is off that is at it: a search comes near to a bound and does not reach it."""
 
 
-def at_bounds(parameters: Iterable[Parameter], values: Mapping[str, float]) -> tuple[str, ...]:
-    """Which ``values`` [SI] ended at a bound of their parameters, in words; a bound of zero is left out."""
+def at_bounds(parameters: Iterable[Parameter], values: Mapping[str, float]) -> dict[str, str]:
+    """Which ``values`` [SI] ended at a bound of their parameters, in words by name; a bound of zero is left out."""
     ends = ((each, ("lower", each.lower), ("upper", each.upper)) for each in parameters)
-    return tuple(
-        f"{each.name} ended at its {side} bound, {_with_unit(bound, each.unit)}: it would go further, or makes up "
-        "for something."
+    return {
+        each.name: f"{each.name} ended at its {side} bound, {with_unit(bound, each.unit)}: it would go further, or "
+        "makes up for something."
         for each, *both in ends
         for side, bound in both
         if bound and isfinite(bound) and abs(values[each.name] - bound) <= AT_A_BOUND * abs(bound)
-    )
+    }
 
 
-def _with_unit(value: float, unit: str) -> str:
+def with_unit(value: float, unit: str) -> str:
+    """A value and its unit, as text."""
     return f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"

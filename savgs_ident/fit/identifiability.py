@@ -18,7 +18,7 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Progress
-from savgs_ident.fit.estimate import at_bounds
+from savgs_ident.fit.estimate import at_bounds, with_unit
 from savgs_ident.fit.identified import Verdict
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.fit.result import comparable, gaps
@@ -67,28 +67,32 @@ def verdict_of(
     covariance: NDArray[np.float64],
     bounds: Mapping[str, float],
     advice: tuple[str, ...],
+    ended: Mapping[str, str],
 ) -> Verdict:
     """The verdict for free parameters ``names`` whose logarithms have ``covariance`` (n, n).
 
-    ``bounds`` holds 95 % lower bounds of unidentifiable parameters [SI], ``advice`` which tests would help.
+    ``bounds`` holds 95 % lower bounds of unidentifiable parameters [SI], ``advice`` which tests would help, ``ended``
+    what is said of parameters that ended at a bound: whatever their errors are there, they are not identified.
     """
     sd = np.sqrt(np.diag(covariance))
     groups = confounded_groups(names, covariance)
     in_group = {name for group in groups for name in group}
-    identifiable = [n for n in names if n not in in_group and sd[names.index(n)] <= LARGEST_SD]
+    held = in_group | set(ended)
+    identifiable = [n for n in names if n not in held and sd[names.index(n)] <= LARGEST_SD]
     sentences = []
     if identifiable:
         figures = ", ".join(f"{name} to {100.0 * sd[names.index(name)]:.2g} %" for name in identifiable)
         sentences.append(f"These data identify {figures}.")
     for group in groups:
         sentences += _about_group(group, names, values, units, covariance)
-    unknown = [n for n in names if n not in identifiable and n not in in_group]
+    unknown = [n for n in names if n not in identifiable and n not in held]
     sentences += [f"These data do not identify {name}." for name in unknown]
     sentences += [
-        f"{name} is at least {bound:.3g} {units[name]} (95 %, profile likelihood)."
+        f"{name} is at least {with_unit(bound, units[name])} (95 %, profile likelihood)."
         for name, bound in bounds.items()
     ]
-    return Verdict(not groups and not unknown, (*sentences, *advice), groups)
+    everything = not groups and not unknown and not ended
+    return Verdict(everything, (*sentences, *ended.values(), *advice), groups)
 
 
 def _about_group(
@@ -274,9 +278,8 @@ def assess(task: Task, minimiser: Minimiser, best: Minimum, explained: bool, pro
     if not best.finite:
         return Verdict(False, (BROKEN_DOWN,), explained=False)
     values = {name: float(value) for name, value in task.problem.parameters(best.u).items()}
-    verdict = _verdict(task, minimiser, best, values, explained, progress)
     ended = at_bounds((task.table[name] for name in task.problem.free.identified), values)
-    return replace(verdict, sentences=(*verdict.sentences, *ended))
+    return _verdict(task, minimiser, best, values, ended, explained, progress)
 
 
 def _verdict(
@@ -284,6 +287,7 @@ def _verdict(
     minimiser: Minimiser,
     best: Minimum,
     values: Mapping[str, float],
+    ended: Mapping[str, str],
     explained: bool,
     progress: Progress,
 ) -> Verdict:
@@ -292,7 +296,7 @@ def _verdict(
     units = {name: table[name].unit for name in names}
     per_datum, missed = _chi2_per_datum(problem, best), _misfit(task, best)
     if not explained:
-        return Verdict(False, (unexplained(per_datum, missed),), explained=False)
+        return Verdict(False, (unexplained(per_datum, missed), *ended.values()), explained=False)
     covariance = _log_covariance(problem, best, values)
     bounds: dict[str, float] = {}
     advice: tuple[str, ...] = ()
@@ -304,7 +308,7 @@ def _verdict(
             bounds |= {} if bound is None else {name: bound}
         progress("looking for a test that would help")
         advice = advice_of(task, minimiser, best)
-    verdict = verdict_of(names, values, units, covariance, bounds, advice)
+    verdict = verdict_of(names, values, units, covariance, bounds, advice, ended)
     if per_datum <= EXPLAINED:
         return verdict
     beyond = (
@@ -325,8 +329,8 @@ def unexplained(per_datum: float, missed: float) -> str:
     """That a model misses its data, by chi2 per datum and as a share of the response [1]."""
     return (
         f"The model does not explain these data: it misses by {100.0 * missed:.2g} % of the response beyond the "
-        f"noise (chi2/dof = {per_datum:.3g}). Look for what is missing with `diagnose`. Until then the parameters "
-        "make up for it; their errors contain what is not explained."
+        f"noise (chi2/dof = {per_datum:.3g}). Where units and signs are sure, look for what is missing with "
+        "`diagnose`. Until then the parameters make up for it; their errors contain what is not explained."
     )
 
 

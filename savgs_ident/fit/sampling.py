@@ -159,7 +159,7 @@ def sentences_of(
     covariance = log_covariance(names, draws)
     values = {each.name: each.median for each in identified}
     units = {each.name: each.unit for each in identified}
-    verdict = verdict_of(names, values, units, covariance, {}, advice)
+    verdict = verdict_of(names, values, units, covariance, {}, advice, {})
     return (
         *verdict.sentences,
         *_tied(names, covariance, confounded_groups(names, covariance)),

@@ -22,6 +22,7 @@ from savgs_ident.fit.result import (
     predicted_peak_to_peak,
     whitened,
 )
+from savgs_ident.inference.result import UNEXPLAINED
 from savgs_ident.report.text import channel_label, counted, fixed, plain, table
 
 
@@ -96,9 +97,15 @@ def verdict_record(fit: Identified) -> dict[str, object]:
     return {
         "explained": verdict.explained,
         "identifiable": verdict.identifiable,
-        "sentences": verdict.sentences,
+        "sentences": verdict_sentences(fit),
         "confounded": verdict.confounded,
     }
+
+
+def verdict_sentences(fit: Identified) -> list[str]:
+    """Why the fit is not to be trusted, if it is not, and what the data identify."""
+    said = fit.doubt == UNEXPLAINED or not fit.doubt
+    return [*([] if said else [f"Not to be trusted: {fit.doubt}."]), *fit.verdict.sentences]
 
 
 def correlation_record(fit: Identified) -> dict[str, dict[str, float]]:
@@ -313,10 +320,8 @@ def _far_tests(fit: Fit) -> list[RenderableType]:
 
 
 def _verdict(fit: Fit) -> list[str]:
-    sentences = [] if fit.status.ok else [f"The fit is not to be trusted: {fit.status.advice}."]
     failed = [
         test for test, status in zip(fit.measured.tests, fit.dwell_status, strict=True) if not status.ok
     ]
-    if failed:
-        sentences.append("The model's periodic motion was not found in: " + ", ".join(failed) + ".")
-    return sentences + list(fit.verdict.sentences)
+    unsolved = [f"The model's periodic motion was not found in: {', '.join(failed)}."] if failed else []
+    return unsolved + verdict_sentences(fit)

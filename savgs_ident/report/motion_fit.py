@@ -12,6 +12,7 @@ from savgs_ident.report.fit import (
     parameter_records,
     tolerance_tables,
     verdict_record,
+    verdict_sentences,
 )
 from savgs_ident.report.text import fixed, plain, table
 
@@ -56,7 +57,6 @@ def motion_fit_text(fit: MotionFit) -> RenderableType:
         apart = fit.held_out
         gaps = (apart.as_given, apart.identified, apart.noise)
         rows.append(("held out", *(fixed(100.0 * each, 2) for each in gaps)))
-    status = [] if fit.status.ok else [f"The fit is not to be trusted: {fit.status.advice}."]
     return Group(
         identified_table(fit),
         plain(
@@ -71,7 +71,7 @@ def motion_fit_text(fit: MotionFit) -> RenderableType:
         ),
         *tolerance_tables(fit),
         plain("Verdict", "bold"),
-        *(plain(f"- {sentence}") for sentence in (*status, *fit.verdict.sentences)),
+        *(plain(f"- {sentence}") for sentence in verdict_sentences(fit)),
     )
 
 

@@ -31,13 +31,13 @@ def _covariance(sd: float, *directions: tuple[tuple[float, ...], float]) -> NDAr
 
 
 def _words(covariance: NDArray[np.float64], bounds: dict[str, float] | None = None) -> str:
-    return " ".join(verdict_of(NAMES, VALUES, UNITS, covariance, bounds or {}, ()).sentences)
+    return " ".join(verdict_of(NAMES, VALUES, UNITS, covariance, bounds or {}, (), {}).sentences)
 
 
 def test_well_identified_parameters_form_no_group_and_are_listed_with_their_errors() -> None:
     covariance = np.diag([0.01, 0.02, 0.03, 0.005]) ** 2
     assert confounded_groups(NAMES, covariance) == ()
-    verdict = verdict_of(NAMES, VALUES, UNITS, covariance, {}, ())
+    verdict = verdict_of(NAMES, VALUES, UNITS, covariance, {}, (), {})
     assert verdict.identifiable
     assert verdict.confounded == ()
     assert verdict.sentences == (
@@ -48,7 +48,7 @@ def test_well_identified_parameters_form_no_group_and_are_listed_with_their_erro
 def test_a_pair_that_grows_together_is_known_by_its_ratio() -> None:
     covariance = _covariance(0.01, ((0.0, 1.0, 1.0, 0.0), 30.0))
     assert confounded_groups(NAMES, covariance) == (("mu_t", "ydot_Hth"),)
-    verdict = verdict_of(NAMES, VALUES, UNITS, covariance, {"ydot_Hth": 0.043}, ("Do this.",))
+    verdict = verdict_of(NAMES, VALUES, UNITS, covariance, {"ydot_Hth": 0.043}, ("Do this.",), {})
     assert not verdict.identifiable
     assert verdict.confounded == (("mu_t", "ydot_Hth"),)
     assert verdict.sentences == (
@@ -95,7 +95,16 @@ def test_two_pairs_are_two_groups() -> None:
 @pytest.mark.parametrize(("share", "reported"), [(0.99, True), (1.01, False)])
 def test_the_limit_is_a_share_of_the_value(share: float, reported: bool) -> None:
     covariance = _covariance(0.01, ((0.0, 0.0, 0.0, 1.0), share * LARGEST_SD))
-    assert verdict_of(NAMES, VALUES, UNITS, covariance, {}, ()).identifiable is reported
+    assert verdict_of(NAMES, VALUES, UNITS, covariance, {}, (), {}).identifiable is reported
+
+
+def test_what_ended_at_a_bound_is_not_identified_whatever_its_error_is() -> None:
+    ended = {"mu_t": "mu_t ended at its upper bound, 1: it would go further, or makes up for something."}
+    verdict = verdict_of(NAMES, VALUES, UNITS, _covariance(0.001), {}, (), ended)
+    assert not verdict.identifiable
+    assert [sentence for sentence in verdict.sentences if "mu_t" in sentence] == [ended["mu_t"]]
+    identified = verdict.sentences[0]
+    assert all(f"{name} to " in identified for name in NAMES if name != "mu_t")
 
 
 @given(seed=st.integers(0, 2**32 - 1), scale=st.floats(0.01, 3.0))
@@ -104,7 +113,7 @@ def test_a_verdict_is_consistent_whatever_the_covariance(seed: int, scale: float
     rng = np.random.default_rng(seed)
     root = rng.standard_normal((4, 4)) * 10.0 ** rng.uniform(-3.0, 0.0, (4, 1))
     covariance = scale**2 * root @ root.T
-    verdict = verdict_of(NAMES, VALUES, UNITS, covariance, {}, ())
+    verdict = verdict_of(NAMES, VALUES, UNITS, covariance, {}, (), {})
     members = [name for group in verdict.confounded for name in group]
     assert len(members) == len(set(members))
     if verdict.identifiable:
@@ -144,8 +153,8 @@ def test_a_value_near_a_bound_is_at_it_and_one_near_zero_is_not() -> None:
     shift = Parameter("shift", 0.0, "m", lower=-0.2, upper=0.2)
     free = Parameter("free", 1.0, "kg")
     every = (rise, shift, free)
-    assert at_bounds(every, {"rise": 1e-9, "shift": 0.1, "free": 1e9}) == ()
-    (one,) = at_bounds(every, {"rise": 4.97, "shift": 0.0, "free": 1.0})
+    assert at_bounds(every, {"rise": 1e-9, "shift": 0.1, "free": 1e9}) == {}
+    one = at_bounds(every, {"rise": 4.97, "shift": 0.0, "free": 1.0})["rise"]
     assert one.startswith("rise ended at its upper bound, 5: ")
-    (other,) = at_bounds(every, {"rise": 1.0, "shift": -0.1999, "free": 1.0})
+    other = at_bounds(every, {"rise": 1.0, "shift": -0.1999, "free": 1.0})["shift"]
     assert other.startswith("shift ended at its lower bound, -0.2 m: ")
