@@ -38,7 +38,7 @@ from savgs_ident.core.executor import Lost, compute_on_one_core, cores, run_task
 from savgs_ident.core.files import prepare_folder, spelled_out
 from savgs_ident.core.presentation import Origin, Progress, no_progress
 from savgs_ident.fit.least_squares import FitSettings
-from savgs_ident.fit.public import fit_with
+from savgs_ident.fit.public import fit
 from savgs_ident.plants.from_file import load_plant
 from savgs_ident.plants.model import Model, PlantModel
 from savgs_ident.plants.model_toml import model_text, parse_model
@@ -48,7 +48,9 @@ from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import default_rig_path, parse_rig, rig_text
 from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.channels import read_channel_map
-from savgs_ident.recordings.read import map_digest
+from savgs_ident.recordings.read import campaign_files, digest_files, map_digest
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.responses.driven_motion import DrivenMotion, is_motion, load_motion
 from savgs_ident.simulate.program_cache import make_room_for_programs, use_persistent_cache
 
 QUARTER_CAR = "quarter_car"
@@ -264,8 +266,8 @@ def _identified(task: CampaignTask) -> StoredResult:
         )
     request = task.request
     model = request.model_of(task.rig)
-    campaign = load_campaign(request.campaign, request.channels, layout=model.layout)
-    if campaign.sha256 != task.data_sha256:
+    measured, start, digest = _recorded(request, model, task.source)
+    if digest != task.data_sha256:
         raise InputError(
             "is not what it was when the run began",
             source=task.source,
@@ -277,14 +279,14 @@ def _identified(task: CampaignTask) -> StoredResult:
             source=task.source,
             remedy="run again",
         )
-    found = fit_with(
+    found = fit(
         model,
-        # The worker of a cluster has it under another path.
-        replace(campaign, source=task.source),
+        measured,
         request.free,
-        request.settings,
-        request.max_frequency,
-        request.command,
+        orders=request.settings.orders,
+        fixed_tolerances=request.settings.fixed_tolerances,
+        max_frequency=request.max_frequency,
+        command=request.command,
     )
     identified = found.model
     text = (
@@ -292,7 +294,19 @@ def _identified(task: CampaignTask) -> StoredResult:
         if isinstance(identified, RigModel)
         else model_text(cast(PlantModel, identified))
     )
-    return StoredResult(found.to_json(), text, campaign.start)
+    return StoredResult(found.to_json(), text, start)
+
+
+def _recorded(
+    request: FitRequest, model: Model, source: str
+) -> tuple[Campaign | DrivenMotion, float | None, str]:
+    """What was recorded, when it began [s since 1970, UTC] where that is known, and its digest."""
+    # The worker of a cluster has it under another path than ``source``.
+    if is_motion(request.campaign):
+        motion = replace(load_motion(request.campaign), source=source)
+        return motion, None, digest_files(campaign_files(request.campaign))
+    campaign = load_campaign(request.campaign, request.channels, layout=model.layout)
+    return replace(campaign, source=source), campaign.start, campaign.sha256
 
 
 @dataclass(frozen=True)

@@ -170,7 +170,7 @@ def row_of(
         name=name,
         source=source,
         status=RowStatus.ok if trusted else RowStatus.not_trusted,
-        reason="" if trusted else _why_not(record),
+        reason="" if trusted else str(record["doubt"]),
         start=start,
         chi2_per_dof=None if ratio is None else float(ratio),
         parameters={
@@ -227,16 +227,6 @@ def _followed(rows: Sequence[CampaignRow], place: NDArray[np.float64], name: str
 def _counts(row: CampaignRow, name: str) -> bool:
     entry = row.parameters.get(name)
     return row.status is RowStatus.ok and entry is not None and 0.0 < entry.stderr < np.inf
-
-
-def _why_not(record: Mapping[str, Any]) -> str:
-    if record["status"] != "converged":
-        return str(record["advice"])
-    if not record["converged"]:
-        return "the model's periodic motion was not found in every dwell"
-    if not record.get("verdict", {}).get("explained", True):
-        return "the model does not explain the data"
-    return "the data do not identify every free parameter"
 
 
 def _order_notes(by_time: bool, starts: Sequence[float], read: Sequence[object]) -> tuple[str, ...]:

@@ -41,6 +41,7 @@ def fit_record(fit: Fit) -> dict[str, object]:
         "chi2_per_dof": fit.chi2 / fit.dof if fit.dof > 0 else None,
         "converged": fit.status.ok and all(status.ok for status in fit.dwell_status),
         "trusted": fit.trusted,
+        "doubt": fit.doubt or None,
         "gap": gap_record(fit),
         "dwells": _dwell_records(fit),
         "status": fit.status.name.lower(),

@@ -30,6 +30,7 @@ def motion_fit_record(fit: MotionFit) -> dict[str, object]:
         "converged": fit.status.ok,
         "dwells": [],
         "trusted": fit.trusted,
+        "doubt": fit.doubt or None,
         "gap": {"force": {"before": before, "after": after, "floor": noise}},
         "status": fit.status.name.lower(),
         "advice": fit.status.advice,

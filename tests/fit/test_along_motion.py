@@ -11,6 +11,7 @@ import savgs_ident as si
 from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.core.values import as_values
 from savgs_ident.fit.along_motion import MotionFit
+from savgs_ident.recordings.axis_recording import AxisRecording
 from savgs_ident.responses.driven_motion import DrivenMotion, driven_motion
 from savgs_ident.simulate.along_motion import needed_force
 from savgs_ident.simulate.driven_plant import samples_of
@@ -111,11 +112,34 @@ def test_a_value_at_its_bound_is_said_to_be_there() -> None:
     assert not [each for each in _fit(motion, *TEXTBOOK).verdict.sentences if "bound" in each]
 
 
-def test_other_commands_say_who_serves_a_measured_motion(tmp_path: Path) -> None:
-    motion = recorded_axis({"coulomb": 12.0}, 3)
-    rows = np.stack([motion.time, motion.force, motion.position], axis=1)
+def _written(path: Path, recording: AxisRecording) -> None:
+    rows = np.stack([recording.time, recording.force, recording.position], axis=1)
     header = "time [s],drive_force [N],position [m]"
-    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header=header, comments="")
+    np.savetxt(path, rows, delimiter=",", header=header, comments="")
+
+
+@pytest.mark.slow
+def test_motions_of_several_days_are_campaigns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # The process that identifies them is not strict either.
+    for name in ("JAX_NUMPY_RANK_PROMOTION", "JAX_NUMPY_DTYPE_PROMOTION"):
+        monkeypatch.delenv(name)
+    for day, friction in (("monday", 11.0), ("tuesday", 12.0), ("wednesday", 13.0)):
+        laws = TRUTH | {"guide_preload_force": friction}
+        motion = _needed(laws, 3)
+        _written(tmp_path / f"{day}.csv", replace(recorded_axis({}, 3), force=motion.drive))
+    study = si.run_campaigns(tmp_path, tmp_path / "out", plant="axis", beside=TEXTBOOK, workers=1)
+    assert not study.failures
+    found = [row.parameters["guide_preload_force"].value for row in study.rows]
+    assert found == pytest.approx([11.0, 12.0, 13.0], abs=0.1)
+    friction, mass = (study.trends[name].line for name in ("guide_preload_force", "mass"))
+    assert friction is not None
+    assert friction.rises_or_falls
+    assert mass is not None
+    assert not mass.rises_or_falls
+
+
+def test_other_commands_say_who_serves_a_measured_motion(tmp_path: Path) -> None:
+    _written(tmp_path / "run.csv", recorded_axis({"coulomb": 12.0}, 3))
     model = axis_with("guide_preload")
     campaign = si.load_campaign(tmp_path / "run.csv", layout=model.layout)
     assert isinstance(si.fit(model, campaign), MotionFit)
