@@ -3,6 +3,7 @@
 import json
 import re
 import runpy
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import savgs_ident as si
+from savgs_ident.core.parameter import merge_parameters
 
 from .relaxed import with_kept_programs
 from .simulate.test_windows import campaign
@@ -80,6 +82,30 @@ def test_a_fit_finds_the_truth(fit: si.Fit) -> None:
         assert abs(fit[name].value - true) < 3.0 * fit[name].stderr
         assert fit[name].stderr < 0.01 * true
     assert 0.7 < fit.chi2 / fit.dof < 1.3
+
+
+@pytest.mark.slow
+def test_a_contact_that_was_declared_far_too_soft_takes_no_parameter_along(model: si.PlantModel) -> None:
+    """All masses, stiffnesses and forces together are seen in no reading: a contact that is off would scale them."""
+    rubbing = model + "guide_coulomb"
+    truth = TRUTH | {"guide_coulomb_coefficient": 0.05}
+    noise = {name: 0.1 * each for name, each in NOISE.items()}
+    measured = si.simulate_dwells(rubbing.with_values(truth), DWELLS, {"road_height": 0.01}, noise, seed=2)
+    contact = {"k_pre": 2e4, "c_pre": 60.0}
+    soft = [replace(rubbing.table[name], value=value) for name, value in contact.items()]
+
+    def fitted(source: str) -> si.Fit:
+        table = si.ParameterTable(tuple(replace(each, source=source) for each in soft))
+        given = rubbing.with_parameters(merge_parameters(table, rubbing.table))
+        found = si.fit(given, measured)
+        assert isinstance(found, si.Fit)
+        return found
+
+    typical, exact = fitted("typical"), fitted("")
+    assert typical.trusted, typical.doubt
+    for name, true in truth.items():
+        assert abs(typical[name].value - true) < 4.0 * typical[name].stderr, name
+    assert not exact.trusted
 
 
 @pytest.mark.slow

@@ -42,7 +42,7 @@ class Bench(si.StateSpacePlant):
             si.Parameter(
                 "k_pre", 1e4, "N/m", tolerance=5e3, lower=1.0, source="typical", about="guide that sticks"
             ),
-            si.Parameter("c_pre", 10.0, "N s/m", about="damping of the guide that sticks"),
+            si.Parameter("c_pre", 10.0, "N s/m", source="typical", about="damping of a guide that sticks"),
         )
     )
 

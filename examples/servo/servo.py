@@ -29,8 +29,8 @@ class Servo(si.StateSpacePlant):
             si.Parameter("k_m", 0.05, "N m/A", tolerance=0.001, lower=0.0, about="torque constant"),
             si.Parameter("R", 1.0, "ohm", tolerance=0.02, lower=0.0, about="resistance"),
             si.Parameter("L", 0.005, "H", lower=1e-4, upper=0.1, about="inductance"),
-            si.Parameter("k_pre", 50.0, "N m/rad", tolerance=20.0, lower=1.0, about="bearing that sticks"),
-            si.Parameter("c_pre", 0.05, "N m s/rad", about="damping of the bearing that sticks"),
+            si.Parameter("k_pre", 50.0, "N m/rad", source="typical", about="bearing that sticks"),
+            si.Parameter("c_pre", 0.05, "N m s/rad", source="typical", about="its damping"),
         )
     )
 

@@ -54,6 +54,11 @@ class Parameter:
                 remedy="give one standard deviation, zero or positive",
             )
 
+    @property
+    def rough(self) -> bool:
+        """Whether it is a positive number of which no more than the order of magnitude is known."""
+        return self.source in (TYPICAL, SIZED) and self.value > max(self.lower, 0.0)
+
 
 @dataclass(frozen=True)
 class ParameterTable(Mapping[str, Parameter]):

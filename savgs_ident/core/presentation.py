@@ -97,6 +97,15 @@ class Origin:
         return replace(self, versions=package_versions(packages))
 
 
+def percent(share: float) -> str:
+    """A share [1] in a sentence, to two digits where it is below one.
+
+    >>> percent(0.00123), percent(1.13)
+    ('0.12 %', '113 %')
+    """
+    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
+
+
 def package_versions(packages: Sequence[str]) -> dict[str, str]:
     """The versions of this package, of Python and of ``packages``, by name."""
     found = {"savgs_ident": __version__, "python": python_version()}

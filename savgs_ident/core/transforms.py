@@ -2,11 +2,13 @@
 
 A transform is a smooth one-to-one map from the whole line to the open range of a parameter. A solver works on the
 coordinate u without bounds; the model only ever sees values strictly inside them. At u = 0 stands the table's value
-(moved inside a little where it is a bound, for there the slope would be zero). There are four
-(:func:`transform_of`): the first for a parameter with a tolerance, the others for the rest, by their bounds.
+(moved inside a little where it is a bound, for there the slope would be zero). There are five
+(:func:`transform_of`): the first for a parameter with a tolerance, the second for a typical one, the others for the
+rest, by their bounds.
 
 - :class:`Tolerated`: v = v0 + sigma s(u), a parameter in standard deviations of what is known of it. s is
   exactly u up to half way to a bound and bends towards it beyond, twice differentiable.
+- :class:`Rough`: v = v0 10^s(u).
 - :class:`OneSided`: v = bound + scale exp(u) above a bound, v = bound - scale exp(-u) below one.
 - :class:`TwoSided`: v = lower + (upper - lower) / (1 + exp(-(u + offset))): logarithmic near either bound.
 - :class:`Unbounded`: v = v0 + scale u.
@@ -16,7 +18,8 @@ coordinate u without bounds; the model only ever sees values strictly inside the
     (0.0, True)
 
 The prior is normal on the coordinate, about 0 with the standard deviation of :func:`prior_width`: 1 where a tolerance
-is known, whether the parameter is to be identified or not, and :data:`WIDTH` where nothing is.
+is known, whether the parameter is to be identified or not, and :data:`WIDTH` where nothing is. What is no more than
+typical is known to an order of magnitude (:class:`Rough`).
 
 The parameters of a table that may move form a :class:`FreeVector` of coordinates. *Identified* ones, which are asked
 for, come first, then those *tolerated* ones that are estimated along.
@@ -33,7 +36,7 @@ for, come first, then those *tolerated* ones that are estimated along.
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from math import exp, isfinite, log, sqrt
+from math import exp, inf, isfinite, log, sqrt
 from typing import Any
 
 import equinox as eqx
@@ -55,6 +58,12 @@ WIDTH = 3.0
 A factor of twenty either way. An estimate to 1 % that is a factor of two off its start moves by less than a
 thousandth of its standard error; a parameter that the data do not identify keeps a finite spread.
 """
+
+ORDER = log(10.0)
+"""Standard deviation before the data of the logarithm of a number that stands for an order of magnitude alone."""
+
+_ORDERS = 3.0
+"""Most orders of magnitude that such a number is off. Beyond, a contact is as hard as any, and no motion is found."""
 
 _INSIDE = 0.01
 # Without a bound the map bends only this many standard deviations away: finite, to keep slopes finite.
@@ -116,6 +125,25 @@ class Tolerated(AbstractBijection):
         half = 0.5 * (self.above if u > 0.0 else self.below)
         beyond = max(abs(u) / half - 1.0, 0.0)
         return self.tolerance / (1.0 + beyond * beyond) ** 1.5
+
+
+class Rough(AbstractBijection):
+    """Orders of magnitude from a typical value, :class:`Tolerated` as a logarithm: never more than three of them."""
+
+    nominal: float
+    orders: Tolerated
+
+    def forward(self, u: Any) -> Any:
+        """The value at ``u`` orders of magnitude."""
+        return self.nominal * _array_module(u).exp(self.orders.forward(u))
+
+    def inverse(self, value: float) -> float:
+        """Orders of magnitude of ``value`` from the typical one, unbent."""
+        return self.orders.inverse(log(value / self.nominal))
+
+    def slope(self, u: float) -> float:
+        """d value / du."""
+        return float(self.forward(u)) * self.orders.slope(u)
 
 
 class OneSided(AbstractBijection):
@@ -196,6 +224,8 @@ def transform_of(parameter: Parameter) -> AbstractBijection:
     A tolerance about a value that is itself a bound, as that of an effect at its null, is no more than a scale.
     Raises :class:`InputError` if nothing about the parameter gives a scale.
     """
+    if parameter.rough:
+        return _rough_bijection(parameter)
     inside = parameter.lower < parameter.value < parameter.upper
     return (
         tolerated_bijection(parameter)
@@ -206,7 +236,15 @@ def transform_of(parameter: Parameter) -> AbstractBijection:
 
 def prior_width(parameter: Parameter) -> float:
     """Standard deviation of a parameter's coordinate before the data [1]."""
-    return 1.0 if isinstance(transform_of(parameter), Tolerated) else WIDTH
+    return 1.0 if isinstance(transform_of(parameter), Tolerated | Rough) else WIDTH
+
+
+def _rough_bijection(parameter: Parameter) -> Rough:
+    below, above = (
+        min(_ORDERS, abs(log(parameter.value / bound)) / ORDER) if 0.0 < bound < inf else _ORDERS
+        for bound in (parameter.lower, parameter.upper)
+    )
+    return Rough(parameter.value, Tolerated(0.0, ORDER, below, above))
 
 
 def identified_bijection(parameter: Parameter) -> AbstractBijection:
@@ -356,7 +394,8 @@ class FreeVector(eqx.Module):
     def _bijections(self) -> list[AbstractBijection]:
         split = len(self.identified)
         return [transform_of(parameter) for parameter in self.parameters[:split]] + [
-            tolerated_bijection(parameter) for parameter in self.parameters[split:]
+            transform_of(parameter) if parameter.rough else tolerated_bijection(parameter)
+            for parameter in self.parameters[split:]
         ]
 
     @eqx.filter_jit
@@ -372,8 +411,8 @@ class FreeVector(eqx.Module):
 
 
 def known_to_tolerance(table: ParameterTable, identified: Sequence[str] = ()) -> tuple[str, ...]:
-    """The names in ``table`` that carry a tolerance and are not ``identified``, in the order of the table."""
-    known = (entry.name for entry in table.entries if entry.tolerance > 0.0)
+    """The names in ``table`` that carry a tolerance, or are typical, and are not ``identified``, in its order."""
+    known = (entry.name for entry in table.entries if entry.tolerance > 0.0 or entry.rough)
     return tuple(name for name in known if name not in identified)
 
 

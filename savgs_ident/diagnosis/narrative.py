@@ -6,6 +6,7 @@ from math import exp, inf
 
 import numpy as np
 
+from savgs_ident.core.presentation import percent
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FlexibleMember
 from savgs_ident.diagnosis.findings import hypothesis_of, left_over
 from savgs_ident.diagnosis.gap import Shrink
@@ -202,14 +203,14 @@ _KINDS = {
 def _nothing_missing(problem: DiagnosisProblem, evidence: DiagnosisEvidence, gap: Shrink) -> str:
     if evidence.unsupported:
         return (
-            f"Nothing can be named: the recalibrated model differs from these data by {_percent(gap.recalibrated)} "
-            f"of the response, where the noise accounts for {_percent(gap.floor)}, but what would explain some tests "
+            f"Nothing can be named: the recalibrated model differs from these data by {percent(gap.recalibrated)} "
+            f"of the response, where the noise accounts for {percent(gap.floor)}, but what would explain some tests "
             "predicts those that were held out no better than the model without it. Look for what changed between "
             "the tests."
         )
     return (
         f"These data show nothing missing in the model: the recalibrated model differs from them by "
-        f"{_percent(gap.recalibrated)} of the response; the noise accounts for {_percent(gap.floor)}."
+        f"{percent(gap.recalibrated)} of the response; the noise accounts for {percent(gap.floor)}."
         + _evidence_against(alarm_odds(evidence.weighed), problem.constants)
     )
 
@@ -225,9 +226,13 @@ def _evidence_against(odds: float, constants: DecisionConstants) -> str:
         )
     overall, in_one_test = constants.material_share, constants.material_share_of_test
     return (
-        f" The effects that would explain more change the response by less than {_percent(overall)}, and by less "
-        f"than {_percent(in_one_test)} in any single test, which is too little to matter."
+        f" The effects that would explain more change the response by less than {percent(overall)}, and by less "
+        f"than {percent(in_one_test)} in any single test, which is too little to matter."
     )
+
+
+WORTH_SAYING = 0.01
+"""Share of the squared gap [1] that a law at one port accounts for to first order, below which it is not said."""
 
 
 def _something_unknown(problem: DiagnosisProblem, evidence: DiagnosisEvidence, gap: Shrink) -> str:
@@ -235,15 +240,21 @@ def _something_unknown(problem: DiagnosisProblem, evidence: DiagnosisEvidence, g
     where = problem.location_text(found.name)
     sentence = "The model lacks something that no effect of the catalogue explains: "
     if gap.after < gap.recalibrated:
+        shrinks = (
+            f"from {percent(gap.recalibrated)} recalibrated to {percent(gap.after)} of the response; the noise is "
+            f"{percent(gap.floor)}."
+        )
+        # To first order a strong friction may explain nothing of what it does.
         sentence += (
-            f"a law learned at the {where} accounts for {100.0 * found.share:.0f} % of the squared gap "
-            f"in held-out tests, which shrinks from {_percent(gap.recalibrated)} recalibrated to "
-            f"{_percent(gap.after)} of the response; the noise is {_percent(gap.floor)}."
+            f"a law learned at the {where} accounts for {100.0 * found.share:.0f} % of the squared gap in held-out "
+            f"tests, which shrinks {shrinks}"
+            if found.share >= WORTH_SAYING
+            else f"with a law learned at the {where} the gap in held-out tests shrinks {shrinks}"
         )
     else:
         sentence += (
-            f"recalibrated it misses by {_percent(gap.recalibrated)} of the response, the noise is "
-            f"{_percent(gap.floor)}, and no law learned at a port predicts held-out tests better; the nearest acts "
+            f"recalibrated it misses by {percent(gap.recalibrated)} of the response, the noise is "
+            f"{percent(gap.floor)}, and no law learned at a port predicts held-out tests better; the nearest acts "
             f"at the {where}."
         )
     return sentence + _nearest(problem, evidence) + _not_apart(problem, evidence)
@@ -263,8 +274,8 @@ def _sheet_wrong(problem: DiagnosisProblem, evidence: DiagnosisEvidence, gap: Sh
     sentence = (
         f"{numbers} of the data sheet {do} not hold, and no effect of the catalogue is as good an explanation. "
         f"The model would need {_off_sheet(off)}, which {act} at the {places}. Recalibrated it misses by "
-        f"{_percent(gap.recalibrated)} of the response in held-out tests ({_percent(gap.before)} as given); the "
-        f"noise is {_percent(gap.floor)}."
+        f"{percent(gap.recalibrated)} of the response in held-out tests ({percent(gap.before)} as given); the "
+        f"noise is {percent(gap.floor)}."
     )
     least = evidence.unknown.weight - problem.constants.indistinguishable_log_odds
     fitted = [each for each in evidence.weighed if each.mode is not None and each.hypothesis.effects]
@@ -335,17 +346,17 @@ def _effects_missing(
 def _shrinking(evidence: DiagnosisEvidence, gap: Shrink, named: str) -> str:
     """How far the gap shrinks with what is ``named``; where it does not, what calibration needs in its place."""
     # To the digits that are shown, or the sentence would contradict itself.
-    if gap.after < gap.recalibrated and _percent(gap.after) != _percent(gap.recalibrated):
+    if gap.after < gap.recalibrated and percent(gap.after) != percent(gap.recalibrated):
         return (
-            f" With {named} the gap shrinks from {_percent(gap.recalibrated)} recalibrated "
-            f"({_percent(gap.before)} as given) to {_percent(gap.after)} of the response in held-out tests; the "
-            f"noise is {_percent(gap.floor)}."
+            f" With {named} the gap shrinks from {percent(gap.recalibrated)} recalibrated "
+            f"({percent(gap.before)} as given) to {percent(gap.after)} of the response in held-out tests; the "
+            f"noise is {percent(gap.floor)}."
         )
     base = evidence.findings.base
     worst = int(np.argmax(np.abs(base.x)))
     return (
-        f" Calibration closes the gap as well, from {_percent(gap.before)} to {_percent(gap.recalibrated)} of the "
-        f"response in held-out tests (noise {_percent(gap.floor)}), but needs `{base.coordinates[worst].name}` "
+        f" Calibration closes the gap as well, from {percent(gap.before)} to {percent(gap.recalibrated)} of the "
+        f"response in held-out tests (noise {percent(gap.floor)}), but needs `{base.coordinates[worst].name}` "
         f"{abs(base.x[worst]):.1f} standard deviations {'above' if base.x[worst] > 0.0 else 'below'} its sheet."
     )
 
@@ -370,7 +381,3 @@ def _times_less(evidence: DiagnosisEvidence, fit: LaplaceFit, member: FlexibleMe
     if odds < 1.5:
         return "no less"
     return f"{odds:.2g} times less" if odds < 1e3 else "more than a thousand times less"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"

@@ -171,9 +171,12 @@ class AbstractProblem(ABC):
     def nuisances(self) -> Coordinates:
         """The free parameters of the baseline, then those known to a tolerance that matter.
 
-        What is identified and known to a tolerance all the same, as the damping is, is held against it.
+        What is identified and known to a tolerance all the same, as the damping is, is held against it. Of a contact
+        in which something may rub, numbers that are typical alone matter as soon as something does.
         """
-        used = used_parameters(self.model(()), self.table)
+        plant = self.model(())
+        contacts = {name for port in plant.ports for name in port.contact or () if self.table[name].rough}
+        used = contacts.union(used_parameters(plant, self.table))
         known = [name for name in known_to_tolerance(self.table, self.free) if name in used]
         return tuple(sheet_coordinate(self.table[name]) for name in (*self.free, *known))
 

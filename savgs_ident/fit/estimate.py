@@ -31,7 +31,7 @@ class Estimate:
     ``stderr`` is its standard error, which contains what the model leaves unexplained; ``own_stderr`` is the part of
     it that another campaign of the same rig does not share: noise and drift. ``free`` distinguishes an identified
     parameter from one that was known to a tolerance and estimated along. For the latter ``prior`` and ``prior_sd``
-    say what was known before.
+    say what was known before; ``prior_sd`` is zero of a number of which the order of magnitude was known alone.
     """
 
     name: str

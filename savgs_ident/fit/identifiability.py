@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Array
 from numpy.typing import NDArray
 
-from savgs_ident.core.presentation import Progress
+from savgs_ident.core.presentation import Progress, percent
 from savgs_ident.fit.estimate import at_bounds, with_unit
 from savgs_ident.fit.identified import Verdict
 from savgs_ident.fit.minimise import Minimiser, Minimum
@@ -312,7 +312,7 @@ def _verdict(
     if per_datum <= EXPLAINED:
         return verdict
     beyond = (
-        f"The model misses by {100.0 * missed:.2g} % of the response beyond the noise (chi2/dof = {per_datum:.3g}), "
+        f"The model misses by {percent(missed)} of the response beyond the noise (chi2/dof = {per_datum:.3g}), "
         "no more than small errors of any model; the errors of the parameters contain it."
     )
     return replace(verdict, sentences=(beyond, *verdict.sentences))
@@ -328,7 +328,7 @@ BROKEN_DOWN = (
 def unexplained(per_datum: float, missed: float) -> str:
     """That a model misses its data, by chi2 per datum and as a share of the response [1]."""
     return (
-        f"The model does not explain these data: it misses by {100.0 * missed:.2g} % of the response beyond the "
+        f"The model does not explain these data: it misses by {percent(missed)} of the response beyond the "
         f"noise (chi2/dof = {per_datum:.3g}). Where units and signs are sure, look for what is missing with "
         "`diagnose`. Until then the parameters make up for it; their errors contain what is not explained."
     )

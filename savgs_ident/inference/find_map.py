@@ -34,6 +34,9 @@ Array = NDArray[np.float64]
 STEPS = 15
 """Most steps to a mode."""
 
+LAST_STEPS = 40
+"""The same where the mode is one of the best: as many as a fit by least squares may take."""
+
 HALVINGS = 8
 """Most halvings of a step that does not rise: what shapes a law may curve the density a hundred times as much as the
 slopes say."""
@@ -301,4 +304,4 @@ def find_map_from_several(
 def refine(search: Search, mode: LaplaceFit, terms: tuple[Term, ...]) -> LaplaceFit:
     """The mode again, with the plant made as precise there as it can be."""
     warm_start = search.plant.refined(mode.terms, mode.values, mode.prediction.warm_start)
-    return replace(find_map(search, terms, mode.values, warm_start), precise=True)
+    return replace(find_map(search, terms, mode.values, warm_start, LAST_STEPS), precise=True)

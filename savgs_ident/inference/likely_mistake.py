@@ -110,7 +110,9 @@ def likely_mistake(
                 f"{channels[one].name} follows what the model says of {channels[other].name}, and that the other, as "
                 "if the two had been exchanged: look at their columns"
             )
-    units = [_unit(each.channel, each.factor) for each in ratios if each.off]
+    off = [each for each in ratios if each.off]
+    others = f"{driven.name} and all other channels" if len(off) == 1 < len(ratios) else ""
+    units = [_unit(each.channel, each.factor, others=others) for each in off]
     signs = [_sign(each.channel) for each in ratios if each.opposed]
     return "; ".join((*units, *signs))
 
@@ -134,14 +136,17 @@ def _ratio(
     return _Ratio(channel, factor, scatter, float(np.median(np.abs(ratio.imag))))
 
 
-def _unit(channel: _Recorded, factor: float, or_else: str = "") -> str:
-    """What a channel is that is so many times too large (the logarithm of that), alone or beside another."""
+def _unit(channel: _Recorded, factor: float, or_else: str = "", others: str = "") -> str:
+    """What a channel is that is so many times too large (the logarithm of that), alone or beside another.
+
+    If there are ``others`` which agree, it may be they that are not as they are said to be.
+    """
     which = channel.name if not or_else else f"{channel.name}, or {or_else} the other way round,"
     said = f"{which} is {np.exp(factor):.3g} times what the model says, in all tests alike"
     units = _UNITS.get(channel.unit, _OF_ANY)
     size, large, small = min(units, key=lambda each: abs(abs(factor) - np.log(each[0])))
     if abs(abs(factor) - np.log(size)) > _NEARLY:
-        return f"{said}: look at its unit and its scale"
+        return f"{said}: look at its unit and its scale" + (f", or at those of {others}" if others else "")
     read, wrote = (small, large) if factor > 0.0 else (large, small)
     return f"{said}, as if {read} had been taken for {wrote}: look at its unit"
 

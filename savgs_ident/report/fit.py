@@ -267,8 +267,23 @@ def _gap_table(fit: Fit) -> RenderableType:
 
 
 def tolerance_tables(fit: Identified) -> list[RenderableType]:
-    """What was known to a tolerance and has changed by half of one or more."""
-    known = [each for each in fit.estimates if not each.free]
+    """What was known to a tolerance and has changed by half of one or more, and numbers that were typical alone."""
+    along = [each for each in fit.estimates if not each.free]
+    return [*_tolerated([each for each in along if each.prior_sd > 0.0]), *_typical(along)]
+
+
+def _typical(along: list[Estimate]) -> list[RenderableType]:
+    rows = [
+        (each.name, f"{each.prior:.3g}", value_with_error(each.value, each.stderr), each.unit)
+        for each in along
+        if each.prior_sd == 0.0
+    ]
+    headers = ("parameter", "typical", "estimate ± 1 sd", "unit")
+    title = "Known to an order of magnitude, and estimated too"
+    return [table(title, headers, rows, texts=(0, 3))] if rows else []
+
+
+def _tolerated(known: list[Estimate]) -> list[RenderableType]:
     if not known:
         return []
     moved = sorted((each for each in known if _shift(each) >= 0.5), key=_shift, reverse=True)

@@ -126,6 +126,11 @@ def _longer(lead: float, half: float, left: float) -> float:
 def _lasting(response: HarmonicResponse, left: NDArray[np.float64]) -> HarmonicResponse:
     """The windows of which less than :data:`REMEMBERED` is ``left``."""
     forgotten = left < REMEMBERED
+    if not np.isfinite(left).any():
+        raise InputError(
+            "the model has no motion that follows the recorded one in any window",
+            remedy="begin with a model that was identified from dwells, or record a sweep or a road without steps",
+        )
     if not forgotten.any():
         raise InputError(
             f"the model remembers {100.0 * np.min(left):.2g} % of how a motion began where windows are compared",

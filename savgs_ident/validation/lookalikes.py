@@ -89,8 +89,13 @@ def moved(each: Parameter, value: float, x: float) -> float:
 
     ``x`` is in standard deviations.
     """
-    there = value + each.tolerance * x if each.tolerance > 0.0 else value * np.exp(x)
+    there = value + each.tolerance * x if each.tolerance > 0.0 and not each.rough else value * np.exp(x)
     return float(np.clip(there, each.lower, each.upper))
+
+
+def _unit(each: Parameter, value: float, unknown: bool) -> float:
+    """What a step of one in a parameter of this value is [its unit]."""
+    return value if unknown or each.rough else each.tolerance
 
 
 def hiding_at(
@@ -103,7 +108,7 @@ def hiding_at(
     names = (*bench.free, *known)
     slopes = np.asarray(harmonic_sensitivities(model, p, solution, names, ORDERS))
     noise = noise_rows(bench)
-    units = [float(p[name]) if name in bench.unknown else bench.table[name].tolerance for name in names]
+    units = [_unit(bench.table[name], float(p[name]), name in bench.unknown) for name in names]
     columns = [rows_of(slope) / noise * unit for slope, unit in zip(slopes, units, strict=True)]
     return Hiding(noise, names, np.stack(columns, axis=1))
 

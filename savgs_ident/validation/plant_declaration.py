@@ -170,6 +170,7 @@ def _port(model: PlantModel, port: Port) -> Iterator[Finding]:
             elif table[name].unit not in units:
                 yield _other_unit(f"port '{port.name}': contact", name, table[name].unit, units[0])
         yield from _soft(model, port)
+        yield from _exact(model, port)
     for number in port.numbers:
         if number.name not in table:
             yield _unknown(f"port '{port.name}': number", number.name)
@@ -217,6 +218,22 @@ def _soft(model: PlantModel, port: Port) -> Iterator[Finding]:
                     f"{port.force_unit} from {reached:.2g} {unit} on, {reached / size:.0%} of the typical motion, "
                     f"and acts like a {acts} before; a greater one sticks",
                 )
+
+
+def _exact(model: PlantModel, port: Port) -> Iterator[Finding]:
+    """Numbers of a contact that nobody measured, and that nothing estimates."""
+    exact = [
+        f"'{name}'"
+        for name in port.contact or ()
+        if name in model.table and model.table[name].tolerance == 0.0 and not model.table[name].rough
+    ]
+    if exact:
+        yield Finding(
+            "note",
+            f"port '{port.name}': {' and '.join(exact)} of its contact {'is' if len(exact) == 1 else 'are'} taken as "
+            "exact; a contact that is too soft, or too hard, takes masses, stiffnesses and forces along",
+            "write source='typical' unless it was measured: it is estimated then, from its order of magnitude",
+        )
 
 
 def _over(force: str, displacement: str) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from jax.test_util import check_grads
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.parameter import Parameter, ParameterTable
+from savgs_ident.core.parameter import TYPICAL, Parameter, ParameterTable
 from savgs_ident.core.transforms import (
     WIDTH,
     AbstractBijection,
@@ -21,6 +21,7 @@ from savgs_ident.core.transforms import (
     known_to_tolerance,
     prior_width,
     tolerated_bijection,
+    transform_of,
 )
 from savgs_ident.plants.quarter_car.rig import Rig
 
@@ -45,9 +46,15 @@ TOLERATED = {
     "near the lower bound": Parameter("c_t", 300.0, "N s/m", tolerance=150.0, lower=0.0),
     "near the upper bound": Parameter("efficiency", 0.94, "1", tolerance=0.0282, lower=0.01, upper=1.0),
 }
+ROUGH = {
+    "above zero": Parameter("k_pre", 6e3, "N/m", tolerance=3e3, lower=0.0, source=TYPICAL),
+    "within bounds": Parameter("c_pre", 60.0, "N s/m", lower=1.0, upper=1e3, source=TYPICAL),
+}
 CASES = [(p, identified_bijection) for p in IDENTIFIED.values()]
 CASES += [(p, tolerated_bijection) for p in TOLERATED.values()]
+CASES += [(p, transform_of) for p in ROUGH.values()]
 NAMES = [f"identified, {name}" for name in IDENTIFIED] + [f"tolerated, {name}" for name in TOLERATED]
+NAMES += [f"rough, {name}" for name in ROUGH]
 
 
 class Case:
@@ -118,6 +125,16 @@ def test_a_tolerance_is_its_own_unit_up_to_half_way_to_a_bound() -> None:
     for u in (-1.0, -0.5, 0.0, 2.0, 7.0):
         assert float(bijection.forward(jnp.asarray(u))) == pytest.approx(300.0 + 150.0 * u, rel=1e-14)
     assert 300.0 - 150.0 * 1.5 < float(bijection.forward(jnp.asarray(-1.5))) < 150.0
+
+
+def test_a_typical_number_is_known_to_an_order_of_magnitude() -> None:
+    number = ROUGH["above zero"]
+    assert prior_width(number) == 1.0
+    found = [float(transform_of(number).forward(u)) for u in (-1.0, 0.0, 1.0)]
+    assert found == pytest.approx([6e2, 6e3, 6e4], rel=1e-12)
+    # At zero, or below, nothing says how large it is.
+    assert not replace(number, value=0.0).rough
+    assert known_to_tolerance(ParameterTable((*ROUGH.values(),))) == ("k_pre", "c_pre")
 
 
 def test_near_a_bound_the_steps_of_an_identified_parameter_are_relative() -> None:

@@ -65,11 +65,13 @@ def test_parameters_are_found_within_their_errors() -> None:
     assert fit.held_out.identified < 1.2 * fit.held_out.noise < fit.held_out.as_given
 
 
-def test_a_friction_that_turns_otherwise_is_not_trusted_and_its_errors_contain_the_truth() -> None:
+def test_how_a_friction_turns_round_is_left_to_the_contact_which_takes_no_parameter_along() -> None:
+    """It turns round smoothly; of the contact the order of magnitude is known."""
     fit = _fit(_motion(), *TEXTBOOK)
-    assert not fit.trusted
+    _, after, noise = fit.gap
+    assert after < 1.1 * noise
     for name, true in TRUTH.items():
-        assert abs(fit[name].value - true) < 2.0 * fit[name].stderr < 2.0 * abs(true)
+        assert fit[name].value == pytest.approx(true, rel=5e-3)
 
 
 def test_what_lacks_its_friction_is_not_trusted_and_its_errors_contain_the_truth() -> None:

@@ -265,6 +265,22 @@ def test_what_does_not_go_together_is_said(declared: dict[str, Any], said: str) 
     assert any(said in each for each in found), found
 
 
+def test_a_contact_that_nobody_measured_is_to_be_marked_so() -> None:
+    def said(**known: Any) -> list[str]:
+        contact = si.Parameter("k_pre", 1e5, "N/m", **known), si.Parameter("c_pre", 1e3, "N s/m", **known)
+        sticking = _changed(
+            ports=(replace(GUIDE, contact=("k_pre", "c_pre")), *Sound.ports[1:]),
+            parameters=si.ParameterTable((M, K, C, *contact)),
+        )
+        declared = check_declaration(si.load_plant(sticking))
+        return [each.what for each in declared if "taken as exact" in each.what]
+
+    (one,) = said()
+    assert "'k_pre' and 'c_pre' of its contact are taken as exact" in one
+    assert not said(source="typical")
+    assert not said(tolerance=50.0)
+
+
 @pytest.mark.parametrize(
     ("stiffness", "damping", "acts"), [(1e5, 1e3, ()), (1e5, 2.0, ("damper",)), (1e-3, 1e3, ("spring",))]
 )
