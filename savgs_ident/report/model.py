@@ -13,7 +13,15 @@ from savgs_ident.core.presentation import Origin
 from savgs_ident.effects.base import per
 from savgs_ident.export.gather import Gathered
 from savgs_ident.plants.base import Input
-from savgs_ident.report.text import channel_labels, fixed, per_input_key, plain, table
+from savgs_ident.report.text import (
+    channel_labels,
+    fixed,
+    per_input_key,
+    plain,
+    shown_unit,
+    significant,
+    table,
+)
 from savgs_ident.report.theme import BLUE, GREY, new_figure, styled
 from savgs_ident.simulate.public import (
     DURATION_S,
@@ -85,11 +93,19 @@ def response_text(solved: SimulatedResponse) -> RenderableType:
     headers.append("solution")
     columns.append([status.replace("_", " ") for status in record["status"]])
     return table(
-        f"Periodic response to the {solved.model.plant.inputs[0].about}",
+        f"Periodic response to {_driven_by(solved)}",
         headers,
         zip(*columns, strict=True),
         texts=(len(headers) - 1,),
     )
+
+
+def _driven_by(solved: SimulatedResponse) -> str:
+    """What the plant is driven by, and how far."""
+    driven = solved.model.plant.inputs[0]
+    unit, scale = shown_unit(driven.unit)
+    ends = dict.fromkeys(significant(2.0 * scale * end(np.abs(solved.driven))) for end in (np.min, np.max))
+    return f"the {driven.about} of {' to '.join(ends)} {unit} peak to peak"
 
 
 def _key(driven: Input) -> str:
