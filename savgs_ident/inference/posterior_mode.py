@@ -21,7 +21,7 @@ from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status, joint_status
 from savgs_ident.inference.background.locations import Linearisation
 from savgs_ident.inference.background.shared_errors import background_about
-from savgs_ident.inference.find_map import find_map
+from savgs_ident.inference.find_map import LAST_STEPS, find_map
 from savgs_ident.inference.laplace import principal_axes
 from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 from savgs_ident.inference.likelihood import Likelihood, sharing_errors
@@ -193,10 +193,10 @@ def find_mode(
     """
     search = search_of(PosteriorPlant(posterior), posterior.likelihood.data)
     start = _values_at(posterior, u)
-    found = find_map(search, (), start, warm_start, level=LEVEL, progress=report)
+    found = find_map(search, (), start, warm_start, steps=LAST_STEPS, level=LEVEL, progress=report)
     if found.status.ok:
         finer = search.plant.refined((), found.values, found.prediction.warm_start)
-        found = find_map(search, (), found.values, finer, level=LEVEL, progress=report)
+        found = find_map(search, (), found.values, finer, steps=LAST_STEPS, level=LEVEL, progress=report)
     return PosteriorMode(_linearisation_point(posterior, found), found.status, found.solved)
 
 
@@ -227,7 +227,7 @@ def find_mode_again(posterior: PosteriorDensity, known: PosteriorMode, report: P
     at = known.linearisation_point
     search = search_of(PosteriorPlant(posterior), posterior.likelihood.data)
     start = _values_at(posterior, jnp.asarray(at.point[:-2]))
-    found = find_map(search, (), start, at.solution, level=LEVEL, progress=report)
+    found = find_map(search, (), start, at.solution, steps=LAST_STEPS, level=LEVEL, progress=report)
     return PosteriorMode(_linearisation_point(posterior, found), found.status, found.solved)
 
 

@@ -261,7 +261,9 @@ def posterior_text(posterior: Posterior) -> RenderableType:
         plain(""),
         _nuisance(posterior),
         *_tolerances(posterior),
-        plain("Identifiability", "bold"),
+        plain(
+            "Identifiability" if not why else "Identifiability, by numbers that are not to be trusted", "bold"
+        ),
         *(plain(f"- {sentence}") for sentence in posterior.sentences),
         plain(f"- {scope_sentence(posterior)}"),
         plain(f"- {predictive_sentence(posterior)}"),
