@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Progress
+from savgs_ident.core.status import Status
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.inference.background.shared_errors import drifts_of
-from savgs_ident.inference.find_map import LAST_STEPS, find_map
+from savgs_ident.inference.find_map import LAST_STEPS, LEVEL, find_map
 from savgs_ident.inference.laplace import linearised_optimum
 from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 from savgs_ident.inference.likelihood import likelihood_of
@@ -108,6 +109,11 @@ def fit_with_errors(
     values = {name: float(value) for name, value in task.problem.parameters(best.u).items()}
     search = search_of(PosteriorPlant(density), density.likelihood.data)
     found = find_map(search, (), values, best.solution, level=SETTLED, steps=LAST_STEPS, progress=progress)
+    if found.status is Status.MAX_ITERATIONS:
+        # Along a contact as hard as any nothing rises any more, for as many steps as one likes.
+        found = find_map(
+            search, (), found.values, found.prediction.warm_start, level=LEVEL, progress=progress
+        )
     if not found.status.ok:
         return None
     if found.noise_scales.discrepancy > BACKGROUND.largest_error:
