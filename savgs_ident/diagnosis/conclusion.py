@@ -23,14 +23,13 @@ from savgs_ident.diagnosis.findings import hypothesis_of
 from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint, Rows, Shrink, shrinks
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out, select_in_folds
 from savgs_ident.diagnosis.learning import LearnedLaw
-from savgs_ident.diagnosis.problem import AbstractProblem
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, NextTest
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import UnknownEvidence, WeighedHypothesis
 from savgs_ident.inference.find_map import find_map
 from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 
-FurtherRecording = Callable[[AbstractProblem, Sequence[ModelPoint]], FurtherShrink | None]
+FurtherRecording = Callable[[Sequence[ModelPoint]], FurtherShrink | None]
 """Predicts a recording that takes no part, by two or three models: as given, recalibrated, with what is named."""
 
 
@@ -359,14 +358,14 @@ def _predict_further(
     """
     if further is None:
         return None
-    base = problem.base
-    points: list[ModelPoint] = [((), values), ((), base.values)]
+    plant, base = problem.plant, problem.base
+    points = [ModelPoint(plant, (), values), ModelPoint(plant, (), base.values)]
     if law is not None:
-        return further(law.problem, [*points, ((law.name,), law.values)])
+        return further([*points, ModelPoint(law.problem, (law.name,), law.values)])
     if evidence.kind == "unknown":
-        return further(problem.plant, points)
+        return further(points)
     fit = evidence.chosen.mode or base
-    return further(problem.plant, [*points, (fit.terms, fit.values)])
+    return further([*points, ModelPoint(plant, fit.terms, fit.values)])
 
 
 def _next_tests(

@@ -138,11 +138,10 @@ def diagnose_dwells(
     Look at ``converged`` of the result. Raises :class:`InputError` for a plant whose baseline has no periodic motion.
     """
 
-    def predict_sweep(problem: AbstractProblem, points: Sequence[ModelPoint]) -> FurtherShrink | None:
+    def predict_sweep(points: Sequence[ModelPoint]) -> FurtherShrink | None:
         assert sweep is not None
-        assert isinstance(problem, DwellProblem)
         progress("predicting the sweep")
-        return sweep_shrink(problem, sweep, points)
+        return sweep_shrink(sweep, points)
 
     further = None if sweep is None else predict_sweep
     return diagnose_problem(plant, data, given, settings, values, progress, further, measured, watch, origin)

@@ -140,21 +140,30 @@ class DwellProblem(AbstractProblem):
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
     ) -> PeriodicSolution:
         """The same motions on nodes that follow them. ``values`` are in SI."""
-        model, p = self._solved(terms, values)
+        model, p = self._model_with(terms, values)
         return adapt(model, p, warm_start, warm_start.mesh.layout, self.settings.iterations)
 
     def predict(
         self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
     ) -> Prediction:
         """Rows with ``terms`` at ``values`` [SI], with slopes in ``names``, on the nodes of ``warm_start``."""
-        model, p = self._solved(terms, values)
-        self._have_compiled(model, p)
-        solution = resolve_with_states(model, p, warm_start, partial(self._signals_along, p=p))
+        model, p, solution = self.motions_with(terms, values, warm_start)
         rows = np.asarray(rows_of(model, self.likelihood, p, solution, self.orders))
         rows = rows + self.corrections.get(terms, 0.0) + (0.0 if self.beyond is None else self.beyond)
         status = joint_status(solution.status())
         slopes = partial(self.slopes, model, p, solution, self._shared.names(terms, names))
         return Prediction(rows, slopes, status, solution)
+
+    def motions_with(
+        self, terms: tuple[str, ...], values: Mapping[str, float], known: PeriodicSolution
+    ) -> tuple[AbstractPlant, Values, PeriodicSolution]:
+        """The model with ``terms`` at ``values`` [SI], its parameters, and its motions from those ``known``.
+
+        Under their excitation, on their nodes; look at ``status()`` of the motions.
+        """
+        model, p = self._model_with(terms, values)
+        self._have_compiled(model, p)
+        return model, p, resolve_with_states(model, p, known, partial(self._signals_along, p=p))
 
     def corrected(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
@@ -164,7 +173,7 @@ class DwellProblem(AbstractProblem):
         The rule of the collocation is of second order: four thirds of what twice the nodes change. None where they do
         not lead to a motion.
         """
-        (model, p), layout = self._solved(terms, values), warm_start.mesh.layout
+        (model, p), layout = self._model_with(terms, values), warm_start.mesh.layout
         doubled = Layout(tuple(2 * count for count in layout.counts))
         coarse = resolve(model, p, warm_start, ITERATIONS)
         fine = adapt(model, p, coarse, doubled, self.settings.iterations)
@@ -310,7 +319,7 @@ class DwellProblem(AbstractProblem):
         """The baseline with ``terms`` and all effects without states, in programs that serve others with states."""
         return self._shared.with_effects(terms) or super().complete(terms)
 
-    def _solved(self, terms: Sequence[str], values: Mapping[str, float]) -> tuple[AbstractPlant, Values]:
+    def _model_with(self, terms: Sequence[str], values: Mapping[str, float]) -> tuple[AbstractPlant, Values]:
         """The same, or the smallest model with ``terms`` where these have a program of their own; its parameters."""
         p = self.values(values)
         model, there = self._shared.with_force(terms, p) or (self._shared.with_effects(terms), p)

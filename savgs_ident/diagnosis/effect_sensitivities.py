@@ -62,12 +62,15 @@ class AlikeTests(NamedTuple):
         return 2.0 * np.pi * np.arange(self.instants) / self.instants
 
 
-def alike_tests(layout: Layout, windows: NDArray[np.intp]) -> list[AlikeTests]:
-    """The dwells, and the windows at these places, which are of one length."""
-    dwells = tuple(d for d in range(len(layout.counts)) if d not in windows)
+def alike_tests(
+    layout: Layout, windows: NDArray[np.intp], wanted: Sequence[int] | None = None
+) -> list[AlikeTests]:
+    """The dwells, and the windows at these places, which are of one length; of all tests or those ``wanted``."""
+    tests = range(len(layout.counts)) if wanted is None else wanted
+    dwells = tuple(test for test in tests if test not in windows)
     found = [AlikeTests(dwells, SAMPLES, PERIODS)] if dwells else []
-    if windows.size:
-        every = tuple(windows.tolist())
+    every = tuple(test for test in tests if test in windows)
+    if every:
         found.append(AlikeTests(every, layout.counts[every[0]], PERIODS_OF_A_WINDOW))
     return found
 
@@ -99,11 +102,11 @@ def sensitivities_with_states(
 
     Rows are in the units of their readings, ``typical`` in SI.
     """
-    even = _evenly(model, p, solution)
+    even = _evenly(model, p, solution, None)
 
     def field(one: tuple[Effect, Mapping[str, float]]) -> tuple[str, NDArray[np.float64]]:
         effect, given = one
-        return effect.port.name, _marched(effect, dict(p) | as_values(given), even, solution)
+        return effect.port.name, _marched(effect, [dict(p) | as_values(given)], even, solution)[0]
 
     fields = in_parallel(field, zip(effects, typical, strict=True))
     return impose(model, likelihood, orders, p, solution, fields)
@@ -142,29 +145,41 @@ def rehearse(p: Values, effects: Sequence[Effect], alike: Sequence[AlikeTests]) 
         for effect in effects:
             gives = effect.port.kind is PortKind.SERIES
             seen = Load(still, still) if gives else PortSignals(still, still, still, still)
-            _march_along(effect, p, EvenSignals(tests, {effect.port.name: seen}, np.ones(len(tests.places))))
+            _march_along(
+                effect, [p], EvenSignals(tests, {effect.port.name: seen}, np.ones(len(tests.places)))
+            )
 
 
 def marched_effect(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, effect: Effect
+    model: AbstractPlant,
+    several: Sequence[Values],
+    solution: PeriodicSolution,
+    effect: Effect,
+    tests: Sequence[int] | None = None,
 ) -> NDArray[np.float64]:
-    """What an effect with states does at its port along a motion.
+    """What an effect with states does at its port along a motion, at each of ``several`` parameters.
 
-    A force (P,) [N], or a way and its rate (P, 2).
+    A force (v, P) [N], or a way and its rate (v, P, 2). The parameters differ in those of the effect alone, which
+    ``model`` does not have. Zero at the nodes of other tests than the ``tests``, if given.
     """
-    return _marched(effect, p, _evenly(model, p, solution), solution)
+    return _marched(effect, several, _evenly(model, several[0], solution, tests), solution)
 
 
 def marched_contact(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, effect: Effect
+    model: AbstractPlant,
+    several: Sequence[Values],
+    solution: PeriodicSolution,
+    effect: Effect,
+    tests: Sequence[int] | None = None,
 ) -> NDArray[np.float64]:
-    """Friction [N] of the contact at the port of an effect along a motion of ``model``, (P,).
+    """Friction [N] of the contact at the port of an effect along a motion of ``model``, (v, P).
 
-    Under the friction limits of the effect and of the model at ``p``. The bristle's anchor is marched: it is not that
-    of the motion, which has limits of its own.
+    Under the friction limits of the effect and of the model at each of ``several`` parameters, which differ in those
+    of the effect alone. The bristle's anchor is marched: it is not that of the motion, which has limits of its own.
+    Zero at the nodes of other tests than the ``tests``, if given.
     """
     others = tuple(each for each in model.effects if each.loads_contact and each.name != effect.name)
-    known = placed(dict(p))
+    known = placed(_stacked(several))
 
     def march(each: EvenSignals) -> Array:
         sliding = each.signals[effect.port.name]
@@ -172,11 +187,19 @@ def marched_contact(
         steps = jnp.asarray(each.steps)
         return _march_contact((*others, effect), effect.port, known, sliding, steps, each.tests.periods)
 
-    return _at_nodes([(each.tests, march(each)) for each in _evenly(model, p, solution)], solution)
+    even = _evenly(model, several[0], solution, tests)
+    return _at_nodes([(each.tests, march(each)) for each in even], solution)
 
 
-def _evenly(model: AbstractPlant, p: Values, solution: PeriodicSolution) -> list[EvenSignals]:
-    """Port signals, and loads as those of series elements, of all tests."""
+def _stacked(several: Sequence[Values]) -> Values:
+    """The same parameters of several sets, (v,) each."""
+    return {name: jnp.stack([jnp.asarray(each[name]) for each in several]) for name in several[0]}
+
+
+def _evenly(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, wanted: Sequence[int] | None
+) -> list[EvenSignals]:
+    """Port signals, and loads as those of series elements, of all tests or those ``wanted``."""
     ports, carried = node_loads(model, p, solution)
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
 
@@ -196,20 +219,22 @@ def _evenly(model: AbstractPlant, p: Values, solution: PeriodicSolution) -> list
         frequency = np.asarray(solution.excitation.frequency)[list(tests.places)]
         return EvenSignals(tests, signals, 1.0 / (tests.instants * frequency))
 
-    return [of(tests) for tests in alike_tests(layout, solution.excitation.windows)]
+    return [of(tests) for tests in alike_tests(layout, solution.excitation.windows, wanted)]
 
 
 def _marched(
-    effect: Effect, p: Values, even: Sequence[EvenSignals], solution: PeriodicSolution
+    effect: Effect, several: Sequence[Values], even: Sequence[EvenSignals], solution: PeriodicSolution
 ) -> NDArray[np.float64]:
-    """What the effect does at its port, at the nodes: a force (P,), or a way and its rate (P, 2)."""
-    return _at_nodes([(each.tests, _march_along(effect, p, each)) for each in even], solution)
+    """What the effect does at its port, at the nodes: a force (v, P), or a way and its rate (v, P, 2)."""
+    return _at_nodes([(each.tests, _march_along(effect, several, each)) for each in even], solution)
 
 
-def _march_along(effect: Effect, p: Values, even: EvenSignals) -> Float[Array, "d n k"]:
-    """The same along the last period of tests that are marched alike, (d, n, k)."""
+def _march_along(effect: Effect, several: Sequence[Values], even: EvenSignals) -> Float[Array, "v d n k"]:
+    """The same along the last period of tests that are marched alike, (v, d, n, k)."""
     weight = np.array([1.0 if state.slips else FORWARD for state in effect.states])
-    numbers, weights, steps = placed((effect.by_role(p), jnp.asarray(weight), jnp.asarray(even.steps)))
+    numbers, weights, steps = placed(
+        (_stacked([effect.by_role(p) for p in several]), jnp.asarray(weight), jnp.asarray(even.steps))
+    )
     marched = _march(effect.law, numbers, even.signals[effect.port.name], steps, weights, even.tests.periods)
     return marched * effect.port.sense if isinstance(effect.law, AbstractForceLaw) else marched
 
@@ -218,53 +243,59 @@ def _march_along(effect: Effect, p: Values, even: EvenSignals) -> Float[Array, "
 @eqx.filter_jit
 def _march(
     law: AbstractLaw,
-    v: Values,
+    several: Values,
     signals: PortSignals | Load,
     steps: Float[Array, " d"],
     weight: Float[Array, " s"],
     periods: int,
-) -> Float[Array, "d n k"]:
-    """What a law does along the last period: a force, or a way and its rate."""
-
-    def defect(now: Array, before: Array, at: Any, step: Array) -> Array:
-        rate, state = (now - before) / step, weight * now + (1.0 - weight) * before
-        if isinstance(law, AbstractSeriesLaw):
-            return law.balance(v, at, state, rate)
-        assert isinstance(law, AbstractForceLaw), law.name
-        return rate - law.rate(v, at, state)
-
-    def output(now: Array, before: Array, at: Any, step: Array) -> Array:
-        if isinstance(law, AbstractForceLaw):
-            return law.force(v, at, now)[None]
-        return jnp.stack([now[0], (now[0] - before[0]) / step])
-
+) -> Float[Array, "v d n k"]:
+    """What a law does along the last period, a force, or a way and its rate, with each of several numbers (v,)."""
     # A step ends at an instant, and sees the port as it is on the way there.
     signals = jax.tree.map(
         lambda each: each + (1.0 - weight[0]) * (jnp.roll(each, 1, axis=1) - each), signals
     )
-    return _repeat(defect, output, weight.size, signals, steps, periods)
+
+    def march(v: Values) -> Array:
+        def defect(now: Array, before: Array, at: Any, step: Array) -> Array:
+            rate, state = (now - before) / step, weight * now + (1.0 - weight) * before
+            if isinstance(law, AbstractSeriesLaw):
+                return law.balance(v, at, state, rate)
+            assert isinstance(law, AbstractForceLaw), law.name
+            return rate - law.rate(v, at, state)
+
+        def output(now: Array, before: Array, at: Any, step: Array) -> Array:
+            if isinstance(law, AbstractForceLaw):
+                return law.force(v, at, now)[None]
+            return jnp.stack([now[0], (now[0] - before[0]) / step])
+
+        return _repeat(defect, output, weight.size, signals, steps, periods)
+
+    return jax.vmap(march)(several)
 
 
 @eqx.filter_jit
 def _march_contact(
     effects: tuple[Effect, ...],
     port: Port,
-    p: Values,
+    several: Values,
     signals: PortSignals,
     steps: Float[Array, " d"],
     periods: int,
-) -> Float[Array, "d n 1"]:
-    def held(now: Array, at: PortSignals) -> Bristle:
-        return contact_bristle(effects, port, p, at, now[0])
+) -> Float[Array, "v d n 1"]:
+    def march(p: Values) -> Array:
+        def held(now: Array, at: PortSignals) -> Bristle:
+            return contact_bristle(effects, port, p, at, now[0])
 
-    def defect(now: Array, before: Array, at: PortSignals, step: Array) -> Array:
-        return (now - before) / step - held(now, at).rate
+        def defect(now: Array, before: Array, at: PortSignals, step: Array) -> Array:
+            return (now - before) / step - held(now, at).rate
 
-    def output(now: Array, before: Array, at: PortSignals, step: Array) -> Array:
-        del before, step
-        return held(now, at).force[None]
+        def output(now: Array, before: Array, at: PortSignals, step: Array) -> Array:
+            del before, step
+            return held(now, at).force[None]
 
-    return _repeat(defect, output, 1, signals, steps, periods)
+        return _repeat(defect, output, 1, signals, steps, periods)
+
+    return jax.vmap(march)(several)
 
 
 def _repeat(
@@ -297,12 +328,13 @@ def _repeat(
 
 
 def _at_nodes(along: Sequence[tuple[AlikeTests, Array]], solution: PeriodicSolution) -> NDArray[np.float64]:
-    """What is known at even instants of all tests, (d, n, k) of those alike, on the nodes: (P,) for k = 1, (P, k)."""
+    """What is known at even instants, (v, d, n, k) of tests alike, on the nodes: (v, P) for k = 1, else (v, P, k)."""
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
-    out = np.zeros((layout.total, along[0][1].shape[2]))
+    several, *_, outputs = along[0][1].shape
+    out = np.zeros((several, layout.total, outputs))
     for tests, marched in along:
-        for place, values in zip(tests.places, np.asarray(marched), strict=True):
+        for place, values in zip(tests.places, np.moveaxis(np.asarray(marched), 1, 0), strict=True):
             mine = layout.nodes_of([place])
-            for k, each in enumerate(values.T):
-                out[mine, k] = np.interp(phase[mine], tests.grid, each, period=2.0 * np.pi)
-    return out[:, 0] if out.shape[1] == 1 else out
+            for v, k in np.ndindex(several, outputs):
+                out[v, mine, k] = np.interp(phase[mine], tests.grid, values[v, :, k], period=2.0 * np.pi)
+    return out[..., 0] if outputs == 1 else out

@@ -16,7 +16,7 @@ program of its own. Below the slowest dwell of the campaign nothing is compared.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import jax.numpy as jnp
 import numpy as np
@@ -24,15 +24,16 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from savgs_ident.diagnosis.thresholds import DecisionConstants
+from savgs_ident.inference.background.imposed import harmonics_of_motion
 from savgs_ident.inference.observations import Data
 from savgs_ident.plants.base import Excitation
 from savgs_ident.responses.harmonic_response import SweepResponse
 from savgs_ident.simulate.excitation import only_driven
-from savgs_ident.simulate.periodic import layout_of, simulate_periodic
-from savgs_ident.simulate.readings import harmonics
+from savgs_ident.simulate.periodic import PeriodicSolution, layout_of, simulate_periodic
 
 if TYPE_CHECKING:
     from savgs_ident.diagnosis.dwell_problem import DwellProblem
+    from savgs_ident.diagnosis.problem import AbstractProblem
 
 
 @dataclass(frozen=True)
@@ -277,17 +278,21 @@ SWEEP_NAME = "recorded sweep, first harmonic"
 
 Signal = NDArray[np.float64]
 
-ModelPoint = tuple[tuple[str, ...], Mapping[str, float]]
-"""Terms of a model, and its values by name [SI]."""
+
+class ModelPoint(NamedTuple):
+    """A model of a problem: its terms, and its values by name [SI]."""
+
+    problem: "AbstractProblem"
+    terms: tuple[str, ...]
+    values: Mapping[str, float]
 
 
-def sweep_shrink(
-    problem: "DwellProblem", sweep: SweepResponse, hypotheses: Sequence[ModelPoint]
-) -> FurtherShrink | None:
-    """The gap of a sweep before, recalibrated and after, for three ``hypotheses``; two if nothing is to come after.
+def sweep_shrink(sweep: SweepResponse, points: Sequence[ModelPoint]) -> FurtherShrink | None:
+    """The gap of a sweep before, recalibrated and after, by models of dwells; two if nothing is to come after.
 
-    None where too few dwells of the campaign lie in the sweep's range. NaN for a hypothesis without motion.
+    None where too few dwells of the campaign lie in the sweep's range. NaN for a model without motion.
     """
+    problem = _of_dwells(points[0])
     fewest = problem.constants.sweep_dwells
     dwells = only_driven(problem.excitation, problem.dwells)
     frequencies = frequencies_of(np.asarray(dwells.frequency), sweep, fewest)
@@ -302,12 +307,17 @@ def sweep_shrink(
     shown = {name: rows for name, rows in shown.items() if rows.any()}
     if not shown:
         return None
-    gaps = [
-        _sweep_gap(sweep, shown, problem.channels, first_harmonic(problem, sweep, frequencies, *each))
-        for each in hypotheses
-    ]
+    place = np.argsort(np.argsort(np.asarray(dwells.frequency)))
+    # What is named begins from the motion of the recalibrated baseline.
+    known = [swept_motions(each, sweep, frequencies[place]) for each in points[:2]]
+    gaps = []
+    for point, near in zip(points, [*known, known[1]], strict=False):
+        found = first_harmonic(point, near)
+        rows = None if found is None else found[np.argsort(place)]
+        swept = None if rows is None else along(frequencies, rows, sweep.frequency, sweep.sweep_rate)
+        gaps.append(_sweep_gap(sweep, shown, problem.channels, swept))
     return FurtherShrink(
-        SWEEP_NAME, gaps[0], gaps[1], gaps[2] if len(gaps) > 2 else np.nan, _sweep_floor(sweep, shown)
+        SWEEP_NAME, gaps[0], gaps[1], gaps[2] if len(gaps) > 2 else nan, _sweep_floor(sweep, shown)
     )
 
 
@@ -328,36 +338,43 @@ def frequencies_of(dwells: Signal, sweep: SweepResponse, fewest: int) -> Signal 
     return np.array(found)
 
 
-def first_harmonic(
-    problem: "DwellProblem",
-    sweep: SweepResponse,
-    frequencies: Signal,
-    terms: tuple[str, ...],
-    values: Mapping[str, float],
-) -> NDArray[np.complex128] | None:
-    """First harmonic per unit of the first input at the instants of a sweep, (W, C).
+def swept_motions(point: ModelPoint, sweep: SweepResponse, frequencies: Signal) -> PeriodicSolution:
+    """Motions of a baseline at frequencies [Hz], (D,), under the first input of a sweep alone, the others at rest.
 
-    It follows from motions at frequencies [Hz], (D,), under the first input alone, the others at rest. None where a
-    motion is not found. Slow motions take the places of slow dwells, which have the nodes for it: where there are
-    dwells alone no program is compiled anew.
+    Where slow frequencies take the places of slow dwells, which have the nodes for it, and there are dwells alone, no
+    program is compiled anew.
     """
+    problem = _of_dwells(point)
     dwells = only_driven(problem.excitation, problem.dwells)
-    layout, amplitude = layout_of(dwells, problem.settings), float(np.median(sweep.input_amplitude))
-    place = np.argsort(np.argsort(np.asarray(dwells.frequency)))
     first, *others = (each.name for each in problem.plant.inputs)
     swept = {name: np.zeros(each.shape, complex) for name, each in dwells.harmonics.items()}
-    swept[first][:, 1] = amplitude
+    swept[first][:, 1] = float(np.median(sweep.input_amplitude))
     for name in others:
         swept[name][:, 0] = np.mean(np.asarray(dwells.harmonics[name])[:, 0])
-    there = Excitation(
-        jnp.asarray(frequencies[place]), {name: jnp.asarray(each) for name, each in swept.items()}
-    )
-    model, p = problem.model(terms), problem.values(values)
-    solution = simulate_periodic(model, p, there, problem.settings, layout)
+    driven = {name: jnp.asarray(each) for name, each in swept.items()}
+    there, layout = Excitation(jnp.asarray(frequencies), driven), layout_of(dwells, problem.settings)
+    model, p = problem.model(()), problem.values(point.values)
+    return simulate_periodic(model, p, there, problem.settings, layout)
+
+
+def first_harmonic(point: ModelPoint, known: PeriodicSolution) -> NDArray[np.complex128] | None:
+    """First harmonic per unit of the first input, (D, C), of a model under the excitation of ``known`` motions.
+
+    These are a baseline's, from which its own are found, on nodes that follow them. None where one is not found.
+    """
+    problem = _of_dwells(point)
+    model, p, near = problem.motions_with(point.terms, point.values, known)
+    solution = problem.refined(point.terms, point.values, near)
     if not all(status.ok for status in solution.status()):
         return None
-    found = np.asarray(harmonics(model, p, solution, problem.orders), np.complex128)
-    return along(frequencies, found[np.argsort(place), :, 1] / amplitude, sweep.frequency, sweep.sweep_rate)
+    amplitude = np.asarray(known.excitation.harmonics[problem.plant.inputs[0].name])[:, 1]
+    found = np.asarray(harmonics_of_motion(model, p, solution, problem.orders))[:, :, 1]
+    return np.asarray(found / amplitude[:, None], np.complex128)
+
+
+def _of_dwells(point: ModelPoint) -> "DwellProblem":
+    """The problem of a model of dwells."""
+    return cast("DwellProblem", point.problem)
 
 
 def along(
@@ -380,7 +397,7 @@ def _sweep_gap(
 ) -> float:
     """Relative rms over the instants shown, all channels counting alike."""
     if predicted is None:
-        return np.nan
+        return nan
     shares = []
     for name, rows in shown.items():
         seen = sweep.response[rows, sweep.channel(name)]

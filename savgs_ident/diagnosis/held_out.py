@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.executor import in_parallel
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.find_map import STEPS, find_map_again
 from savgs_ident.inference.laplace_fit import LaplaceFit, Search
@@ -106,13 +107,14 @@ def hold_out(
         )
         return rows, density, found.evidence
 
-    rows, density, evidence = np.empty_like(data.measured), np.empty_like(data.measured), []
-    for out in folds_of(data, constants):
-        rows[out], density[out], known = without(out)
-        evidence.append(known)
+    folds = folds_of(data, constants)
     last = data.test >= data.tests - data.tests // constants.held_out_folds
-    beyond = float(np.mean(without(last)[1])) if last.any() else nan
-    return HeldOut(rows, density, tuple(evidence), beyond)
+    parts = in_parallel(without, [*folds, last] if last.any() else folds)
+    rows, density = np.empty_like(data.measured), np.empty_like(data.measured)
+    for out, (theirs, dense, _) in zip(folds, parts, strict=False):
+        rows[out], density[out] = theirs, dense
+    evidence = tuple(each for _, _, each in parts[: len(folds)])
+    return HeldOut(rows, density, evidence, float(np.mean(parts[-1][1])) if last.any() else nan)
 
 
 def folds_of(data: Data, constants: DecisionConstants = DEFAULTS) -> list[NDArray[np.bool_]]:

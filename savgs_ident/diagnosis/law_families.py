@@ -8,7 +8,7 @@ taken away from all, too, which says how well it can be spared.
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import log
 from typing import NamedTuple
 
@@ -158,12 +158,14 @@ def families_alone(
     search: Search, mode: LaplaceFit, port: Port, constants: DecisionConstants
 ) -> dict[Family, FamilyAlone]:
     """Each family's functions without those of the others, to first order about the fit."""
-    about, seen, found = _FirstOrder(search, mode), {each.name for each in mode.coordinates}, {}
-    for family in dict.fromkeys(each.family for each in functions_at(port)):
-        mine = tuple(name for name in coefficients_of(port, family) if name in seen)
-        if mine:
-            found[family] = _needed(about, port, mine, mine, constants)
-    return found
+    about, seen = _FirstOrder(search, mode), {each.name for each in mode.coordinates}
+    families = dict.fromkeys(each.family for each in functions_at(port))
+    mine = {
+        family: tuple(name for name in coefficients_of(port, family) if name in seen) for family in families
+    }
+    some = [family for family in families if mine[family]]
+    needed = in_parallel(lambda each: _needed(about, port, mine[each], mine[each], constants), some)
+    return dict(zip(some, needed, strict=True))
 
 
 def families_fitted(
@@ -184,24 +186,21 @@ def families_fitted(
     found = families_alone(search, every.mode, port, constants)
     near = max(least, every.weight - constants.alarm_log_odds)
 
-    def among(
-        family: Family, starts: Sequence[FamilyAlone], known: Sequence[FittedFunctions]
-    ) -> list[FittedFunctions]:
+    def among(family: Family, starts: Sequence[FamilyAlone]) -> list[FittedFunctions]:
         solved = list[FittedFunctions]()
         for each in starts:
-            fits = [*known, *solved]
-            if {*each.functions} in ({*fit.functions} for fit in fits):
+            if {*each.functions} in ({*fit.functions} for fit in solved):
                 continue
-            bound = max([near, *(fit.weight - constants.alarm_log_odds for fit in fits)])
+            bound = max([near, *(fit.weight - constants.alarm_log_odds for fit in solved)])
             one = _fitted(search, every, port, family, each, bound, constants)
             solved += [] if one is None else [one]
         return solved
 
     def fitted(family: Family) -> list[FittedFunctions]:
-        first = among(family, [found[family]], ())
+        first = found[family]
         groups = _by_themselves(every.term, port, family, alone, start, constants)
-        others = in_parallel(lambda starts: among(family, starts, first), groups)
-        return [*first, *(fit for some in others for fit in some)]
+        others = [some for some in groups if {*some[0].functions} != {*first.functions}]
+        return [fit for some in in_parallel(partial(among, family), [[first], *others]) for fit in some]
 
     weights = {family: each.weight for family, each in found.items()}
     likely = sorted(found, key=lambda family: -weights[family])[: constants.likely_families]

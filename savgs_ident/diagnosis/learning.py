@@ -42,7 +42,7 @@ from savgs_ident.effects.learned_functions import (
 )
 from savgs_ident.inference.find_map import find_map, find_map_from_both
 from savgs_ident.inference.laplace_fit import LaplaceFit, Search, Start, search_of
-from savgs_ident.inference.observations import Data, Term
+from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.inference.prior import Logarithmic
 
 
@@ -222,26 +222,14 @@ def _begin_learning(
     least: float,
 ) -> _Begun | None:
     """The first steps of the fit of all functions of a port; None where there is none."""
-    spans = problem.learned_spans(port, base.values, base.prediction.warm_start)
-    if spans is None:
+    at_rest = _at_rest(problem, base, port)
+    if at_rest is None or not at_rest.prediction.solved:
         return None
-    effect = learned_effect(port)
-    there = {name: each for name, each in problem.catalogue.items() if name in problem.baseline}
-    alike = {each.name: each for each in _alike(effect, problem)}
-    parameters = tuple(each for some in alike.values() for each in some.parameters)
-    table = ParameterTable(parameters).with_values(spans)
-    mine = replace(
-        problem,
-        parameters=merge_parameters(problem.parameters, table),
-        catalogue={**there, **alike},
-    ).uncorrected()
+    mine, effect, spans, known = at_rest
     search, names = search_of(mine, data, given), coefficients_at(port)
-    at_rest = mine.predict((effect.name,), base.values, (), base.prediction.warm_start)
-    if not at_rest.solved:
-        return None
-    places = best_places(mine, search, base, port, at_rest.warm_start, constants)
+    places = best_places(mine, search, base, port, known.warm_start, constants)
     values = {**base.values, **places}
-    there_now = mine.predict((effect.name,), values, names, at_rest.warm_start)
+    there_now = mine.predict((effect.name,), values, names, known.warm_start)
     if not there_now.solved:
         return None
     shapes = tuple(each for each in term_of(effect, constants).shapes if each.name not in spans)
@@ -256,6 +244,39 @@ def _begin_learning(
     blocked = _blocked_play(search, effect, blank, port, base, near, constants)
     alone = widths_alone(term, port, search, base, columns, constants)
     return _Begun(port, mine, search, spans, places, alone, FittedFunctions(term, mode), blocked)
+
+
+class _AtRest(NamedTuple):
+    """The baseline with a learned law that does nothing: the problem, the law, its ``spans`` and the motion."""
+
+    problem: AbstractProblem
+    effect: Effect
+    spans: Mapping[str, float]
+    prediction: Prediction
+
+
+def _at_rest(problem: AbstractProblem, base: LaplaceFit, port: Port) -> _AtRest | None:
+    """The baseline with the law of a port; None where no law can be learned there."""
+    spans = problem.learned_spans(port, base.values, base.prediction.warm_start)
+    if spans is None:
+        return None
+    effect = learned_effect(port)
+    there = {name: each for name, each in problem.catalogue.items() if name in problem.baseline}
+    alike = {each.name: each for each in _alike(effect, problem)}
+    parameters = tuple(each for some in alike.values() for each in some.parameters)
+    table = ParameterTable(parameters).with_values(spans)
+    mine = replace(
+        problem,
+        parameters=merge_parameters(problem.parameters, table),
+        catalogue={**there, **alike},
+    ).uncorrected()
+    known = mine.predict((effect.name,), base.values, (), base.prediction.warm_start)
+    return _AtRest(mine, effect, spans, known)
+
+
+def rehearse_learning(problem: AbstractProblem, base: LaplaceFit, port: Port) -> None:
+    """Have compiled what :func:`learn` will ask for at a port: nothing else must wait for it."""
+    _at_rest(problem, base, port)
 
 
 def _alike(effect: Effect, problem: AbstractProblem) -> list[Effect]:

@@ -5,7 +5,7 @@ named effect is that of the model itself: the force at the port with the effect,
 along the motion of the baseline. Nothing of the rig's laws is written here.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import equinox as eqx
@@ -65,12 +65,13 @@ def force_loops(
     moving = motion_port(problem.plant, port)
     signals = ports[moving]
     motion_unit = next(each.displacement_unit for each in problem.plant.ports if each.name == moving)
-    force, error, near = _drawn(problem, solution, law, nearest)
     order = problem.dwells[np.argsort(np.asarray(solution.excitation.frequency)[problem.dwells])]
+    tests = tuple(dict.fromkeys(int(order[int(share * (len(order) - 1))]) for share in QUANTILES))
+    force, error, near = _drawn(problem, solution, law, nearest, tests)
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
     grid = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
     loops = []
-    for test in dict.fromkeys(int(order[int(share * (len(order) - 1))]) for share in QUANTILES):
+    for test in tests:
         nodes = layout.dwell == test
 
         def sample(
@@ -96,19 +97,25 @@ def force_loops(
 
 
 def _drawn(
-    problem: "DwellProblem", solution: PeriodicSolution, law: DrawnLaw | None, nearest: DrawnLaw | None
+    problem: "DwellProblem",
+    solution: PeriodicSolution,
+    law: DrawnLaw | None,
+    nearest: DrawnLaw | None,
+    tests: Sequence[int],
 ) -> tuple[NDArray[np.float64] | None, list[NDArray[np.float64]], NDArray[np.float64] | None]:
-    """The force of a law along a motion (P,), what its errors change in it, and that of the nearest formula."""
+    """The force of a law along a motion (P,), what its errors change in it, and that of the nearest formula.
 
-    def force_of(each: DrawnLaw, values: Mapping[str, float]) -> NDArray[np.float64] | None:
-        return effect_force(problem.complete(()), problem.values(values), solution, each.effect)
+    All in these ``tests``.
+    """
 
-    force = None if law is None else force_of(law, law.values)
-    near = None if nearest is None else force_of(nearest, nearest.values)
-    if law is None or force is None:
-        return None, [], near
-    erring = in_parallel(lambda values: force_of(law, values), law.erring)
-    return force, [each - force for each in erring if each is not None], near
+    def forces_of(each: DrawnLaw) -> NDArray[np.float64] | None:
+        several = [problem.values(values) for values in (each.values, *each.erring)]
+        return effect_forces(problem.complete(()), several, solution, each.effect, tests)
+
+    forces = None if law is None else forces_of(law)
+    near = None if nearest is None else forces_of(nearest)
+    first = None if near is None else near[0]
+    return (None, [], first) if forces is None else (forces[0], [*(forces[1:] - forces[0])], first)
 
 
 def root_sum_square(errors: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -132,39 +139,46 @@ def motion_port(plant: AbstractPlant, port: Port) -> str:
     return (beside or forces)[0].name
 
 
-def effect_force(
-    model: AbstractPlant, p: Values, solution: PeriodicSolution, effect: Effect
+def effect_forces(
+    model: AbstractPlant,
+    several: Sequence[Values],
+    solution: PeriodicSolution,
+    effect: Effect,
+    tests: Sequence[int] | None = None,
 ) -> NDArray[np.float64] | None:
-    """What an effect with parameters among ``p`` adds to the signal at its port along a motion without it, (P,).
+    """What an effect adds to the signal at its port along a motion without it, at several parameters, (v, P).
 
-    A force [N] with the sign of the port; at a port that is not one of force, by how much it gives way [m or rad];
-    None for an error of a sensor or of the road, which has neither. ``model`` has the effect if that has no states.
+    These are ``several`` sets that differ in the effect's own. A force [N] with the sign of the port; at a port that
+    is not one of force, by how much it gives way [m or rad]; None for an error of a sensor or of the road, which has
+    neither. ``model`` has the effect if that has no states. An effect with states is followed in the ``tests`` alone,
+    if given.
     """
+    p = several[0]
     null = as_values({name: float(value) for name, value in p.items()} | dict(effect.null))
     law, port = effect.law, force_port(model, effect.port.location)
+
+    def held() -> NDArray[np.float64]:
+        """What the contact of the effect holds with it beyond that at its null [N]."""
+        own, without = (marched_contact(model, each, solution, effect, tests) for each in (several, [null]))
+        return own - without
+
+    def there(imposed: Array) -> Array:
+        return _forces(model, p, solution, {effect.port.name: imposed})[port.name] if port else imposed[:, 0]
+
     if isinstance(law, AbstractFrictionLimitLaw):
-        return _held(model, p, null, solution, effect)
+        return held()
     if isinstance(law, AbstractForceLaw) and effect.states:
-        force = marched_effect(model, p, solution, effect)
-        return force + (_held(model, p, null, solution, effect) if effect.loads_contact else 0.0)
-    forces = _forces(model, p, solution)
+        force = marched_effect(model, several, solution, effect, tests)
+        return force + held() if effect.loads_contact else force
     if isinstance(law, AbstractSeriesLaw):
-        deflection = marched_effect(model, p, solution, effect)
-        if port is None:
-            return np.asarray(deflection[:, 0])
-        imposed = {effect.port.name: jnp.asarray(deflection)}
-        return np.asarray(_forces(model, p, solution, imposed)[port.name] - forces[port.name])
+        ways = jnp.asarray(marched_effect(model, several, solution, effect, tests))
+        found = np.stack(in_parallel(there, ways))
+        return found - np.asarray(_forces(model, p, solution)[port.name]) if port else found
     if isinstance(law, AbstractForceLaw | AbstractNumberLaw) and port is not None:
-        return np.asarray(forces[port.name] - _forces(model, null, solution)[port.name])
+        every = in_parallel(lambda each: _forces(model, each, solution)[port.name], [null, *several])
+        without, *own = map(np.asarray, every)
+        return np.stack(own) - without
     return None
-
-
-def _held(
-    model: AbstractPlant, p: Values, null: Values, solution: PeriodicSolution, effect: Effect
-) -> NDArray[np.float64]:
-    """What the contact of an effect holds with it at ``p`` beyond that at ``null`` along a motion, (P,) [N]."""
-    own, without = (marched_contact(model, each, solution, effect) for each in (p, null))
-    return own - without
 
 
 @eqx.filter_jit

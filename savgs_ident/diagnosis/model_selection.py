@@ -16,6 +16,7 @@ is named beside it.
 """
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from math import hypot, log, sqrt
 
@@ -33,12 +34,12 @@ from savgs_ident.diagnosis.evidence import (
 )
 from savgs_ident.diagnosis.findings import (
     Findings,
-    explains_all,
     hypothesis_of,
     left_over,
     to_be_gained,
 )
-from savgs_ident.diagnosis.learning import LearnedLaw, learn
+from savgs_ident.diagnosis.laws_to_learn import laws_instead_of_two, learned_laws, rehearse
+from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.localisation import Localisation, anywhere, localise
 from savgs_ident.diagnosis.materiality import (
     change_by_law,
@@ -55,13 +56,12 @@ from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import (
     WeighedHypothesis,
     decide,
-    log_prior,
     log_prior_of_pair,
     most_probable,
     unknown_evidence,
     weigh,
 )
-from savgs_ident.effects.base import Port, PortKind
+from savgs_ident.effects.base import PortKind
 from savgs_ident.inference.find_map import find_map, find_map_again, refine
 from savgs_ident.inference.laplace_fit import LaplaceFit, Start, search_of
 from savgs_ident.inference.observations import Data
@@ -118,11 +118,19 @@ def compare_models(problem: DiagnosisProblem, progress: Progress) -> FittedHypot
     """
     plant, search, base, constants = problem.plant, problem.search, problem.base, problem.constants
     progress("locating the gap, and looking for its cause")
-    findings, localisations = side_by_side(
-        lambda: single_effects(search, base, plant.candidates, progress, plant.known, constants),
-        lambda: _localised(problem, base),
-    )
-    laws = _learned_laws(problem, findings, localisations, progress)
+    with ThreadPoolExecutor(1) as pool:
+        located = pool.submit(_localised, problem, base)
+        findings = single_effects(
+            search,
+            base,
+            plant.candidates,
+            progress,
+            plant.known,
+            constants,
+            lambda: rehearse(problem, located.result()),
+        )
+        localisations = located.result()
+    laws = learned_laws(problem, findings, localisations, progress)
     members = _flexible_members(problem, laws, len(localisations))
     findings = _with_formulas_of(problem, findings, members, progress)
     beside, least = -np.inf, -np.inf
@@ -134,7 +142,7 @@ def compare_models(problem: DiagnosisProblem, progress: Progress) -> FittedHypot
         findings = _with_nearest(problem, findings, localisations, progress)
         findings, beside = _law_beside_best(problem, material(problem, findings), progress)
     best = most_probable(findings, constants)
-    laws = laws or _laws_instead_of_two(problem, findings, best, progress)
+    laws = laws or laws_instead_of_two(problem, findings, best, progress)
     return FittedHypotheses(
         findings, tuple(localisations), laws, beside, best, change_without(problem, best, best.terms)
     )
@@ -254,56 +262,6 @@ def _is_named(problem: DiagnosisProblem, evidence: DiagnosisEvidence, member: Fl
     return explains and change_by_law(problem, member.law).matters(constants)
 
 
-def _learned_laws(
-    problem: DiagnosisProblem,
-    findings: Findings,
-    localisations: Sequence[Localisation],
-    progress: Progress,
-) -> tuple[LearnedLaw, ...]:
-    """Learned laws on the nonlinear plant at the ports that explain most.
-
-    None where a single effect explains all, and a law to first order is certainly less probable, or where nothing
-    seems to be missing.
-    """
-    constants, base = problem.constants, problem.base
-    best, linear = most_probable(findings, constants), anywhere(localisations)
-    if max(best.evidence, linear) < base.evidence + constants.alarm_log_odds:
-        return ()
-    count = len(findings.scores)
-    weight = best.evidence + log_prior(hypothesis_of(best), count, constants)
-    explained = explains_all(problem.search, base, best, constants)
-    law = linear + log_prior(UNKNOWN, count, constants)
-    # To first order a law that calibration nearly takes up is less probable than it is.
-    if explained and weight >= law + constants.indistinguishable_log_odds:
-        return ()
-    ports = _worth_learning(problem, findings, localisations)
-    least, given = best.evidence - constants.refined_log_evidence, problem.search.given
-    return learn(problem.plant, problem.data, base, ports, constants, given, progress, least)
-
-
-def _laws_instead_of_two(
-    problem: DiagnosisProblem, findings: Findings, best: LaplaceFit, progress: Progress
-) -> tuple[LearnedLaw, ...]:
-    """Learned laws where effects act that explain all alone, if two effects are more probable still.
-
-    The second may stand for what a formula has wrong: of the first, or of what does nearly the same elsewhere.
-    """
-    if len(best.terms) < 2:
-        return ()
-    constants, search = problem.constants, problem.search
-    alone = [
-        mode
-        for mode in findings.modes
-        if len(mode.terms) == 1
-        and left_over(search, problem.base, mode, constants) <= constants.explained_share
-    ]
-    ports = dict.fromkeys(problem.plant.catalogue[mode.terms[0]].port.name for mode in alone)
-    nearest = list(ports)[: constants.nearest_ports]
-    wanted = [problem.port(name) for name in dict.fromkeys([*nearest, *_in_series(problem, nearest)])]
-    least = best.evidence - constants.refined_log_evidence
-    return learn(problem.plant, problem.data, problem.base, wanted, constants, search.given, progress, least)
-
-
 def _flexible_members(
     problem: DiagnosisProblem, laws: Sequence[LearnedLaw], locations: int
 ) -> list[FlexibleMember]:
@@ -325,41 +283,6 @@ def _flexible_members(
         )
 
     return sorted(map(member, laws), key=lambda each: -each.weight)
-
-
-def _worth_learning(
-    problem: DiagnosisProblem, findings: Findings, localisations: Sequence[Localisation]
-) -> list[Port]:
-    """The ports whose learned laws are worth a fit: those that explain most to first order, if that is anything.
-
-    And the ports of the best single effects, and what is in series with the nearest ports: to first order about the
-    baseline a strong effect may explain little, and a play with a film in it hardly anything.
-    """
-    constants = problem.constants
-    least = problem.base.evidence + constants.alarm_log_odds
-    ports = {
-        name: weight
-        for each in localisations
-        for name, weight in each.ports.items()
-        if name and weight > least
-    }
-    ranked = sorted(ports, key=lambda name: -ports[name])[: constants.learned_fits]
-    ranked += _in_series(problem, ranked[: constants.nearest_ports])
-    singles = [mode for mode in findings.modes if len(mode.terms) == 1]
-    ranked += [
-        problem.plant.catalogue[mode.terms[0]].port.name for mode in singles[: constants.nearest_ports]
-    ]
-    return [problem.port(name) for name in dict.fromkeys(ranked)]
-
-
-def _in_series(problem: DiagnosisProblem, names: Sequence[str]) -> list[str]:
-    """The series ports at the locations of some ports."""
-    locations = {problem.port(name).location for name in names}
-    return [
-        each.name
-        for each in problem.plant.plant.ports
-        if each.kind is PortKind.SERIES and each.location in locations
-    ]
 
 
 def _with_nearest(

@@ -11,13 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, cycle_position
+from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, ModelPoint, cycle_position
 from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.loops import root_sum_square
 from savgs_ident.diagnosis.problem import AbstractProblem, DrawnLaw, spans_of_force
@@ -330,17 +330,14 @@ def motion_problem(
     return problem, force_data(motion)
 
 
-def further_motion(
-    problem: MotionProblem,
-    motion: DrivenMotion,
-    points: Sequence[tuple[tuple[str, ...], Mapping[str, float]]],
-) -> FurtherShrink:
+def further_motion(motion: DrivenMotion, points: Sequence[ModelPoint]) -> FurtherShrink:
     """The gap of another motion by models that nothing of it was fitted to: as given, recalibrated, with more.
 
-    ``points`` are terms and values [SI] of each; nothing comes after where there are two.
+    Nothing comes after where there are two ``points``, which are models along motions.
     """
-    there = replace(problem, motion=motion)
-    measured = motion.rows(motion.drive)
-    gaps = [relative_miss(measured, there.predict(terms, values, (), None).rows) for terms, values in points]
+    measured, gaps = motion.rows(motion.drive), []
+    for problem, terms, values in points:
+        there = replace(cast(MotionProblem, problem), motion=motion)
+        gaps.append(relative_miss(measured, there.predict(terms, values, (), None).rows))
     after = gaps[2] if len(gaps) > 2 else np.nan
     return FurtherShrink(Path(motion.source).name, gaps[0], gaps[1], after, relative_noise(motion))

@@ -19,8 +19,7 @@ from savgs_ident.diagnosis.diagnose import (
 )
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint
-from savgs_ident.diagnosis.motion_problem import MotionProblem, further_motion, motion_problem
-from savgs_ident.diagnosis.problem import AbstractProblem
+from savgs_ident.diagnosis.motion_problem import further_motion, motion_problem
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.observations import Data
@@ -168,10 +167,9 @@ def _diagnose_motion(
         motion, bare, given.table, offered, model.effects, settings.free, settings.constants
     )
 
-    def predict(there: AbstractProblem, points: Sequence[ModelPoint]) -> FurtherShrink:
-        assert isinstance(there, MotionProblem)
+    def predict(points: Sequence[ModelPoint]) -> FurtherShrink:
         assert held_out is not None
-        return further_motion(there, held_out, points)
+        return further_motion(held_out, points)
 
     further = None if held_out is None else predict
     origin = replace(model.origin(warnings=motion.warnings), data=motion.source, command=tuple(command))

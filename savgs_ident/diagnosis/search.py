@@ -14,12 +14,12 @@ Every hypothesis that is fitted in full comes out with its evidence; one whose f
 named in :attr:`~savgs_ident.diagnosis.findings.Findings.lost`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from savgs_ident.core.executor import in_parallel
+from savgs_ident.core.executor import in_parallel, side_by_side
 from savgs_ident.core.presentation import Progress
 from savgs_ident.diagnosis.findings import (
     Findings,
@@ -38,6 +38,10 @@ from savgs_ident.inference.laplace_fit import LaplaceFit, Search
 from savgs_ident.inference.observations import Term
 
 
+def _nothing() -> None:
+    """Do nothing."""
+
+
 def single_effects(
     search: Search,
     base: LaplaceFit,
@@ -45,8 +49,11 @@ def single_effects(
     progress: Progress,
     known: Sequence[tuple[str, ...]] = (),
     constants: DecisionConstants = DEFAULTS,
+    meanwhile: Callable[[], None] = _nothing,
 ) -> Findings:
     """Single effects that may be missing in the recalibrated baseline ``base``, scored, the promising ones fitted.
+
+    Where the best of them does not explain all, ``meanwhile`` is done beside the fits of the others.
 
     ``known`` are sets of terms that are often missing together. They are fitted from their typical sizes, because a
     search from a baseline that lacks all of them, and misses by as much as it moves, would not arrive.
@@ -58,7 +65,7 @@ def single_effects(
         return _findings(base, score_terms(search, base, list(terms), constants), together)
     progress(f"scores of {len(terms)} effects")
     scores = score_terms(search, base, list(terms), constants)
-    return _findings(base, scores, [*together, *_single_effects(fits, scores)])
+    return _findings(base, scores, [*together, *_single_effects(fits, scores, meanwhile)])
 
 
 def with_pairs(
@@ -145,14 +152,24 @@ def _findings(
     return Findings(base, tuple(scores), tuple(found), lost)
 
 
-def _single_effects(fits: Fits, scores: Sequence[Score]) -> list[LaplaceFit]:
+def _single_effects(fits: Fits, scores: Sequence[Score], meanwhile: Callable[[], None]) -> list[LaplaceFit]:
     """Fits of the single effects whose scores promise most, best first."""
     constants, base = fits.constants, fits.base
     worth = [each for each in scores if each.evidence > base.evidence + constants.promising_log_evidence]
-    first, second = constants.first_fits, constants.first_fits + constants.further_fits
-    alike = fits.lookalikes(worth[first:second], worth[:1])
     # The best alone: where it explains all, little or nothing is worth fitting beside it.
     begun = fits.refined(fits.extended(base, worth[:1]))
+    if not begun or fits.explains_all(begun[0]):
+        return _other_singles(fits, scores, worth, begun)
+    return side_by_side(lambda: _other_singles(fits, scores, worth, begun), meanwhile)[0]
+
+
+def _other_singles(
+    fits: Fits, scores: Sequence[Score], worth: Sequence[Score], begun: Sequence[LaplaceFit]
+) -> list[LaplaceFit]:
+    """The best single effect, which is fitted already, and those of the others that are ``worth`` it, best first."""
+    constants, base = fits.constants, fits.base
+    first, second = constants.first_fits, constants.first_fits + constants.further_fits
+    alike = fits.lookalikes(worth[first:second], worth[:1])
     least = fits.negligible(begun)
     ranked = fits.refined([*begun, *fits.extended(base, [*worth[1:first], *alike], least)])
     names = {each.term.name for each in (*worth[:first], *alike)}

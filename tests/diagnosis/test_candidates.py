@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from savgs_ident.core.presentation import no_progress
-from savgs_ident.diagnosis import model_selection
+from savgs_ident.diagnosis import laws_to_learn, model_selection
 from savgs_ident.diagnosis.candidates import joint_sigma, not_judgeable_of
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
 from savgs_ident.diagnosis.findings import Findings
@@ -123,10 +123,10 @@ def test_laws_are_weighed_against_two_effects_wherever_one_formula_explains_all(
         learned.append([each.name for each in wanted])
         return ()
 
-    monkeypatch.setattr(model_selection, "learn", learn)
-    monkeypatch.setattr(model_selection, "left_over", lambda search, base, mode, constants: mode.left)
+    monkeypatch.setattr(laws_to_learn, "learn", learn)
+    monkeypatch.setattr(laws_to_learn, "left_over", lambda search, base, mode, constants: mode.left)
     findings = Findings(_mode(0.0), (), (_mode(60.0, *best), *singles))
-    assert model_selection._laws_instead_of_two(problem, findings, findings.modes[0], no_progress) == ()
+    assert laws_to_learn.laws_instead_of_two(problem, findings, findings.modes[0], no_progress) == ()
     assert learned == ([] if ports is None else [ports])
 
 

@@ -149,7 +149,7 @@ def test_a_frame_that_is_marched_answers_its_load_as_an_oscillator_does(
     numbers = {"frame_mobility": 1e-3, "frame_frequency": 9.0, "frame_damping_ratio": 0.1}
     p = plant.values(numbers)
     model, nodes = plant.complete(()), mesh_points(start)
-    marched = marched_effect(model, p, start, CATALOGUE["frame_mode"])[:, 0]
+    marched = marched_effect(model, [p], start, CATALOGUE["frame_mode"])[0][:, 0]
     load = np.asarray(node_loads(model, p, start)[1]["frame"].beyond_rest)
     own, grid = 2.0 * np.pi * 9.0, 2.0 * np.pi * np.arange(1024) / 1024
     for test in range(len(DWELLS)):

@@ -9,8 +9,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from savgs_ident.diagnosis import gap as module
-from savgs_ident.diagnosis.gap import along, first_harmonic, frequencies_of, sweep_shrink
+from savgs_ident.diagnosis.dwell_problem import DwellProblem
+from savgs_ident.diagnosis.gap import (
+    ModelPoint,
+    along,
+    first_harmonic,
+    frequencies_of,
+    sweep_shrink,
+    swept_motions,
+)
 from savgs_ident.diagnosis.thresholds import DEFAULTS
+from savgs_ident.inference.observations import Data
 from savgs_ident.plants.base import Excitation
 from savgs_ident.plants.quarter_car.catalogue import CATALOGUE, MODELS, build_model
 from savgs_ident.plants.quarter_car.rig import Rig
@@ -19,6 +28,8 @@ from savgs_ident.recordings.recording import RecordedChannel, Recording
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import SweepResponse
 from savgs_ident.responses.sweeps import estimate_sweep_response
+from savgs_ident.simulate.periodic import simulate_periodic
+from savgs_ident.simulate.readings import harmonics
 from savgs_ident.validation.virtual_motions import sweep_readings
 
 from .conftest import rig_problem
@@ -106,23 +117,25 @@ def test_the_gap_is_relative_to_the_response_and_leaves_out_what_no_dwell_reache
     plant = cast(Any, SimpleNamespace(**given))
     sweep = _sweep()
 
-    def reported(plant: Any, sweep: SweepResponse, frequencies: Any, terms: Any, values: Any) -> Any:
-        low = sweep.frequency < 0.5
-        return (
-            None
-            if terms
-            else np.where(low[:, None], 99.0, values["gain"] * np.repeat(sweep.response, 2, axis=1))
-        )
+    def reported(point: ModelPoint, known: float) -> Any:
+        return None if point.terms else np.full((len(DWELLS), 2), known)
 
+    def as_dwells(frequencies: Any, steady: Any, frequency: Any, rate: Any) -> Any:
+        low = frequency < 0.5
+        return np.where(low[:, None], 99.0, steady[0, 0] * np.repeat(sweep.response, 2, axis=1))
+
+    monkeypatch.setattr(module, "swept_motions", lambda point, sweep, frequencies: point.values["gain"])
     monkeypatch.setattr(module, "first_harmonic", reported)
-    found = sweep_shrink(plant, sweep, [((), {"gain": 1.2}), ((), {"gain": 0.9}), (("lag",), {})])
+    monkeypatch.setattr(module, "along", as_dwells)
+    baselines = [ModelPoint(plant, (), {"gain": gain}) for gain in (1.2, 0.9)]
+    found = sweep_shrink(sweep, [*baselines, ModelPoint(plant, ("lag",), {})])
     assert found is not None
     assert (found.before, found.recalibrated) == (pytest.approx(0.2), pytest.approx(0.1))
     assert np.isnan(found.after)
     seen = sweep.response[sweep.frequency >= 0.5]
     assert found.floor == pytest.approx(0.01 * np.sqrt(2.0 * seen.size / np.sum(np.abs(seen) ** 2)))
-    assert np.isnan(sweep_shrink(plant, sweep, [((), {"gain": 1.0})] * 2).after)  # type: ignore[union-attr]
-    assert sweep_shrink(plant, _sweep(channels=("motor_current",)), [((), {"gain": 1.0})] * 2) is None
+    assert np.isnan(sweep_shrink(sweep, baselines).after)  # type: ignore[union-attr]
+    assert sweep_shrink(_sweep(channels=("motor_current",)), baselines) is None
 
 
 @pytest.mark.slow
@@ -143,9 +156,31 @@ def test_the_rig_swept_in_time_answers_as_predicted(rig: Rig, nominal_campaign) 
     sweep = estimate_sweep_response(Recording("sweep", "sweep", None, channels), "road_height")
     frequencies = frequencies_of(np.asarray(plant.excitation.frequency), sweep, DEFAULTS.sweep_dwells)
     assert frequencies is not None
-    reported = first_harmonic(plant, sweep, frequencies, (), {})
-    assert reported is not None
+    baseline = ModelPoint(plant, (), {})
+    found = first_harmonic(baseline, swept_motions(baseline, sweep, frequencies))
+    assert found is not None
+    reported = along(frequencies, found, sweep.frequency, sweep.sweep_rate)
     rows = (sweep.frequency > frequencies[0]) & (sweep.frequency < frequencies[-1])
     for place, name in enumerate(("sprung_accel", "susp_deflection")):
         seen = sweep.response[rows, sweep.channel(name)]
         assert np.linalg.norm(seen - reported[rows, place]) < 0.01 * np.linalg.norm(seen)
+
+
+@pytest.mark.slow
+def test_what_a_corrected_model_does_in_a_sweep_is_found_from_the_baselines_motions(
+    plant_and_data: tuple[DwellProblem, Data],
+) -> None:
+    """The same as from a cold start of a model of its own, but for where nodes fall."""
+    plant, _ = plant_and_data
+    values = {"mount_compliance": 2e-6, "mount_damping": 500.0}
+    slow = plant.excitation.frequency * 0.9
+    motions = swept_motions(ModelPoint(plant, (), {}), _sweep(), np.asarray(slow))
+    found = first_harmonic(ModelPoint(plant, ("mount_compliance",), values), motions)
+    without = first_harmonic(ModelPoint(plant, (), {}), motions)
+    assert found is not None
+    assert without is not None
+    model, p = plant.model(("mount_compliance",)), plant.values(values)
+    cold = simulate_periodic(model, p, motions.excitation, plant.settings, plant.layout)
+    own = np.asarray(harmonics(model, p, cold, plant.orders))[:, :, 1] / 0.01375
+    assert np.abs(found - own).max() < 5e-3 * np.abs(own).max()
+    assert np.abs(found - without).max() > 0.1 * np.abs(own).max()

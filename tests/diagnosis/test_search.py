@@ -13,7 +13,7 @@ from savgs_ident.core.status import Status
 from savgs_ident.diagnosis.findings import Findings, excess, explains_all, left_over, to_be_gained
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.score_test import best_pairs, cosine, score_terms
-from savgs_ident.diagnosis.search import pairs_with, singles_among
+from savgs_ident.diagnosis.search import pairs_with, single_effects, singles_among
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.inference.find_map import find_map
 from savgs_ident.inference.laplace_fit import Search, search_of
@@ -358,3 +358,16 @@ def test_an_effect_at_the_location_of_what_is_left_is_found_beside_the_right_mem
     assert best_of(found).terms == ("round", "wavy")
     assert left_over(search, base, best_of(found)) < 0.01
     assert {mode.terms for mode in found.modes} >= {wrong.terms, alone.terms}
+
+
+@pytest.mark.parametrize(
+    ("values", "times"), [({"a": 1.1}, 0), ({"a": 0.8, "c": 0.3}, 0), ({"a": 1.0, "c": 0.3, "t": -0.8}, 1)]
+)
+@over("seed", range(3))
+def test_what_a_learned_law_needs_is_prepared_only_where_no_single_effect_explains_all(
+    values: dict[str, float], times: int, seed: int
+) -> None:
+    search = search_of(PLANT, draw(PLANT, values, NOISE, seed))
+    base, prepared = find_map(search, (), {}, None), list[str]()
+    single_effects(search, base, TERMS, _silent, meanwhile=lambda: prepared.append("law"))
+    assert len(prepared) == times

@@ -11,7 +11,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Complex
 from numpy.typing import NDArray
 
 from savgs_ident.core.executor import in_parallel
@@ -47,6 +47,13 @@ def rows_of(
     return _rows(likelihood, seen, solution.excitation.part, solution.mesh)
 
 
+def harmonics_of_motion(
+    model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int
+) -> Complex[Array, "D C K"]:
+    """Complex harmonics of a motion [unit of the reading], (D, C, orders + 1), by the program that its rows have."""
+    return _harmonics(_seen(model, p, solution, orders), solution.excitation.part, solution.mesh)
+
+
 @eqx.filter_jit
 def _seen(model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: int) -> Seen:
     readings = readings_of(model, p, solution.trajectory, solution)
@@ -57,6 +64,11 @@ def _seen(model: AbstractPlant, p: Values, solution: PeriodicSolution, orders: i
 @eqx.filter_jit
 def _rows(likelihood: Likelihood, seen: Seen, part: ComparedPart | None, mesh: Mesh) -> Array:
     return likelihood.rows(shown_by(seen.sensors, seen.readings, part, mesh))
+
+
+@eqx.filter_jit
+def _harmonics(seen: Seen, part: ComparedPart | None, mesh: Mesh) -> Complex[Array, "D C K"]:
+    return shown_by(seen.sensors, seen.readings, part, mesh)
 
 
 @eqx.filter_jit
