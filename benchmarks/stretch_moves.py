@@ -18,7 +18,7 @@ from jaxtyping import Array, Float
 
 from benchmarks.outcome import Progress
 from benchmarks.posterior_problem import PosteriorProblem
-from savgs_ident.core.transforms import FreeVector
+from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.inference.near_mode import Surrogate
 
 LONG_ENOUGH = 50.0

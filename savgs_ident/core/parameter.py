@@ -55,9 +55,14 @@ class Parameter:
             )
 
     @property
-    def rough(self) -> bool:
+    def is_typical(self) -> bool:
         """Whether it is a positive number of which no more than the order of magnitude is known."""
         return self.source in (TYPICAL, SIZED) and self.value > max(self.lower, 0.0)
+
+    @property
+    def has_prior(self) -> bool:
+        """Whether it is known before the data, but not exactly: to a tolerance, or to an order of magnitude."""
+        return self.tolerance > 0.0 or self.is_typical
 
 
 @dataclass(frozen=True)

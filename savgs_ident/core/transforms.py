@@ -8,7 +8,7 @@ rest, by their bounds.
 
 - :class:`Tolerated`: v = v0 + sigma s(u), a parameter in standard deviations of what is known of it. s is
   exactly u up to half way to a bound and bends towards it beyond, twice differentiable.
-- :class:`Rough`: v = v0 10^s(u).
+- :class:`OrdersOfMagnitude`: v = v0 10^s(u).
 - :class:`OneSided`: v = bound + scale exp(u) above a bound, v = bound - scale exp(-u) below one.
 - :class:`TwoSided`: v = lower + (upper - lower) / (1 + exp(-(u + offset))): logarithmic near either bound.
 - :class:`Unbounded`: v = v0 + scale u.
@@ -19,23 +19,10 @@ rest, by their bounds.
 
 The prior is normal on the coordinate, about 0 with the standard deviation of :func:`prior_width`: 1 where a tolerance
 is known, whether the parameter is to be identified or not, and :data:`WIDTH` where nothing is. What is no more than
-typical is known to an order of magnitude (:class:`Rough`).
-
-The parameters of a table that may move form a :class:`FreeVector` of coordinates. *Identified* ones, which are asked
-for, come first, then those *tolerated* ones that are estimated along.
-
-    >>> table = ParameterTable((
-    ...     Parameter("mu_r", 0.03, "1", lower=0.0, upper=0.5),
-    ...     Parameter("k_t", 275e3, "N/m", tolerance=13.75e3, lower=0.0),
-    ... ))
-    >>> free = FreeVector(table, identified=("mu_r",), tolerated=("k_t",))
-    >>> values = free.to_constrained(jnp.array([0.0, -1.0]))
-    >>> [f"{name} = {float(value):.6g}" for name, value in values.items()]
-    ['mu_r = 0.03', 'k_t = 261250']
+typical is known to an order of magnitude (:class:`OrdersOfMagnitude`).
 """
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
 from math import exp, inf, isfinite, log, sqrt
 from typing import Any
 
@@ -43,11 +30,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 from scipy.special import expit
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.core.parameter import Parameter, ParameterTable
+from savgs_ident.core.parameter import Parameter
 
 # Near a bound single precision leaves no digits to differentiate.
 jax.config.update("jax_enable_x64", True)
@@ -127,7 +113,7 @@ class Tolerated(AbstractBijection):
         return self.tolerance / (1.0 + beyond * beyond) ** 1.5
 
 
-class Rough(AbstractBijection):
+class OrdersOfMagnitude(AbstractBijection):
     """Orders of magnitude from a typical value, :class:`Tolerated` as a logarithm: never more than three of them."""
 
     nominal: float
@@ -224,8 +210,8 @@ def transform_of(parameter: Parameter) -> AbstractBijection:
     A tolerance about a value that is itself a bound, as that of an effect at its null, is no more than a scale.
     Raises :class:`InputError` if nothing about the parameter gives a scale.
     """
-    if parameter.rough:
-        return _rough_bijection(parameter)
+    if parameter.is_typical:
+        return _typical_bijection(parameter)
     inside = parameter.lower < parameter.value < parameter.upper
     return (
         tolerated_bijection(parameter)
@@ -236,15 +222,15 @@ def transform_of(parameter: Parameter) -> AbstractBijection:
 
 def prior_width(parameter: Parameter) -> float:
     """Standard deviation of a parameter's coordinate before the data [1]."""
-    return 1.0 if isinstance(transform_of(parameter), Tolerated | Rough) else WIDTH
+    return 1.0 if isinstance(transform_of(parameter), Tolerated | OrdersOfMagnitude) else WIDTH
 
 
-def _rough_bijection(parameter: Parameter) -> Rough:
+def _typical_bijection(parameter: Parameter) -> OrdersOfMagnitude:
     below, above = (
         min(_ORDERS, abs(log(parameter.value / bound)) / ORDER) if 0.0 < bound < inf else _ORDERS
         for bound in (parameter.lower, parameter.upper)
     )
-    return Rough(parameter.value, Tolerated(0.0, ORDER, below, above))
+    return OrdersOfMagnitude(parameter.value, Tolerated(0.0, ORDER, below, above))
 
 
 def identified_bijection(parameter: Parameter) -> AbstractBijection:
@@ -329,96 +315,3 @@ def _saturate(x: Any) -> Any:
 
 def _logit(value: float, lower: float, upper: float) -> float:
     return log(value - lower) - log(upper - value)
-
-
-class FreeVector(eqx.Module):
-    """Named parameters of a table on unconstrained coordinates, u = 0 at the table's values.
-
-    It holds no arrays: close over it or pass it through any JAX transformation.
-
-    Raises :class:`InputError` for a name that the table does not have, a name given twice, a tolerated
-    parameter without tolerance or on its bound, an identified one whose scale nothing gives.
-    """
-
-    identified: tuple[str, ...] = eqx.field(static=True)
-    tolerated: tuple[str, ...] = eqx.field(static=True)
-    parameters: tuple[Parameter, ...] = eqx.field(static=True)
-
-    def __init__(
-        self, table: ParameterTable, identified: Sequence[str], tolerated: Sequence[str] = ()
-    ) -> None:
-        self.identified = tuple(identified)
-        self.tolerated = tuple(tolerated)
-        _check_names(table, self.names)
-        self.parameters = tuple(table[name] for name in self.names)
-        self._bijections()  # A parameter that has none is refused here, not at the first use.
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All n names in the order of the vector: identified ones first."""
-        return self.identified + self.tolerated
-
-    def to_unconstrained(self, values: Mapping[str, float]) -> Float[Array, " n"]:
-        """The vector (n,) [1] of the given SI values; a value on a bound is moved inside a little.
-
-        ``values`` may hold other names too. Raises :class:`InputError` for a missing name or a value outside
-        its bounds. Not for use inside a JAX transformation.
-        """
-        missing = [name for name in self.names if name not in values]
-        if missing:
-            raise InputError(f"the value of parameter '{missing[0]}' is missing", remedy="give all free ones")
-        inside = [move_inside(parameter, float(values[parameter.name])) for parameter in self.parameters]
-        pairs = zip(self._bijections(), inside, strict=True)
-        return jnp.asarray([bijection.inverse(value) for bijection, value in pairs], float)
-
-    def to_constrained(self, u: Float[Array, " n"]) -> dict[str, Float[Array, ""]]:
-        """Name to SI value, strictly inside the bounds, at the vector ``u`` (n,) [1]."""
-        return dict(zip(self.names, jnp.unstack(self._values(u)), strict=True))
-
-    def jacobian_diag(self, u: Float[Array, " n"]) -> Float[Array, " n"]:
-        """d value / d u of every parameter at ``u`` (n,) [SI unit of each]; the Jacobian is diagonal."""
-        return jax.jvp(self._values, (u,), (jnp.ones_like(u),))[1]
-
-    @property
-    def widths(self) -> Float[np.ndarray, " n"]:
-        """Standard deviations of the coordinates before the data [1]."""
-        return np.array([prior_width(parameter) for parameter in self.parameters])
-
-    def prior_residuals(self, u: Float[Array, " n"]) -> Float[Array, " n"]:
-        """The coordinates in their standard deviations before the data [1].
-
-        Half their sum of squares is minus the log prior, but for a constant.
-        """
-        return u / self.widths
-
-    def _bijections(self) -> list[AbstractBijection]:
-        split = len(self.identified)
-        return [transform_of(parameter) for parameter in self.parameters[:split]] + [
-            transform_of(parameter) if parameter.rough else tolerated_bijection(parameter)
-            for parameter in self.parameters[split:]
-        ]
-
-    @eqx.filter_jit
-    def _values(self, u: Float[Array, " n"]) -> Float[Array, " n"]:
-        # All maps of one kind in one operation: dozens of scalar ones would take a second to compile.
-        values = jnp.zeros_like(u)
-        bijections = self._bijections()
-        for kind in dict.fromkeys(type(bijection) for bijection in bijections):
-            places = [place for place, bijection in enumerate(bijections) if type(bijection) is kind]
-            stacked = jax.tree.map(lambda *leaves: np.array(leaves), *(bijections[place] for place in places))
-            values = values.at[np.array(places)].set(stacked.forward(u[np.array(places)]))
-        return values
-
-
-def known_to_tolerance(table: ParameterTable, identified: Sequence[str] = ()) -> tuple[str, ...]:
-    """The names in ``table`` that carry a tolerance, or are typical, and are not ``identified``, in its order."""
-    known = (entry.name for entry in table.entries if entry.tolerance > 0.0 or entry.rough)
-    return tuple(name for name in known if name not in identified)
-
-
-def _check_names(table: ParameterTable, names: tuple[str, ...]) -> None:
-    for position, name in enumerate(names):
-        if name not in table:
-            raise InputError(f"there is no parameter '{name}'", remedy="choose among: " + ", ".join(table))
-        if name in names[:position]:
-            raise InputError(f"parameter '{name}' is free twice", remedy="name it once")

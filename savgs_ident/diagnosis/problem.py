@@ -22,8 +22,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.free_vector import known_to_tolerance
 from savgs_ident.core.parameter import Parameter, ParameterTable, merge_parameters
-from savgs_ident.core.transforms import known_to_tolerance
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.diagnosis.gap import CyclePosition, MapCell
 from savgs_ident.diagnosis.localisation import Localisation
@@ -175,7 +175,9 @@ class AbstractProblem(ABC):
         in which something may rub, numbers that are typical alone matter as soon as something does.
         """
         plant = self.model(())
-        contacts = {name for port in plant.ports for name in port.contact or () if self.table[name].rough}
+        contacts = {
+            name for port in plant.ports for name in port.contact or () if self.table[name].is_typical
+        }
         used = contacts.union(used_parameters(plant, self.table))
         known = [name for name in known_to_tolerance(self.table, self.free) if name in used]
         return tuple(sheet_coordinate(self.table[name]) for name in (*self.free, *known))

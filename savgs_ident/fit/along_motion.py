@@ -16,9 +16,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.parameter import Parameter
+from savgs_ident.core.free_vector import known_to_tolerance
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progress
-from savgs_ident.core.transforms import known_to_tolerance
 from savgs_ident.fit.estimate import Estimate, at_bounds
 from savgs_ident.fit.identifiability import (
     EXPLAINED,
@@ -153,7 +152,7 @@ def _estimates(
         spread_of(np.concatenate([mode.slopes / noise / size, priors]))
         for size in (widened_by_misfit(chi2, rows - len(free)), 1.0)
     )
-    known = np.array([_known(model.table[each.name]) for each in coordinates])
+    known = np.array([model.table[each.name].has_prior for each in coordinates])
     own = np.sqrt(np.diag(own_part(alone.covariance, np.where(known, 1.0, np.inf))))
     slope = slopes_at(coordinates, mode.x)
     estimates = []
@@ -170,14 +169,10 @@ def _estimates(
                 unit=before.unit,
                 free=each.name in free,
                 prior=before.value,
-                prior_sd=0.0 if before.rough else before.tolerance,
+                prior_sd=0.0 if before.is_typical else before.tolerance,
             )
         )
     return tuple(estimates), scaled.covariance * np.outer(slope, slope)
-
-
-def _known(parameter: Parameter) -> bool:
-    return parameter.tolerance > 0.0 or parameter.rough
 
 
 def _verdict(

@@ -143,7 +143,7 @@ def _estimates(task: Task, outcome: Outcome) -> tuple[tuple[Estimate, ...], np.n
                 unit=before.unit,
                 free=name in problem.free.identified,
                 prior=before.value,
-                prior_sd=0.0 if before.rough else before.tolerance,
+                prior_sd=0.0 if before.is_typical else before.tolerance,
             )
         )
     return tuple(estimates), outcome.covariance * np.outer(slope, slope)

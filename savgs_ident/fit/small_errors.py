@@ -134,11 +134,11 @@ def _softened(task: Task, minimiser: Minimiser, best: Minimum) -> Minimum:
 
     Least squares takes what is left for noise, and makes a contact harder than any solver takes for the last of it.
     """
-    rough = np.array([each.rough for each in task.problem.free.parameters])
-    for share in SOFTER if np.any(rough) else ():
+    typical = np.array([each.is_typical for each in task.problem.free.parameters])
+    for share in SOFTER if np.any(typical) else ():
         if best.evaluation.ok:
             break
-        u = jnp.where(jnp.asarray(rough), share * best.u, best.u)
+        u = jnp.where(jnp.asarray(typical), share * best.u, best.u)
         best = minimiser.evaluate(u, best.solution)
     return best
 

@@ -21,8 +21,8 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 from scipy.special import logsumexp, ndtri
 
+from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.core.status import Status
-from savgs_ident.core.transforms import FreeVector
 from savgs_ident.inference.find_map import find_map
 from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 from savgs_ident.inference.likelihood import values_of

@@ -30,7 +30,7 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 from numpy.typing import NDArray
 
-from savgs_ident.core.transforms import FreeVector
+from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import NUISANCE, Scales
 from savgs_ident.inference.problem import HarmonicTarget

@@ -25,15 +25,9 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.core.transforms import (
-    AbstractBijection,
-    FreeVector,
-    Tolerated,
-    move_inside,
-    prior_width,
-    transform_of,
-)
+from savgs_ident.core.transforms import AbstractBijection, Tolerated, move_inside, prior_width, transform_of
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from jaxtyping import Array, Complex, Float
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.free_vector import FreeVector, known_to_tolerance
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.status import Status, joint_status
-from savgs_ident.core.transforms import FreeVector, known_to_tolerance
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.effects.base import InputSignal
 from savgs_ident.plants.base import AbstractPlant, Channel, Excitation, Motion

@@ -25,8 +25,8 @@ from jaxtyping import Array
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from savgs_ident.core.free_vector import known_to_tolerance
 from savgs_ident.core.parameter import Parameter
-from savgs_ident.core.transforms import known_to_tolerance
 from savgs_ident.core.values import Values
 from savgs_ident.diagnosis.effect_sensitivities import sensitivities_with_states
 from savgs_ident.diagnosis.problem import term_of
@@ -89,13 +89,13 @@ def moved(each: Parameter, value: float, x: float) -> float:
 
     ``x`` is in standard deviations.
     """
-    there = value + each.tolerance * x if each.tolerance > 0.0 and not each.rough else value * np.exp(x)
+    there = value + each.tolerance * x if each.tolerance > 0.0 and not each.is_typical else value * np.exp(x)
     return float(np.clip(there, each.lower, each.upper))
 
 
 def _unit(each: Parameter, value: float, unknown: bool) -> float:
     """What a step of one in a parameter of this value is [its unit]."""
-    return value if unknown or each.rough else each.tolerance
+    return value if unknown or each.is_typical else each.tolerance
 
 
 def hiding_at(

@@ -223,9 +223,7 @@ def _soft(model: PlantModel, port: Port) -> Iterator[Finding]:
 def _exact(model: PlantModel, port: Port) -> Iterator[Finding]:
     """Numbers of a contact that nobody measured, and that nothing estimates."""
     exact = [
-        f"'{name}'"
-        for name in port.contact or ()
-        if name in model.table and model.table[name].tolerance == 0.0 and not model.table[name].rough
+        f"'{name}'" for name in port.contact or () if name in model.table and not model.table[name].has_prior
     ]
     if exact:
         yield Finding(

@@ -12,13 +12,12 @@ from hypothesis import strategies as st
 from jax.test_util import check_grads
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.free_vector import FreeVector, known_to_tolerance
 from savgs_ident.core.parameter import TYPICAL, Parameter, ParameterTable
 from savgs_ident.core.transforms import (
     WIDTH,
     AbstractBijection,
-    FreeVector,
     identified_bijection,
-    known_to_tolerance,
     prior_width,
     tolerated_bijection,
     transform_of,
@@ -46,15 +45,15 @@ TOLERATED = {
     "near the lower bound": Parameter("c_t", 300.0, "N s/m", tolerance=150.0, lower=0.0),
     "near the upper bound": Parameter("efficiency", 0.94, "1", tolerance=0.0282, lower=0.01, upper=1.0),
 }
-ROUGH = {
+TYPICAL_NUMBERS = {
     "above zero": Parameter("k_pre", 6e3, "N/m", tolerance=3e3, lower=0.0, source=TYPICAL),
     "within bounds": Parameter("c_pre", 60.0, "N s/m", lower=1.0, upper=1e3, source=TYPICAL),
 }
 CASES = [(p, identified_bijection) for p in IDENTIFIED.values()]
 CASES += [(p, tolerated_bijection) for p in TOLERATED.values()]
-CASES += [(p, transform_of) for p in ROUGH.values()]
+CASES += [(p, transform_of) for p in TYPICAL_NUMBERS.values()]
 NAMES = [f"identified, {name}" for name in IDENTIFIED] + [f"tolerated, {name}" for name in TOLERATED]
-NAMES += [f"rough, {name}" for name in ROUGH]
+NAMES += [f"typical, {name}" for name in TYPICAL_NUMBERS]
 
 
 class Case:
@@ -128,13 +127,13 @@ def test_a_tolerance_is_its_own_unit_up_to_half_way_to_a_bound() -> None:
 
 
 def test_a_typical_number_is_known_to_an_order_of_magnitude() -> None:
-    number = ROUGH["above zero"]
+    number = TYPICAL_NUMBERS["above zero"]
     assert prior_width(number) == 1.0
     found = [float(transform_of(number).forward(u)) for u in (-1.0, 0.0, 1.0)]
     assert found == pytest.approx([6e2, 6e3, 6e4], rel=1e-12)
     # At zero, or below, nothing says how large it is.
-    assert not replace(number, value=0.0).rough
-    assert known_to_tolerance(ParameterTable((*ROUGH.values(),))) == ("k_pre", "c_pre")
+    assert not replace(number, value=0.0).is_typical
+    assert known_to_tolerance(ParameterTable((*TYPICAL_NUMBERS.values(),))) == ("k_pre", "c_pre")
 
 
 def test_near_a_bound_the_steps_of_an_identified_parameter_are_relative() -> None:

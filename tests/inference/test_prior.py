@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.core.parameter import Parameter, ParameterTable
-from savgs_ident.core.transforms import WIDTH, FreeVector
+from savgs_ident.core.transforms import WIDTH
 from savgs_ident.inference.likelihood import values_of
 from savgs_ident.inference.prior import Prior, Scales, sheet_coordinate
 

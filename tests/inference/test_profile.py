@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.core.parameter import Parameter, ParameterTable
-from savgs_ident.core.transforms import FreeVector
 from savgs_ident.inference.diagnostics import SPAN, STEPS, profile_of
 
 from .toy import FIXED_SCALES, straight_toy

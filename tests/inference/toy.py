@@ -11,8 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.core.parameter import Parameter, ParameterTable
-from savgs_ident.core.transforms import FreeVector
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of
 from savgs_ident.inference.near_mode import Responses
 from savgs_ident.inference.prior import Scales

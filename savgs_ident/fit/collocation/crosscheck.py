@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
+from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.core.status import Status
-from savgs_ident.core.transforms import FreeVector
 from savgs_ident.fit.collocation.program import (
     Program,
     as_casadi,

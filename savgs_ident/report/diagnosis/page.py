@@ -206,7 +206,7 @@ def _parameter_rows(diagnosis: Diagnosis) -> Iterator[ParameterRow]:
 
 
 def _moved(about: Parameter | None, given: float | None, identified: float | None) -> str:
-    if about is None or about.rough or not about.tolerance > 0.0 or given is None or identified is None:
+    if about is None or about.is_typical or not about.tolerance > 0.0 or given is None or identified is None:
         return DASH
     return signed((identified - given) / about.tolerance, 1)
 
