@@ -199,8 +199,12 @@ def families_fitted(
     def fitted(family: Family) -> list[FittedFunctions]:
         first = found[family]
         groups = _by_themselves(every.term, port, family, alone, start, constants)
+        # From elsewhere only if nothing came of the first.
+        same = [each for some in groups for each in some if {*each.functions} == {*first.functions}]
         others = [some for some in groups if {*some[0].functions} != {*first.functions}]
-        return [fit for some in in_parallel(partial(among, family), [[first], *others]) for fit in some]
+        return [
+            fit for some in in_parallel(partial(among, family), [[first, *same], *others]) for fit in some
+        ]
 
     weights = {family: each.weight for family, each in found.items()}
     likely = sorted(found, key=lambda family: -weights[family])[: constants.likely_families]
