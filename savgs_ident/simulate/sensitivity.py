@@ -29,6 +29,7 @@ from savgs_ident.simulate.collocation import (
 from savgs_ident.simulate.excitation import inputs_at, signals_at
 from savgs_ident.simulate.mesh import Mesh
 from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
+from savgs_ident.simulate.program_cache import placed
 from savgs_ident.simulate.readings import Sensors, readings_of, sensors_of, shown_by
 
 
@@ -61,7 +62,8 @@ def directions_of(
         return found
 
     changes = jax.vmap(prepared, out_axes=(None, 0))(dict(tangents))
-    return Directions(dict(tangents), *changes, jnp.asarray(count))
+    # Where it stands tells programs apart: placed, it is the one that imposed signals have, too.
+    return Directions(dict(tangents), *changes, placed(jnp.asarray(count)))
 
 
 def unit_tangents(p: Values, names: Sequence[str], count: int) -> dict[str, NDArray[np.float64]]:
