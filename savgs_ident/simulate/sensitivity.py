@@ -29,7 +29,6 @@ from savgs_ident.simulate.collocation import (
 from savgs_ident.simulate.excitation import inputs_at, signals_at
 from savgs_ident.simulate.mesh import Mesh
 from savgs_ident.simulate.periodic import PeriodicSolution, node_steps
-from savgs_ident.simulate.program_cache import placed
 from savgs_ident.simulate.readings import Sensors, readings_of, sensors_of, shown_by
 
 
@@ -62,8 +61,7 @@ def directions_of(
         return found
 
     changes = jax.vmap(prepared, out_axes=(None, 0))(dict(tangents))
-    # Where it stands tells programs apart: placed, it is the one that imposed signals have, too.
-    return Directions(dict(tangents), *changes, placed(jnp.asarray(count)))
+    return Directions(dict(tangents), *changes, jnp.asarray(count))
 
 
 def unit_tangents(p: Values, names: Sequence[str], count: int) -> dict[str, NDArray[np.float64]]:

@@ -123,7 +123,8 @@ def slopes_in(
         tangents = unit_tangents(p, some, ROOM)
         directions = directions_of(model, p, placed(tangents), len(some))
         flat = _seen_along(model, p, solution, directions, orders)
-        parts.append(_shown(likelihood, flat, directions.wanted, solution)[: len(some)])
+        # Placed, as that of imposed signals is: so one program shows both.
+        parts.append(_shown(likelihood, flat, placed(directions.wanted), solution)[: len(some)])
     return np.concatenate(parts).T
 
 
