@@ -276,7 +276,8 @@ def check_clipping(recordings: Sequence[Recording], source: str) -> tuple[DataWa
                         "clipped_sensor",
                         f"{100 * worst.share:.1f} % of the samples stand at the {side} end {sign * end:.6g}"
                         f" ({len(clips)} tests reach it)",
-                        "use a larger range, or leave these tests out",
+                        "use a larger range, or leave these tests out; a signal that is meant to hold there,"
+                        " as steps do, may be right",
                         time=worst.time,
                     )
                 )

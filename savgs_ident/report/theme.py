@@ -62,10 +62,13 @@ def new_figure(width: float, height: float) -> Figure:
 def frequency_axis(axes: Axes, lowest: float, highest: float, labelled: bool = True) -> None:
     """A logarithmic frequency axis from ``lowest`` to ``highest`` [Hz] with round numbers on it."""
     axes.set_xscale("log")
-    axes.set_xlim(lowest / 1.06, highest * 1.06)
-    axes.xaxis.set_major_locator(FixedLocator([tick for tick in _TICKS if lowest / 1.06 <= tick]))
+    low, high = lowest / 1.06, highest * 1.06
+    axes.set_xlim(low, high)
+    ticks = [tick for tick in _TICKS if low <= tick <= high]
+    # Tests that lie close together, or one alone, may have no round number among them.
+    axes.xaxis.set_major_locator(FixedLocator(ticks if len(ticks) > 1 else [lowest, highest]))
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
     axes.tick_params(axis="x", labelbottom=labelled)
     if labelled:
         axes.set_xlabel("frequency [Hz]")

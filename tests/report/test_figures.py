@@ -17,7 +17,7 @@ from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campa
 from savgs_ident.report.bode import bode_figure, response_figure
 from savgs_ident.report.campaigns.inspect import campaign_figure
 from savgs_ident.report.text import response_labels
-from savgs_ident.report.theme import DPI, printable, write_figure
+from savgs_ident.report.theme import DPI, frequency_axis, new_figure, printable, write_figure
 from savgs_ident.responses.summary import CampaignSummary, inspect
 from savgs_ident.simulate.public import ModelCurve, model_curve
 
@@ -171,3 +171,21 @@ def test_a_response_at_a_single_frequency_is_seen(
     curve = model_curve("one", frequency, mass_on_spring(frequency, 0.3), road, ok)
     figure = response_figure("one point", [curve], LABELS)
     assert all(axes.get_lines()[0].get_marker() == "o" for axes in figure.axes)
+
+
+@pytest.mark.parametrize(
+    ("lowest", "highest", "numbers"),
+    [(0.5, 6.0, ["0.5", "1", "1.5", "2"]), (2.137, 2.137, ["2.137"]), (3.1, 3.6, ["3.1", "3.6"])],
+)
+def test_every_frequency_axis_has_numbers(lowest: float, highest: float, numbers: list[str]) -> None:
+    figure = new_figure(5.0, 4.0)
+    axes = figure.subplots()
+    frequency_axis(axes, lowest, highest)
+    figure.draw_without_rendering()
+    low, high = axes.get_xlim()
+    shown = [
+        label.get_text()
+        for place, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
+        if low <= place <= high
+    ]
+    assert list(dict.fromkeys(shown))[: len(numbers)] == numbers
