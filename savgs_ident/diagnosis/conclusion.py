@@ -20,9 +20,10 @@ from savgs_ident.diagnosis.evidence import (
     counted_with_more,
 )
 from savgs_ident.diagnosis.findings import hypothesis_of
-from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint, Rows, Shrink, shrinks
+from savgs_ident.diagnosis.gap import FurtherShrink, Rows, Shrink, shrinks
 from savgs_ident.diagnosis.held_out import HeldOut, hold_out, select_in_folds
 from savgs_ident.diagnosis.learning import LearnedLaw
+from savgs_ident.diagnosis.problem import ModelPoint
 from savgs_ident.diagnosis.result import NONE, UNKNOWN, Hypothesis, NextTest
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.diagnosis.verdict import UnknownEvidence, WeighedHypothesis

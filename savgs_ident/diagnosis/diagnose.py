@@ -31,7 +31,7 @@ from savgs_ident.diagnosis.conclusion import (
 from savgs_ident.diagnosis.drift import drifting
 from savgs_ident.diagnosis.dwell_problem import DwellProblem, dwell_problem
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FittedHypotheses
-from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint, sweep_shrink
+from savgs_ident.diagnosis.gap import FurtherShrink
 from savgs_ident.diagnosis.learning import LearnedLaw
 from savgs_ident.diagnosis.model_selection import (
     compare_models,
@@ -39,7 +39,7 @@ from savgs_ident.diagnosis.model_selection import (
     recalibrate,
 )
 from savgs_ident.diagnosis.narrative import write_verdict
-from savgs_ident.diagnosis.problem import AbstractProblem, DrawnLaw, drawn_law
+from savgs_ident.diagnosis.problem import AbstractProblem, DrawnLaw, ModelPoint, drawn_law
 from savgs_ident.diagnosis.result import (
     NONE,
     UNKNOWN,
@@ -52,6 +52,7 @@ from savgs_ident.diagnosis.result import (
     PortShare,
     Verdict,
 )
+from savgs_ident.diagnosis.sweep_gap import sweep_shrink
 from savgs_ident.diagnosis.verdict import indistinguishable, most_probable
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned_functions import coefficients_at

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.parameter import ParameterTable
-from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, ModelPoint, cycle_position
+from savgs_ident.diagnosis.gap import CyclePosition, FurtherShrink, cycle_position
 from savgs_ident.diagnosis.localisation import Localisation
 from savgs_ident.diagnosis.loops import root_sum_square
-from savgs_ident.diagnosis.problem import AbstractProblem, DrawnLaw, spans_of_force
+from savgs_ident.diagnosis.problem import AbstractProblem, DrawnLaw, ModelPoint, spans_of_force
 from savgs_ident.diagnosis.regimes import Cycles, find_regimes
 from savgs_ident.diagnosis.result import DriveForces, ForceLoop, NextTest, Regime
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants

@@ -17,7 +17,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -350,3 +350,11 @@ class AbstractProblem(ABC):
     @abstractmethod
     def responses(self, data: Data, *rows: NDArray[np.float64]) -> Responses | DriveForces:
         """Rows before, recalibrated and after, (m,) each [units of the rows], as a report shows them."""
+
+
+class ModelPoint(NamedTuple):
+    """A model of a problem: its terms, and its values by name [SI]."""
+
+    problem: AbstractProblem
+    terms: tuple[str, ...]
+    values: Mapping[str, float]

@@ -18,8 +18,9 @@ from savgs_ident.diagnosis.diagnose import (
     offered_effects,
 )
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
-from savgs_ident.diagnosis.gap import FurtherShrink, ModelPoint
+from savgs_ident.diagnosis.gap import FurtherShrink
 from savgs_ident.diagnosis.motion_problem import further_motion, motion_problem
+from savgs_ident.diagnosis.problem import ModelPoint
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference.observations import Data

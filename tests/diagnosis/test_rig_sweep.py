@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from savgs_ident.diagnosis import gap as module
+from savgs_ident.diagnosis import sweep_gap as module
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
-from savgs_ident.diagnosis.gap import (
-    ModelPoint,
+from savgs_ident.diagnosis.problem import ModelPoint
+from savgs_ident.diagnosis.sweep_gap import (
     along,
     first_harmonic,
     frequencies_of,
