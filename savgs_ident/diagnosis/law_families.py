@@ -6,7 +6,7 @@ fitted on the nonlinear plant, and what that fit does not need is taken away aga
 taken away from all, too, which says how well it can be spared.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import log
@@ -33,6 +33,7 @@ from savgs_ident.inference.laplace import (
     log_evidence,
 )
 from savgs_ident.inference.laplace_fit import LaplaceFit, Search
+from savgs_ident.inference.likelihood import NoiseScales
 from savgs_ident.inference.observations import Term
 from savgs_ident.inference.prior import bounds_of
 
@@ -98,6 +99,13 @@ class FamilyAlone(NamedTuple):
     start: Mapping[str, float]
 
 
+class _Without(NamedTuple):
+    """The log evidence of a fit without some coordinates, and its noise scales."""
+
+    log_evidence: float
+    scales: NoiseScales
+
+
 @dataclass(frozen=True)
 class _FirstOrder:
     """Fits without some coordinates, to first order about a fit: its slopes serve them all."""
@@ -119,24 +127,30 @@ class _FirstOrder:
     def _wider(self, functions: Collection[str], width: float) -> NDArray[np.float64]:
         return np.array([width if each.name in functions else 1.0 for each in self.mode.coordinates])
 
-    def _optimum(self, kept: NDArray[np.bool_], wider: NDArray[np.float64]) -> LinearisedOptimum:
+    def _optimum(
+        self, kept: NDArray[np.bool_], wider: NDArray[np.float64], near: NoiseScales | None = None
+    ) -> LinearisedOptimum:
         without = self._missed + self._slopes[:, ~kept] @ self.mode.x[~kept]
         lower, upper = (each[kept] / wider[kept] for each in bounds_of(self.mode.coordinates))
         slopes, here = self._slopes[:, kept] * wider[kept], self.mode.x[kept] / wider[kept]
-        near, rows = self.mode.noise_scales, self.search.rows
+        near, rows = near or self.mode.noise_scales, self.search.rows
         return linearised_optimum(rows, without, slopes, here, (lower, upper), scales=near)
 
-    def log_evidence(
-        self, gone: Collection[str], functions: Collection[str] = (), width: float = 1.0
-    ) -> float:
-        """Log evidence with the coordinates that are ``gone`` at zero.
+    def without(
+        self,
+        gone: Collection[str],
+        functions: Collection[str] = (),
+        width: float = 1.0,
+        near: NoiseScales | None = None,
+    ) -> "_Without":
+        """The best point with the coordinates that are ``gone`` at zero, looked for from the scales ``near`` it.
 
         The coefficients of the ``functions`` have a prior that is ``width`` times as wide as in the fit.
         """
         kept = self._kept(gone)
-        top = self._optimum(kept, self._wider(functions, width))
+        top = self._optimum(kept, self._wider(functions, width), near)
         coordinates = (each for each, keep in zip(self.mode.coordinates, kept, strict=True) if keep)
-        return log_evidence(top.value, top.precision, tuple(coordinates))
+        return _Without(log_evidence(top.value, top.precision, tuple(coordinates)), top.noise_scales)
 
     def attainable(self, functions: Collection[str], width: float) -> float:
         """The log evidence that fewer of the ``functions`` cannot exceed, if each may be ``width`` times as large."""
@@ -227,7 +241,7 @@ def _by_themselves(
     start: Mapping[str, float],
     constants: DecisionConstants,
 ) -> list[list[FamilyAlone]]:
-    """Those functions of a family that could be all of it, the fewest functions first, each with its starts.
+    """Those functions of a family that could be all of it, each with its starts; first the most, which take longest.
 
     Where their prior is wider or narrower than beside all others, each is a start: the first step from the wider one
     may leave the range in which the plant is solved, and the narrower one may promise too little.
@@ -238,7 +252,7 @@ def _by_themselves(
             FamilyAlone(group, each, -np.inf, _log_prior(group, mine, port, constants), start)
             for each in dict.fromkeys((1.0, alone[group]))
         ]
-        for group in sorted(alone, key=len)
+        for group in sorted(alone, key=len, reverse=True)
         if {*group} <= {*mine}
     ]
 
@@ -288,7 +302,7 @@ def families_spared(search: Search, mode: LaplaceFit, port: Port) -> dict[Family
     """Minus the log evidence of the law without the functions of each family."""
     about = _FirstOrder(search, mode)
     gone = {each.family: coefficients_of(port, each.family) for each in functions_at(port)}
-    return {family: -about.log_evidence(names) for family, names in gone.items()}
+    return {family: -about.without(names).log_evidence for family, names in gone.items()}
 
 
 def _log_prior(
@@ -313,24 +327,23 @@ def _needed(
     """Those of a family's functions, among the ``first``, without which the law is less probable; one at least."""
     of_all = set(coefficients_at(port))
 
-    def alone(functions: tuple[str, ...], width: float) -> _Weighed:
+    def alone(functions: tuple[str, ...], width: float, near: NoiseScales | None) -> _Weighed:
         log_prior = _log_prior(functions, family, port, constants)
-        weight = about.log_evidence(of_all.difference(functions), functions, width) + log_prior
-        return _Weighed(weight, functions, width, log_prior)
+        found = about.without(of_all.difference(functions), functions, width, near)
+        return _Weighed(found.log_evidence + log_prior, functions, width, log_prior, found.scales)
 
-    def at_its_width(functions: tuple[str, ...]) -> _Weighed:
-        return max(alone(functions, width) for width in constants.family_widths)
+    def at_its_width(functions: tuple[str, ...], near: NoiseScales | None = None) -> _Weighed:
+        return _heaviest(alone(functions, width, near) for width in constants.family_widths)
 
     # Of functions that do nearly the same, one alone is needed: the best may lie beyond worse ones.
     found = [at_its_width(first)]
     while len(found[-1].functions) > 1:
-        left = found[-1].functions
-        found.append(
-            max(alone(tuple(each for each in left if each != gone), found[-1].width) for gone in left)
-        )
+        _, left, width, _, near = found[-1]
+        fewer = (tuple(each for each in left if each != gone) for gone in left)
+        found.append(_heaviest(alone(each, width, near) for each in fewer))
     # One alone that calibration nearly takes up is far larger than all of them together seem to be.
-    found += [at_its_width((name,)) for name in first]
-    weight, functions, width, log_prior = at_its_width(max(found).functions)
+    found += [at_its_width((name,), found[-1].scales) for name in first]
+    weight, functions, width, log_prior, _ = at_its_width(_heaviest(found).functions)
     start = about.best(of_all.difference(functions), functions, width)
     return FamilyAlone(functions, width, weight, log_prior, start)
 
@@ -342,3 +355,8 @@ class _Weighed(NamedTuple):
     functions: tuple[str, ...]
     width: float
     log_prior: float
+    scales: NoiseScales
+
+
+def _heaviest(some: Iterable[_Weighed]) -> _Weighed:
+    return max(some, key=lambda each: each.weight)
