@@ -93,11 +93,21 @@ def enough(mixing: Sequence[Mixing], target: float) -> bool:
     return least_ess(mixing) >= target and all(each.r_hat <= R_HAT for each in mixing)
 
 
-def others_mixed(chains: Chains, count: int) -> bool:
-    """Whether all coordinates but the first ``count``, those of the identified parameters, have mixed."""
+def mixing_of_identified(chains: Chains, count: int) -> list[Mixing]:
+    """The mixing of the first ``count`` coordinates, those of the identified parameters."""
+    return [mixing_of(each) for each in np.moveaxis(chains.points[:, :, :count], 2, 0)]
+
+
+def mixing_of_others(chains: Chains, count: int) -> list[Mixing]:
+    """The mixing of the other coordinates."""
     # The discrepancy is the size of the last coordinate, whose sign means nothing.
     sized = np.concatenate([chains.points[:, :, count:-1], np.abs(chains.points[:, :, -1:])], axis=2)
-    return all(mixing_of(each).r_hat <= R_HAT_OTHERS for each in np.moveaxis(sized, 2, 0))
+    return [mixing_of(each) for each in np.moveaxis(sized, 2, 0)]
+
+
+def others_mixed(others: Sequence[Mixing]) -> bool:
+    """Whether what is not identified has mixed."""
+    return all(each.r_hat <= R_HAT_OTHERS for each in others)
 
 
 def precise(mixing: Sequence[Mixing]) -> bool:

@@ -30,6 +30,8 @@ from savgs_ident.inference.diagnostics import (
     least_ess,
     marginals_of,
     mixing_of,
+    mixing_of_identified,
+    mixing_of_others,
     names_by_role,
     others_mixed,
     precise,
@@ -250,7 +252,7 @@ def _run(
     with closing(SAMPLERS[settings.sampler](*expansion, settings.seed, checkpoint)) as sampler:
         while True:
             chains = next(sampler)
-            mixing = [mixing_of(chains.points[:, :, place]) for place in range(count)]
+            mixing = mixing_of_identified(chains, count)
             ess, spent = least_ess(mixing), time.perf_counter() - began
             report(
                 f"{settings.sampler}: {len(chains.points)} steps of {chains.points.shape[1]} chains, effective "
@@ -259,7 +261,7 @@ def _run(
             done = enough(mixing, settings.target_ess) and (precise(mixing) or spent > settings.patience_s)
             late = spent > settings.time_limit_s
             # The first steps are left out: until there is a draw there is nothing to sum up.
-            if (done and others_mixed(chains, count)) or (late and len(chains.points)):
+            if (done and others_mixed(mixing_of_others(chains, count))) or (late and len(chains.points)):
                 return chains
             if late and chains.unsolved == chains.evaluations:
                 raise InputError(
@@ -280,8 +282,9 @@ def _summed_up(
     roles = names_by_role(posterior.problem.free)
     values = values_of(posterior.problem.free, posterior.likelihood.scales, chains.points)
     mixing = {name: mixing_of(values[name]) for name in roles}
-    identified = [mixing[name] for name, role in roles.items() if role == "identified"]
-    others = [mixing[name] for name, role in roles.items() if role != "identified"]
+    # Of coordinates, as the chains were stopped: a map of them moves R-hat by what may be over the limit.
+    count = len(posterior.problem.free.identified)
+    identified, others = mixing_of_identified(chains, count), mixing_of_others(chains, count)
     status = answer.mode.status
     doubts = () if status.ok else (f"the mode was not found: {status.advice}",)
     convergence = assess_convergence(chains, identified, others, settings.target_ess, doubts)
