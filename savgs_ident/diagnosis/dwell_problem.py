@@ -174,9 +174,8 @@ class DwellProblem(AbstractProblem):
         not lead to a motion.
         """
         (model, p), layout = self._model_with(terms, values), warm_start.mesh.layout
-        doubled = Layout(tuple(2 * count for count in layout.counts))
         coarse = resolve(model, p, warm_start, ITERATIONS)
-        fine = adapt(model, p, coarse, doubled, self.settings.iterations)
+        fine = adapt(model, p, coarse, layout.finer(2), self.settings.iterations)
         if not all(status.ok for each in (coarse, fine) for status in each.status()):
             return None
         less, more = (

@@ -344,6 +344,11 @@ class Excitation(NamedTuple):
         none = np.zeros(0, np.intp)
         return none if self.part is None else np.flatnonzero(~self.part.repeats)
 
+    @property
+    def begins_at_rest(self) -> tuple[int, ...]:
+        """Places of the windows before which the plant rested."""
+        return () if self.part is None else tuple(np.flatnonzero(self.part.begins_at_rest).tolist())
+
 
 class AbstractSource(eqx.Module):
     """What drives a plant over time; it may have k states of its own, as a motor has."""

@@ -219,7 +219,7 @@ UNKNOWN_LAYOUT = RecordingLayout()
 """Of recordings about which nothing is known."""
 
 
-TestKind = Literal["dwell", "sweep", "road", "standstill", "other"]
+TestKind = Literal["dwell", "sweep", "road", "step", "standstill", "other"]
 
 
 @dataclass(frozen=True)
@@ -328,6 +328,8 @@ _FREQUENCY = re.compile(r"(?<![\d.])(\d+(?:[.,p]\d+)?)\s*_?hz", re.IGNORECASE)
 _SWEEP = re.compile(r"sweep|chirp", re.IGNORECASE)
 _ROAD = re.compile(r"road|random|track|ride|drive|8608|broad_?band", re.IGNORECASE)
 _STANDSTILL = re.compile(r"stand_?still|at_?rest|idle", re.IGNORECASE)
+_PULSE = re.compile(r"square|pulse|bump", re.IGNORECASE)
+_STEP = re.compile(r"step", re.IGNORECASE)
 _DWELL = re.compile(r"dwell|harmonic|sine|sinus", re.IGNORECASE)
 
 
@@ -339,13 +341,16 @@ def classify_test(name: str) -> tuple[TestKind, float | None]:
         return "standstill", None
     if _ROAD.search(name) and not _DWELL.search(name):
         return "road", None
+    if _PULSE.search(name) and not _DWELL.search(name):
+        return "step", None
     found = _FREQUENCY.search(name)
     frequency = float(re.sub("[,p]", ".", found[1])) if found else None
     if frequency is not None and not (isfinite(frequency) and frequency > 0.0):
         frequency = None
     if _DWELL.search(name) or frequency is not None:
         return "dwell", frequency
-    return "other", None
+    # A step with a frequency is one of a programme of dwells.
+    return "step" if _STEP.search(name) else "other", None
 
 
 _YEAR_2000 = 946_684_800.0

@@ -28,6 +28,7 @@ class ComparedPart(NamedTuple):
         begin: phase at which it begins [rad], (D,).
         end: phase at which it ends [rad], (D,).
         every: from one order of the readings to the next, in orders of the test [1], (D,).
+        begins_at_rest: 1 where the plant rested when the window began, 0 where nobody knows how it moved [1], (D,).
 
     Of a window it is a part. Of a dwell beside windows it begins so long before the period and ends so long after it
     (:data:`WHOLE_PERIOD`) that every instant counts alike, and every order is compared.
@@ -36,6 +37,7 @@ class ComparedPart(NamedTuple):
     begin: NDArray[np.float64]
     end: NDArray[np.float64]
     every: NDArray[np.float64]
+    begins_at_rest: NDArray[np.float64]
 
     @property
     def repeats(self) -> NDArray[np.bool_]:
@@ -43,7 +45,7 @@ class ComparedPart(NamedTuple):
         return self.end - self.begin > 2.0 * np.pi
 
 
-WHOLE_PERIOD = ComparedPart(*(np.array([each]) for each in (-10.0 * np.pi, 12.0 * np.pi, 1.0)))
+WHOLE_PERIOD = ComparedPart(*(np.array([each]) for each in (-10.0 * np.pi, 12.0 * np.pi, 1.0, 0.0)))
 """That of one dwell."""
 
 

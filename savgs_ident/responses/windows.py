@@ -6,7 +6,9 @@ A rig forgets how a motion began. So each window begins some seconds before what
 more for a plant that rings), and at its end its inputs are led over, in :data:`CLOSING_S`, to what they were before
 it began. In such a window the inputs repeat, and the periodic motion that they lead to is the recorded one in what is
 compared, wherever the recorded one came from: no state at the beginning has to be estimated. A test that
-begins at rest is compared from its beginning, for before it the rig rested.
+begins at rest is compared from its beginning, for before it the rig rested: there the state is known. Where a rig
+forgets nothing, as one that sticks from step to step, such a test is one window, as long as it is
+(:func:`estimate_whole_tests`).
 
 What is compared are complex amplitudes of the readings, weighted in time by a share that is zero outside that part
 (:func:`savgs_ident.responses.harmonic_response.compared_share`), recorded and predicted alike:
@@ -18,7 +20,7 @@ share what they see of it, for the part that is compared is shorter than the win
 and every so many-th where there would be more than :data:`NUMBERS`.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, log
 
@@ -28,16 +30,17 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.recordings.recording import Campaign, TestKind
 from savgs_ident.responses.even_record import EvenRecord, even_record
-from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, compared_share
+from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.outliers import estimate_standstill_noise
 from savgs_ident.responses.selection import only_tests
+from savgs_ident.responses.window_amplitudes import CLOSING_S, HIGHEST_HZ, IMPOSED_HZ, LOWEST_HZ, Cut, Windows
 
 Array = NDArray[np.float64]
 
-KINDS: tuple[TestKind, ...] = ("road", "sweep", "other")
+KINDS: tuple[TestKind, ...] = ("road", "sweep", "step", "other")
 """The kinds of test that are cut into windows."""
 
-BESIDE_DWELLS: tuple[TestKind, ...] = ("road",)
+BESIDE_DWELLS: tuple[TestKind, ...] = ("road", "step")
 """Those of them that are where there are dwells: there a sweep is kept to see what is predicted of it."""
 
 LEAD_S = 3.0
@@ -47,27 +50,17 @@ Origin: the body of a quarter car, at 1.3 Hz with a fifth of critical damping, h
 the wheel nothing; friction shortens both.
 """
 
-CLOSING_S = 0.5
-"""Length in which the inputs are led over to where the window began [s]."""
-
 COMPARED = 3.0
 """About how much of each window is compared, over its lead. Origin: computing time; more wastes less on the lead."""
 
 LEAST_S = 2.0
 """Less than this is not worth a window [s]."""
 
-LOWEST_HZ, HIGHEST_HZ = 0.4, 15.0
-"""Between these is compared where nothing else is asked for [Hz]: above body and wheel a model of two masses says
-nothing."""
-
-IMPOSED_HZ = 80.0
-"""Up to this the inputs are imposed [Hz], or as far as they are sampled: friction feels what no mass follows."""
-
 MOST_HZ = 0.5 * IMPOSED_HZ
 """Up to this may be compared [Hz]: what the readings show there has to come from inputs that are imposed."""
 
-NUMBERS = 1200
-"""About how many numbers are compared. Origin: computing time; it rises with their cube where they share errors."""
+WHOLE_S = 60.0
+"""So much of a test is compared as one window at most [s]. Origin: computing time."""
 
 _NEAR = 1.5
 
@@ -88,45 +81,123 @@ def estimate_windows(
 
     Raises :class:`InputError` where no test is long enough, the first input does not move, or nothing is compared.
     """
-    if not 2.0 * LOWEST_HZ <= highest_hz <= MOST_HZ:
-        raise InputError(
-            f"windows cannot be compared up to {highest_hz:g} Hz",
-            source="--max-frequency",
-            remedy=f"choose it from {2.0 * LOWEST_HZ:g} to {MOST_HZ:g} Hz",
-        )
-    still, warnings = estimate_standstill_noise(campaign)
-    driven, found = inputs[0], []
-    for recording in campaign.recordings:
-        if recording.kind not in kinds:
-            continue
-        even = even_record(
-            campaign.source, recording, driven, (*inputs, *readings), still, LEAST_S, highest_hz
-        )
-        if isinstance(even, DataWarning):
-            warnings += (even,)
-        else:
-            found.append(even.rested(lead_s + CLOSING_S) if even.begins_at_rest else even)
-    first = lead_s + CLOSING_S
+    tests, first = _Tests.of(campaign, inputs, readings, highest_hz, kinds), lead_s + CLOSING_S
+    if tests.need_no_cut(COMPARED * lead_s * _NEAR):
+        return _whole(tests)
+    found = [each.rested(first) if each.begins_at_rest else each for each in tests.records]
     compared = _compared_s([each.duration - first for each in found], COMPARED * lead_s)
     if compared == 0.0:
-        raise _no_window(campaign, found, warnings, lead_s)
-    warnings += tuple(
-        _too_short(campaign.source, each, first + compared)
-        for each in found
-        if each.duration - first < compared
-    )
-    cut = [(even, end) for even in found for end in _ends(even.duration, first, compared)]
-    assumed = [name for name in readings if name not in still and any(name in each.values for each in found)]
-    if assumed:
-        warnings += (_noise_assumed(campaign.source, assumed),)
-    windows = _Windows.of(cut, lead_s, compared)
-    channels = tuple(name for name in (*inputs, *readings) if any(name in each.values for each in found))
-    response = replace(
-        windows.response(channels, set(inputs), warnings, highest_hz),
-        recorded=windows.recorded(campaign),
-        beside=windows.beside(campaign),
-    )
-    return _with_readings(campaign.source, response, readings)
+        raise _no_window(campaign, found, tests.warnings, lead_s)
+    short = (each for each in found if each.duration - first < compared)
+    warnings = [_too_short(campaign.source, each, first + compared) for each in short]
+    cut = [Cut(each, end, compared) for each in found for end in _ends(each.duration, first, compared)]
+    return tests.response(cut, lead_s, warnings)
+
+
+def estimate_whole_tests(
+    campaign: Campaign,
+    inputs: Sequence[str],
+    readings: Sequence[str],
+    highest_hz: float = HIGHEST_HZ,
+    kinds: Collection[TestKind] = KINDS,
+) -> HarmonicResponse:
+    """The same of the tests that begin at rest, each in one window from its beginning to its end.
+
+    For a plant that forgets nothing. Of each :data:`WHOLE_S` are compared at most. Raises :class:`InputError` also
+    where no test begins at rest.
+    """
+    return _whole(_Tests.of(campaign, inputs, readings, highest_hz, kinds))
+
+
+def _whole(tests: "_Tests") -> HarmonicResponse:
+    source = tests.campaign.source
+    rested = [each.rested(LEAD_S + CLOSING_S) for each in tests.records if each.begins_at_rest]
+    if not rested:
+        raise InputError(
+            "no test begins at rest",
+            source=source,
+            remedy="let each test begin with a second of rest",
+        )
+    warnings = [_begins_moving(source, each) for each in tests.records if not each.begins_at_rest]
+    lasting = [min(each.duration - each.before, WHOLE_S) for each in rested]
+    warnings += [
+        _shortened(source, each)
+        for each, compared in zip(rested, lasting, strict=True)
+        if compared < each.duration - each.before
+    ]
+    cut = [
+        Cut(each, each.before + compared, compared) for each, compared in zip(rested, lasting, strict=True)
+    ]
+    return tests.response(cut, LEAD_S, warnings)
+
+
+@dataclass(frozen=True)
+class _Tests:
+    """Tests of a campaign that can be used, in inputs and readings, up to a frequency [Hz]."""
+
+    campaign: Campaign
+    inputs: Sequence[str]
+    readings: Sequence[str]
+    highest_hz: float
+    still: Mapping[str, float]
+    records: tuple[EvenRecord, ...]
+    warnings: tuple[DataWarning, ...]
+
+    @classmethod
+    def of(
+        cls,
+        campaign: Campaign,
+        inputs: Sequence[str],
+        readings: Sequence[str],
+        highest_hz: float,
+        kinds: Collection[TestKind],
+    ) -> "_Tests":
+        """Those of some kinds. Raises :class:`InputError` for a frequency up to which nothing can be compared."""
+        if not 2.0 * LOWEST_HZ <= highest_hz <= MOST_HZ:
+            raise InputError(
+                f"windows cannot be compared up to {highest_hz:g} Hz",
+                source="--max-frequency",
+                remedy=f"choose it from {2.0 * LOWEST_HZ:g} to {MOST_HZ:g} Hz",
+            )
+        still, warnings = estimate_standstill_noise(campaign)
+        names = (*inputs, *readings)
+        found = [
+            even_record(campaign.source, each, inputs[0], names, still, LEAST_S, highest_hz)
+            for each in campaign.recordings
+            if each.kind in kinds
+        ]
+        refused = tuple(each for each in found if isinstance(each, DataWarning))
+        records = tuple(each for each in found if isinstance(each, EvenRecord))
+        return cls(campaign, inputs, readings, highest_hz, still, records, (*warnings, *refused))
+
+    def need_no_cut(self, longest_s: float) -> bool:
+        """Whether there are some, each of which begins at rest and is no longer than a window may be [s]."""
+        return bool(self.records) and all(
+            each.begins_at_rest and LEAST_S <= each.duration <= longest_s for each in self.records
+        )
+
+    def response(
+        self, cut: Sequence[Cut], lead_s: float, warnings: Sequence[DataWarning]
+    ) -> HarmonicResponse:
+        """What is compared in windows, after a lead [s], with further warnings."""
+        here = [each.record for each in cut]
+        assumed = [
+            name
+            for name in self.readings
+            if name not in self.still and any(name in each.values for each in here)
+        ]
+        told = (*self.warnings, *warnings)
+        if assumed:
+            told += (_noise_assumed(self.campaign.source, assumed),)
+        windows = Windows.of(cut, lead_s)
+        names = (*self.inputs, *self.readings)
+        channels = tuple(name for name in names if any(name in each.values for each in here))
+        response = replace(
+            windows.response(channels, set(self.inputs), told, self.highest_hz),
+            recorded=windows.recorded(self.campaign),
+            beside=windows.beside(self.campaign),
+        )
+        return _with_readings(self.campaign.source, response, self.readings)
 
 
 def _with_readings(source: str, response: HarmonicResponse, readings: Sequence[str]) -> HarmonicResponse:
@@ -186,7 +257,27 @@ def _too_short(source: str, even: EvenRecord, needed: float) -> DataWarning:
         f"has {even.duration - even.before:.3g} s, the windows of this campaign need {needed:.3g} s",
         source,
         even.test,
-        remedy="give it as a campaign of its own, or record a longer one",
+        remedy="give it as a campaign of its own, or record a longer one or one that begins at rest",
+    )
+
+
+def _begins_moving(source: str, even: EvenRecord) -> DataWarning:
+    return DataWarning(
+        "window_not_used",
+        "does not begin at rest, and the model remembers how its motion began",
+        source,
+        even.test,
+        remedy="let each test begin with a second of rest",
+    )
+
+
+def _shortened(source: str, even: EvenRecord) -> DataWarning:
+    return DataWarning(
+        "window_not_used",
+        f"is compared in its first {WHOLE_S:g} s only, for the model remembers how its motion began",
+        source,
+        even.test,
+        remedy="cut it into tests that begin at rest",
     )
 
 
@@ -228,144 +319,3 @@ def _noise_assumed(source: str, names: Sequence[str]) -> DataWarning:
         None,
         "record some seconds at rest, and name that test standstill",
     )
-
-
-@dataclass(frozen=True)
-class _Window:
-    """One window: the even record, and the place of its first instant in it."""
-
-    record: EvenRecord
-    first: int
-
-
-@dataclass(frozen=True)
-class _Windows:
-    """Windows of one length [s], of which the part between two phases [rad] is compared, after a lead [s]."""
-
-    length: float
-    lead: float
-    part: tuple[float, float]
-    windows: tuple[_Window, ...]
-
-    @property
-    def imposed_hz(self) -> float:
-        """Up to which frequency the inputs are imposed [Hz]."""
-        return min(IMPOSED_HZ, 0.45 * min(each.record.slowest for each in self.windows))
-
-    @classmethod
-    def of(cls, cut: Sequence[tuple[EvenRecord, float]], lead: float, compared: float) -> "_Windows":
-        """The windows of which so much is compared [s], up to an end [s], after a ``lead`` [s]."""
-        length = lead + compared + CLOSING_S
-        part = 2.0 * np.pi * lead / length, 2.0 * np.pi * (lead + compared) / length
-        windows = []
-        for record, end in cut:
-            last = min(round(end * record.rate), record.count - 1)
-            first = last - round((lead + compared) * record.rate)
-            windows.append(_Window(record, max(first, round(CLOSING_S * record.rate))))
-        return cls(length, lead, part, tuple(windows))
-
-    def response(
-        self,
-        channels: tuple[str, ...],
-        inputs: set[str],
-        warnings: tuple[DataWarning, ...],
-        highest_hz: float,
-    ) -> HarmonicResponse:
-        """The complex amplitudes of all windows, up to a frequency [Hz]."""
-        orders = floor(self.imposed_hz * self.length)
-        shape = (len(self.windows), len(channels), orders + 1)
-        harmonics, covariance = np.zeros(shape, np.complex128), np.zeros((*shape, 2, 2))
-        valid, noise = np.zeros(shape, np.bool_), np.zeros(shape[:2])
-        every, compared = self._compared(sum(name not in inputs for name in channels), highest_hz)
-        for w, window in enumerate(self.windows):
-            for c, name in enumerate(channels):
-                if name not in window.record.values:
-                    continue
-                noise[w, c] = window.record.noise[name]
-                signal, share = self._signal(window, name, name in inputs)
-                step, kept = (1, valid[w, c] | True) if name in inputs else (every, compared)
-                amplitudes, variance = self._amplitudes(signal, share, orders)
-                picked = amplitudes[::step][: kept.size]
-                harmonics[w, c, : picked.size] = picked
-                covariance[w, c] = noise[w, c] ** 2 * variance * np.eye(2)
-                valid[w, c, : kept.size] = kept & (not self._has_gap(window, name))
-        return HarmonicResponse(
-            tests=tuple(self._name(each) for each in self.windows),
-            channels=channels,
-            frequency=np.full(shape[0], 1.0 / self.length),
-            frequency_sd=np.zeros(shape[0]),
-            harmonics=harmonics,
-            covariance=covariance,
-            valid=valid,
-            peak_to_peak=np.zeros(shape[:2]),
-            peak_to_peak_sd=np.zeros(shape[:2]),
-            noise_sd=noise,
-            periods=np.ones(shape[0], np.int64),
-            warnings=warnings,
-            part=ComparedPart(*(np.full(shape[0], float(each)) for each in (*self.part, every))),
-        )
-
-    def recorded(self, campaign: Campaign) -> Array:
-        """When what is compared in each window began, on the scale of when the tests did, (D,)."""
-        return np.array([campaign.when(each.record.test, self._begin(each)) for each in self.windows])
-
-    def beside(self, campaign: Campaign) -> dict[str, Array]:
-        """Means of the free channels in what is compared of each window [their units], (D,) by name."""
-        recordings = {each.name: each.channels for each in campaign.recordings}
-
-        def mean(window: _Window, name: str) -> float:
-            channel = recordings[window.record.test].get(name)
-            if channel is None:
-                return np.nan
-            begin = window.record.start + window.first / window.record.rate + self.lead
-            here = (channel.time >= begin) & (channel.time <= begin + self.length - self.lead - CLOSING_S)
-            known = channel.values[here & np.isfinite(channel.values)]
-            return float(known.mean()) if known.size else np.nan
-
-        return {name: np.array([mean(each, name) for each in self.windows]) for name in campaign.layout.free}
-
-    def _begin(self, window: _Window) -> float:
-        """Where what is compared in a window begins [s after its test did]."""
-        return window.first / window.record.rate + self.lead - window.record.before
-
-    def _name(self, window: _Window) -> str:
-        # Rounded to what is printed, and no negative zero.
-        begin = round(self._begin(window), 1) + 0.0
-        return f"{window.record.test}, {begin:.1f} to {begin + self.length - self.lead - CLOSING_S:.1f} s"
-
-    def _compared(self, readings: int, highest_hz: float) -> tuple[int, NDArray[np.bool_]]:
-        """From one order that is compared to the next, and which of them are, from 0 to the last."""
-        last = floor(highest_hz * self.length)
-        every = max(2, ceil(2 * len(self.windows) * readings * last / NUMBERS))
-        return every, every * np.arange(last // every + 1) >= LOWEST_HZ * self.length
-
-    def _signal(self, window: _Window, name: str, led_over: bool) -> tuple[Array, Array]:
-        """A channel at the instants of a window [its unit], and the share with which each counts [1], (n,) both.
-
-        An input is led over at the end to what it was before the beginning.
-        """
-        record = window.record
-        count, values = round(self.length * record.rate), record.values[name]
-        phase = np.asarray(2.0 * np.pi * np.arange(count) / (self.length * record.rate), np.float64)
-        place = window.first + np.arange(count)
-        here = values[np.minimum(place, values.size - 1)]
-        if not led_over:
-            return here, compared_share(phase, self.part[0], self.part[1])
-        ahead = np.clip((phase - self.part[1]) / (2.0 * np.pi - self.part[1]), 0.0, 1.0)
-        share = ahead**3 * (10.0 - 15.0 * ahead + 6.0 * ahead**2)
-        before = values[np.maximum(place - count, 0)]
-        return (1.0 - share) * here + share * before, np.ones(count)
-
-    def _amplitudes(self, signal: Array, share: Array, orders: int) -> tuple[NDArray[np.complex128], float]:
-        """Complex amplitudes (orders + 1,), and the variance of each part of them for noise of unit variance."""
-        count = signal.size
-        found = 2.0 / count * np.fft.rfft(share * signal)
-        kept = np.zeros(orders + 1, np.complex128)
-        upto = min(orders + 1, found.size)
-        kept[:upto] = found[:upto]
-        kept[0] = 0.5 * kept[0].real
-        return kept, float(2.0 * np.sum(share**2)) / count**2
-
-    def _has_gap(self, window: _Window, name: str) -> bool:
-        begin = window.first / window.record.rate
-        return any(end > begin and start < begin + self.length for start, end in window.record.gaps[name])

@@ -18,7 +18,8 @@ with F = d(xd)/dx. In terms of A_n dx_n it is an affine recurrence whose matrice
 Such recurrences are solved dwell by dwell (:func:`factorise_recurrence`, :func:`solve_recurrence`). Eliminating from
 node to node is stable because a rig forgets its past (the products of M_n shrink). Products are formed in chunks, all
 chunks of all dwells at a time, then over the chunks of a dwell; the period closes with
-(I - M_{N-1} ... M_0) x_0 = d. The factorisation serves any number of right sides, which is what makes sensitivities
+(I - M_{N-1} ... M_0) x_0 = d. A window that begins at rest does not close: with M_{N-1} = 0 and d_{N-1} = 0 its first
+state stays as it is. The factorisation serves any number of right sides, which is what makes sensitivities
 cheap.
 
 Arrays are laid out with the matrix indices first and the nodes of all dwells last, so that every operation is
@@ -97,6 +98,11 @@ def _over_chunks(layout: Layout, array: Float[Array, "*k C"], absent: Array) -> 
     return jnp.moveaxis(padded[..., layout.chunk_table], -1, 0)
 
 
+def _opened(layout: Layout, values: Float[Array, "*k P"]) -> Float[Array, "*k P"]:
+    """Nothing leads from the last node of a window that begins at rest to its first."""
+    return values.at[..., layout.loose_ends].set(0.0) if layout.begins_at_rest else values
+
+
 def factorise_recurrence(layout: Layout, steps: Float[Array, "m m P"]) -> CyclicFactors:
     """Factorise the recurrence with step matrices M_n [units of the states per those of the states]."""
 
@@ -106,7 +112,7 @@ def factorise_recurrence(layout: Layout, steps: Float[Array, "m m P"]) -> Cyclic
         )
         return total
 
-    eye = jnp.eye(steps.shape[0])
+    steps, eye = _opened(layout, steps), jnp.eye(steps.shape[0])
     chunks = compose(by_chunks(steps))
     period = compose(_over_chunks(layout, chunks, eye))
     closing = jnp.linalg.inv(jnp.moveaxis(eye[:, :, None] - period, -1, 0))
@@ -127,7 +133,7 @@ def solve_recurrence(
     def pass_on(x: Array, step: tuple[Array, Array]) -> tuple[Array, Array]:
         return apply_nodes(step[0], x) + step[1], x
 
-    size = right.shape[0]
+    right, size = _opened(layout, right), right.shape[0]
     inside = (by_chunks(factors.steps), by_chunks(right))
     sides, _ = jax.lax.scan(end, jnp.zeros_like(inside[1][0]), inside)
     over = (

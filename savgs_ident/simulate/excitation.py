@@ -4,7 +4,7 @@ A plant is driven by the harmonics of its inputs, as they are given or as they w
 A model is held against the response of the campaign's dwells, or of those of them that a command is asked to look at.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import ceil, log2
 from typing import Any, cast
@@ -24,11 +24,10 @@ from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, SweepResponse
 from savgs_ident.responses.selection import join_tests, only_tests
 from savgs_ident.responses.sweeps import estimate_sweep_response
+from savgs_ident.responses.window_amplitudes import HIGHEST_HZ
 from savgs_ident.responses.windows import (
     BESIDE_DWELLS,
-    HIGHEST_HZ,
     KINDS,
-    LEAD_S,
     MOST_HZ,
     estimate_windows,
 )
@@ -250,12 +249,21 @@ def _recorded(given: Input, measured: HarmonicResponse, table: ParameterTable) -
     if given.keeps_mean:
         harmonics[~valid[:, 0], 0] = rest
     else:
-        harmonics[:, 0] = 0.0
+        harmonics[:, 0] = _means(harmonics, measured)
     if given.orders is None:
         return harmonics
     # A window is long: its orders are a few tenths of a hertz apart, and all of them count.
     harmonics[measured.dwells, given.orders + 1 :] = 0.0
     return harmonics if measured.windows.size else harmonics[:, : given.orders + 1]
+
+
+def _means(harmonics: NDArray[np.complex128], measured: HarmonicResponse) -> NDArray[np.float64]:
+    """The mean of an input in each test [its unit], (D,): about zero, and from zero where a window begins at rest."""
+    means = np.zeros(harmonics.shape[0])
+    if measured.part is not None:
+        rested = measured.part.begins_at_rest > 0.0
+        means[rested] = -harmonics[rested, 1:].sum(axis=1).real
+    return means
 
 
 def up_to_frequency(response: HarmonicResponse, highest: float | None) -> HarmonicResponse:
@@ -315,12 +323,12 @@ def response_of_tests(
     orders: int,
     max_frequency: float | None = None,
     progress: Progress = no_progress,
-    lead_s: float = LEAD_S,
+    cut: Callable[..., HarmonicResponse] = estimate_windows,
 ) -> HarmonicResponse:
     """The same, and beside dwells that of roads, in windows; without dwells that of sweeps and other tests, too.
 
-    What is compared in windows begins ``lead_s`` [s] after they do, up to 15 Hz or ``max_frequency`` [Hz]. With a
-    warning where roads beside dwells cannot be used.
+    Windows are those that ``cut`` makes of the campaign, its inputs and readings, up to 15 Hz or ``max_frequency``
+    [Hz], of tests of some ``kinds``. With a warning where roads beside dwells cannot be used.
     """
     if isinstance(measured, HarmonicResponse):
         return measured_response(measured, plant, orders, max_frequency, progress)
@@ -335,7 +343,7 @@ def response_of_tests(
     highest = min(highest, MOST_HZ) if dwells else highest
     only = measured.only((*recorded_names(plant), *measured.layout.free))
     try:
-        windows = estimate_windows(only, inputs, readings, highest, lead_s, kinds)
+        windows = cut(only, inputs, readings, highest, kinds=kinds)
     except InputError as error:
         if response is None:
             raise

@@ -1,6 +1,8 @@
 """Windows in which a plant has forgotten how its motion began where the comparison begins."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,7 @@ from savgs_ident.plants.model import Model
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.selection import only_tests
-from savgs_ident.responses.windows import LEAD_S
+from savgs_ident.responses.windows import LEAD_S, estimate_whole_tests, estimate_windows
 from savgs_ident.simulate.driven_plant import is_held_against_drive
 from savgs_ident.simulate.excitation import Measurements, measured_excitation, response_of_tests
 from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
@@ -67,26 +69,74 @@ def forgetful_motion(
 def _forgetful(
     measured: Measurements, model: Model, orders: int, max_frequency: float | None, progress: Progress
 ) -> tuple[HarmonicResponse, PeriodicSolution | None]:
-    response = response_of_tests(measured, model.plant, orders, max_frequency, progress)
+    def in_windows(cut: Callable[..., HarmonicResponse] = estimate_windows) -> HarmonicResponse:
+        return response_of_tests(measured, model.plant, orders, max_frequency, progress, cut)
+
+    response = in_windows()
     if response.part is None:
         return response, None
-    left, half, motion = _left(response, model)
     try:
-        if np.min(left) >= REMEMBERED and isinstance(measured, Campaign):
-            lead = _longer(LEAD_S, float(np.median(half)), float(np.median(left)))
-            progress(f"cutting windows of which the first {lead:.3g} s are not compared")
-            response = response_of_tests(measured, model.plant, orders, max_frequency, lead_s=lead)
-            if response.part is None:
-                # The roads are too short for that, and the dwells remain.
-                return response, None
-            left, _, motion = _left(response, model)
-        lasting = _lasting(response, left)
+        return _forgetting(response, measured, model, in_windows, progress)
     except InputError as error:
+        whole = _from_rest(measured, model, in_windows, progress)
+        if whole is not None:
+            return whole
         if not response.dwells.size:
             raise
         warnings = (*response.warnings, error.as_warning("tests_not_used"))
         return replace(only_tests(response, response.dwells), warnings=warnings), None
+
+
+_InWindows = Callable[[Callable[..., HarmonicResponse]], HarmonicResponse]
+
+
+def _forgetting(
+    response: HarmonicResponse,
+    measured: Measurements,
+    model: Model,
+    in_windows: _InWindows,
+    progress: Progress,
+) -> tuple[HarmonicResponse, PeriodicSolution | None]:
+    """A response in windows of which the plant forgets the beginning, longer ones where it has to be, and its motion.
+
+    Raises :class:`InputError` where it forgets in none of those that do not begin at rest.
+    """
+    left, half, motion = _left(response, model)
+    begun = _begun(response)
+    if begun.any() and np.min(left[begun]) >= REMEMBERED and isinstance(measured, Campaign):
+        lead = _longer(LEAD_S, float(np.median(half[begun])), float(np.median(left[begun])))
+        progress(f"cutting windows of which the first {lead:.3g} s are not compared")
+        response = in_windows(partial(estimate_windows, lead_s=lead))
+        if response.part is None:
+            # The roads are too short for that, and the dwells remain.
+            return response, None
+        left, _, motion = _left(response, model)
+    lasting = _lasting(response, left)
     return lasting, motion if lasting is response else None
+
+
+def _from_rest(
+    measured: Measurements, model: Model, in_windows: _InWindows, progress: Progress
+) -> tuple[HarmonicResponse, PeriodicSolution | None] | None:
+    """The response of tests that begin at rest, each in one window; None where none can be compared."""
+    if not isinstance(measured, Campaign):
+        return None
+    progress("comparing whole tests, from rest: the model remembers how a motion began")
+    try:
+        response = in_windows(estimate_whole_tests)
+        if response.part is None:
+            return None
+        left, _, motion = _left(response, model)
+        lasting = _lasting(response, left)
+    except InputError:
+        return None
+    return lasting, motion if lasting is response else None
+
+
+def _begun(response: HarmonicResponse) -> NDArray[np.bool_]:
+    """Which of the windows do not begin at rest, (w,)."""
+    assert response.part is not None
+    return np.asarray(response.part.begins_at_rest[response.windows] == 0.0)
 
 
 def _left(
@@ -99,8 +149,14 @@ def _left(
     assert response.part is not None
     plant, p = model.build(), as_values(model.table.as_dict())
     solution = simulate_periodic(plant, p, measured_excitation(plant, response, model.table))
-    begin = response.part.begin
-    return remembered(solution, begin), remembered(solution, 0.5 * begin), solution
+    begin, begun = response.part.begin, _begun(response)
+
+    def after(upto: NDArray[np.float64]) -> NDArray[np.float64]:
+        left = remembered(solution, upto)
+        # Where a motion began at rest, how it began is known; there may be none all the same.
+        return np.where(begun | ~np.isfinite(left), left, 0.0)
+
+    return after(begin), after(0.5 * begin), solution
 
 
 def _longer(lead: float, half: float, left: float) -> float:
@@ -118,23 +174,24 @@ def _longer(lead: float, half: float, left: float) -> float:
         )
         raise InputError(
             f"the model {what}: {LONGEST_LEAD_S:g} s before what is compared would not do",
-            remedy="give the plant the damping that it has, or record dwells",
+            remedy="give the plant the damping that it has, or record tests that begin with a second of rest",
         )
     return float(longer)
 
 
 def _lasting(response: HarmonicResponse, left: NDArray[np.float64]) -> HarmonicResponse:
     """The windows of which less than :data:`REMEMBERED` is ``left``."""
-    forgotten = left < REMEMBERED
+    forgotten, begun = left < REMEMBERED, _begun(response)
     if not np.isfinite(left).any():
         raise InputError(
             "the model has no motion that follows the recorded one in any window",
             remedy="begin with a model that was identified from dwells, or record a sweep or a road without steps",
         )
-    if not forgotten.any():
+    if not forgotten.any() or (begun.any() and not forgotten[begun].any()):
         raise InputError(
-            f"the model remembers {100.0 * np.min(left):.2g} % of how a motion began where windows are compared",
-            remedy="record dwells: a plant that rings or sticks for so long is not identified from windows",
+            f"the model remembers {100.0 * np.min(left[begun]):.2g} % of how a motion began where windows are "
+            "compared",
+            remedy="record tests that begin with a second of rest, or dwells",
         )
     gone = response.windows[~forgotten]
     warnings = tuple(

@@ -108,7 +108,10 @@ def _held(
     steps: Float[Array, " P"],
     mesh: Mesh,
 ) -> Float[Array, "s P"]:
-    """The states of each test where they follow their bounds; else what does, over the second of two periods."""
+    """The states of each test where they follow their bounds; else what does, over the second of two periods.
+
+    Those of a window that begins at rest begin without stretch.
+    """
     layout, middle = mesh.layout, 0.5 * (lower + upper)
     step = steps[layout.preceding]
 
@@ -123,12 +126,16 @@ def _held(
     def in_time(values: Array) -> Array:
         return jnp.moveaxis(values[..., nodes], -2, 0)
 
-    follows, _ = advance(states[:, layout.preceding], (lower, upper, middle, step))
+    rested = list(layout.begins_at_rest)
+    firsts = layout.starts[rested]
+    before = states[:, layout.preceding].at[:, firsts].set(states[:, firsts])
+    follows, _ = advance(before, (lower, upper, middle, step))
     off = over_dwells(jnp.max(jnp.abs(states - follows) / (upper - lower), axis=0), layout)
     nodes, present = _side_by_side(layout)
     along = (*map(in_time, (lower, upper, middle)), jnp.where(present, step[nodes], 0.0))
     # What never slides creeps to where its stretch is nothing in the mean over time.
     begun, _ = jax.lax.scan(advance, _means(middle, steps, layout), along)
+    begun = begun.at[:, rested].set(0.0)
     every: Array = jax.lax.scan(advance, begun, along)[1]
     anew = every[np.arange(layout.total) - layout.starts[layout.dwell], :, layout.dwell].T
     return jnp.where((off < FOLLOWS)[layout.dwell], states, anew)

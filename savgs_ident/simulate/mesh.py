@@ -28,9 +28,15 @@ CHUNK = 16
 
 @dataclass(frozen=True)
 class Layout:
-    """Nodes per period of D dwells, each a multiple of :data:`CHUNK`; hashable, so that it can be static."""
+    """Nodes per period of D dwells, each a multiple of :data:`CHUNK`; hashable, so that it can be static.
+
+    Attributes:
+        counts: nodes of each.
+        begins_at_rest: windows that do: their last node does not lead back to the first, whose state is known.
+    """
 
     counts: tuple[int, ...]
+    begins_at_rest: tuple[int, ...] = ()
 
     @property
     def total(self) -> int:
@@ -65,6 +71,16 @@ class Layout:
         before = np.arange(-1, self.total - 1)
         before[self.starts] = self.starts + np.asarray(self.counts) - 1
         return before
+
+    @property
+    def loose_ends(self) -> NDArray[np.intp]:
+        """The last nodes of the windows that begin at rest."""
+        places = list(self.begins_at_rest)
+        return self.starts[places] + np.asarray(self.counts)[places] - 1
+
+    def finer(self, times: int) -> "Layout":
+        """So many times as many nodes."""
+        return Layout(tuple(times * count for count in self.counts), self.begins_at_rest)
 
     @cached_property
     def chunk_table(self) -> NDArray[np.intp]:
@@ -158,7 +174,9 @@ def _multiples(angle: Float[Array, " P"], count: int) -> tuple[Float[Array, "n P
 def only_dwells(mesh: Mesh, dwells: Sequence[int] | NDArray[np.intp]) -> Mesh:
     """The nodes of some of the dwells."""
     nodes = mesh.layout.nodes_of(dwells)
-    layout = Layout(tuple(mesh.layout.counts[d] for d in dwells))
+    places = [int(d) for d in dwells]
+    rested = tuple(here for here, d in enumerate(places) if d in mesh.layout.begins_at_rest)
+    layout = Layout(tuple(mesh.layout.counts[d] for d in places), rested)
     return Mesh(layout, *(np.asarray(each)[nodes] for each in mesh[1:]))
 
 

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values, as_values
+from savgs_ident.plants.at_rest import find_rest
 from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.simulate.collocation import (
     CyclicFactors,
@@ -173,7 +174,7 @@ def layout_of(excitation: Excitation, settings: PeriodicSettings) -> Layout:
     counts = np.array(layout_for(frequency, settings.nodes, settings.slow).counts)
     windows = excitation.windows
     counts[windows] = CHUNK * np.ceil(settings.window_rate / frequency[windows] / CHUNK)
-    return Layout(tuple(counts.tolist()))
+    return Layout(tuple(counts.tolist()), excitation.begins_at_rest)
 
 
 class PeriodicSolution(eqx.Module):
@@ -291,9 +292,38 @@ def _with_windows_marched(
     """The start of all tests, that of the windows followed in time from their first instant."""
     windows = excitation.windows
     theirs, nodes = only_dwells(mesh, windows), mesh.layout.nodes_of(windows)
+    rested = mesh.layout.starts[list(mesh.layout.begins_at_rest)]
+    if rested.size:
+        start = start._replace(x=_resting(model, p, excitation, mesh, start.x, rested))
     first = start.x[:, mesh.layout.starts[windows]]
     marched = march(model, p, model.prepare(p), only_driven(excitation, windows), theirs, first)
-    return Trajectory(*(known.at[:, nodes].set(new) for known, new in zip(start, marched, strict=True)))
+    return Trajectory(
+        *(
+            known.at[:, nodes].set(new).at[:, rested].set(known[:, rested])
+            for known, new in zip(start, marched, strict=True)
+        )
+    )
+
+
+@eqx.filter_jit
+def _resting(
+    model: AbstractPlant,
+    p: Values,
+    excitation: Excitation,
+    mesh: Mesh,
+    x: Float[Array, "m P"],
+    places: NDArray[np.intp],
+) -> Float[Array, "m P"]:
+    """States [SI] with those at some nodes as the plant rests there under its inputs, where such a rest is found."""
+    prepared = model.prepare(p)
+
+    def rest(u: Any, known: Array) -> Array:
+        q, s, root = find_rest(model, p, u, prepared)
+        found = jnp.concatenate([jnp.stack([*q]), jnp.zeros(len(q)), s])
+        return jnp.where(root.step_left <= root.precision, found, known)
+
+    inputs = jax.tree.map(lambda each: each[places], inputs_at(model, excitation, mesh))
+    return x.at[:, places].set(jax.vmap(rest, in_axes=(0, 1), out_axes=1)(inputs, x[:, places]))
 
 
 def _carry_over(trajectory: Trajectory, old: Mesh, new: Mesh) -> Trajectory:

@@ -58,7 +58,7 @@ def analyse(
     """
     phase, weight = jnp.asarray(mesh.phase), jnp.asarray(mesh.weight)
     if part is not None:
-        begin, end, every = (jnp.asarray(each)[mesh.layout.dwell] for each in part)
+        begin, end, every = (jnp.asarray(each)[mesh.layout.dwell] for each in part[:3])
         weight = weight * share(phase, begin, end)
         phase = phase * every
     cosines, sines = waves(phase, orders)

@@ -247,6 +247,8 @@ def test_a_file_much_larger_than_a_block(
         ("dwell_2.35Hz", "dwell", 2.35), ("dwell 0.5 Hz run 2", "dwell", 0.5), ("2p75hz", "dwell", 2.75),
         ("harmonic", "dwell", None), ("sweep_0_3Hz_60s", "sweep", None), ("Chirp 3 Hz", "sweep", None),
         ("standstill", "standstill", None), ("at_rest", "standstill", None), ("monday", "other", None),
+        ("step_up", "step", None), ("square_0.5Hz", "step", None), ("speed bump", "step", None),
+        ("step_03_1.2Hz", "dwell", 1.2), ("stepped_sine", "dwell", None),
         ("dwell_0Hz", "dwell", None), ("dwell_" + 400 * "9" + "Hz", "dwell", None),
     ],
 )  # fmt: skip

@@ -23,9 +23,14 @@ def road(seconds: float, seed: int) -> tuple[NDArray[np.float64], NDArray[np.flo
     return time, height * np.minimum(time, 1.0) ** 2
 
 
-def linear_readings(time: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Acceleration of the body [m/s^2] and deflection [m], (2, n), by the exponential of the state matrix."""
-    p = PARAMETERS.as_dict()
+def linear_readings(
+    time: NDArray[np.float64], height: NDArray[np.float64], **other: float
+) -> NDArray[np.float64]:
+    """Acceleration of the body [m/s^2] and deflection [m], (2, n), by the exponential of the state matrix.
+
+    With ``other`` parameters than those of the sheet, by name.
+    """
+    p = PARAMETERS.as_dict() | other
     k, c, kt, ct, ms, mu = (p[name] for name in ("k", "c", "k_t", "c_t", "m_s", "m_u"))
     # States: height and speed of the body, height of the wheel, its speed less what the tyre's damper gives it.
     a = np.array(

@@ -21,8 +21,10 @@ LAYOUTS = (
     Layout((2 * CHUNK, CHUNK)),
     Layout((CHUNK, 3 * CHUNK, 2 * CHUNK)),
     Layout((4 * CHUNK, CHUNK, CHUNK, 2 * CHUNK)),
+    Layout((CHUNK, 3 * CHUNK, 2 * CHUNK), begins_at_rest=(1,)),
+    Layout((2 * CHUNK, CHUNK), begins_at_rest=(0, 1)),
 )
-"""Dwells of unlike lengths, the longest first, last and in between."""
+"""Dwells of unlike lengths, the longest first, last and in between, and windows that begin at rest."""
 
 
 @partial(jax.jit, static_argnums=0)
@@ -40,15 +42,18 @@ _invert_nodes = jax.jit(collocation.invert_nodes)
 
 
 def _dense(layout: Layout, steps: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """All x_n at once from x_{n+1} - M_n x_n = d_n, the indices worked out here by hand."""
-    size, total = right.shape
+    """All x_n at once from x_{n+1} - M_n x_n = d_n, or x_0 = 0 from rest, the indices worked out here by hand."""
+    (size, total), right = right.shape, right.copy()
     matrix = np.zeros((total, size, total, size))
     first = 0
-    for count in layout.counts:
+    for number, count in enumerate(layout.counts):
         for place in range(count):
             here, after = first + place, first + (place + 1) % count
             matrix[here, :, after, :] += np.eye(size)
-            matrix[here, :, here, :] -= steps[:, :, here]
+            if after < here and number in layout.begins_at_rest:
+                right[:, here] = 0.0
+            else:
+                matrix[here, :, here, :] -= steps[:, :, here]
         first += count
     flat = np.linalg.solve(matrix.reshape(total * size, -1), right.T.reshape(-1))
     return flat.reshape(total, size).T

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from savgs_ident.simulate.mesh import CHUNK, Layout, layout_for
+from savgs_ident.simulate.mesh import CHUNK, Layout, layout_for, only_dwells, uniform_mesh
 
 _layouts = st.lists(st.integers(1, 6), min_size=1, max_size=8).map(
     lambda chunks: Layout(tuple(CHUNK * count for count in chunks))
@@ -50,6 +50,16 @@ def test_slow_dwells_get_nodes_in_proportion_to_their_period(
     assert np.all(counts % CHUNK == 0)
     assert np.all(counts >= wanted - 1e-6)
     assert np.all(counts < wanted + CHUNK + 1e-6)
+
+
+def test_the_loose_ends_are_the_last_nodes_of_what_begins_at_rest() -> None:
+    layout = Layout((2 * CHUNK, CHUNK, 3 * CHUNK), begins_at_rest=(0, 2))
+    assert layout.loose_ends.tolist() == [2 * CHUNK - 1, 6 * CHUNK - 1]
+    assert Layout(layout.counts).loose_ends.size == 0
+    finer = layout.finer(3)
+    assert finer.counts == (6 * CHUNK, 3 * CHUNK, 9 * CHUNK)
+    assert finer.begins_at_rest == layout.begins_at_rest
+    assert only_dwells(uniform_mesh(layout), (2, 1)).layout == Layout((3 * CHUNK, CHUNK), begins_at_rest=(0,))
 
 
 def test_layouts_of_equal_counts_are_the_same_static_argument() -> None:
