@@ -252,33 +252,26 @@ def _ends(duration: float, first: float, compared: float) -> list[float]:
 
 
 def _too_short(source: str, even: EvenRecord, needed: float) -> DataWarning:
-    return DataWarning(
-        "window_not_used",
-        f"has {even.duration - even.before:.3g} s, the windows of this campaign need {needed:.3g} s",
+    return _not_used(
         source,
-        even.test,
-        remedy="give it as a campaign of its own, or record a longer one or one that begins at rest",
+        even,
+        f"has {even.duration - even.before:.3g} s, the windows of this campaign need {needed:.3g} s",
+        "give it as a campaign of its own, or record a longer one or one that begins at rest",
     )
 
 
 def _begins_moving(source: str, even: EvenRecord) -> DataWarning:
-    return DataWarning(
-        "window_not_used",
-        "does not begin at rest, and the model remembers how its motion began",
-        source,
-        even.test,
-        remedy="let each test begin with a second of rest",
-    )
+    what = "does not begin at rest, and the model remembers how its motion began"
+    return _not_used(source, even, what, "let each test begin with a second of rest")
 
 
 def _shortened(source: str, even: EvenRecord) -> DataWarning:
-    return DataWarning(
-        "window_not_used",
-        f"is compared in its first {WHOLE_S:g} s only, for the model remembers how its motion began",
-        source,
-        even.test,
-        remedy="cut it into tests that begin at rest",
-    )
+    what = f"is compared in its first {WHOLE_S:g} s only, for the model remembers how its motion began"
+    return _not_used(source, even, what, "cut it into tests that begin at rest")
+
+
+def _not_used(source: str, even: EvenRecord, what: str, remedy: str) -> DataWarning:
+    return DataWarning("window_not_used", what, source, even.test, remedy=remedy)
 
 
 def _no_window(

@@ -24,10 +24,10 @@ from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicRespon
 from savgs_ident.responses.windows import WHOLE_S, estimate_whole_tests
 from savgs_ident.simulate.excitation import measured_excitation
 from savgs_ident.simulate.forgetting import forgetful_response
-from savgs_ident.simulate.periodic import PeriodicSettings, resolve, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 from savgs_ident.simulate.readings import harmonics
-from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 from tests.simulate.linear_roads import INPUTS, RATE, READINGS, linear_readings, recording_of
+from tests.simulate.slopes import assert_slopes_are_differences
 
 RINGING = 40.0
 """Damping with which half of a motion of the body is left after six seconds [N s/m]."""
@@ -93,14 +93,8 @@ def test_slopes_from_rest_are_those_of_differences_where_friction_sticks(
     values = table.as_dict() | {"c": 400.0, "guide_preload_force": 20.0}
     solution = simulate_periodic(plant, as_values(values), measured_excitation(plant, two_steps, table))
     assert all(status.ok for status in solution.status())
-    names, orders = ("k", "guide_preload_force"), 40
-    slopes = np.asarray(harmonic_sensitivities(plant, as_values(values), solution, names, orders))
-    for name, slope in zip(names, slopes, strict=True):
-        step = 1e-6 * values[name]
-        ahead, behind = (as_values(values | {name: values[name] + sign * step}) for sign in (1.0, -1.0))
-        two = [np.asarray(harmonics(plant, p, resolve(plant, p, solution), orders)) for p in (ahead, behind)]
-        difference = (two[0] - two[1]) / (2.0 * step)
-        np.testing.assert_allclose(slope, difference, atol=1e-6 * np.abs(difference).max())
+    names = ("k", "guide_preload_force")
+    assert_slopes_are_differences(plant, values, solution, names, orders=40, share=1e-6, tolerance=1e-6)
 
 
 def test_before_the_road_moves_the_rig_rests_whatever_the_link_is_held_at(rig: Rig) -> None:

@@ -20,10 +20,10 @@ from savgs_ident.responses.windows import CLOSING_S, HIGHEST_HZ, LEAD_S, estimat
 from savgs_ident.simulate.excitation import SUMMED, measured_excitation, signals_at
 from savgs_ident.simulate.forgetting import REMEMBERED, forgetful_motion, forgetful_response, remembered
 from savgs_ident.simulate.mesh import uniform_mesh, waves
-from savgs_ident.simulate.periodic import PeriodicSettings, layout_of, resolve, simulate_periodic
+from savgs_ident.simulate.periodic import PeriodicSettings, layout_of, simulate_periodic
 from savgs_ident.simulate.readings import harmonics
-from savgs_ident.simulate.sensitivity import harmonic_sensitivities
 from tests.simulate.linear_roads import INPUTS, NOISE, RATE, READINGS, campaign, channel_of, recording_of
+from tests.simulate.slopes import assert_slopes_are_differences
 
 LAG_S = 0.015
 
@@ -74,15 +74,9 @@ def test_slopes_in_windows_are_those_of_differences() -> None:
     measured = estimate_windows(campaign(noise=0.0), INPUTS, READINGS)
     plant = TwoMass() + generic_effects(TwoMass.ports)["accelerometer_lag"]
     values = PARAMETERS.as_dict() | {"accelerometer_lag_time": LAG_S}
-    names, orders = ("k", "c", "accelerometer_lag_time"), 30
     solution = simulate_periodic(plant, as_values(values), measured_excitation(plant, measured, PARAMETERS))
-    slopes = np.asarray(harmonic_sensitivities(plant, as_values(values), solution, names, orders))
-    for name, slope in zip(names, slopes, strict=True):
-        step = 1e-4 * values[name]
-        ahead, behind = (as_values(values | {name: values[name] + sign * step}) for sign in (1.0, -1.0))
-        two = [np.asarray(harmonics(plant, p, resolve(plant, p, solution), orders)) for p in (ahead, behind)]
-        difference = (two[0] - two[1]) / (2.0 * step)
-        np.testing.assert_allclose(slope, difference, atol=1e-5 * np.abs(difference).max())
+    names = ("k", "c", "accelerometer_lag_time")
+    assert_slopes_are_differences(plant, values, solution, names, orders=30, share=1e-4, tolerance=1e-5)
 
 
 @pytest.mark.slow
