@@ -13,10 +13,10 @@ from jaxtyping import Float
 
 from benchmarks.campaign import read_dwells, response_of
 from benchmarks.outcome import Progress
+from savgs_ident.inference.harmonic_question import Question, density_of, locate, plan
 from savgs_ident.inference.near_mode import Surrogate, identity_map
 from savgs_ident.inference.posterior_mode import expand
 from savgs_ident.inference.problem import Problem
-from savgs_ident.inference.sample import Question, density_of, locate, plan
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.inference.samplers.emcee import pcn_steps
 from savgs_ident.plants.base import Excitation

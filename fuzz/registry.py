@@ -56,7 +56,7 @@ _LOADERS = (
     Loader("controller", "controller.json", "controller.json", Form.json, models.controller,
            models.read_controller_file, ("control.design.read_controller",)),
     Loader("posterior", "draws in posterior.nc", "posterior.nc", Form.hdf5, models.posterior,
-           models.read_posterior, ("inference.result.read_draws",)),
+           models.read_posterior, ("inference.draws.read_draws",)),
     Loader("model-json", "exported model.json", "model.json", Form.json, models.exported, models.read_exported,
            _EXPORT),
     Loader("python-control", "exported model-control.json", "model-control.json", Form.json,

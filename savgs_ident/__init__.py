@@ -45,13 +45,19 @@ if TYPE_CHECKING:
     from savgs_ident.export.json_export import read_model_json
     from savgs_ident.export.public import Exported, export
     from savgs_ident.export.python_control_export import load_python_control, resting_point
-    from savgs_ident.fit.along_motion import HeldOutForce, MotionFit
+    from savgs_ident.fit.along_motion import HeldOutForce, MotionComparison, MotionFit
     from savgs_ident.fit.estimate import Estimate
     from savgs_ident.fit.identified import Verdict as Identifiability
     from savgs_ident.fit.public import Comparison, compare, demo, fit
     from savgs_ident.fit.result import Fit
     from savgs_ident.fit.sampling import sample
-    from savgs_ident.inference.result import Convergence, Marginal, Posterior
+    from savgs_ident.inference.result import (
+        Convergence,
+        HarmonicPosterior,
+        Marginal,
+        MotionPosterior,
+        Posterior,
+    )
     from savgs_ident.plants.axis import Axis
     from savgs_ident.plants.base import AbstractPlant, Channel, Coordinate, Input
     from savgs_ident.plants.from_file import load_plant
@@ -171,7 +177,9 @@ _PLACES = {
     "LinearStudy": "control.linear_study",
     "LoopStudy": "control.closed_loop.study",
     "PlantCheck": "validation.check_plant",
+    "MotionComparison": "fit.along_motion",
     "MotionFit": "fit.along_motion",
+    "MotionPosterior": "inference.result",
     "Posterior": "inference.result",
     "Rig": "plants.quarter_car.rig",
     "SimulatedResponse": "simulate.public",
@@ -183,6 +191,7 @@ _PLACES = {
     "DataWarning": "core.errors",
     "Estimate": "fit.estimate",
     "Finding": "validation.plant_declaration",
+    "HarmonicPosterior": "inference.result",
     "HeldOutForce": "fit.along_motion",
     "Hypothesis": "diagnosis.result",
     "Identifiability": "fit.identified:Verdict",
@@ -235,6 +244,7 @@ __all__ = [
     "ExportedModel",
     "Finding",
     "Fit",
+    "HarmonicPosterior",
     "HarmonicResponse",
     "HeldOutForce",
     "Hypothesis",
@@ -246,7 +256,9 @@ __all__ = [
     "Marginal",
     "Margins",
     "Model",
+    "MotionComparison",
     "MotionFit",
+    "MotionPosterior",
     "NextTest",
     "Number",
     "Origin",

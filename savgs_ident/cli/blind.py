@@ -20,7 +20,7 @@ from savgs_ident.cli.options import (
     SchedulerOption,
     baseline_model,
     command_line,
-    read_campaign,
+    read_recorded,
 )
 
 
@@ -153,7 +153,7 @@ def blind(
             baseline = baseline_model(plant, rig, model, ())
             study = si.blind_like(
                 baseline,
-                read_campaign(campaign, channels, progress, baseline),
+                read_recorded(campaign, channels, progress, baseline),
                 out,
                 trials,
                 seed=1 if seed is None else seed,

@@ -14,7 +14,7 @@ from savgs_ident.cli.options import (
     PlantOption,
     QuietOption,
     identified_model,
-    read_campaign,
+    read_recorded,
 )
 
 
@@ -31,9 +31,11 @@ def bode(
 ) -> int:
     """Draw the response of a model against a campaign: magnitude, phase, peak to peak, residuals. No fitting.
 
-    A road of at least six seconds is cut into windows; without dwells so is a sweep or any other motion.
+    A road of at least six seconds is cut into windows; without dwells so is a sweep or any other motion. As in
+    `fit`, a plant may be held against the force of its drive along the measured motion.
 
-    Writes bode.png, bode.pdf and bode.json; of windows spectra.png and spectra.pdf.
+    Writes bode.png, bode.pdf and bode.json; of windows spectra.png and spectra.pdf, of a drive's force drive.png
+    and drive.pdf.
 
     Exit code 1 if a periodic motion was not found.
 
@@ -46,6 +48,6 @@ def bode(
     prepare_folder(out)
     shown = identified_model(plant, model)
     with reporter.working() as progress:
-        compared = si.compare(shown, read_campaign(campaign, channels, progress, shown), orders, progress)
+        compared = si.compare(shown, read_recorded(campaign, channels, progress, shown), orders, progress)
         files = compared.save(out, progress)
     return reporter.conclude(compared, files)

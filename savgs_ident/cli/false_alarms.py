@@ -22,7 +22,7 @@ from savgs_ident.cli.options import (
     SeedOption,
     baseline_model,
     command_line,
-    read_campaign,
+    read_recorded,
 )
 
 
@@ -70,7 +70,7 @@ def false_alarms(
     with reporter.working() as progress:
         study = si.false_alarms(
             baseline,
-            read_campaign(campaign, channels, progress, baseline),
+            read_recorded(campaign, channels, progress, baseline),
             draws,
             orders=orders,
             max_frequency=max_frequency,

@@ -27,7 +27,7 @@ def inspect(
 ) -> int:
     """Show what is in a campaign: tests, channels, amplitudes, signal-to-noise, noise, warnings.
 
-    Writes inspect.json, inspect.png and inspect.pdf.
+    Writes inspect.json, inspect.png and inspect.pdf; of tests that do not repeat motions.png and motions.pdf.
 
     Example: savgs-ident inspect campaign.csv.gz
     """

@@ -22,7 +22,7 @@ from savgs_ident.cli.options import (
     SeedOption,
     command_line,
     identified_model,
-    read_campaign,
+    read_recorded,
 )
 
 
@@ -86,7 +86,7 @@ def posterior(
         with reporter.working() as progress:
             found = si.sample(
                 identified,
-                read_campaign(campaign, channels, progress, identified),
+                read_recorded(campaign, channels, progress, identified),
                 sampler.value,
                 target_ess=target_ess,
                 time_limit=time_limit,

@@ -47,7 +47,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Origin, Progress, Result
 from savgs_ident.core.values import Values, as_values
-from savgs_ident.inference.result import (
+from savgs_ident.inference.draws import (
     FAR,
     REMEDY,
     DrawSource,

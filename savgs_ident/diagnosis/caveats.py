@@ -22,8 +22,8 @@ def write_warnings(
     tests, fewest = problem.data.tests, constants.fewest_held_out_tests
     if tests < fewest:
         found.append(
-            f"There are {tests} tests, so that each that was left out is predicted from very few: figures of "
-            f"held-out tests are rough. Record {fewest} or more."
+            f"There are {tests} tests, or windows of them, so that each that was left out is predicted from few: "
+            f"figures of held-out tests are rough. Record {fewest} or more, or for longer."
         )
     if evidence.refit_failed:
         found.append(

@@ -44,6 +44,9 @@ QUANTILES = (0.1, 0.5, 0.9)
 SAMPLES = 256
 """Samples of a loop."""
 
+SHOWN_S = 4.0
+"""So much of a window is drawn where there are no dwells [s]."""
+
 
 def force_loops(
     problem: "DwellProblem",
@@ -53,23 +56,23 @@ def force_loops(
     law: DrawnLaw | None,
     nearest: DrawnLaw | None,
 ) -> tuple[ForceLoop, ...]:
-    """Loops at a port for a slow, a middle and a fast dwell.
+    """Loops at a port for a slow, a middle and a fast dwell; without dwells the law along a part of a window.
 
     Beside them, the ``law`` that is named with its error, and the ``nearest`` formula. ``solution`` is the motion of
     the baseline; ``p`` are its parameters, SI.
     """
     port = signal_port(problem.plant, found.name)
-    if port is None or not problem.dwells.size:
+    if port is None or not (problem.dwells.size or law or nearest):
         return ()
     ports, _ = node_loads(problem.complete(()), p, solution)
     moving = motion_port(problem.plant, port)
     signals = ports[moving]
     motion_unit = next(each.displacement_unit for each in problem.plant.ports if each.name == moving)
-    order = problem.dwells[np.argsort(np.asarray(solution.excitation.frequency)[problem.dwells])]
-    tests = tuple(dict.fromkeys(int(order[int(share * (len(order) - 1))]) for share in QUANTILES))
+    frequency = np.asarray(solution.excitation.frequency)
+    tests, turns, samples = _drawn_tests(problem, frequency)
     force, error, near = _drawn(problem, solution, law, nearest, tests)
     layout, phase = solution.mesh.layout, np.asarray(solution.mesh.phase)
-    grid = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+    grid = 2.0 * np.pi * turns * np.arange(samples) / samples
     loops = []
     for test in tests:
         nodes = layout.dwell == test
@@ -82,10 +85,10 @@ def force_loops(
         loops.append(
             ForceLoop(
                 port=found.name,
-                frequency_hz=float(solution.excitation.frequency[test]),
+                frequency_hz=float(frequency[test]) / turns,
                 displacement=sample(signals.displacement),
                 velocity=sample(signals.velocity),
-                inferred=free_signal(found.free_input[test], grid),
+                inferred=free_signal(found.free_input[test], grid) if problem.dwells.size else np.zeros(0),
                 law=np.zeros(0) if force is None else _without_mean(sample(force)),
                 unit=_unit(problem.plant, port),
                 motion_unit=motion_unit,
@@ -94,6 +97,21 @@ def force_loops(
             )
         )
     return tuple(loops)
+
+
+def _drawn_tests(
+    problem: "DwellProblem", frequency: NDArray[np.float64]
+) -> tuple[tuple[int, ...], float, int]:
+    """The tests that are drawn, how much of the period of each [1], and in how many samples."""
+    if problem.dwells.size:
+        order = problem.dwells[np.argsort(frequency[problem.dwells])]
+        return (
+            tuple(dict.fromkeys(int(order[int(share * (len(order) - 1))]) for share in QUANTILES)),
+            1.0,
+            SAMPLES,
+        )
+    window = len(frequency) // 2
+    return (window,), min(1.0, SHOWN_S * float(frequency[window])), 8 * SAMPLES
 
 
 def _drawn(

@@ -6,6 +6,10 @@ The model says which effects may be missing in its plant, and which such plants 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progress
@@ -18,8 +22,9 @@ from savgs_ident.diagnosis.diagnose import (
     offered_effects,
 )
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
+from savgs_ident.diagnosis.evidence import DiagnosisProblem
 from savgs_ident.diagnosis.gap import FurtherShrink
-from savgs_ident.diagnosis.motion_problem import further_motion, motion_problem
+from savgs_ident.diagnosis.motion_problem import MotionProblem, further_motion, motion_problem
 from savgs_ident.diagnosis.problem import ModelPoint
 from savgs_ident.diagnosis.result import Diagnosis, DiagnosisSettings
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
@@ -32,7 +37,7 @@ from savgs_ident.plants.quarter_car.rig import Rig
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse
-from savgs_ident.simulate.driven_plant import motion_in, motion_of, sized_along
+from savgs_ident.simulate.driven_plant import motion_in, motion_of, origin_along, sized_along
 from savgs_ident.simulate.excitation import Measurements, campaign_of, first_sweep
 from savgs_ident.simulate.forgetting import forgetful_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
@@ -73,26 +78,36 @@ def diagnose(
     do not exist, and for a model without periodic motion.
     """
     use_persistent_cache()
-    motion = motion_in(measured, model) if isinstance(measured, Campaign) else None
-    measured = measured if motion is None else motion
-    if isinstance(measured, DrivenMotion):
-        held_out = motion_of(held_out, model) if isinstance(held_out, Campaign) else held_out
-        return _diagnose_motion(model, measured, held_out, without, constants, command, progress)
+    asked = ask(model, measured, orders, max_frequency, without, constants, progress)
+    if isinstance(asked, AskedMotion):
+        apart = motion_of(held_out, model) if isinstance(held_out, Campaign) else held_out
+        return _diagnose_motion(model, asked, apart, command, progress)
     if held_out is not None:
         raise InputError(
-            "a held-out motion goes with a measured motion alone", remedy="diagnose each campaign by itself"
+            "a held-out motion goes with a measured motion alone",
+            remedy="diagnose one campaign, and hold a model against the other by `bode`",
         )
-    asked = ask_dwells(model, measured, orders, max_frequency, without, constants, progress)
-    response, given, settings = asked.response, asked.given, asked.settings
+    assert not isinstance(measured, DrivenMotion)
     campaign = campaign_of(measured)
     # Without dwells a sweep is what the model is fitted to, and no test that was left out.
-    apart = campaign if response.dwells.size else None
-    sweep, found_in_sweep = (None, ()) if apart is None else first_sweep(apart, model.plant)
-    plant, data = problem_of_dwells(response, given, settings)
+    sweep, found_in_sweep = (
+        first_sweep(campaign, model.plant) if campaign and asked.response.dwells.size else (None, ())
+    )
+    plant, data = asked.problem()
     origin = model.origin(campaign, (*asked.warnings, *found_in_sweep)).with_command(command)
     return diagnose_dwells(
-        plant, data, response, given, settings, asked.values, progress, sweep, origin=origin
+        plant, data, asked.response, asked.given, asked.settings, asked.values, progress, sweep, origin=origin
     )
+
+
+class NoiseLevels(NamedTuple):
+    """To which level of noise each row belongs, (m,), and how many degrees of freedom that was found from, (m,).
+
+    Infinitely many where the level is known.
+    """
+
+    level: NDArray[np.intp]
+    dof: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -113,25 +128,80 @@ class AskedDwells:
     values: Mapping[str, float]
     warnings: tuple[DataWarning, ...]
 
+    def problem(self) -> tuple[DwellProblem, Data]:
+        """The plant with what may be missing in it, and the response as data; raises as :func:`problem_of_dwells`."""
+        return problem_of_dwells(self.response, self.given, self.settings)
 
-def ask_dwells(
+    def noise_levels(self, problem: DiagnosisProblem) -> NoiseLevels:
+        """One for each channel of a test."""
+        measured, plant, test = self.response, problem.plant, problem.data.test
+        level = test * len(plant.channels) + plant.channel
+        if measured.covariance_dof is None:
+            return NoiseLevels(level, np.full(level.size, np.inf))
+        first = {c: measured.channel(n) for c, n in enumerate(plant.channels) if n in measured.channels}
+        places = np.array([first[channel] for channel in plant.channel])
+        return NoiseLevels(level, np.asarray(measured.covariance_dof[test, places, 1]))
+
+
+@dataclass(frozen=True)
+class AskedMotion:
+    """A measured motion, and the baseline of which the drive's force is to be diagnosed along it.
+
+    Attributes:
+        motion: what was measured.
+        given: the model as known before its own fit, its forces as large as the recorded one asks for.
+        settings: what the baseline is.
+        values: those that the baseline is given with [SI], by name.
+    """
+
+    motion: DrivenMotion
+    given: Model
+    settings: DiagnosisSettings
+    values: Mapping[str, float]
+
+    @property
+    def warnings(self) -> tuple[DataWarning, ...]:
+        """About the recordings."""
+        return self.motion.warnings
+
+    def problem(self) -> tuple[MotionProblem, Data]:
+        """The plant with what may be missing in it, and the force of its drive as data.
+
+        Raises :class:`InputError` for effects that do not exist, and for effects of the baseline that are to be left
+        out.
+        """
+        given, settings = self.given, self.settings
+        bare, offered = replace(given.build(), effects=()), offered_effects(given.candidates, settings)
+        return motion_problem(
+            self.motion, bare, given.table, offered, given.effects, settings.free, settings.constants
+        )
+
+    def noise_levels(self, problem: DiagnosisProblem) -> NoiseLevels:
+        """One for all rows, which is known: there are thousands of them."""
+        rows = problem.data.measured.size
+        return NoiseLevels(np.zeros(rows, np.intp), np.full(rows, np.inf))
+
+
+Asked = AskedDwells | AskedMotion
+"""What a diagnosis is asked about."""
+
+
+def ask(
     model: Model,
-    measured: Measurements,
+    measured: Measurements | DrivenMotion,
     orders: int = 9,
     max_frequency: float | None = None,
     without: Sequence[str] = (),
     constants: DecisionConstants = DEFAULTS,
     progress: Progress = no_progress,
-) -> AskedDwells:
-    """What :func:`diagnose` holds recordings of dwells or of roads against.
-
-    Raises as it does, and :class:`InputError` for a motion along which a plant is held against its drive's force.
-    """
-    if isinstance(measured, Campaign) and motion_in(measured, model) is not None:
-        raise InputError(
-            "the recordings are of a motion along which the drive's force is compared",
-            remedy="`fit` and `diagnose` serve them; here record dwells, a sweep or a road that is imposed",
-        )
+) -> Asked:
+    """What :func:`diagnose` holds a model against: a response, or the force of a drive; raises as it does."""
+    motion = motion_in(measured, model) if isinstance(measured, Campaign) else None
+    measured = measured if motion is None else motion
+    if isinstance(measured, DrivenMotion):
+        sized = sized_along(model, measured)
+        settings, values = _asked(sized, 0, without, constants)
+        return AskedMotion(measured, sized.before, settings, values)
     response = forgetful_response(measured, model, orders, max_frequency, progress)
     model, resized = sized_to(model, response)
     given, settings, values = baseline_of(model, orders, without, constants)
@@ -152,29 +222,23 @@ def problem_of_dwells(
 
 def _diagnose_motion(
     model: Model,
-    motion: DrivenMotion,
+    asked: AskedMotion,
     held_out: DrivenMotion | None,
-    without: Sequence[str],
-    constants: DecisionConstants,
     command: Sequence[str],
     progress: Progress,
 ) -> Diagnosis:
     """Diagnose a plant from the force of its drive along a measured motion."""
-    model = sized_along(model, motion)
-    bare, given = replace(model.build(), effects=()), model.before
-    settings, values = _asked(model, 0, without, constants)
-    offered = offered_effects(given.candidates, settings)
-    problem, data = motion_problem(
-        motion, bare, given.table, offered, model.effects, settings.free, settings.constants
-    )
+    problem, data = asked.problem()
 
     def predict(points: Sequence[ModelPoint]) -> FurtherShrink:
         assert held_out is not None
         return further_motion(held_out, points)
 
     further = None if held_out is None else predict
-    origin = replace(model.origin(warnings=motion.warnings), data=motion.source, command=tuple(command))
-    return diagnose_problem(problem, data, given, settings, values, progress, further, origin=origin)
+    origin = origin_along(model, asked.motion, command)
+    return diagnose_problem(
+        problem, data, asked.given, asked.settings, asked.values, progress, further, origin=origin
+    )
 
 
 def baseline_of(

@@ -257,10 +257,10 @@ class ForceLoop:
 
     Attributes:
         port: name of the port.
-        frequency_hz: of the test.
+        frequency_hz: of the test; one over the time that is drawn of a motion that does not repeat.
         displacement: [``motion_unit``], (n,).
         velocity: [``motion_unit``/s], (n,).
-        inferred: inferred signal [``unit``], (n,).
+        inferred: inferred signal [``unit``], (n,); empty in windows, which have no signal of their own each.
         law: the named effect's law along the same motion [``unit``], (n,); empty if none is named.
         law_sd: its standard deviation [``unit``], (n,); empty if not known.
         nearest: the same by the nearest formula of the catalogue [``unit``], (n,); empty where the law is that.

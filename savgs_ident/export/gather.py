@@ -22,7 +22,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.effects.base import AbstractSensorLaw
 from savgs_ident.export.document import JsonValue, read_document
 from savgs_ident.export.exported_model import ExportedModel, learned_effects, with_effects
-from savgs_ident.inference.result import (
+from savgs_ident.inference.draws import (
     FAR,
     Draws,
     DrawSource,

@@ -19,7 +19,8 @@ from savgs_ident.diagnosis.result import Diagnosis
 from savgs_ident.export.exported_model import ExportedModel
 from savgs_ident.export.gather import DIAGNOSIS_REMEDY, Gathered, gather, read_diagnosis
 from savgs_ident.export.json_export import covariance_record
-from savgs_ident.inference.result import DrawSource, Posterior
+from savgs_ident.inference.draws import DrawSource
+from savgs_ident.inference.result import Posterior
 from savgs_ident.plants.model import Model
 from savgs_ident.plants.quarter_car.model import load_rig, model_of
 from savgs_ident.simulate.program_cache import use_persistent_cache

@@ -17,7 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.free_vector import known_to_tolerance
-from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progress
+from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, Result, no_progress
+from savgs_ident.core.status import Status, joint_status
+from savgs_ident.core.values import as_values
 from savgs_ident.fit.estimate import Estimate, at_bounds
 from savgs_ident.fit.identifiability import (
     EXPLAINED,
@@ -29,7 +31,13 @@ from savgs_ident.fit.identifiability import (
 )
 from savgs_ident.fit.identified import Identified, Verdict
 from savgs_ident.fit.small_errors import own_part
-from savgs_ident.inference.drive_force import DriveForce, force_data, relative_miss, relative_noise
+from savgs_ident.inference.drive_force import (
+    DriveForce,
+    force_data,
+    force_rows,
+    relative_miss,
+    relative_noise,
+)
 from savgs_ident.inference.find_map import find_map
 from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
@@ -38,6 +46,7 @@ from savgs_ident.inference.problem import check_free, used_parameters
 from savgs_ident.plants.model import Model
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.simulate.driven_plant import sized_along
+from savgs_ident.simulate.public import disable_effects
 
 
 class HeldOutForce(NamedTuple):
@@ -88,6 +97,45 @@ class MotionFit(Identified):
         """Relative rms [1] by which the force is missed before the fit and after, and that of the noise alone."""
         before, after = (relative_miss(self.measured, rows) for rows in (self.as_given, self.predicted))
         return before, after, relative_noise(self.motion)
+
+
+@dataclass(frozen=True)
+class MotionComparison(Result):
+    """The force of a drive along a measured motion of m rows, and what a model, and the same without effects, need.
+
+    Attributes:
+        model: the model.
+        motion: what was measured.
+        measured: force of the drive, low-passed and thinned [N], (m,).
+        needed: force that the model needs [N], (m,).
+        frictionless: that without its effects [N], (m,).
+        status: how the states along the motion were found.
+    """
+
+    presenter: ClassVar[str] = "MOTION_COMPARISON"
+
+    model: Model
+    motion: DrivenMotion
+    measured: NDArray[np.float64]
+    needed: NDArray[np.float64]
+    frictionless: NDArray[np.float64]
+    status: Status
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the states were found."""
+        return self.status.ok
+
+
+def compare_along_motion(model: Model, motion: DrivenMotion, origin: Origin = NO_ORIGIN) -> MotionComparison:
+    """Hold a model against the force of its drive along a measured motion; nothing is fitted."""
+    found, without = (
+        force_rows(each.build(), as_values(each.table.as_dict()), motion, ())
+        for each in (model, disable_effects(model))
+    )
+    status = joint_status([found.status, without.status])
+    measured = motion.rows(motion.drive)
+    return MotionComparison(model, motion, measured, found.rows, without.rows, status, origin=origin)
 
 
 def fit_along_motion(

@@ -329,8 +329,9 @@ def unexplained(per_datum: float, missed: float) -> str:
     """That a model misses its data, by chi2 per datum and as a share of the response [1]."""
     return (
         f"The model does not explain these data: it misses by {percent(missed)} of the response beyond the "
-        f"noise (chi2/dof = {per_datum:.3g}). Where units and signs are sure, look for what is missing with "
-        "`diagnose`. Until then the parameters make up for it; their errors contain what is not explained."
+        f"noise (chi2/dof = {per_datum:.3g}). Where units and signs are sure, look with `diagnose` for what is "
+        "missing, or follows another law. Until then the parameters make up for it, and may be off by more than "
+        "their errors."
     )
 
 

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.core.executor import side_by_side
 from savgs_ident.core.presentation import Progress, Result, no_progress
-from savgs_ident.fit.along_motion import MotionFit, fit_along_motion
+from savgs_ident.fit.along_motion import MotionComparison, MotionFit, compare_along_motion, fit_along_motion
 from savgs_ident.fit.least_squares import FitSettings, fit_least_squares
 from savgs_ident.fit.result import Fit, comparable
 from savgs_ident.inference.port_sizes import sized_to
@@ -27,7 +27,7 @@ from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.selection import only_tests
-from savgs_ident.simulate.driven_plant import motion_in, motion_of
+from savgs_ident.simulate.driven_plant import motion_in, motion_of, origin_along
 from savgs_ident.simulate.excitation import (
     Measurements,
     campaign_of,
@@ -90,7 +90,8 @@ def fit(
         return _fit_motion(model, measured, free, held_out, fixed_tolerances, command, progress)
     if held_out is not None:
         raise InputError(
-            "a held-out motion goes with a measured motion alone", remedy="fit each campaign by itself"
+            "a held-out motion goes with a measured motion alone",
+            remedy="fit one campaign, and hold its model.toml against the other by `bode`",
         )
     settings = FitSettings(
         orders=orders,
@@ -117,7 +118,7 @@ def _fit_motion(
         free=drawing.free(free),
         fixed_tolerances=fixed_tolerances,
         held_out=motion_of(held_out, model) if isinstance(held_out, Campaign) else held_out,
-        origin=replace(model.origin(warnings=motion.warnings), data=motion.source, command=tuple(command)),
+        origin=origin_along(model, motion, command),
         progress=progress,
     )
 
@@ -240,14 +241,23 @@ class Comparison(Result):
 
 
 def compare(
-    model: Model, measured: Measurements, orders: int = 9, progress: Progress = no_progress
-) -> Comparison:
+    model: Model,
+    measured: Measurements | DrivenMotion,
+    orders: int = 9,
+    progress: Progress = no_progress,
+) -> Comparison | MotionComparison:
     """Hold a model against a campaign or the response of its dwells, orders up to ``orders``; nothing is fitted.
 
-    A road is cut into windows, and where there are no dwells a sweep, too. Raises :class:`InputError` for a campaign
+    A road is cut into windows, and where there are no dwells a sweep, too. As in a fit, a plant may be held against
+    the force of its drive along a measured motion. Raises :class:`InputError` for a campaign
     that cannot be used.
     """
     use_persistent_cache()
+    motion = motion_in(measured, model) if isinstance(measured, Campaign) else None
+    measured = measured if motion is None else motion
+    if isinstance(measured, DrivenMotion):
+        progress("finding the force that the model needs")
+        return compare_along_motion(model, measured, origin_along(model, measured))
     response = forgetful_response(measured, model.before, orders, None, progress)
     excitation = measured_excitation(model.plant, response, model.table)
     names = [each.name for each in model.channels]

@@ -25,13 +25,18 @@ from savgs_ident.fit.identifiability import (
 from savgs_ident.fit.minimise import Minimiser
 from savgs_ident.fit.result import Fit
 from savgs_ident.inference.background.constants import BACKGROUND
+from savgs_ident.inference.harmonic_question import PosedHarmonics, Question
+from savgs_ident.inference.motion_question import MotionQuestion, PosedMotion
 from savgs_ident.inference.posterior_mode import PosteriorMode
 from savgs_ident.inference.problem import Task
-from savgs_ident.inference.result import Marginal, Posterior, Sampler
-from savgs_ident.inference.sample import Question, sample_posterior
+from savgs_ident.inference.result import HarmonicPosterior, Marginal, MotionPosterior, Posterior, Sampler
+from savgs_ident.inference.sample import sample_posterior
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.plants.model import Model
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.driven_plant import motion_in, origin_along, sized_along
 from savgs_ident.simulate.excitation import Measurements, campaign_of
 from savgs_ident.simulate.forgetting import forgetful_response
 from savgs_ident.simulate.program_cache import use_persistent_cache
@@ -39,7 +44,7 @@ from savgs_ident.simulate.program_cache import use_persistent_cache
 
 def sample(
     identified: Fit | MotionFit | Model,
-    measured: Measurements | None = None,
+    measured: Measurements | DrivenMotion | None = None,
     sampler: Sampler = "emcee",
     *,
     target_ess: float = 1000.0,
@@ -61,7 +66,8 @@ def sample(
     Args:
         identified: a fit, or a model that was identified.
         measured: the recordings, or the response of their dwells; what was fitted, if left out. A road is cut into
-            windows, and without dwells so is a sweep.
+            windows, and without dwells so is a sweep; or, as in a fit, a plant is held against the force of its
+            drive along the measured motion, or along one that is given.
         sampler: "emcee", an ensemble of walkers, or "nuts", gradient-based trajectories.
         target_ess: effective sample size to reach for every parameter [1].
         time_limit: stop sampling after this [s].
@@ -76,7 +82,7 @@ def sample(
         progress: called with a sentence on what is being done.
 
     Look at ``trusted`` of the result. Raises :class:`InputError` for a model without campaign, a campaign that cannot
-    be used, a model without periodic motion, and a chain of another question.
+    be used, a model without a solution, and a chain of another question.
     """
     use_persistent_cache()
     settings = SamplingSettings(
@@ -88,18 +94,47 @@ def sample(
         orders=orders,
         seed=seed,
     )
-    if isinstance(identified, MotionFit):
-        raise InputError(
-            "a fit along a measured motion has no posterior", remedy="its errors are those of `fit`"
-        )
-    model = identified.model if isinstance(identified, Fit) else identified
-    response = _measured(identified, measured, settings.orders, max_frequency, progress)
-    question = question_about(model, response)
-    origin = _origin(identified, measured, response).with_command(command)
+    model = identified if not isinstance(identified, (Fit, MotionFit)) else identified.model
     checkpoint = None if chain is None else Path(chain)
+    motion = _motion(identified, measured)
+    if motion is not None:
+        if max_frequency is not None:
+            raise InputError(
+                "a force along a measured motion has no frequencies",
+                source="--max-frequency",
+                remedy="leave it out",
+            )
+        origin, question = origin_along(model, motion, command), question_along(model, motion)
+        return sample_posterior(
+            question, settings, checkpoint, resume, progress, _describe_along_motion, origin
+        )
+    assert not isinstance(measured, DrivenMotion)
+    fitted = identified if isinstance(identified, Fit) else model
+    response = _measured(fitted, measured, settings.orders, max_frequency, progress)
+    origin = _origin(fitted, measured, response).with_command(command)
     # As in a fit.
     with threadpool_limits(1, "blas"):
-        return sample_posterior(question, settings, checkpoint, resume, progress, describe_posterior, origin)
+        return sample_posterior(
+            question_about(model, response),
+            settings,
+            checkpoint,
+            resume,
+            progress,
+            describe_posterior,
+            origin,
+        )
+
+
+def _motion(
+    identified: Fit | MotionFit | Model, measured: Measurements | DrivenMotion | None
+) -> DrivenMotion | None:
+    """The motion along which the model is held against the force of its drive; None where it is not."""
+    if isinstance(measured, DrivenMotion):
+        return measured
+    if measured is None:
+        return identified.motion if isinstance(identified, MotionFit) else None
+    model = identified.model if isinstance(identified, (Fit, MotionFit)) else identified
+    return motion_in(measured, model) if isinstance(measured, Campaign) else None
 
 
 def _origin(identified: Fit | Model, measured: Measurements | None, response: HarmonicResponse) -> Origin:
@@ -114,6 +149,12 @@ def question_about(model: Model, measured: HarmonicResponse) -> Question:
     """What is asked of the data about an identified model."""
     free, values = model.identified
     return Question(measured, model.before, values, free)
+
+
+def question_along(model: Model, motion: DrivenMotion) -> MotionQuestion:
+    """What is asked of a measured motion about an identified model."""
+    free, values = model.identified
+    return MotionQuestion(motion, sized_along(model.before, motion), values, free)
 
 
 def _measured(
@@ -142,18 +183,41 @@ CLOSE = 0.15
 
 
 def describe_posterior(
-    task: Task, mode: PosteriorMode, marginals: Sequence[Marginal], draws: Mapping[str, NDArray[np.float64]]
+    posed: PosedHarmonics,
+    mode: PosteriorMode,
+    marginals: Sequence[Marginal],
+    draws: Mapping[str, NDArray[np.float64]],
 ) -> tuple[str, ...]:
     """All statements about a posterior, the most important first. ``draws`` (s,) are in SI, by name."""
-    return sentences_of(marginals, draws, advise(task, mode, draws))
+    return sentences_of(marginals, draws, advise(posed.task, mode, draws))
+
+
+def _describe_along_motion(
+    posed: PosedMotion,
+    mode: PosteriorMode,
+    marginals: Sequence[Marginal],
+    draws: Mapping[str, NDArray[np.float64]],
+) -> tuple[str, ...]:
+    """The same along a measured motion; which other motion would help is not known."""
+    del posed, mode
+    return sentences_of(marginals, draws, (), MotionPosterior.errs_in, "")
+
+
+ALLOWED = "; the intervals allow for that, for tolerances of damper curves and for drifts during the campaign"
+"""What the intervals of a response allow for."""
 
 
 def sentences_of(
     marginals: Sequence[Marginal],
     draws: Mapping[str, NDArray[np.float64]],
     advice: tuple[str, ...],
+    errs_in: str = HarmonicPosterior.errs_in,
+    allowed: str = ALLOWED,
 ) -> tuple[str, ...]:
-    """The statements of a report, the most important first. ``draws`` (s,) are in SI, by name."""
+    """The statements of a report, the most important first. ``draws`` (s,) are in SI, by name.
+
+    ``errs_in`` says of what the discrepancy is a share, ``allowed`` what the intervals allow for.
+    """
     identified = [each for each in marginals if each.role == "identified"]
     names = tuple(each.name for each in identified)
     covariance = log_covariance(names, draws)
@@ -163,7 +227,7 @@ def sentences_of(
     return (
         *verdict.sentences,
         *_tied(names, covariance, confounded_groups(names, covariance)),
-        *_discrepancy(marginals),
+        *_discrepancy(marginals, errs_in, allowed),
         *_added(identified),
         *_laplace(identified),
     )
@@ -194,18 +258,15 @@ def _tied(
     return found
 
 
-def _discrepancy(marginals: Sequence[Marginal]) -> list[str]:
+def _discrepancy(marginals: Sequence[Marginal], errs_in: str, allowed: str) -> list[str]:
     scale = next(each for each in marginals if each.name == "discrepancy")
     noise = next(each for each in marginals if each.name == "noise_scale")
     if not scale.q025 > BACKGROUND.largest_error:
-        miss = (
-            f"The model errs by less than {100.0 * scale.q975:.2g} % of the response at each of its ports (95 %); "
-            "the intervals allow for that, for tolerances of damper curves and for drifts during the campaign."
-        )
+        miss = f"The model errs by less than {100.0 * scale.q975:.2g} % {errs_in} (95 %){allowed}."
     else:
         miss = (
-            f"To explain the data the model would have to err by {100.0 * scale.median:.2g} % of the response at "
-            "each of its ports: something is missing in it."
+            f"To explain the data the model would have to err by {100.0 * scale.median:.2g} % {errs_in}: something "
+            "is missing in it."
         )
     return [miss, f"The noise is {noise.median:.3g} times what the recordings show."]
 
@@ -238,6 +299,6 @@ def advise(task: Task, mode: PosteriorMode, draws: Mapping[str, NDArray[np.float
         return ()
     minimiser = Minimiser(task.problem)
     known = minimiser.evaluate(
-        jnp.asarray(mode.linearisation_point.point[:-2]), mode.linearisation_point.solution
+        jnp.asarray(mode.linearisation_point.point[:-2]), mode.linearisation_point.warm_start
     )
     return advice_of(task, minimiser, known)

@@ -17,12 +17,14 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.inference.background.shared_errors import drifts_of
 from savgs_ident.inference.find_map import LAST_STEPS, LEVEL, find_map
+from savgs_ident.inference.harmonic_model import SampledHarmonics
 from savgs_ident.inference.laplace import linearised_optimum
 from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
 from savgs_ident.inference.likelihood import likelihood_of
@@ -84,7 +86,8 @@ def fit_with_errors(
 ) -> FitWithErrors | LargeErrors | None:
     """The fit with a background of small errors, from that of least squares on its nodes.
 
-    None where least squares did not end, where no such fit is found, and of peak-to-peak values: harmonics share
+    None where least squares did not end, or ended where small errors do no finite thing, where no such fit is found,
+    and of peak-to-peak values: harmonics share
     errors, and what becomes of them in a peak is not known.
     """
     target = task.problem.target
@@ -92,10 +95,16 @@ def fit_with_errors(
     if not (isinstance(target, HarmonicTarget) and best.evaluation.ok):
         return None
     progress("fitting with a background of small errors")
-    plain = PosteriorDensity(task.problem, likelihood_of(target), Prior(task.problem.free))
+    plain = PosteriorDensity(
+        SampledHarmonics(task.problem, task.measured.times), likelihood_of(target), Prior(task.problem.free)
+    )
     at = linearisation_point(plain, best.u, best.solution)
     drifting = task.problem.free.identified
-    density, data = with_background(plain, at, task.measured.times, drifting)
+    try:
+        density, data = with_background(plain, at, drifting)
+    except InputError:
+        # As far off as least squares ends where a channel has another unit.
+        return None
     widths = np.asarray(task.problem.free.widths)
     roughly = linearised_optimum(
         density.likelihood.data,

@@ -254,7 +254,7 @@ def profile_of(surrogate: Surrogate, name: str) -> ProfileLine:
 
 _ABOUT = {
     "noise_scale": "factor on the measured noise",
-    "discrepancy": "size of the small errors of the model at each of its ports, relative to the response",
+    "discrepancy": "size of the small errors of the model, relative to the response or the force",
 }
 
 _STEP = 1e-5
@@ -262,10 +262,11 @@ _STEP = 1e-5
 
 
 def names_by_role(free: FreeVector) -> dict[str, Role]:
-    """All names with their roles: identified, nuisance, tolerated."""
+    """All names with their roles: identified, nuisance, what was known beforehand."""
     roles: dict[str, Role] = dict.fromkeys(free.identified, "identified")
     roles |= dict.fromkeys(NUISANCE, "nuisance")
-    return roles | dict.fromkeys(free.tolerated, "tolerated")
+    known = {each.name: each for each in free.parameters if each.name in free.tolerated}
+    return roles | {name: "typical" if each.is_typical else "tolerated" for name, each in known.items()}
 
 
 def marginals_of(

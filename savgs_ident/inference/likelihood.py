@@ -36,22 +36,50 @@ from savgs_ident.inference.prior import NUISANCE, Scales
 from savgs_ident.inference.problem import HarmonicTarget
 
 
-class Likelihood(eqx.Module):
-    """Measured harmonics as m independent rows.
+class RowLikelihood(eqx.Module):
+    """m independent rows.
 
-    ``axes`` (D, C, K, 2, 2) turns (Re, Im) of every harmonic into its principal axes, ``place`` (m,) picks
-    the rows that are compared; ``measured`` (m,) is what they are, ``variance`` (m,) their noise,
-    ``discrepancy_scale`` (m,) their a_k. ``scales`` says what a point's last two coordinates mean. Rows are in the
-    unit of their reading, ``variance`` in its square, ``axes`` and ``place`` without dimension. Where they share
-    errors, ``turning`` (m, m) makes rows without unit of them that do not.
+    ``measured`` (m,) is what they are, ``variance`` (m,) their noise, ``discrepancy_scale`` (m,) their a_i; in the
+    unit of their reading, ``variance`` in its square. ``scales`` says what a point's last two coordinates mean.
     """
 
-    axes: Float[Array, "D C K 2 2"]
-    place: np.ndarray
     measured: Float[Array, " m"]
     variance: Float[Array, " m"]
     discrepancy_scale: Float[Array, " m"]
     scales: Scales
+
+    def spread(self, point: Float[Array, " n+2"]) -> Float[Array, " m"]:
+        """Variance of the rows [unit^2] about the model's, noise and discrepancy together."""
+        noise, miss = self.scales.noise_scale(point), self.scales.miss(point)
+        return noise**2 * self.variance + (miss * self.discrepancy_scale) ** 2
+
+    def __call__(self, rows: Float[Array, " m"], point: Float[Array, " n+2"]) -> Float[Array, ""]:
+        """Log likelihood of the model's ``rows``, up to a constant. Rows are in the unit of their reading."""
+        spread = self.spread(point)
+        return -0.5 * jnp.sum((rows - self.measured) ** 2 / spread + jnp.log(spread / self.variance))
+
+    @property
+    def data(self) -> Data:
+        """The measured rows, which count as of one test."""
+        return self._data(np.zeros(len(self.measured), np.intp))
+
+    def _data(self, tests: NDArray[np.intp]) -> Data:
+        measured, variance, discrepancy_scale = (
+            np.asarray(each) for each in (self.measured, self.variance, self.discrepancy_scale)
+        )
+        return Data(measured, variance, discrepancy_scale, tests, self.scales)
+
+
+class Likelihood(RowLikelihood):
+    """Measured harmonics as m independent rows.
+
+    ``axes`` (D, C, K, 2, 2) turns (Re, Im) of every harmonic into its principal axes, ``place`` (m,) picks
+    the rows that are compared; both are without dimension. Where rows share errors, ``turning`` (m, m) makes rows
+    without unit of them that do not.
+    """
+
+    axes: Float[Array, "D C K 2 2"]
+    place: np.ndarray
     turning: Float[Array, "m m"] | None = None
 
     def rows(self, harmonics: Complex[Array, "D C K"]) -> Float[Array, " m"]:
@@ -65,16 +93,6 @@ class Likelihood(eqx.Module):
         parts = np.stack([harmonics.real, harmonics.imag], axis=-1)
         rows = np.einsum("dckij,dckj->dcki", np.asarray(self.axes), parts).ravel()[self.place]
         return rows if self.turning is None else np.asarray(self.turning) @ rows
-
-    def spread(self, point: Float[Array, " n+2"]) -> Float[Array, " m"]:
-        """Variance of the rows [unit^2] about the model's, noise and discrepancy together."""
-        noise, miss = self.scales.noise_scale(point), self.scales.miss(point)
-        return noise**2 * self.variance + (miss * self.discrepancy_scale) ** 2
-
-    def __call__(self, rows: Float[Array, " m"], point: Float[Array, " n+2"]) -> Float[Array, ""]:
-        """Log likelihood of the model's ``rows``, up to a constant. Rows are in the unit of their reading."""
-        spread = self.spread(point)
-        return -0.5 * jnp.sum((rows - self.measured) ** 2 / spread + jnp.log(spread / self.variance))
 
     @property
     def test(self) -> NDArray[np.intp]:
@@ -92,11 +110,7 @@ class Likelihood(eqx.Module):
     @property
     def data(self) -> Data:
         """The measured rows; those that are turned are of all tests and count as of one."""
-        tests = self.test if self.turning is None else np.zeros(len(self.place), dtype=np.intp)
-        measured, variance, discrepancy_scale = (
-            np.asarray(each) for each in (self.measured, self.variance, self.discrepancy_scale)
-        )
-        return Data(measured, variance, discrepancy_scale, tests, self.scales)
+        return super().data if self.turning is not None else self._data(self.test)
 
     def harmonics(
         self, rows: Float[np.ndarray, "S m"], shape: tuple[int, ...]

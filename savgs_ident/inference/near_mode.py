@@ -1,11 +1,7 @@
 """The model near its posterior's mode: exactly, and as a cheap stand-in to second order.
 
-The exact model decides about every proposal of a sampler. A periodic motion at nearby parameters starts from the
-linear prediction X + dX/du (u - u0), on the same time nodes, and is solved until what is left is far below the noise.
-Solutions do not depend on each other, so that a chain is the same however its proposals are grouped or interrupted.
-
-The surrogate proposes. With v one standard deviation along the principal axes, u = centre + scale v, the rows of the
-likelihood are
+The exact model (:class:`ExactModel`) decides about every proposal of a sampler, the surrogate proposes. With v one
+standard deviation along the principal axes, u = centre + scale v, the rows of the likelihood are
 
     rows(v) = rows + slope v + 1/2 sum_ij v_i v_j bend_ij.
 
@@ -23,139 +19,83 @@ v_k depends on t_k and later ones only, volumes stay as they are and the way bac
 other.
 """
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Complex, Float
+from jaxtyping import Array, Float
 
-from savgs_ident.core.executor import in_parallel
-from savgs_ident.inference.likelihood import Likelihood
+from savgs_ident.core.free_vector import FreeVector
+from savgs_ident.core.status import Status
+from savgs_ident.inference.likelihood import RowLikelihood
+from savgs_ident.inference.observations import Data
 from savgs_ident.inference.prior import NUISANCE, Prior
-from savgs_ident.inference.problem import Problem
-from savgs_ident.simulate.collocation import Trajectory
-from savgs_ident.simulate.periodic import PeriodicSolution, resolve, solve_near
-from savgs_ident.simulate.program_cache import placed, run_cached
-from savgs_ident.simulate.readings import harmonics, harmonics_of
-from savgs_ident.simulate.sensitivity import harmonic_sensitivities, trajectory_sensitivities
-
-ENOUGH = 1e-4
-"""Last relative Newton step at which a motion near the anchor counts as solved; what is left is far smaller, and that
-is a hundredth of what the noise hides."""
-
-LIMIT = 30
-"""Most Newton steps; two or three are the rule."""
 
 
-class Anchor(eqx.Module):
-    """Free coordinates u (n,) where the model is known: its motions and their derivatives in u, (n, ...) each."""
+class LinearRows(NamedTuple):
+    """A model at a point: rows (m,), their slopes (m, n) in u, what it is solved from nearby, and how that ended."""
 
-    u: Float[Array, " n"]
-    solution: PeriodicSolution
-    slopes: Trajectory
-
-    def predicted(self, u: Float[Array, " n"]) -> Trajectory:
-        """The motions at free coordinates ``u``, to first order."""
-        parts = zip(self.solution.trajectory, self.slopes, strict=True)
-        return Trajectory(*(value + jnp.tensordot(u - self.u, slope, 1) for value, slope in parts))
+    rows: Float[np.ndarray, " m"]
+    slopes: Float[np.ndarray, "m n"]
+    warm_start: Any
+    status: Status
 
 
-class Responses(NamedTuple):
-    """Harmonics (W, D, C, K) of the model at W points, and whether all dwells were solved, (W,).
+class LinearisationPoint(NamedTuple):
+    """A model about a point of its posterior: rows (m,), their slopes (m, n) in u, and the exact log density.
 
-    Harmonics are in the unit of their reading.
+    ``warm_start`` is what the model is solved from nearby.
     """
 
-    harmonics: Complex[np.ndarray, "W D C K"]
-    solved: np.ndarray
+    point: Float[np.ndarray, " n+2"]
+    rows: Float[np.ndarray, " m"]
+    slopes: Float[np.ndarray, "m n"]
+    warm_start: Any
+    value: float
 
 
-class ExactModel(eqx.Module):
-    """The model about an anchor."""
+class ExactModel(Protocol):
+    """A model about a point where it is known."""
 
-    problem: Problem
-    likelihood: Likelihood
-    anchor: Anchor
-
-    def responses(self, us: Float[np.ndarray, "W n"]) -> Responses:
-        """The model at several sets of free coordinates, on as many cores as there are."""
-        found = in_parallel(lambda u: _response(self.problem, self.anchor, placed(jnp.asarray(u))), us)
-        harmonics = np.stack([np.asarray(each[0]) for each in found])
-        step = np.array([float(each[1]) for each in found])
-        return Responses(harmonics, (step <= ENOUGH) & np.isfinite(harmonics).all(axis=(1, 2, 3)))
+    @property
+    def likelihood(self) -> RowLikelihood:
+        """Of its rows."""
 
     def rows(self, us: Float[np.ndarray, "W n"]) -> tuple[Float[np.ndarray, "W m"], np.ndarray]:
-        """Their rows of the likelihood [unit of the reading], (W, m), and whether they were solved, (W,)."""
-        found = self.responses(us)
-        return np.asarray(_rows_of(self.likelihood, placed(jnp.asarray(found.harmonics)))), found.solved
+        """Rows of the likelihood at several sets of free coordinates, (W, m), and whether they were solved, (W,)."""
+
+    def predicted(self, u: Float[Array, " n"]) -> Any:
+        """What the model is solved from at free coordinates ``u``, better than from the point; None if nothing is."""
 
 
-def anchor_at(problem: Problem, u: Float[Array, " n"], solution: PeriodicSolution) -> Anchor:
-    """The anchor at free coordinates ``u`` (n,), where the model has ``solution``."""
-    u = placed(u)
-    slopes = Trajectory(*_slopes_of(problem, u, problem.parameters(u), solution))
-    return Anchor(u, solution, slopes)
+class SampledProblem(Protocol):
+    """What a posterior asks of a model that is held against data. ``u`` are free coordinates."""
 
+    @property
+    def free(self) -> FreeVector:
+        """The parameters that are sampled."""
 
-def rows_and_slopes(
-    problem: Problem,
-    likelihood: Likelihood,
-    u: Float[Array, " n"],
-    warm_start: PeriodicSolution,
-    start: Trajectory | None = None,
-) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m n"], PeriodicSolution]:
-    """The rows (m,) of the model at ``u``, their derivatives in u (m, n), and its motions there.
+    def linear_rows(
+        self, likelihood: Any, u: Float[Array, " n"], warm_start: Any, predicted: Any = None
+    ) -> LinearRows:
+        """The model at ``u``, solved as near ``warm_start``, from ``predicted`` where that is given."""
 
-    Solved on the nodes of ``warm_start``, from its motions or a better ``start``. ``u`` are free coordinates,
-    rows are in the unit of their reading.
-    """
-    u = placed(u)
-    p = problem.parameters(u)
-    solution = resolve(problem.model, p, warm_start, problem.iterations, start)
-    rows, slopes = _linear_rows(problem, likelihood, u, p, solution)
-    return np.asarray(rows), np.asarray(slopes), solution
+    def refined(self, u: Float[Array, " n"], warm_start: Any) -> Any:
+        """What the model is solved from near ``u``, made as precise as it can be."""
 
+    def with_background(
+        self, likelihood: Any, at: LinearisationPoint, drifting: Sequence[str]
+    ) -> tuple["SampledProblem", Any, Data]:
+        """The same, and its likelihood, with the small errors that any model has, and the data that say which.
 
-@eqx.filter_jit
-def _linear_rows(*args: Any) -> tuple[Array, ...]:
-    return run_cached(_rows_and_derivatives, *args)
+        ``drifting`` are free parameters that may change while the recordings are made.
+        """
 
-
-def _rows_and_derivatives(
-    problem: Problem, likelihood: Likelihood, u: Array, p: Any, solution: PeriodicSolution
-) -> tuple[Array, Array]:
-    by_name = harmonic_sensitivities(problem.model, p, solution, problem.free.names, problem.orders)
-    slopes = jax.vmap(likelihood.rows)(by_name).T * problem.slopes(u)
-    return likelihood.rows(harmonics(problem.model, p, solution, problem.orders)), slopes
-
-
-@eqx.filter_jit
-def _slopes_of(*args: Any) -> tuple[Array, ...]:
-    return run_cached(_trajectory_slopes, *args)
-
-
-def _trajectory_slopes(problem: Problem, u: Array, p: Any, solution: PeriodicSolution) -> tuple[Array, ...]:
-    moved = trajectory_sensitivities(problem.model, p, solution, problem.free.names)
-    scale = problem.slopes(u)[:, None, None]
-    return moved.x * scale, moved.y * scale
-
-
-@eqx.filter_jit
-def _response(*args: Any) -> tuple[Array, ...]:
-    return run_cached(_harmonics_near, *args)
-
-
-def _harmonics_near(problem: Problem, anchor: Anchor, u: Array) -> tuple[Array, Array]:
-    p, known = problem.parameters(u), anchor.solution
-    motions, step = solve_near(problem.model, p, known, anchor.predicted(u), LIMIT, ENOUGH)
-    return harmonics_of(problem.model, p, motions, known, problem.orders), step
-
-
-@eqx.filter_jit
-def _rows_of(likelihood: Likelihood, harmonics: Array) -> Array:
-    return jax.vmap(likelihood.rows)(harmonics)
+    def exact(self, likelihood: Any, u: Float[Array, " n"], warm_start: Any) -> ExactModel:
+        """The model about ``u``, where it is known."""
 
 
 class TriangularMap(eqx.Module):
@@ -219,7 +159,7 @@ class Surrogate(eqx.Module):
     t is in standard deviations, rows are in the unit of their reading.
     """
 
-    likelihood: Likelihood
+    likelihood: RowLikelihood
     prior: Prior
     centre: Float[Array, " n+2"]
     scale: Float[Array, "n+2 n+2"]

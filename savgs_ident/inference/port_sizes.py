@@ -40,6 +40,10 @@ FAR = 10.0
 WEAK = 100.0
 """The same of a force, or of a deflection, that is declared too small: weak ones are looked for, too."""
 
+STRONG = 30.0
+"""The same of a force that is declared too large: a plant that is damped by little rings by far more without the
+friction that it has, so that the force that would matter seems weaker than it is."""
+
 
 def sized_to(model: Model, measured: HarmonicResponse) -> tuple[Model, tuple[DataWarning, ...]]:
     """The model with effects as large as recorded motions say where they contradict its plant, and a warning of each.
@@ -129,7 +133,7 @@ def _sized(port: Port, displacement: float, velocity: float, force: float) -> Po
         if displacement / REACHED < port.displacement < FAR * displacement
         else displacement,
         velocity=port.velocity if velocity / FAR < port.velocity < FAR * velocity else velocity,
-        force=port.force if force / WEAK < port.force < FAR * force else force,
+        force=port.force if force / WEAK < port.force < STRONG * force else force,
     )
 
 
@@ -156,6 +160,6 @@ def _warning(port: Port, found: Port) -> DataWarning:
     ]
     return DataWarning(
         "port_size",
-        f"port '{port.name}': its typical sizes are those of the recorded motion: {', '.join(changed)}",
-        remedy="declare these sizes in the plant",
+        f"port '{port.name}': its typical sizes are those along the recordings without effects: {', '.join(changed)}",
+        remedy="declare sizes near these in the plant",
     )

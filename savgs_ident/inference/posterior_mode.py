@@ -1,8 +1,8 @@
 """The posterior's mode, and what a sampler proposes from: a surrogate to second order about it.
 
 The mode is found by the same search as the hypotheses of a diagnosis (:mod:`savgs_ident.inference.find_map`); at the
-mode the time nodes are adapted once more. Its normal approximation gives the scale of the posterior about a point,
-in which it is round for the samplers; second derivatives are differences of exact slopes.
+mode the model is made as precise as it can be. Its normal approximation gives the scale of the posterior about a
+point, in which it is round for the samplers; second derivatives are differences of exact slopes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,28 +18,23 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
-from savgs_ident.core.status import Status, joint_status
-from savgs_ident.inference.background.locations import Linearisation
-from savgs_ident.inference.background.shared_errors import background_about
+from savgs_ident.core.status import Status
 from savgs_ident.inference.find_map import LAST_STEPS, find_map
 from savgs_ident.inference.laplace import principal_axes
 from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
-from savgs_ident.inference.likelihood import Likelihood, sharing_errors
+from savgs_ident.inference.likelihood import RowLikelihood
 from savgs_ident.inference.near_mode import (
-    Anchor,
     ExactModel,
+    LinearisationPoint,
+    SampledProblem,
     Surrogate,
-    anchor_at,
     bend_of,
     identity_map,
     no_bend,
-    rows_and_slopes,
     triangular_map_of,
 )
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.inference.prior import Coordinates, Prior, sheet_coordinate
-from savgs_ident.inference.problem import Problem
-from savgs_ident.simulate.periodic import PeriodicSolution, adapt
 
 LONGEST = 1.0
 """Longest axis [unconstrained coordinates]: an e-fold of an identified parameter, a tolerance of the others. A
@@ -55,7 +50,7 @@ _MISS_GRID = np.concatenate([[0.0], np.geomspace(1e-5, 30.0, 300)])
 
 
 def parameter_scale(
-    likelihood: Likelihood, prior: Prior, point: Float[Array, " n+2"], slopes: Float[np.ndarray, "m n"]
+    likelihood: RowLikelihood, prior: Prior, point: Float[Array, " n+2"], slopes: Float[np.ndarray, "m n"]
 ) -> Float[np.ndarray, "n n"]:
     """Columns along the principal axes of the parameters' information at ``point``, one sd long each, or shorter."""
     count = slopes.shape[1]
@@ -66,7 +61,7 @@ def parameter_scale(
 
 
 def nuisance_scale(
-    likelihood: Likelihood,
+    likelihood: RowLikelihood,
     prior: Prior,
     point: Float[Array, " n+2"],
     rows: Float[np.ndarray, " m"],
@@ -99,7 +94,7 @@ def nuisance_scale(
 
 
 @eqx.filter_jit
-def _log_densities(likelihood: Likelihood, prior: Prior, rows: Array, points: Array) -> Array:
+def _log_densities(likelihood: RowLikelihood, prior: Prior, rows: Array, points: Array) -> Array:
     return jax.vmap(lambda point: likelihood(rows, point) + prior(point))(points)
 
 
@@ -110,16 +105,6 @@ def _along(point: Array, place: int, grid: np.ndarray) -> Array:
 
 LEVEL = 0.01
 """Rise of the log density that a further step promises below which the mode is found."""
-
-
-class LinearisationPoint(NamedTuple):
-    """The model at a point: rows (m,), their slopes (m, n) in u, motions, and the exact log density."""
-
-    point: Float[np.ndarray, " n+2"]
-    rows: Float[np.ndarray, " m"]
-    slopes: Float[np.ndarray, "m n"]
-    solution: PeriodicSolution
-    value: float
 
 
 class PosteriorMode(NamedTuple):
@@ -133,8 +118,8 @@ class PosteriorMode(NamedTuple):
 class PosteriorDensity(NamedTuple):
     """The density of a posterior: a problem with its likelihood and its prior."""
 
-    problem: Problem
-    likelihood: Likelihood
+    problem: SampledProblem
+    likelihood: RowLikelihood
     prior: Prior
 
     def density(self, rows: Float[np.ndarray, " m"], point: Float[np.ndarray, " n+2"]) -> float:
@@ -155,27 +140,19 @@ class PosteriorPlant:
         return tuple(sheet_coordinate(parameter) for parameter in self.posterior.problem.free.parameters)
 
     def predict(
-        self,
-        terms: tuple[str, ...],
-        values: Mapping[str, float],
-        names: Sequence[str],
-        warm_start: PeriodicSolution,
+        self, terms: tuple[str, ...], values: Mapping[str, float], names: Sequence[str], warm_start: Any
     ) -> Prediction:
-        """Rows at ``values`` [SI] with their slopes, on the nodes of ``warm_start``. There are no ``terms``."""
+        """Rows at ``values`` [SI] with their slopes, from ``warm_start``. There are no ``terms``."""
         problem = self.posterior.problem
         u = problem.free.to_unconstrained(values)
-        rows, slopes, solution = rows_and_slopes(problem, self.posterior.likelihood, u, warm_start)
-        status = joint_status(solution.status())
-        by_value = slopes / np.asarray(problem.slopes(u))
-        return Prediction(rows, lambda: by_value, status, solution)
+        found = problem.linear_rows(self.posterior.likelihood, u, warm_start)
+        by_value = found.slopes / np.asarray(problem.free.jacobian_diag(jnp.asarray(u)))
+        return Prediction(found.rows, lambda: by_value, found.status, found.warm_start)
 
-    def refined(
-        self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: PeriodicSolution
-    ) -> PeriodicSolution:
-        """The same motions on nodes that follow them. ``values`` are in SI."""
+    def refined(self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any) -> Any:
+        """What to start from nearby, made as precise as it can be. ``values`` are in SI."""
         problem = self.posterior.problem
-        p = problem.parameters(problem.free.to_unconstrained(values))
-        return adapt(problem.model, p, warm_start, warm_start.mesh.layout, problem.iterations)
+        return problem.refined(problem.free.to_unconstrained(values), warm_start)
 
     def sensitivities(
         self, terms: tuple[str, ...], values: Mapping[str, float], warm_start: Any, candidates: Sequence[Term]
@@ -185,12 +162,9 @@ class PosteriorPlant:
 
 
 def find_mode(
-    posterior: PosteriorDensity, u: Float[Array, " n"], warm_start: PeriodicSolution, report: Progress
+    posterior: PosteriorDensity, u: Float[Array, " n"], warm_start: Any, report: Progress
 ) -> PosteriorMode:
-    """The mode from free coordinates ``u`` (n,), where the model has the motions ``warm_start``.
-
-    Its nodes are adapted there.
-    """
+    """The mode from free coordinates ``u`` (n,), where the model is solved from ``warm_start``."""
     search = search_of(PosteriorPlant(posterior), posterior.likelihood.data)
     start = _values_at(posterior, u)
     found = find_map(search, (), start, warm_start, steps=LAST_STEPS, level=LEVEL, progress=report)
@@ -201,39 +175,27 @@ def find_mode(
 
 
 def with_background(
-    posterior: PosteriorDensity,
-    at: LinearisationPoint,
-    recorded: NDArray[np.float64],
-    drifting: Sequence[str],
+    posterior: PosteriorDensity, at: LinearisationPoint, drifting: Sequence[str]
 ) -> tuple[PosteriorDensity, Data]:
     """The density whose rows share the small errors that any model has about a point, and the data that say which.
 
-    ``recorded`` (D,) is when each dwell was recorded, in any unit of time; ``drifting`` are free parameters that may
-    change in the meantime.
+    ``drifting`` are free parameters that may change while the recordings are made.
     """
-    problem, likelihood, u = posterior.problem, posterior.likelihood, jnp.asarray(at.point[:-2])
-    p = problem.parameters(u)
-    about = Linearisation(problem.model, problem.model, likelihood, problem.orders, p, at.solution)
-    columns = [problem.free.names.index(name) for name in drifting]
-    per_unit = (at.slopes / np.asarray(problem.slopes(u)))[:, columns]
-    data = background_about(
-        likelihood.data, about, per_unit * [float(p[name]) for name in drifting], recorded
-    )
-    return posterior._replace(likelihood=sharing_errors(likelihood, data)), data
+    problem, likelihood, data = posterior.problem.with_background(posterior.likelihood, at, drifting)
+    return PosteriorDensity(problem, likelihood, posterior.prior), data
 
 
 def find_mode_again(posterior: PosteriorDensity, known: PosteriorMode, report: Progress) -> PosteriorMode:
-    """The mode from that of another density of the same model, on its nodes."""
+    """The mode from that of another density of the same model."""
     at = known.linearisation_point
     search = search_of(PosteriorPlant(posterior), posterior.likelihood.data)
     start = _values_at(posterior, jnp.asarray(at.point[:-2]))
-    found = find_map(search, (), start, at.solution, steps=LAST_STEPS, level=LEVEL, progress=report)
+    found = find_map(search, (), start, at.warm_start, steps=LAST_STEPS, level=LEVEL, progress=report)
     return PosteriorMode(_linearisation_point(posterior, found), found.status, found.solved)
 
 
 def _values_at(posterior: PosteriorDensity, u: Float[Array, " n"]) -> dict[str, float]:
-    values = posterior.problem.parameters(u)
-    return {name: float(values[name]) for name in posterior.problem.free.names}
+    return {name: float(value) for name, value in posterior.problem.free.to_constrained(u).items()}
 
 
 def _linearisation_point(posterior: PosteriorDensity, found: LaplaceFit) -> LinearisationPoint:
@@ -246,12 +208,13 @@ def _linearisation_point(posterior: PosteriorDensity, found: LaplaceFit) -> Line
 
 
 def linearisation_point(
-    posterior: PosteriorDensity, u: Float[Array, " n"], warm_start: PeriodicSolution
+    posterior: PosteriorDensity, u: Float[Array, " n"], warm_start: Any
 ) -> LinearisationPoint:
-    """The model at free coordinates ``u`` (n,), on the nodes of ``warm_start``; noise as measured, no discrepancy."""
-    rows, slopes, solution = rows_and_slopes(posterior.problem, posterior.likelihood, u, warm_start)
+    """The model at free coordinates ``u`` (n,), solved as near ``warm_start``; noise as measured, no discrepancy."""
+    found = posterior.problem.linear_rows(posterior.likelihood, u, warm_start)
     point = np.append(np.asarray(u), [0.0, 0.0])
-    return LinearisationPoint(point, rows, slopes, solution, posterior.density(rows, point))
+    value = posterior.density(found.rows, point)
+    return LinearisationPoint(point, found.rows, found.slopes, found.warm_start, value)
 
 
 def linear_surrogate(posterior: PosteriorDensity, at: LinearisationPoint) -> Surrogate:
@@ -292,17 +255,17 @@ def expand(posterior: PosteriorDensity, at: LinearisationPoint, report: Progress
     axes = np.asarray(linear.scale)[:-2, :-2]
     weight = 1.0 / np.sqrt(np.asarray(posterior.likelihood.spread(linear.centre)))
     report(f"second derivatives of the response along {axes.shape[1]} axes")
-    anchor = anchor_at(posterior.problem, jnp.asarray(at.point[:-2]), at.solution)
-    second = _second_derivatives(posterior, at, anchor, axes, weight)
+    exact = posterior.problem.exact(posterior.likelihood, jnp.asarray(at.point[:-2]), at.warm_start)
+    second = _second_derivatives(posterior, at, exact, axes, weight)
     bent = (bend_of(second, weight), triangular_map_of(second, np.asarray(linear.slope), weight))
     surrogate = eqx.tree_at(lambda each: (each.bend, each.map), linear, bent)
-    return Expansion(ExactModel(posterior.problem, posterior.likelihood, anchor), surrogate)
+    return Expansion(exact, surrogate)
 
 
 def _second_derivatives(
     posterior: PosteriorDensity,
     at: LinearisationPoint,
-    anchor: Anchor,
+    exact: ExactModel,
     axes: Float[np.ndarray, "n n"],
     weight: Float[np.ndarray, " m"],
 ) -> Float[np.ndarray, "n n m"]:
@@ -313,10 +276,8 @@ def _second_derivatives(
 
     def slopes_at(shift: np.ndarray) -> np.ndarray | None:
         u = jnp.asarray(at.point[:-2] + shift)
-        _, slopes, solution = rows_and_slopes(
-            posterior.problem, posterior.likelihood, u, at.solution, anchor.predicted(u)
-        )
-        return np.asarray((slopes @ axes).T) if joint_status(solution.status()).ok else None
+        found = posterior.problem.linear_rows(posterior.likelihood, u, at.warm_start, exact.predicted(u))
+        return np.asarray((found.slopes @ axes).T) if found.status.ok else None
 
     here = (at.slopes @ axes).T
     ahead = in_parallel(slopes_at, axes.T)

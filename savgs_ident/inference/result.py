@@ -1,24 +1,17 @@
-"""What sampling gives: draws with their convergence, marginals, predictions, what they mean, and the draws on file.
+"""What sampling gives: draws with their convergence, marginals, predictions, and what they mean."""
 
-The file is ArviZ's inference data (netCDF), written whole and read back by name. Its groups are posterior,
-posterior_predictive, sample_stats and observed_data; complex harmonics stand in them as real and imaginary parts.
-"""
-
-from collections.abc import Collection, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import prod
-from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Literal
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.core.errors import InputError
-from savgs_ident.core.files import scratch_folder, write_bytes
 from savgs_ident.core.presentation import Result
 from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.plants.model import Model
+from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.selection import only_tests
 
@@ -29,8 +22,8 @@ if TYPE_CHECKING:
 Sampler = Literal["emcee", "nuts"]
 """The samplers there are."""
 
-Role = Literal["identified", "tolerated", "nuisance"]
-"""Identified by the data alone, known to a tolerance before, or a scale of the likelihood."""
+Role = Literal["identified", "tolerated", "typical", "nuisance"]
+"""Identified by the data alone, known to a tolerance or an order of magnitude before, a scale of the likelihood."""
 
 
 @dataclass(frozen=True)
@@ -156,23 +149,22 @@ UNEXPLAINED = "the model does not explain the data"
 
 
 @dataclass(frozen=True)
-class Posterior(Result):
-    """A finished run; arrays are read-only.
+class Posterior(Result, ABC):
+    """A finished run, whatever the model was held against; arrays are read-only.
 
     Attributes:
         model: the model with the posterior medians in place of the assumed values.
         sampler: which sampler ran.
-        marginals: identified parameters first, then the nuisance scales, then the tolerated parameters.
+        marginals: identified parameters first, then the nuisance scales, then what was known beforehand.
         draws: name to values in SI, (chains, draws), in the order of ``marginals``.
         statistics: per draw, (chains, draws): "lp" log density, "accepted" whether the draw is a new one.
         convergence: whether they may be used.
-        predictive: what they predict.
-        measured: the response that they follow from.
         sentences: what the data say, in words.
-        wall_s: time taken, from the response to the last draw [s].
+        wall_s: time taken, from what was measured to the last draw [s].
     """
 
-    presenter: ClassVar[str] = "POSTERIOR"
+    errs_in: ClassVar[str]
+    """Of what its discrepancy is a share, in words."""
 
     model: Model
     sampler: Sampler
@@ -180,15 +172,13 @@ class Posterior(Result):
     draws: Mapping[str, NDArray[np.float64]]
     statistics: Mapping[str, NDArray[np.float64]]
     convergence: Convergence
-    predictive: Predictive
-    measured: HarmonicResponse
     sentences: tuple[str, ...]
     wall_s: float
 
-    def of_tests(self, kept: NDArray[np.intp]) -> "Posterior":
-        """With the measurement and the predictions of some of the tests; the draws are those from all."""
-        measured = only_tests(self.measured, kept)
-        return replace(self, measured=measured, predictive=self.predictive.of_tests(kept, measured.orders))
+    @property
+    @abstractmethod
+    def count_inside(self) -> tuple[int, int]:
+        """How many of the numbers that are compared lie where 95 % of repetitions lie, and how many there are."""
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -221,7 +211,7 @@ class Posterior(Result):
             return self.convergence.reasons
         missed = 100.0 * self["discrepancy"].median
         what = (
-            f"{UNEXPLAINED}: for that it would have to err by {missed:.2g} % of the response at each of its ports; "
+            f"{UNEXPLAINED}: for that it would have to err by {missed:.2g} % {self.errs_in}; "
             "look for what is missing with `diagnose`, until then the parameters make up for it by more than their "
             "intervals say"
         )
@@ -229,140 +219,83 @@ class Posterior(Result):
 
     def to_arviz(self) -> "xr.DataTree":
         """The draws as ArviZ's inference data: the content of ``posterior.nc``."""
+        from savgs_ident.inference.inference_data import inference_data
+
         return inference_data(self)
 
     def of_role(self, role: Role) -> tuple[Marginal, ...]:
         """The marginals of one role."""
         return tuple(each for each in self.marginals if each.role == role)
 
+    @property
+    def known_before(self) -> tuple[Marginal, ...]:
+        """The marginals of what was known beforehand, to a tolerance or an order of magnitude."""
+        return self.of_role("tolerated") + self.of_role("typical")
+
     def correlation(self, names: tuple[str, ...]) -> NDArray[np.float64]:
         """Correlation [1] of the draws of the named parameters, (n, n)."""
         return np.atleast_2d(np.corrcoef(np.stack([self.draws[name].ravel() for name in names])))
 
 
-LARGEST = 2**28
-"""Most bytes that all draws, or a piece of the file that has to be unpacked for them, may take in memory."""
+@dataclass(frozen=True)
+class HarmonicPosterior(Posterior):
+    """The posterior of a model that is held against harmonics.
 
-FAR = 6.0
-"""Standard deviations by which a parameter may be off the mean of its draws: its own posterior has it within 3."""
-
-REMEDY = "give the posterior.nc that `savgs-ident posterior` wrote for this model"
-
-Draws: TypeAlias = NDArray[np.float64]
-"""Of one parameter, (n,), SI."""
-
-DrawSource: TypeAlias = Path | Posterior
-"""A ``posterior.nc``, or the posterior itself."""
-
-
-def source_name(source: DrawSource) -> str:
-    """What sentences call where draws come from."""
-    return "the posterior" if isinstance(source, Posterior) else str(source)
-
-
-def read_draws(path: DrawSource, names: Collection[str], count: int | None = None) -> dict[str, Draws]:
-    """Draws by name, each (n,), SI, chains one after the other; of ``names``, those that the file holds.
-
-    With a ``count``, at most so many, evenly spread over all. Raises :class:`InputError` if the file cannot be read
-    or holds no finite draws of any.
+    Attributes:
+        predictive: what the draws predict.
+        measured: the response that they follow from.
     """
-    if isinstance(path, Posterior):
-        return thin_draws({name: np.ravel(path.draws[name]) for name in names if name in path.draws}, count)
-    try:
-        with h5py.File(path, "r") as file:
-            group = file["posterior"]
-            held = set(group.keys())
-            _check_size(path, [group[name] for name in names if name in held])
-            draws = {name: np.ravel(group[name][()]) for name in names if name in held}
-    except OSError as error:
-        raise InputError(f"cannot be read: {error}", source=path, remedy=REMEDY) from error
-    except (KeyError, TypeError, AttributeError, ValueError, RuntimeError) as error:
-        raise InputError("is no posterior", source=path, remedy=REMEDY) from error
-    lengths = {values.size for values in draws.values()}
-    finite = all(values.dtype.kind == "f" and np.isfinite(values).all() for values in draws.values())
-    if len(lengths) != 1 or 0 in lengths or not finite:
-        raise InputError("holds no finite draws of the model's parameters", source=path, remedy=REMEDY)
-    return thin_draws({name: values.astype(np.float64) for name, values in draws.items()}, count)
+
+    presenter: ClassVar[str] = "POSTERIOR"
+    errs_in: ClassVar[str] = "of the response at each of its ports"
+
+    predictive: Predictive
+    measured: HarmonicResponse
+
+    @property
+    def count_inside(self) -> tuple[int, int]:
+        """How many of the compared phasors lie inside, and how many there are."""
+        return self.predictive.count_inside
+
+    def of_tests(self, kept: NDArray[np.intp]) -> "HarmonicPosterior":
+        """With the measurement and the predictions of some of the tests; the draws are those from all."""
+        measured = only_tests(self.measured, kept)
+        return replace(self, measured=measured, predictive=self.predictive.of_tests(kept, measured.orders))
 
 
-def thin_draws(draws: Mapping[str, Draws], count: int | None) -> dict[str, Draws]:
-    """At most ``count`` draws of each parameter, evenly spread over all, each (n,), SI; all without a count."""
-    total = min((values.size for values in draws.values()), default=0)
-    chosen = np.unique(np.linspace(0, total - 1, min(count or total, total)).astype(int))
-    return {name: values[chosen] for name, values in draws.items()}
+@dataclass(frozen=True)
+class PredictedForce:
+    """What the posterior predicts for the force of a drive along the same motion; S draws, m rows.
 
-
-def far_from_draws(
-    values: Mapping[str, float], draws: Mapping[str, Draws], limit: float = FAR
-) -> tuple[str, ...]:
-    """Names of the ``values`` [SI] that are more than ``limit`` standard deviations [1] off the mean of their draws.
-
-    To be asked of all draws (n,), before they are thinned: few of them know no standard deviation, and one has none.
+    Attributes:
+        model: force that the model needs at the draws [N], (S, m).
+        replicated: the same with the noise and the small errors that a repetition would have [N], (S, m).
+        inside: whether the measured force lies within the central 95 % of ``replicated``, (m,).
     """
-    return tuple(
-        name
-        for name, each in draws.items()
-        if each.size > 1 and abs(values[name] - float(np.mean(each))) > limit * float(np.std(each))
-    )
+
+    model: NDArray[np.float64]
+    replicated: NDArray[np.float64]
+    inside: NDArray[np.bool_]
 
 
-def _check_size(path: Path, held: Sequence[h5py.Dataset]) -> None:
-    """A file of some kilobytes can declare terabytes, and be read as so many zeros."""
-    whole = sum(each.size * each.dtype.itemsize for each in held)
-    pieces = [prod(each.chunks) * each.dtype.itemsize for each in held if each.chunks]
-    if max([whole, *pieces]) > LARGEST:
-        raise InputError(f"declares more than {LARGEST} bytes of draws", source=path, remedy=REMEDY)
+@dataclass(frozen=True)
+class MotionPosterior(Posterior):
+    """The posterior of a model that is held against the force of its drive along a measured motion of m rows.
 
+    Attributes:
+        predictive: what the draws predict.
+        motion: what was measured.
+        measured: force of the drive, low-passed and thinned [N], (m,).
+    """
 
-_DIMENSIONS = ["dwell", "channel", "order"]
+    presenter: ClassVar[str] = "MOTION_POSTERIOR"
+    errs_in: ClassVar[str] = "of the force, in every row by itself"
 
+    predictive: PredictedForce
+    motion: DrivenMotion
+    measured: NDArray[np.float64]
 
-def inference_data(posterior: Posterior) -> "xr.DataTree":
-    """All groups; variables carry their units."""
-    # Only here: ArviZ and what it brings along take seconds to load.
-    import arviz_base
-
-    predictive, measured = posterior.predictive, posterior.measured
-    orders = predictive.used.shape[2]
-    channels = [each.name for each in posterior.model.channels]
-    rows = [measured.channel(name) if name in measured.channels else 0 for name in channels]
-    observed = np.where(predictive.used, measured.harmonics[:, rows, :orders], np.nan)
-    replicated = np.where(predictive.used, predictive.replicated, np.nan)[None]
-    model = predictive.model[None]
-    tree = arviz_base.from_dict(
-        {
-            "posterior": dict(posterior.draws),
-            "posterior_predictive": _parts("harmonics", replicated) | _parts("model", model),
-            "sample_stats": dict(posterior.statistics),
-            "observed_data": _parts("harmonics", observed),
-        },
-        dims={f"{name}_{part}": _DIMENSIONS for name in ("harmonics", "model") for part in ("re", "im")},
-        coords={
-            "dwell": list(measured.tests),
-            "channel": channels,
-            "order": np.arange(orders),
-        },
-        # A run that was stopped early may have fewer draws than walkers.
-        check_conventions=False,
-    )
-    for marginal in posterior.marginals:
-        tree["posterior"][marginal.name].attrs.update(
-            unit=marginal.unit, about=marginal.about, role=marginal.role
-        )
-    for group in ("posterior_predictive", "observed_data"):
-        tree[group].coords["frequency"] = ("dwell", measured.frequency, {"unit": "Hz"})
-        tree[group].coords["spacing"] = ("dwell", measured.spacing, {"unit": "Hz"})
-    tree.attrs["sampler"] = posterior.sampler
-    return tree
-
-
-def write_inference_data(posterior: Posterior, path: Path) -> Path:
-    """Write the inference data, whole or not at all; raises :class:`InputError` if it cannot be written."""
-    with scratch_folder() as folder:
-        file = folder / "posterior.nc"
-        inference_data(posterior).to_netcdf(file, engine="h5netcdf")
-        return write_bytes(path, file.read_bytes())
-
-
-def _parts(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
-    return {f"{name}_re": np.real(values), f"{name}_im": np.imag(values)}
+    @property
+    def count_inside(self) -> tuple[int, int]:
+        """How many rows of force lie inside, and how many there are."""
+        return int(np.sum(self.predictive.inside)), self.measured.size

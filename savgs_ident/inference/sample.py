@@ -11,14 +11,12 @@ they predict for a repetition of the campaign.
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Complex, Float
 from numpy.typing import NDArray
 
 from savgs_ident import __version__
@@ -36,20 +34,17 @@ from savgs_ident.inference.diagnostics import (
     others_mixed,
     precise,
 )
-from savgs_ident.inference.likelihood import likelihood_of, values_of
+from savgs_ident.inference.likelihood import values_of
 from savgs_ident.inference.near_mode import ExactModel, Surrogate
 from savgs_ident.inference.posterior_mode import (
     Expansion,
     PosteriorDensity,
     PosteriorMode,
     expand,
-    find_mode,
     find_mode_again,
     with_background,
 )
-from savgs_ident.inference.prior import Prior
-from savgs_ident.inference.problem import ProblemSettings, Task, harmonic_target, plan_task
-from savgs_ident.inference.result import Marginal, Posterior, Predictive, Sampler
+from savgs_ident.inference.result import Marginal, Posterior, Sampler
 from savgs_ident.inference.samplers.chains import (
     Chains,
     Checkpoint,
@@ -61,8 +56,6 @@ from savgs_ident.inference.samplers.chains import (
 from savgs_ident.inference.samplers.emcee import sample_by_emcee
 from savgs_ident.inference.samplers.nuts import sample_by_nuts
 from savgs_ident.plants.model import Model
-from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.periodic import simulate_periodic
 
 SAMPLERS: Mapping[Sampler, Callable[[ExactModel, Surrogate, int, Checkpoint], Generator[Chains]]] = {
     "emcee": sample_by_emcee,
@@ -71,73 +64,53 @@ SAMPLERS: Mapping[Sampler, Callable[[ExactModel, Surrogate, int, Checkpoint], Ge
 """Each gives chains that grow, for as long as it is asked."""
 
 
-WITHIN = 0.95
-"""Share of repetitions that the band holds."""
+class PosedQuestion(Protocol):
+    """A question with what is to be compared."""
+
+    @property
+    def density(self) -> PosteriorDensity:
+        """Of its posterior, without a background of small errors."""
+
+    def mode(self, report: Progress) -> PosteriorMode:
+        """That of this density; raises :class:`InputError` if the model has no solution where the search begins."""
+
+    def answer(self, exact: Any, chains: Chains, answer: Mapping[str, Any]) -> Posterior:
+        """The posterior, of which the ``answer`` has what does not depend on what was measured."""
 
 
-def predict(exact: ExactModel, chains: Chains, count: int, seed: int) -> Predictive:
-    """The prediction at ``count`` draws, evenly spaced along the chains; unsolved ones are left out."""
-    flat = chains.points.reshape(-1, chains.points.shape[-1])
-    points = flat[np.unique(np.linspace(0, len(flat) - 1, count).astype(int))]
-    found = exact.responses(points[:, :-2])
-    points, model = points[found.solved], found.harmonics[found.solved]
-    likelihood, shape = exact.likelihood, model.shape[1:]
-    spread = np.asarray(jax.vmap(likelihood.spread)(jnp.asarray(points)))
-    errors = np.random.default_rng(seed).standard_normal(spread.shape) * np.sqrt(spread)
-    replicated = model + likelihood.harmonics(errors, shape)
-    measured = likelihood.harmonics(np.asarray(likelihood.measured)[None], shape)[0]
-    used = np.asarray(exact.problem.target.used)
-    return Predictive(model, np.where(used, replicated, 0.0), used, _inside(measured, replicated, used))
+class AnyQuestion(Protocol):
+    """What is asked of data, whatever they are."""
 
+    @property
+    def model(self) -> Model:
+        """The model as known before the data: the centres and tolerances of its priors."""
 
-def _inside(
-    measured: Complex[np.ndarray, "D C K"], replicated: Complex[np.ndarray, "S D C K"], used: np.ndarray
-) -> Bool[np.ndarray, "D C K"]:
-    """Whether a phasor is no further from the repetitions' mean than 95 % of them, in their covariance."""
-    middle = replicated.mean(axis=0)
-    off = _parts(replicated - middle)
-    covariance = np.einsum("sdcki,sdckj->dckij", off, off) / len(off)
-    precision = np.linalg.inv(np.where(used[..., None, None], covariance, np.eye(2)))
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Where to look for the mode: identified values by name, SI; the model's own where left out."""
 
-    def distance(parts: Float[np.ndarray, "... 2"]) -> Float[np.ndarray, "..."]:
-        return np.asarray(np.einsum("...i,...ij,...j->...", parts, precision, parts))
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the parameters that the data alone identify."""
 
-    return np.asarray(
-        used & (distance(_parts(measured - middle)) <= np.quantile(distance(off), WITHIN, axis=0))
-    )
+    @property
+    def marks(self) -> Mapping[str, object]:
+        """What the data are, by which a chain is recognised."""
 
-
-def _parts(values: np.ndarray) -> np.ndarray:
-    return np.stack([values.real, values.imag], axis=-1)
-
-
-@dataclass(frozen=True)
-class Question:
-    """What is asked of the data.
-
-    Attributes:
-        measured: the response.
-        model: the model as known before the data: the centres and tolerances of its priors.
-        values: where to look for the mode: identified values by name, SI; the model's own where left out.
-        free: names of the parameters that the data alone identify.
-    """
-
-    measured: HarmonicResponse
-    model: Model
-    values: Mapping[str, float]
-    free: tuple[str, ...]
+    def posed(self, settings: SamplingSettings) -> PosedQuestion:
+        """The question with what is to be compared."""
 
 
 Describe = Callable[
-    [Task, PosteriorMode, Sequence[Marginal], Mapping[str, NDArray[np.float64]]], tuple[str, ...]
+    [Any, PosteriorMode, Sequence[Marginal], Mapping[str, NDArray[np.float64]]], tuple[str, ...]
 ]
-"""What the draws (s,) [SI] identify, in words: of the task, its mode, the marginals and the draws by name."""
+"""What the draws (s,) [SI] identify, in words: of the posed question, its mode, the marginals, the draws by name."""
 
 
 class _Answer(NamedTuple):
     """Everything that a result is made of."""
 
-    task: Task
+    posed: PosedQuestion
     posterior: PosteriorDensity
     mode: PosteriorMode
     expansion: Expansion
@@ -145,7 +118,7 @@ class _Answer(NamedTuple):
 
 
 def sample_posterior(
-    question: Question,
+    question: AnyQuestion,
     settings: SamplingSettings,
     chain: Path | None = None,
     resume: bool = False,
@@ -158,57 +131,22 @@ def sample_posterior(
     The chain is kept at the path ``chain``, after every step; with ``resume`` it is continued. ``describe`` gives the
     sentences of the result, none by default; ``origin`` is that of the result. Look at
     ``convergence.converged`` of the result. Raises :class:`InputError` for a question that makes no sense, a
-    model without periodic motion where the search begins, and a chain of another question.
+    model without a solution where the search begins, and a chain of another question.
     """
     began, report = time.perf_counter(), progress or _silent
-    task = plan(question, settings)
-    posterior = density_of(task)
+    posed = question.posed(settings)
     checkpoint = _checkpoint(question, settings, chain, resume)
-    mode = locate(posterior, task, question, report)
+    mode = posed.mode(report)
     report("looking for the mode with a background of small errors")
-    at, drifting = mode.linearisation_point, task.problem.free.identified
-    posterior, _ = with_background(posterior, at, question.measured.times, drifting)
+    drifting = posed.density.problem.free.identified
+    posterior, _ = with_background(posed.density, mode.linearisation_point, drifting)
     mode = find_mode_again(posterior, mode, report)
     expansion = expand(posterior, mode.linearisation_point, report)
     chains = _run(expansion, settings, checkpoint, began, report)
     wall_s = time.perf_counter() - began
     report("summing up")
-    answer = _Answer(task, posterior, mode, expansion, chains)
+    answer = _Answer(posed, posterior, mode, expansion, chains)
     return _summed_up(answer, question, settings, wall_s, describe or _nothing, origin)
-
-
-def plan(question: Question, settings: SamplingSettings) -> Task:
-    """The fitting task behind a question: its model, free vector and target."""
-    options = ProblemSettings(
-        orders=settings.orders, fixed_tolerances=settings.fixed_tolerances, periodic=settings.periodic
-    )
-    return plan_task(question.measured, question.model, question.free, options)
-
-
-def density_of(task: Task) -> PosteriorDensity:
-    """The density of the posterior: always the complex harmonics, never peak-to-peak values."""
-    target = harmonic_target(task.measured, task.model.channels, task.settings.orders)
-    return PosteriorDensity(task.problem, likelihood_of(target), Prior(task.problem.free))
-
-
-def locate(posterior: PosteriorDensity, task: Task, question: Question, report: Progress) -> PosteriorMode:
-    """The mode, looked for from the question's values.
-
-    Raises :class:`InputError` if the model has no periodic motion there.
-    """
-    report("solving the model")
-    start = task.table.as_dict() | dict(question.values)
-    u = posterior.problem.free.to_unconstrained(start)
-    warm_start = simulate_periodic(
-        posterior.problem.model, posterior.problem.parameters(u), task.excitation, task.settings.periodic
-    )
-    mode = find_mode(posterior, u, warm_start, report)
-    if not mode.solved:
-        raise InputError(
-            "the model has no periodic motion at these parameters",
-            remedy="identify it first: savgs-ident fit",
-        )
-    return mode
 
 
 def _nothing(*_: object) -> tuple[str, ...]:
@@ -220,14 +158,11 @@ def _silent(line: str) -> None:
 
 
 def _checkpoint(
-    question: Question, settings: SamplingSettings, chain: Path | None, resume: bool
+    question: AnyQuestion, settings: SamplingSettings, chain: Path | None, resume: bool
 ) -> Checkpoint:
-    measured = question.measured
     case = digest_of(
         {
-            "harmonics": measured.harmonics,
-            "covariance": measured.covariance,
-            "frequency": measured.frequency,
+            **question.marks,
             "parameters": [(each.name, each.value, each.tolerance) for each in question.model.table.entries],
             "plant": [np.asarray(leaf) for leaf in jax.tree.leaves(question.model.build())],
             "values": sorted(question.values.items()),
@@ -248,7 +183,7 @@ def _run(
 
     Raises :class:`InputError` if by then the model was solved at no proposal.
     """
-    count = len(expansion.exact.problem.free.identified)
+    count = len(expansion.surrogate.prior.free.identified)
     with closing(SAMPLERS[settings.sampler](*expansion, settings.seed, checkpoint)) as sampler:
         while True:
             chains = next(sampler)
@@ -265,14 +200,14 @@ def _run(
                 return chains
             if late and chains.unsolved == chains.evaluations:
                 raise InputError(
-                    "the model has a periodic motion at none of the points that the surrogate proposes",
+                    "the model has a solution at none of the points that the surrogate proposes",
                     remedy="identify it first: savgs-ident fit",
                 )
 
 
 def _summed_up(
     answer: _Answer,
-    question: Question,
+    question: AnyQuestion,
     settings: SamplingSettings,
     wall_s: float,
     describe: Describe,
@@ -291,16 +226,16 @@ def _summed_up(
     marginals = marginals_of(posterior, answer.expansion.surrogate, chains, mixing)
     draws = {name: values[name].T for name in roles}
     medians = {each.name: each.median for each in marginals if each.role != "nuisance"}
-    return Posterior(
-        model=question.model.with_parameters(answer.task.table.with_values(medians)),
-        sampler=settings.sampler,
-        marginals=marginals,
-        draws=draws,
-        statistics={"lp": chains.log_density.T, "accepted": chains.accepted.T.astype(float)},
-        convergence=convergence,
-        predictive=predict(answer.expansion.exact, chains, settings.predictive_draws, settings.seed),
-        measured=question.measured,
-        sentences=describe(answer.task, answer.mode, marginals, draws),
-        wall_s=wall_s,
-        origin=origin,
-    )
+    table = question.model.table
+    result = {
+        "model": question.model.with_parameters(table.with_values(medians)),
+        "sampler": settings.sampler,
+        "marginals": marginals,
+        "draws": draws,
+        "statistics": {"lp": chains.log_density.T, "accepted": chains.accepted.T.astype(float)},
+        "convergence": convergence,
+        "sentences": describe(answer.posed, answer.mode, marginals, draws),
+        "wall_s": wall_s,
+        "origin": origin,
+    }
+    return answer.posed.answer(answer.expansion.exact, chains, result)

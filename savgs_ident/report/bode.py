@@ -24,7 +24,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from savgs_ident.fit.result import MeasuredPoints, measured_points
-from savgs_ident.inference.result import Posterior
+from savgs_ident.inference.result import HarmonicPosterior
 from savgs_ident.report.text import ChannelLabel, channel_labels
 from savgs_ident.report.theme import (
     BLUE,
@@ -261,7 +261,7 @@ class Band:
         return _in_half_widths(np.abs(self.measured), self.magnitude), _in_half_widths(turned, self.phase)
 
 
-def predictive_band(posterior: Posterior, c: int) -> Band:
+def predictive_band(posterior: HarmonicPosterior, c: int) -> Band:
     """The band of the first harmonic of the plant's channel ``c``."""
     predictive, measured = posterior.predictive, posterior.measured
     input_name = posterior.model.plant.inputs[0].name
@@ -281,7 +281,7 @@ def predictive_band(posterior: Posterior, c: int) -> Band:
     )
 
 
-def predictive_figure(posterior: Posterior, c: int) -> Figure:
+def predictive_figure(posterior: HarmonicPosterior, c: int) -> Figure:
     """Magnitude, phase and distance from the band of one channel."""
     band, shown = predictive_band(posterior, c), tuple(channel_labels(posterior.model).values())[c]
     curve = _curve(band)

@@ -23,11 +23,12 @@ def drive_figure(
     models: Sequence[tuple[str, NDArray[np.float64]]],
     noise: float,
     units: tuple[str, str],
+    band: str = "measurement noise",
 ) -> Figure:
     """Velocity, force, and force less that which each of the ``models`` needs, over ``time`` [s]; (m,) each.
 
-    The models are labels with their force, the best first. ``noise`` is the standard deviation of the force,
-    ``units`` are those of force and velocity.
+    The models are labels with their force, the best first. ``noise`` is half the width of the band about zero, which
+    is called ``band``; ``units`` are those of force and velocity.
     """
     shown = time <= time[0] + SHOWN_S
     # Lines are broken where rows are left out.
@@ -49,12 +50,12 @@ def drive_figure(
         middle.set_ylabel(f"force of the drive [{units[0]}]")
         below.set_ylabel(f"measured less\nneeded [{units[0]}]")
         below.set_xlabel("time since the first sample [s]")
-        _explain_lines(figure, middle)
+        _explain_lines(figure, middle, band)
         figure.align_ylabels()
         return figure
 
 
-def _explain_lines(figure: Figure, axes: Axes) -> None:
+def _explain_lines(figure: Figure, axes: Axes, band: str) -> None:
     lines, _ = axes.get_legend_handles_labels()
-    noise = Patch(color=PALE, label="measurement noise")
+    noise = Patch(color=PALE, label=band)
     figure.legend(handles=[*lines, noise], loc="outside upper center", ncols=5, columnspacing=1.2)

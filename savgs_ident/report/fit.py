@@ -212,7 +212,9 @@ def identified_table(fit: Identified) -> RenderableType:
 
 def _quality(fit: Fit) -> RenderableType:
     ratio = f" = {fit.chi2 / fit.dof:.3f}" if fit.dof > 0 else ""
-    return plain(f"chi2/dof = {fit.chi2:.1f}/{fit.dof}{ratio} on {_compared(fit)} ({fit.wall_s:.1f} s)")
+    return plain(
+        f"chi2/dof = {fit.chi2:.1f}/{fit.dof}{ratio} on {_compared(fit)} (computed in {fit.wall_s:.1f} s)"
+    )
 
 
 def _compared(fit: Fit) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.console import RenderableType
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from savgs_ident.diagnosis.result import Diagnosis
-    from savgs_ident.fit.along_motion import MotionFit
+    from savgs_ident.fit.along_motion import MotionComparison, MotionFit
     from savgs_ident.fit.identified import Identified
     from savgs_ident.fit.public import Comparison
     from savgs_ident.fit.result import Fit
-    from savgs_ident.inference.result import Posterior
+    from savgs_ident.inference.result import HarmonicPosterior, MotionPosterior, Posterior
     from savgs_ident.responses.summary import CampaignSummary
 
 
@@ -48,8 +48,15 @@ class _CampaignSummary(AbstractPresenter["CampaignSummary"]):
 
     def figures(self, result: "CampaignSummary") -> Figures:
         from savgs_ident.report.campaigns.inspect import campaign_figure
+        from savgs_ident.report.campaigns.motions import motions_figure, moving_tests
 
-        return {"inspect": lambda: campaign_figure(result)}
+        responses: Figures = {"inspect": lambda: campaign_figure(result)}
+        motions: Figures = {"motions": lambda: motions_figure(result.campaign)}
+        tests = moving_tests(result.campaign)
+        if tests and result.response is None and not result.sweeps:
+            return motions
+        # A sweep is drawn among the responses.
+        return {**responses, **motions} if any(each.kind != "sweep" for each in tests) else responses
 
 
 CAMPAIGN_SUMMARY = _CampaignSummary()
@@ -201,42 +208,70 @@ def _bode_figure(title: str, comparison: "Comparison", progress: Progress) -> "F
     return bode_figure(title, points, curves, residuals, tuple(labels.values()))
 
 
+class _MotionComparison(AbstractPresenter["MotionComparison"]):
+    stem = "bode"
+
+    def record(self, result: "MotionComparison") -> Mapping[str, Any]:
+        from savgs_ident.report.motion_fit import motion_comparison_record
+
+        return motion_comparison_record(result)
+
+    def text(self, result: "MotionComparison") -> RenderableType:
+        from savgs_ident.report.motion_fit import motion_comparison_text
+
+        return motion_comparison_text(result)
+
+    def doubts(self, result: "MotionComparison") -> tuple[str, ...]:
+        return () if result.trusted else (f"{result.status.advice}.",)
+
+    def figures(self, result: "MotionComparison") -> Figures:
+        from savgs_ident.report.motion_fit import compared_force_figure
+
+        return {"drive": lambda: compared_force_figure(result)}
+
+
 FIT = _Fit()
 MOTION_FIT = _MotionFit()
 COMPARISON = _Comparison()
+MOTION_COMPARISON = _MotionComparison()
 
 
-class _Posterior(AbstractPresenter["Posterior"]):
+AnyPosterior = TypeVar("AnyPosterior", bound="Posterior")
+
+
+class _AnyPosterior(AbstractPresenter[AnyPosterior]):
+    """A posterior, whatever the model was held against."""
+
     stem = "posterior"
     packages = ("jax", "emcee", "blackjax", "arviz-stats", "numpy", "scipy")
     """Whose version matters to a chain."""
 
-    def record(self, result: "Posterior") -> Mapping[str, Any]:
+    @abstractmethod
+    def predictions(self, result: AnyPosterior) -> Figures:
+        """What it predicts."""
+
+    def record(self, result: AnyPosterior) -> Mapping[str, Any]:
         from savgs_ident.report.posterior.record import posterior_record
 
         return posterior_record(result, result.origin.with_versions(self.packages))
 
-    def text(self, result: "Posterior") -> RenderableType:
+    def text(self, result: AnyPosterior) -> RenderableType:
         from savgs_ident.report.posterior.text import posterior_text
 
         return posterior_text(result)
 
-    def doubts(self, result: "Posterior") -> tuple[str, ...]:
+    def doubts(self, result: AnyPosterior) -> tuple[str, ...]:
         return () if result.trusted else (f"{'; '.join(result.reasons)}.",)
 
-    def page(self, result: "Posterior") -> str | None:
+    def page(self, result: AnyPosterior) -> str | None:
         from savgs_ident.report.posterior.page import posterior_html
 
         return posterior_html(result, result.origin.with_versions(self.packages))
 
-    def figures(self, result: "Posterior") -> Figures:
-        from savgs_ident.report.bode import predictive_figure
+    def figures(self, result: AnyPosterior) -> Figures:
         from savgs_ident.report.posterior.figures import corner_figure, profile_figure, trace_figure
-        from savgs_ident.report.spectra import predicted_spectrum_figure
 
         identified = result.of_role("identified")
-        dwells, windows = by_kind(result)
-        channels = [each.name for each in result.model.channels]
         return {
             "corner": lambda: corner_figure(result),
             **{f"trace {each.name}": partial(trace_figure, result, each) for each in identified},
@@ -245,6 +280,28 @@ class _Posterior(AbstractPresenter["Posterior"]):
                 for each in identified
                 if each.profile is not None
             },
+            **self.predictions(result),
+        }
+
+    def write(self, result: AnyPosterior, folder: Path, progress: Progress) -> Iterator[Path]:
+        from savgs_ident.inference.inference_data import write_inference_data
+
+        progress("writing")
+        yield write_inference_data(result, folder / "posterior.nc")
+        yield write_json(folder / "posterior.json", self.record(result))
+        page = self.page(result)
+        if page is not None:
+            yield write_bytes(folder / "posterior.html", page.encode())
+
+
+class _Posterior(_AnyPosterior["HarmonicPosterior"]):
+    def predictions(self, result: "HarmonicPosterior") -> Figures:
+        from savgs_ident.report.bode import predictive_figure
+        from savgs_ident.report.spectra import predicted_spectrum_figure
+
+        dwells, windows = by_kind(result)
+        channels = [each.name for each in result.model.channels]
+        return {
             **{
                 f"predicted {name}": partial(predictive_figure, dwells, c)
                 for c, name in enumerate(channels)
@@ -257,18 +314,16 @@ class _Posterior(AbstractPresenter["Posterior"]):
             },
         }
 
-    def write(self, result: "Posterior", folder: Path, progress: Progress) -> Iterator[Path]:
-        from savgs_ident.inference.result import write_inference_data
 
-        progress("writing")
-        yield write_inference_data(result, folder / "posterior.nc")
-        yield write_json(folder / "posterior.json", self.record(result))
-        page = self.page(result)
-        if page is not None:
-            yield write_bytes(folder / "posterior.html", page.encode())
+class _MotionPosterior(_AnyPosterior["MotionPosterior"]):
+    def predictions(self, result: "MotionPosterior") -> Figures:
+        from savgs_ident.report.posterior.predicted import predicted_force_figure
+
+        return {"predicted force": lambda: predicted_force_figure(result)}
 
 
 POSTERIOR = _Posterior()
+MOTION_POSTERIOR = _MotionPosterior()
 
 
 class _Diagnosis(AbstractPresenter["Diagnosis"]):
@@ -323,7 +378,7 @@ class _Diagnosis(AbstractPresenter["Diagnosis"]):
             }
             shrink = {**spectra, **shrink}
         if dwells is None:
-            return shrink
+            return {**shrink, **loops}
         return {
             **{f"gap {name}": partial(gap_map_figure, result, name) for name in names},
             "ports": partial(report_of(result.given).ports_figure, result),

@@ -97,9 +97,11 @@ _FILES = {
     "FIT": "present_campaign",
     "MOTION_FIT": "present_campaign",
     "COMPARISON": "present_campaign",
+    "MOTION_COMPARISON": "present_campaign",
     "SIMULATED_RESPONSE": "present_models",
     "SIMULATED_SWEEP": "present_models",
     "POSTERIOR": "present_campaign",
+    "MOTION_POSTERIOR": "present_campaign",
     "DIAGNOSIS": "present_campaign",
     "LINEAR_STUDY": "present_models",
     "DESIGN": "present_models",
@@ -123,6 +125,7 @@ _FIGURES = {
     "COMPARISON": "bode",
     "SIMULATED_RESPONSE": "simulate",
     "POSTERIOR": "predicted",
+    "MOTION_POSTERIOR": "predicted",
     "DIAGNOSIS": "bode",
 }
 """By presenter, the first word of the name of the figure that shows the response."""

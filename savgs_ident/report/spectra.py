@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.fit.public import Comparison
 from savgs_ident.fit.result import OverWindows, recorded_spectra, whitened
-from savgs_ident.inference.result import Posterior
+from savgs_ident.inference.result import HarmonicPosterior
 from savgs_ident.report.bode import LINES, PREDICTED, draw_residuals, share_legends
 from savgs_ident.report.text import channel_labels
 from savgs_ident.report.theme import BLUE, INK, ORANGE, magnitude_axis, new_figure, styled
@@ -55,7 +55,7 @@ def _draw_spectra(axes: Axes, compared: Comparison, c: int, name: str, scale: fl
 
 
 def predicted_spectrum(
-    posterior: Posterior, c: int
+    posterior: HarmonicPosterior, c: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Frequencies [Hz], (n,); what channel ``c`` read there, (n,); what 95 % of repetitions lie between, (2, n).
 
@@ -68,7 +68,7 @@ def predicted_spectrum(
     return over.frequency, over.rms(np.abs(recorded) ** 2), np.quantile(repeated, PREDICTED, axis=0)
 
 
-def predicted_spectrum_figure(posterior: Posterior, c: int) -> Figure:
+def predicted_spectrum_figure(posterior: HarmonicPosterior, c: int) -> Figure:
     """What a posterior predicts for one channel in windows: the spectrum, and how far off it the recorded one is."""
     shown = tuple(channel_labels(posterior.model).values())[c]
     frequency, recorded, ends = predicted_spectrum(posterior, c)

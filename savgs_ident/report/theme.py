@@ -26,6 +26,7 @@ BLUE = "#0b5ea8"
 ORANGE = "#d95f02"
 
 _TICKS = (0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 50.0)
+_FEW_TICKS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
 
 def styled() -> AbstractContextManager[None]:
@@ -64,7 +65,8 @@ def frequency_axis(axes: Axes, lowest: float, highest: float, labelled: bool = T
     axes.set_xscale("log")
     low, high = lowest / 1.06, highest * 1.06
     axes.set_xlim(low, high)
-    ticks = [tick for tick in _TICKS if low <= tick <= high]
+    offered = _TICKS if high < 30.0 * low else _FEW_TICKS
+    ticks = [tick for tick in offered if low <= tick <= high]
     # Tests that lie close together, or one alone, may have no round number among them.
     axes.xaxis.set_major_locator(FixedLocator(ticks if len(ticks) > 1 else [lowest, highest]))
     axes.xaxis.set_minor_locator(NullLocator())

@@ -56,7 +56,14 @@ def inspect(
             warnings.append(error.as_warning("no_usable_dwell"))
     else:
         what = "there is no harmonic dwell: a road, a sweep or a motion along its drive is compared instead"
-        warnings.append(DataWarning("no_dwell", what, campaign.source, remedy="name the tests dwell_<f>Hz"))
+        warnings.append(
+            DataWarning(
+                "no_dwell",
+                what,
+                campaign.source,
+                remedy="none needed, unless some are: name these dwell_<f>Hz",
+            )
+        )
     driven = campaign.layout.driven
     wanted = (driven, *(channels or campaign.layout.responses))
     sweeps = []

@@ -4,12 +4,14 @@ Under closed loop the position hides what a model lacks (:mod:`savgs_ident.respo
 coordinate and one input is taken so wherever its recordings have no harmonic dwell.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
 
 from savgs_ident.core.errors import InputError
+from savgs_ident.core.presentation import Origin
 from savgs_ident.core.values import as_values
 from savgs_ident.effects.base import Port, PortKind
 from savgs_ident.plants.base import AbstractPlant
@@ -116,6 +118,11 @@ def samples_of(motion: DrivenMotion) -> Samples:
         motion.begins,
     )
     return Samples(*(jnp.asarray(each) for each in signals))
+
+
+def origin_along(model: Model, motion: DrivenMotion, command: Sequence[str] = ()) -> Origin:
+    """Where results on a model along a measured motion come from."""
+    return replace(model.origin(warnings=motion.warnings), data=motion.source, command=tuple(command))
 
 
 def sized_along(model: Model, motion: DrivenMotion) -> Model:

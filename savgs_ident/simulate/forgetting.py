@@ -15,7 +15,6 @@ from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.selection import only_tests
 from savgs_ident.responses.windows import LEAD_S, estimate_whole_tests, estimate_windows
-from savgs_ident.simulate.driven_plant import is_held_against_drive
 from savgs_ident.simulate.excitation import Measurements, measured_excitation, response_of_tests
 from savgs_ident.simulate.periodic import PeriodicSolution, simulate_periodic
 
@@ -53,22 +52,7 @@ def forgetful_motion(
     progress: Progress = no_progress,
 ) -> tuple[HarmonicResponse, PeriodicSolution | None]:
     """The same, and the motion of the model in all tests, where all windows are compared; None for dwells alone."""
-    try:
-        return _forgetful(measured, model, orders, max_frequency, progress)
-    except InputError as error:
-        if isinstance(measured, Campaign) and is_held_against_drive(measured, model):
-            raise InputError(
-                "the recordings are of a motion along which the drive's force is compared; as windows of tests that "
-                f"a model is driven through they do not serve: {error.what}",
-                source=error.source or measured.source,
-                remedy="`fit` and `diagnose` serve them; for other commands record dwells",
-            ) from error
-        raise
 
-
-def _forgetful(
-    measured: Measurements, model: Model, orders: int, max_frequency: float | None, progress: Progress
-) -> tuple[HarmonicResponse, PeriodicSolution | None]:
     def in_windows(cut: Callable[..., HarmonicResponse] = estimate_windows) -> HarmonicResponse:
         return response_of_tests(measured, model.plant, orders, max_frequency, progress, cut)
 

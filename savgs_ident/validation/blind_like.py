@@ -28,11 +28,12 @@ from savgs_ident.core.files import prepare_folder
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.diagnosis.diagnose import diagnose_recalibrated
 from savgs_ident.diagnosis.model_selection import recalibrate
-from savgs_ident.diagnosis.public import AskedDwells, ask_dwells, problem_of_dwells
+from savgs_ident.diagnosis.public import Asked, ask
 from savgs_ident.effects.effect import Effect
 from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.plants.model import Model
 from savgs_ident.recordings.recording import Campaign
+from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.validation.blind import FILE, BlindStudy
 from savgs_ident.validation.blind_answer import Answer
@@ -40,7 +41,7 @@ from savgs_ident.validation.blind_draw import LARGEST, SMALLEST, Shares
 from savgs_ident.validation.blind_marks import failed, score_of
 from savgs_ident.validation.blind_score import Score, score_from
 from savgs_ident.validation.effect_size import draw_form, find_size
-from savgs_ident.validation.recalibrated import RecalibratedCampaign, campaigns_like
+from savgs_ident.validation.recalibrated import RecalibratedCampaign, campaigns_like, origin_of
 from savgs_ident.validation.trials import TrialFile, code_version, marks_of, once_a_process, run_trials
 
 LIKE_SHARES = (25.0, 60.0, 15.0, 0.0)
@@ -52,7 +53,7 @@ ATTEMPTS = 30
 
 def blind_like(
     model: Model,
-    campaign: Campaign,
+    campaign: Campaign | DrivenMotion,
     folder: str | Path,
     trials: int = 60,
     *,
@@ -70,7 +71,7 @@ def blind_like(
 
     Args:
         model: the baseline: it is to explain the campaign, with the effects that are known.
-        campaign: what the drawn ones are like, in tests, noise and parameters.
+        campaign: the recordings, or a measured motion; what the drawn ones are like, in tests, noise and parameters.
         folder: where marks are kept; a run that was stopped goes on from there.
         trials: how many campaigns are drawn.
         seed: of all that is drawn.
@@ -87,18 +88,18 @@ def blind_like(
     """
     use_persistent_cache()
     given = _shares_of(shares or LIKE_SHARES)
-    marks: dict[str, Any] = marks_of(model, campaign.source, channels)
+    marks: dict[str, Any] = marks_of(model, campaign, channels)
     marks |= {"orders": orders, "max_frequency": max_frequency, "seed": seed}
     marks |= {"shares": [given.none, given.effect, given.two, given.unknown]}
     file = TrialFile(prepare_folder(Path(folder)) / FILE, marks, resume=True)
     done = file.earlier(partial(score_from, catalogue=tuple(model.candidates)))
-    dwells = ask_dwells(model, campaign, orders, max_frequency, progress=progress)
-    asked = _Asked(dwells, given, seed)
-    asked.bench(progress)
+    asked = ask(model, campaign, orders, max_frequency, progress=progress)
+    tried = _Tried(asked, given, seed)
+    tried.bench(progress)
     found = run_trials(
-        partial(_trial, asked), trials, file, done, jobs=jobs, scheduler=scheduler, progress=progress
+        partial(_trial, tried), trials, file, done, jobs=jobs, scheduler=scheduler, progress=progress
     )
-    origin = model.origin(campaign, dwells.warnings).with_command(command)
+    origin = origin_of(model, asked, campaign).with_command(command)
     return BlindStudy(tuple(found), marks, origin=origin)
 
 
@@ -129,20 +130,20 @@ class LikeBench:
 
     Attributes:
         campaign: the campaign.
-        dwells: what was asked.
+        asked: what is asked about it.
         shares: how often nothing is missing, one effect, or two.
         seed: of all that is drawn.
     """
 
     campaign: RecalibratedCampaign
-    dwells: AskedDwells
+    asked: Asked
     shares: Shares
     seed: int
 
     @property
     def catalogue(self) -> Mapping[str, Effect]:
         """The effects that may be missing."""
-        known = self.dwells.settings.baseline
+        known = self.asked.settings.baseline
         return {n: each for n, each in self.campaign.problem.plant.catalogue.items() if n not in known}
 
     def trial(self, number: int) -> Score:
@@ -154,7 +155,7 @@ class LikeBench:
             if problem is None:
                 found: Mapping[str, Any] = failed("the recalibrated model has no motion")
             else:
-                of = self.dwells
+                of = self.asked
                 found = json.loads(diagnose_recalibrated(problem, of.given, of.settings, of.values).to_json())
         return score_of(answer, found, code_version(), catalogue=self.campaign.problem.plant.catalogue)
 
@@ -207,7 +208,7 @@ class LikeBench:
 
     def _change(self, moved: NDArray[np.float64], bare: NDArray[np.float64]) -> float:
         """By how much the response changes, relative: the largest over the channels of all tests."""
-        level = np.unique(self.campaign.level, return_inverse=True)[1]
+        level = np.unique(self.campaign.levels.level, return_inverse=True)[1]
         size = np.sqrt(np.bincount(level, bare**2))
         return float(np.max(np.sqrt(np.bincount(level, moved**2)) / np.maximum(size, np.finfo(float).tiny)))
 
@@ -266,36 +267,36 @@ class LikeBench:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Tried:
     """What trials follow from; ``key`` is the same in all processes."""
 
-    dwells: AskedDwells
+    asked: Asked
     shares: Shares
     seed: int
     key: str = field(default_factory=lambda: uuid4().hex)
 
     def bench(self, progress: Progress = no_progress) -> LikeBench:
         """What they are drawn from."""
-        return once_a_process(self.key, lambda: like_bench(self.dwells, self.shares, self.seed, progress))
+        return once_a_process(self.key, lambda: like_bench(self.asked, self.shares, self.seed, progress))
 
 
-def like_bench(dwells: AskedDwells, shares: Shares, seed: int, progress: Progress) -> LikeBench:
-    """The baseline recalibrated on a measured response.
+def like_bench(asked: Asked, shares: Shares, seed: int, progress: Progress) -> LikeBench:
+    """The baseline recalibrated on what was ``asked`` about.
 
-    Raises :class:`InputError` as :func:`savgs_ident.diagnosis.public.problem_of_dwells` does, and for a baseline that
-    does not explain the response: what is missing in it would be missing in every trial.
+    Raises :class:`InputError` as :func:`savgs_ident.diagnosis.public.diagnose` does, and for a baseline that does not
+    explain it: what is missing in it would be missing in every trial.
     """
     with threadpool_limits(1, "blas"):
-        plant, data = problem_of_dwells(dwells.response, dwells.given, dwells.settings)
-        problem = recalibrate(plant, data, dwells.values, progress, dwells.settings.constants)
+        plant, data = asked.problem()
+        problem = recalibrate(plant, data, asked.values, progress, asked.settings.constants)
     misses = problem.base.noise_scales.discrepancy
     if misses > BACKGROUND.largest_error:
         raise InputError(
             f"the model does not explain the campaign: for that it would have to err by {100.0 * misses:.2g} %",
             remedy="find what is missing with `diagnose`, and give the model.toml that `fit --with EFFECT` writes",
         )
-    return LikeBench(campaigns_like(dwells.response, problem), dwells, shares, seed)
+    return LikeBench(campaigns_like(asked, problem), asked, shares, seed)
 
 
-def _trial(asked: _Asked, number: int) -> Score:
-    return asked.bench().trial(number)
+def _trial(tried: _Tried, number: int) -> Score:
+    return tried.bench().trial(number)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, cast
 from uuid import uuid4
 
 import equinox as eqx
@@ -28,7 +28,9 @@ from savgs_ident.core.parameter import Parameter, ParameterTable
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.fit.sampling import question_about
 from savgs_ident.inference.diagnostics import least_ess, mixing_of, names_by_role
-from savgs_ident.inference.likelihood import likelihood_of, values_of
+from savgs_ident.inference.harmonic_model import SampledHarmonics
+from savgs_ident.inference.harmonic_question import Question, plan
+from savgs_ident.inference.likelihood import Likelihood, likelihood_of, values_of
 from savgs_ident.inference.posterior_mode import (
     Expansion,
     PosteriorDensity,
@@ -40,7 +42,7 @@ from savgs_ident.inference.posterior_mode import (
 from savgs_ident.inference.prior import Prior
 from savgs_ident.inference.problem import Task, harmonic_target
 from savgs_ident.inference.result import Sampler
-from savgs_ident.inference.sample import SAMPLERS, Question, plan
+from savgs_ident.inference.sample import SAMPLERS
 from savgs_ident.inference.samplers.chains import SamplingSettings, new_checkpoint
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.recordings.recording import Campaign
@@ -115,7 +117,7 @@ class Calibrator(eqx.Module):
     def _simulate(
         self, truth: Float[np.ndarray, " n+2"], random: np.random.Generator
     ) -> Float[np.ndarray, " m"] | None:
-        problem, likelihood = self.case.problem, self.case.likelihood
+        problem, likelihood = self.task.problem, cast(Likelihood, self.case.likelihood)
         p = problem.parameters(jnp.asarray(truth[:-2]))
         layout = self.middle.mesh.layout
         solution = simulate_periodic(problem.model, p, self.task.excitation, self.settings.periodic, layout)
@@ -157,11 +159,13 @@ def calibrator(question: Question, settings: SamplingSettings) -> Calibrator:
     task = plan(narrow, settings)
     problem = task.problem
     likelihood = likelihood_of(harmonic_target(question.measured, known.channels, settings.orders))
-    plain = PosteriorDensity(problem, likelihood, Prior(problem.free))
+    plain = PosteriorDensity(
+        SampledHarmonics(problem, question.measured.times), likelihood, Prior(problem.free)
+    )
     u = jnp.zeros(len(problem.free.names))
     middle = simulate_periodic(problem.model, problem.parameters(u), task.excitation, settings.periodic)
     at = linearisation_point(plain, u, middle)
-    case, _ = with_background(plain, at, question.measured.times, question.free)
+    case, _ = with_background(plain, at, question.free)
     return Calibrator(task, case, settings, middle, question.free)
 
 

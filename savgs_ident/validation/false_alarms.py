@@ -21,16 +21,14 @@ from savgs_ident.core.files import prepare_folder, record_of
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.diagnosis.conclusion import conclude, leave_tests_out
 from savgs_ident.diagnosis.diagnose import fit_hypotheses
-from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem, FittedHypotheses
 from savgs_ident.diagnosis.model_selection import decide_among, recalibrate
-from savgs_ident.diagnosis.public import AskedDwells, ask_dwells, problem_of_dwells
-from savgs_ident.diagnosis.result import DiagnosisSettings
+from savgs_ident.diagnosis.public import Asked, ask
 from savgs_ident.diagnosis.verdict import alarm_odds
 from savgs_ident.plants.model import Model
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.simulate.program_cache import use_persistent_cache
-from savgs_ident.validation.recalibrated import RecalibratedCampaign, campaigns_like
+from savgs_ident.validation.recalibrated import RecalibratedCampaign, campaigns_like, origin_of
 from savgs_ident.validation.trials import TrialFile, marks_of, once_a_process, run_trials
 
 CONFIDENCE = 0.95
@@ -83,36 +81,24 @@ class AlarmBench:
             problem = None if rows is None else self.campaign.recorded(rows, random)
             if problem is None:
                 return NullDraw(number, None, False, ())
-            evidence = _concluded(*fit_hypotheses(problem, no_progress))
-        odds, alarm = max(alarm_odds(evidence.weighed), LEAST_ODDS), evidence.kind != "none"
-        named = evidence.chosen.hypothesis.effects or (evidence.kind,) * alarm
-        return NullDraw(number, odds, alarm, named)
+            problem, fitted = fit_hypotheses(problem, no_progress)
+            selected = decide_among(problem, fitted)
+            said = conclude(leave_tests_out(problem, selected, {}, no_progress, None), {}, None).evidence
+        named = said.chosen.hypothesis.effects or (said.kind,) * (said.kind != "none")
+        return NullDraw(number, max(alarm_odds(selected.weighed), LEAST_ODDS), said.kind != "none", named)
 
 
-def _concluded(problem: DiagnosisProblem, fitted: FittedHypotheses) -> DiagnosisEvidence:
-    """What a diagnosis says, with tests left out."""
-    selected = decide_among(problem, fitted)
-    return conclude(leave_tests_out(problem, selected, {}, no_progress, None), {}, None).evidence
+def alarm_bench(asked: Asked, seed: int, progress: Progress) -> AlarmBench:
+    """Recalibrate the baseline on what was ``asked`` about, and weigh hypotheses against it.
 
-
-def alarm_bench(
-    measured: HarmonicResponse,
-    given: Model,
-    settings: DiagnosisSettings,
-    values: Mapping[str, float],
-    seed: int,
-    progress: Progress,
-) -> AlarmBench:
-    """Recalibrate the baseline on a measured response, and weigh hypotheses against it.
-
-    Raises :class:`InputError` as :func:`savgs_ident.diagnosis.public.problem_of_dwells` does. ``values`` are in SI.
+    Raises :class:`InputError` as :func:`savgs_ident.diagnosis.public.diagnose` does.
     """
     with threadpool_limits(1, "blas"):
-        plant, data = problem_of_dwells(measured, given, settings)
-        problem = recalibrate(plant, data, values, progress, settings.constants)
+        plant, data = asked.problem()
+        problem = recalibrate(plant, data, asked.values, progress, asked.settings.constants)
         problem, fitted = fit_hypotheses(problem, progress)
         odds = max(alarm_odds(decide_among(problem, fitted).weighed), LEAST_ODDS)
-    return AlarmBench(campaigns_like(measured, problem), odds, seed)
+    return AlarmBench(campaigns_like(asked, problem), odds, seed)
 
 
 MOST = 0.02
@@ -151,7 +137,7 @@ class AlarmStudy(Result):
 
 def false_alarms(
     model: Model,
-    campaign: Campaign,
+    campaign: Campaign | DrivenMotion,
     draws: int = 100,
     *,
     orders: int = 9,
@@ -172,7 +158,7 @@ def false_alarms(
 
     Args:
         model: the baseline.
-        campaign: what the drawn ones are like.
+        campaign: the recordings, or a measured motion; what the drawn ones are like.
         draws: how many are drawn.
         orders: highest harmonic order to compare.
         max_frequency: leave out faster dwells [Hz].
@@ -190,37 +176,35 @@ def false_alarms(
     use_persistent_cache()
     file = None
     if folder is not None:
-        marks = marks_of(model, campaign.source, channels)
+        marks = marks_of(model, campaign, channels)
         marks |= {"max_frequency": max_frequency, "orders": orders, "seed": seed}
         file = TrialFile(prepare_folder(Path(folder)) / FILE, marks, resume)
     done = [] if file is None else file.earlier(read_draw)
-    dwells = ask_dwells(model, campaign, orders, max_frequency, progress=progress)
-    asked = _Asked(dwells, seed)
-    bench = asked.bench(progress)
+    asked = ask(model, campaign, orders, max_frequency, progress=progress)
+    drawn = _Drawn(asked, seed)
+    bench = drawn.bench(progress)
     found = run_trials(
-        partial(_draw, asked), draws, file, done, jobs=jobs, scheduler=scheduler, progress=progress
+        partial(_draw, drawn), draws, file, done, jobs=jobs, scheduler=scheduler, progress=progress
     )
-    origin = model.origin(campaign, dwells.warnings).with_command(command)
+    origin = origin_of(model, asked, campaign).with_command(command)
     return AlarmStudy(tuple(found), bench.odds, origin=origin)
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Drawn:
     """What draws follow from; ``key`` is the same in all processes."""
 
-    dwells: AskedDwells
+    asked: Asked
     seed: int
     key: str = field(default_factory=lambda: uuid4().hex)
 
     def bench(self, progress: Progress = no_progress) -> AlarmBench:
         """What they are drawn from."""
-        of = self.dwells
-        given = (of.response, of.given, of.settings, of.values, self.seed)
-        return once_a_process(self.key, lambda: alarm_bench(*given, progress))
+        return once_a_process(self.key, lambda: alarm_bench(self.asked, self.seed, progress))
 
 
-def _draw(asked: _Asked, number: int) -> NullDraw:
-    return asked.bench().draw(number)
+def _draw(drawn: _Drawn, number: int) -> NullDraw:
+    return drawn.bench().draw(number)
 
 
 def read_draw(fields: Mapping[str, object]) -> NullDraw:

@@ -11,11 +11,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.presentation import Origin
 from savgs_ident.diagnosis.evidence import DiagnosisProblem
+from savgs_ident.diagnosis.public import Asked, AskedMotion, NoiseLevels
+from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.inference.find_map import find_map, refine
 from savgs_ident.inference.laplace_fit import search_of
 from savgs_ident.inference.prior import bounds_of, values_at
-from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.plants.model import Model
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.responses.driven_motion import DrivenMotion
+from savgs_ident.simulate.driven_plant import origin_along
 
 
 @dataclass(frozen=True)
@@ -24,13 +30,11 @@ class RecalibratedCampaign:
 
     Attributes:
         problem: the campaign, its baseline recalibrated.
-        dof: degrees of freedom of the noise level behind each row, (m,); infinite where it is known.
-        level: which level that is, a channel of a test, (m,).
+        levels: of the noise of its rows.
     """
 
     problem: DiagnosisProblem
-    dof: NDArray[np.float64]
-    level: NDArray[np.intp]
+    levels: NoiseLevels
 
     def truth(self, random: np.random.Generator) -> dict[str, float]:
         """Parameters [SI] that the recorded campaign leaves possible."""
@@ -51,7 +55,9 @@ class RecalibratedCampaign:
     def recorded(self, rows: NDArray[np.float64], random: np.random.Generator) -> DiagnosisProblem | None:
         """A campaign that shows ``rows``, with errors, its baseline recalibrated; None where that has no motion."""
         known, scales = self.problem, self.problem.base.noise_scales
-        measured = rows + known.data.draw_errors(scales.noise, scales.discrepancy, random)
+        # Where something is missing, no more than what every model errs by; where rows share no errors, noise alone.
+        errs = 0.0 if known.data.shared is None else min(scales.discrepancy, BACKGROUND.largest_error)
+        measured = rows + known.data.draw_errors(scales.noise, errs, random)
         data = replace(known.data, measured=measured, variance=self._estimated_variance(random))
         search = search_of(known.plant, data)
         base = find_map(search, (), known.base.values, known.base.prediction.warm_start)
@@ -63,24 +69,20 @@ class RecalibratedCampaign:
 
     def _estimated_variance(self, random: np.random.Generator) -> NDArray[np.float64]:
         """The variances (m,) as a record of the same length would show them."""
-        _, first, level = np.unique(self.level, return_index=True, return_inverse=True)
-        dof = self.dof[first]
+        _, first, level = np.unique(self.levels.level, return_index=True, return_inverse=True)
+        dof = self.levels.dof[first]
         known = np.isinf(dof)
         shown = np.where(known, 1.0, random.chisquare(np.where(known, 1.0, dof)) / np.where(known, 1.0, dof))
         return np.asarray(self.problem.data.variance * shown[level])
 
 
-def campaigns_like(measured: HarmonicResponse, problem: DiagnosisProblem) -> RecalibratedCampaign:
-    """Campaigns like a measured response, of a ``problem`` whose baseline is recalibrated on it."""
-    level = problem.data.test * len(problem.plant.channels) + problem.plant.channel
-    return RecalibratedCampaign(problem, _degrees_of_freedom(measured, problem), level)
+def origin_of(model: Model, asked: Asked, campaign: Campaign | DrivenMotion) -> Origin:
+    """Where results on campaigns like one come from."""
+    if isinstance(asked, AskedMotion):
+        return origin_along(model, asked.motion)
+    return model.origin(campaign if isinstance(campaign, Campaign) else None, asked.warnings)
 
 
-def _degrees_of_freedom(measured: HarmonicResponse, problem: DiagnosisProblem) -> NDArray[np.float64]:
-    """Of the noise level behind each row, (m,)."""
-    if measured.covariance_dof is None:
-        return np.full(problem.data.measured.size, np.inf)
-    channels = enumerate(problem.plant.channels)
-    first = {c: measured.channel(name) for c, name in channels if name in measured.channels}
-    places = np.array([first[channel] for channel in problem.plant.channel])
-    return np.asarray(measured.covariance_dof[problem.data.test, places, 1])
+def campaigns_like(asked: Asked, problem: DiagnosisProblem) -> RecalibratedCampaign:
+    """Campaigns like what was ``asked`` about, of a ``problem`` whose baseline is recalibrated on it."""
+    return RecalibratedCampaign(problem, asked.noise_levels(problem))

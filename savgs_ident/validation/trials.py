@@ -15,6 +15,8 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
+
 from savgs_ident import __version__
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.executor import Lost, cores, run_tasks
@@ -22,6 +24,8 @@ from savgs_ident.core.files import write_bytes
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.plants.model import Model
 from savgs_ident.recordings.read import campaign_files, digest_files, map_digest
+from savgs_ident.recordings.recording import Campaign
+from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.simulate.program_cache import make_room_for_programs, use_persistent_cache
 
 if TYPE_CHECKING:
@@ -43,19 +47,25 @@ _STATES = {
 """Marks of what is read, in words."""
 
 
-def marks_of(model: Model, campaign: str | Path, channels: str | Path | None) -> dict[str, object]:
-    """What marks trials on a model and a campaign, with the map of its channels.
+def marks_of(
+    model: Model, campaign: Campaign | DrivenMotion | str | Path, channels: str | Path | None
+) -> dict[str, object]:
+    """What marks trials on a model and a campaign, with the map of its channels, or on a measured motion.
 
     Raises :class:`InputError` where they cannot be read.
     """
-    return {
+    marks: dict[str, object] = {
         "rig": model.source,
         "rig_sha256": model.sha256,
         "effects": list(model.effects),
-        "campaign": str(campaign),
         "channels": str(channels),
-        **campaign_marks(Path(campaign), None if channels is None else Path(channels)),
     }
+    if isinstance(campaign, DrivenMotion):
+        measured = np.concatenate([campaign.position, campaign.drive]).tobytes()
+        return marks | {"campaign": campaign.source, "campaign_sha256": hashlib.sha256(measured).hexdigest()}
+    path = campaign.source if isinstance(campaign, Campaign) else campaign
+    read = campaign_marks(Path(path), None if channels is None else Path(channels))
+    return marks | {"campaign": str(path), **read}
 
 
 def rig_marks(content: bytes) -> dict[str, object]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from savgs_ident.core.presentation import Origin
-from savgs_ident.inference.result import Posterior
+from savgs_ident.inference.result import HarmonicPosterior
 from savgs_ident.report.posterior.page import posterior_html
 
 from ..report.posterior_synthetic import nominal_response, renamed, synthetic_posterior, unconverged
@@ -105,12 +105,12 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="session")
-def posterior(nominal_campaign: Path) -> Posterior:
+def posterior(nominal_campaign: Path) -> HarmonicPosterior:
     return synthetic_posterior(nominal_response(nominal_campaign), length=500)
 
 
 @pytest.fixture(scope="session")
-def page(posterior: Posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def page(posterior: HarmonicPosterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The report of a posterior that converged."""
     command = ("savgs-ident", "posterior", "model.toml", "campaign.csv.gz")
     origin = Origin(command, "campaign.csv.gz", "ab" * 32, "model.toml", {"savgs-ident": "0.1.0"})
@@ -118,7 +118,7 @@ def page(posterior: Posterior, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 
 @pytest.fixture(scope="session")
-def hostile_page(posterior: Posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def hostile_page(posterior: HarmonicPosterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The report of one that did not, from data where every name is an attack."""
     named = renamed(replace(posterior, sentences=(HOSTILE,)), f"k{HOSTILE}", HOSTILE, HOSTILE)
     failed = unconverged(

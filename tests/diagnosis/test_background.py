@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import no_progress
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence
 from savgs_ident.diagnosis.model_selection import compare_models, decide_among, recalibrate
@@ -64,6 +65,13 @@ def test_an_input_errs_in_each_test_by_itself_and_what_is_identified_drifts() ->
     np.testing.assert_allclose(
         there.tolerated[:, 0], DEFAULTS.drift_tolerance * ((recorded - 3.0) / 2.0)[data.test]
     )
+
+
+def test_errors_that_are_no_numbers_are_refused() -> None:
+    data, nothing = _data(), np.zeros((200, 0))
+    drifts = np.full((200, 1), np.nan)
+    with pytest.raises(InputError, match="is no number"):
+        with_background(data, np.zeros(200, int), [], nothing, nothing, drifts, np.arange(5.0))
 
 
 def test_the_pieces_of_a_curve_are_the_curve() -> None:

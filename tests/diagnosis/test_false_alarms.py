@@ -3,6 +3,7 @@
 import pytest
 from scipy.stats import binom
 
+from savgs_ident.diagnosis.public import AskedDwells
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
@@ -32,10 +33,13 @@ def test_campaigns_with_nothing_missing_give_no_alarm_and_one_with_a_gap_does(
     measure_few: Measure, rig: Rig
 ) -> None:
     model = RigModel(rig, COARSE.baseline)
-    bench = alarm_bench(measure_few("nominal"), model, COARSE, {}, 3, _silent)
+    nominal, lacking = (
+        AskedDwells(measure_few(name), model, COARSE, {}, ()) for name in ("nominal", "stribeck_rail")
+    )
+    bench = alarm_bench(nominal, 3, _silent)
     draws = [bench.draw(number) for number in range(2)]
     assert not any(each.alarm for each in draws)
     assert all(each.odds is not None and each.odds < DEFAULTS.alarm_log_odds for each in draws)
     assert draws[1] != draws[0]
-    with_a_gap = alarm_bench(measure_few("stribeck_rail"), model, COARSE, {}, 3, _silent)
+    with_a_gap = alarm_bench(lacking, 3, _silent)
     assert with_a_gap.odds > 10.0 * DEFAULTS.alarm_log_odds

@@ -140,16 +140,6 @@ def test_motions_of_several_days_are_campaigns(tmp_path: Path, monkeypatch: pyte
     assert not mass.rises_or_falls
 
 
-def test_other_commands_say_who_serves_a_measured_motion(tmp_path: Path) -> None:
-    _written(tmp_path / "run.csv", recorded_axis({"coulomb": 12.0}, 3))
-    model = axis_with("guide_preload")
-    campaign = si.load_campaign(tmp_path / "run.csv", layout=model.layout)
-    assert isinstance(si.fit(model, campaign), MotionFit)
-    for command in (si.compare, si.sample):
-        with pytest.raises(si.InputError, match="`fit` and `diagnose` serve them"):
-            command(model, campaign)
-
-
 def test_options_that_mean_nothing_along_a_motion_are_refused() -> None:
     with pytest.raises(si.InputError, match="neither peak-to-peak"):
         si.fit(axis_with(), _motion(), max_frequency=3.0)
@@ -171,3 +161,50 @@ def test_a_published_axis_has_its_published_parameters() -> None:
     assert fit.held_out is not None
     assert fit.gap[1] < 0.0408
     assert fit.held_out.identified < 0.0598
+
+
+def test_a_model_is_held_against_another_motion_as_a_fit_holds_it_against_one_left_out() -> None:
+    other = _needed(TRUTH, 4)
+    fit = _fit(_needed(TRUTH, 3), *TEXTBOOK, held_out=other)
+    compared = si.compare(fit.model, other)
+    assert isinstance(compared, si.MotionComparison)
+    assert fit.held_out is not None
+    gap = compared.to_dict()["gap"]["force"]
+    assert gap["model"] == pytest.approx(fit.held_out.identified, rel=1e-9)
+    # Without its friction and its offset the plant needs less.
+    assert gap["without_effects"] > 10.0 * gap["model"]
+
+
+def test_a_posterior_agrees_with_the_fit_and_predicts_what_was_recorded() -> None:
+    fit = _fit(_needed(TRUTH, 3), *TEXTBOOK)
+    post = si.sample(fit, target_ess=400.0, patience=0.0)
+    assert isinstance(post, si.Posterior)
+    assert post.trusted, post.doubts
+    for name, value in TRUTH.items():
+        assert abs(post[name].median - value) < 4.0 * post[name].sd
+        # By the curvature of the density in one, by draws of the density in the other.
+        assert post[name].sd == pytest.approx(fit[name].stderr, rel=0.25)
+    inside, rows = post.count_inside
+    assert abs(inside / rows - 0.95) < 4.0 * np.sqrt(0.05 * 0.95 / rows)
+    tree = post.to_arviz()
+    assert tree["observed_data"]["force"].shape == (rows,)
+    assert tree["posterior_predictive"]["force"].attrs["unit"] == "N"
+
+
+@pytest.mark.slow
+def test_campaigns_along_the_same_motion_give_no_alarm_where_nothing_is_missing(tmp_path: Path) -> None:
+    fit = _fit(_needed(TRUTH, 3), *TEXTBOOK)
+    study = si.false_alarms(fit.model, fit.motion, 3, folder=tmp_path, jobs=1)
+    assert len(study.solved) == 3
+    assert study.alarms == 0
+    assert max(study.solved) < 0.0
+
+
+@pytest.mark.slow
+def test_what_is_missing_in_campaigns_along_the_same_motion_is_found(tmp_path: Path) -> None:
+    fit = _fit(_needed(TRUTH, 3), *TEXTBOOK)
+    study = si.blind_like(fit.model, fit.motion, tmp_path, 4, seed=2, shares=(0.0, 100.0, 0.0, 0.0), jobs=1)
+    # What calibration does as well as the effect has no mark.
+    marked = [each.located_right for each in study.scores if each.located_right is not None]
+    assert len(marked) >= 2
+    assert all(marked)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from savgs_ident.core.errors import InputError
-from savgs_ident.inference.result import far_from_draws, read_draws
+from savgs_ident.inference.draws import far_from_draws, read_draws
 
 CHAINS = np.arange(12.0).reshape(3, 4)
 

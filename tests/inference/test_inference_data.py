@@ -8,9 +8,10 @@ import xarray as xr
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.inference.diagnostics import assess_convergence, mixing_of
+from savgs_ident.inference.harmonic_question import predict
+from savgs_ident.inference.inference_data import inference_data, write_inference_data
 from savgs_ident.inference.likelihood import values_of
-from savgs_ident.inference.result import Marginal, Posterior, inference_data, write_inference_data
-from savgs_ident.inference.sample import predict
+from savgs_ident.inference.result import HarmonicPosterior, Marginal
 from savgs_ident.inference.samplers.chains import Chains
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig
@@ -21,7 +22,7 @@ DWELLS, DRAWS = 3, 40
 
 
 @pytest.fixture(scope="module")
-def posterior(rig: Rig) -> Posterior:
+def posterior(rig: Rig) -> HarmonicPosterior:
     toy = straight_toy(dwells=DWELLS)
     random = np.random.default_rng(1)
     points = 0.1 * random.standard_normal((DRAWS, 4, 5))
@@ -37,7 +38,7 @@ def posterior(rig: Rig) -> Posterior:
         )
         for name in values
     )  # fmt: skip
-    return Posterior(
+    return HarmonicPosterior(
         model=RigModel(rig),
         sampler="nuts",
         marginals=marginals,
@@ -51,7 +52,7 @@ def posterior(rig: Rig) -> Posterior:
     )
 
 
-def test_groups_dimensions_and_units(posterior: Posterior) -> None:
+def test_groups_dimensions_and_units(posterior: HarmonicPosterior) -> None:
     tree = inference_data(posterior)
     assert set(tree.children) == {"posterior", "posterior_predictive", "sample_stats", "observed_data"}
     for name, draws in posterior.draws.items():
@@ -70,7 +71,7 @@ def test_groups_dimensions_and_units(posterior: Posterior) -> None:
     assert observed.coords["frequency"].attrs["unit"] == "Hz"
 
 
-def test_complex_parts_are_those_of_the_harmonics(posterior: Posterior) -> None:
+def test_complex_parts_are_those_of_the_harmonics(posterior: HarmonicPosterior) -> None:
     tree = inference_data(posterior)
     predictive, used = posterior.predictive, posterior.predictive.used
     group = tree["posterior_predictive"]
@@ -86,7 +87,7 @@ def test_complex_parts_are_those_of_the_harmonics(posterior: Posterior) -> None:
     assert np.isnan(seen[~used]).all()
 
 
-def test_the_file_is_read_back_as_it_was(posterior: Posterior, tmp_path: Path) -> None:
+def test_the_file_is_read_back_as_it_was(posterior: HarmonicPosterior, tmp_path: Path) -> None:
     path = write_inference_data(posterior, tmp_path / "posterior.nc")
     assert list(tmp_path.iterdir()) == [path]
     with xr.open_datatree(path, engine="h5netcdf") as read:
@@ -99,6 +100,6 @@ def test_the_file_is_read_back_as_it_was(posterior: Posterior, tmp_path: Path) -
         assert read.attrs["sampler"] == "nuts"
 
 
-def test_a_place_that_cannot_be_written_is_said(posterior: Posterior, tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_said(posterior: HarmonicPosterior, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"):
         write_inference_data(posterior, tmp_path / "no such folder" / "posterior.nc")

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from savgs_ident.inference.harmonic_question import Question, density_of, locate, plan
 from savgs_ident.inference.posterior_mode import Expansion, PosteriorDensity, PosteriorMode, expand, find_mode
-from savgs_ident.inference.sample import Question, density_of, locate, plan
 from savgs_ident.inference.samplers.chains import SamplingSettings
 from savgs_ident.plants.quarter_car.catalogue import MODELS
 from savgs_ident.plants.quarter_car.model import FREE, RigModel
@@ -117,7 +117,7 @@ def test_a_model_that_misses_is_found_to_miss_by_as_much(
         lambda each: each.measured, likelihood, likelihood.measured + jnp.asarray(miss * errors)
     )
     u = jnp.asarray(mode.linearisation_point.point[:-2])
-    found = find_mode(posterior._replace(likelihood=off), u, mode.linearisation_point.solution, silent)
+    found = find_mode(posterior._replace(likelihood=off), u, mode.linearisation_point.warm_start, silent)
     assert found.status.ok
     assert float(likelihood.scales.miss(jnp.asarray(found.linearisation_point.point))) == pytest.approx(
         miss, rel=0.3

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from savgs_ident.inference.sample import predict
+from savgs_ident.inference.harmonic_question import predict
 from savgs_ident.inference.samplers.chains import Chains
 
 from .toy import Toy, straight_toy

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.free_vector import FreeVector
 from savgs_ident.core.parameter import Parameter, ParameterTable
+from savgs_ident.inference.harmonic_model import Responses
 from savgs_ident.inference.likelihood import Likelihood, likelihood_of
-from savgs_ident.inference.near_mode import Responses
 from savgs_ident.inference.prior import Scales
 from savgs_ident.inference.problem import HarmonicTarget, harmonic_target
 from savgs_ident.plants.quarter_car.plant import QuarterCar

@@ -11,7 +11,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from savgs_ident.inference.result import Convergence, Marginal, Posterior, Predictive, ProfileLine, Role
+from savgs_ident.inference.result import (
+    Convergence,
+    HarmonicPosterior,
+    Marginal,
+    Predictive,
+    ProfileLine,
+    Role,
+)
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import Rig, default_rig_path, read_rig
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
@@ -47,7 +54,7 @@ def nominal_response(campaign: Path) -> HarmonicResponse:
 
 def synthetic_posterior(
     measured: HarmonicResponse, chains: int = 4, length: int = 1500, seed: int = 20170912
-) -> Posterior:
+) -> HarmonicPosterior:
     """A converged posterior of the paper's four parameters, two nuisance scales and the rig's tolerances."""
     rng = np.random.default_rng(seed)
     rig = read_rig(default_rig_path())
@@ -71,7 +78,7 @@ def synthetic_posterior(
             for each in tolerated
         ),
     ]  # fmt: skip
-    return Posterior(
+    return HarmonicPosterior(
         model=RigModel(rig, ("rail_coulomb", "tyre_friction")),
         sampler="nuts",
         marginals=tuple(marginals),
@@ -100,7 +107,7 @@ def synthetic_posterior(
     )
 
 
-def unconverged(posterior: Posterior, *reasons: str) -> Posterior:
+def unconverged(posterior: HarmonicPosterior, *reasons: str) -> HarmonicPosterior:
     """The same, not converged for these reasons, with one chain that stayed away from the others."""
     draws = {name: values.copy() for name, values in posterior.draws.items()}
     first = posterior.marginals[0]
@@ -112,7 +119,7 @@ def unconverged(posterior: Posterior, *reasons: str) -> Posterior:
     return replace(posterior, draws=draws, marginals=marginals, convergence=convergence)
 
 
-def renamed(posterior: Posterior, name: str, about: str, unit: str) -> Posterior:
+def renamed(posterior: HarmonicPosterior, name: str, about: str, unit: str) -> HarmonicPosterior:
     """The same, with its first parameter called otherwise."""
     first, *others = posterior.marginals
     draws = {name if key == first.name else key: values for key, values in posterior.draws.items()}

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import norm
 
-from savgs_ident.inference.result import Posterior
+from savgs_ident.inference.result import HarmonicPosterior
 from savgs_ident.report.bode import predictive_band, predictive_figure
 from savgs_ident.report.html import embed
 from savgs_ident.report.posterior.figures import (
@@ -35,7 +35,7 @@ from .posterior_synthetic import (
 
 
 @pytest.fixture(scope="module")
-def posterior(nominal_campaign: Path) -> Posterior:
+def posterior(nominal_campaign: Path) -> HarmonicPosterior:
     return synthetic_posterior(nominal_response(nominal_campaign))
 
 
@@ -87,7 +87,7 @@ def test_a_chain_that_strays_is_seen_even_if_the_draws_are_worth_next_to_nothing
     assert np.argmax(np.abs(surplus).max(axis=1)) == 2
 
 
-def test_outer_axes_of_the_corner_plot_have_names_and_units(posterior: Posterior) -> None:
+def test_outer_axes_of_the_corner_plot_have_names_and_units(posterior: HarmonicPosterior) -> None:
     figure = corner_figure(posterior)
     assert len(figure.axes) == 10
     below = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel()]
@@ -111,7 +111,7 @@ def test_a_trace_shows_some_chains_and_the_map_shows_all(nominal_campaign: Path)
     assert trace.get_ylabel() == "mu_r [\u2013]"
 
 
-def test_profile_marginal_and_parabola_of_a_normal_posterior_coincide(posterior: Posterior) -> None:
+def test_profile_marginal_and_parabola_of_a_normal_posterior_coincide(posterior: HarmonicPosterior) -> None:
     each = posterior.by_name["c_sd"]
     assert each.profile is not None
     axes = profile_figure(posterior, each, each.profile).axes[0]
@@ -124,7 +124,7 @@ def test_profile_marginal_and_parabola_of_a_normal_posterior_coincide(posterior:
     assert axes.get_xlabel() == "c_sd [N s/m]"
 
 
-def test_misses_are_in_half_widths_of_a_band_that_holds_95_percent(posterior: Posterior) -> None:
+def test_misses_are_in_half_widths_of_a_band_that_holds_95_percent(posterior: HarmonicPosterior) -> None:
     band = predictive_band(posterior, 0)
     repeated = posterior.predictive.replicated[:, :, 0, 1]
     road = posterior.measured.harmonics[:, posterior.measured.channel("road_height"), 1]
@@ -138,7 +138,7 @@ def test_misses_are_in_half_widths_of_a_band_that_holds_95_percent(posterior: Po
     assert np.mean(np.abs(phase) <= 1.0) > 0.8
 
 
-def test_the_bode_figure_draws_every_compared_dwell_inside_its_panels(posterior: Posterior) -> None:
+def test_the_bode_figure_draws_every_compared_dwell_inside_its_panels(posterior: HarmonicPosterior) -> None:
     figure = predictive_figure(posterior, 1)
     assert [axes.get_ylabel().split("[")[1] for axes in figure.axes] == [
         "m per m of road]",
@@ -154,7 +154,7 @@ def test_the_bode_figure_draws_every_compared_dwell_inside_its_panels(posterior:
     assert low < offsets[:, 1].min() < offsets[:, 1].max() < high
 
 
-def test_dwells_that_were_not_compared_are_left_out(posterior: Posterior) -> None:
+def test_dwells_that_were_not_compared_are_left_out(posterior: HarmonicPosterior) -> None:
     used = posterior.predictive.used.copy()
     used[3:] = False
     band = predictive_band(replace(posterior, predictive=replace(posterior.predictive, used=used)), 0)
@@ -162,7 +162,7 @@ def test_dwells_that_were_not_compared_are_left_out(posterior: Posterior) -> Non
     assert np.array_equal(np.isfinite(band.misses[0]), np.arange(28) < 3)
 
 
-def test_chains_that_never_moved_are_still_drawn(posterior: Posterior) -> None:
+def test_chains_that_never_moved_are_still_drawn(posterior: HarmonicPosterior) -> None:
     first = posterior.marginals[0]
     stuck = replace(
         first, sd=0.0, q025=0.03, q975=0.03, laplace_sd=0.0, ess_bulk=float("nan"), autocorrelation=np.inf
@@ -177,7 +177,7 @@ def test_chains_that_never_moved_are_still_drawn(posterior: Posterior) -> None:
         assert embed(figure, "stuck").source.startswith("data:image/svg+xml;base64,")
 
 
-def test_names_in_figures_are_neither_formulas_nor_missing_glyphs(posterior: Posterior) -> None:
+def test_names_in_figures_are_neither_formulas_nor_missing_glyphs(posterior: HarmonicPosterior) -> None:
     named = renamed(unconverged(posterior, "why"), "$\\frac{1}{0}$\x1b漢\ud800", "", "<b>$")
     first = named.marginals[0]
     for figure in (

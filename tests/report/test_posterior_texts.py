@@ -15,7 +15,7 @@ from rich.console import Console
 from savgs_ident.core.errors import DataWarning
 from savgs_ident.core.files import to_json
 from savgs_ident.core.presentation import Origin
-from savgs_ident.inference.result import Posterior
+from savgs_ident.inference.result import HarmonicPosterior
 from savgs_ident.plants.quarter_car.model import RigModel
 from savgs_ident.plants.quarter_car.rig import default_rig_path, read_rig
 from savgs_ident.recordings.recording import Campaign
@@ -37,12 +37,12 @@ ORIGIN = Origin(
 
 
 @pytest.fixture(scope="module")
-def posterior(nominal_campaign: Path) -> Posterior:
+def posterior(nominal_campaign: Path) -> HarmonicPosterior:
     return synthetic_posterior(nominal_response(nominal_campaign), length=400)
 
 
 @pytest.fixture(scope="module")
-def source(posterior: Posterior) -> str:
+def source(posterior: HarmonicPosterior) -> str:
     return posterior_html(posterior, ORIGIN)
 
 
@@ -51,13 +51,13 @@ def page(source: str) -> Reader:
     return Reader(source)
 
 
-def rendered(posterior: Posterior, width: int = 100) -> str:
+def rendered(posterior: HarmonicPosterior, width: int = 100) -> str:
     stream = io.StringIO()
     Console(file=stream, width=width, highlight=False).print(posterior_text(posterior))
     return stream.getvalue()
 
 
-def record_of(posterior: Posterior) -> dict[str, Any]:
+def record_of(posterior: HarmonicPosterior) -> dict[str, Any]:
     return dict(json.loads(to_json(posterior_record(posterior, ORIGIN))))
 
 
@@ -72,7 +72,7 @@ def test_the_page_has_its_sections_in_order(page: Reader) -> None:
             assert (attributes.get(name) or "#").startswith(("data:", "#")), "the page fetches something"
 
 
-def test_the_page_says_numbers_sentences_and_origin(posterior: Posterior, page: Reader) -> None:
+def test_the_page_says_numbers_sentences_and_origin(posterior: HarmonicPosterior, page: Reader) -> None:
     text = " ".join(page.texts)
     damping = posterior.by_name["c_sd"]
     numbers = (f"{damping.median:.0f}", f"{damping.q025:.0f} to {damping.q975:.0f}", "99.5 %")
@@ -82,7 +82,7 @@ def test_the_page_says_numbers_sentences_and_origin(posterior: Posterior, page: 
 
 
 def test_a_posterior_that_did_not_converge_says_so_first_and_hostile_names_stay_text(
-    posterior: Posterior,
+    posterior: HarmonicPosterior,
 ) -> None:
     named = renamed(replace(posterior, sentences=(HOSTILE,)), HOSTILE, HOSTILE, HOSTILE)
     failed = unconverged(named, "the chains do not agree", "Too few draws.")
@@ -101,7 +101,7 @@ def test_a_posterior_that_did_not_converge_says_so_first_and_hostile_names_stay_
     assert "[bold red]\\x1b[2J" in reported
 
 
-def test_that_the_model_does_not_explain_the_data_is_said_first(posterior: Posterior) -> None:
+def test_that_the_model_does_not_explain_the_data_is_said_first(posterior: HarmonicPosterior) -> None:
     missed = tuple(
         replace(each, q025=0.02, median=0.03, q975=0.05) if each.name == "discrepancy" else each
         for each in posterior.marginals
@@ -119,7 +119,7 @@ def test_that_the_model_does_not_explain_the_data_is_said_first(posterior: Poste
     assert record_of(posterior)["explained"] is True
 
 
-def test_a_posterior_of_one_parameter_and_one_channel_has_a_page(posterior: Posterior) -> None:
+def test_a_posterior_of_one_parameter_and_one_channel_has_a_page(posterior: HarmonicPosterior) -> None:
     identified = tuple(replace(each, profile=None) for each in posterior.of_role("identified")[:1])
     kept = (*identified, *posterior.of_role("nuisance"))
     used = posterior.predictive.used & np.array([True, False])[:, None]
@@ -149,7 +149,7 @@ def test_a_value_that_a_template_does_not_get_is_an_error() -> None:
         render_page("posterior.html.j2", {})
 
 
-def test_the_record_has_the_keys_of_the_contract_first(posterior: Posterior) -> None:
+def test_the_record_has_the_keys_of_the_contract_first(posterior: HarmonicPosterior) -> None:
     record = record_of(posterior)
     assert list(record)[:7] == [
         "parameters", "sampler", "wall_s", "ess_min", "converged", "divergences", "acceptance"
@@ -178,14 +178,14 @@ def test_the_record_has_the_keys_of_the_contract_first(posterior: Posterior) -> 
     assert record["warnings"][0]["code"] == "odd"
 
 
-def test_numbers_that_are_not_known_are_null_in_the_record(posterior: Posterior) -> None:
+def test_numbers_that_are_not_known_are_null_in_the_record(posterior: HarmonicPosterior) -> None:
     unknown = replace(posterior, convergence=replace(posterior.convergence, pareto_k=float("nan")))
     assert record_of(unknown)["pareto_k"] is None
     assert [check.value for check in checks(unknown) if check.name == "Pareto k"] == [DASH]
     assert "nan" not in rendered(unknown)
 
 
-def test_the_terminal_says_the_numbers_in_80_columns(posterior: Posterior) -> None:
+def test_the_terminal_says_the_numbers_in_80_columns(posterior: HarmonicPosterior) -> None:
     text = rendered(posterior, width=80)
     assert re.search(r"c_sd +5\d{3} ± \d+ +5\d{3} to 5\d{3} N s/m +99\.[45] % +427", text)
     assert "Strongest correlation: mu_t with ydot_Hth, +0.8" in text
@@ -197,7 +197,7 @@ def test_the_terminal_says_the_numbers_in_80_columns(posterior: Posterior) -> No
     )
 
 
-def test_the_predictive_sentence_counts_and_says_what_chance_would_do(posterior: Posterior) -> None:
+def test_the_predictive_sentence_counts_and_says_what_chance_would_do(posterior: HarmonicPosterior) -> None:
     inside, total = posterior.predictive.count_inside
     assert total == 504
     sentence = predictive_sentence(posterior)
@@ -206,7 +206,7 @@ def test_the_predictive_sentence_counts_and_says_what_chance_would_do(posterior:
     assert sentence.endswith("for a perfect model it would be 469 to 489.")
 
 
-def test_too_few_harmonics_inside_is_said_to_be_the_models_fault(posterior: Posterior) -> None:
+def test_too_few_harmonics_inside_is_said_to_be_the_models_fault(posterior: HarmonicPosterior) -> None:
     inside = posterior.predictive.inside & (np.arange(28) % 5 > 0)[:, None, None]
     missed = replace(posterior, predictive=replace(posterior.predictive, inside=inside))
     assert predictive_sentence(missed).endswith("fewer than chance allows: the model misses something.")
@@ -215,7 +215,7 @@ def test_too_few_harmonics_inside_is_said_to_be_the_models_fault(posterior: Post
 
 
 def test_a_parameter_at_the_end_of_its_prior_interval_has_moved_by_two_deviations(
-    posterior: Posterior,
+    posterior: HarmonicPosterior,
 ) -> None:
     each = posterior.of_role("tolerated")[0]
     assert shift_in_sd(replace(each, median=each.prior[1])) == pytest.approx(1.96, abs=1e-3)

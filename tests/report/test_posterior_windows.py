@@ -7,8 +7,10 @@ import pytest
 
 from savgs_ident.core.files import to_json
 from savgs_ident.fit.result import OverWindows, recorded_spectra
-from savgs_ident.inference.result import Posterior, inference_data
-from savgs_ident.report.posterior.page import octave_rows, posterior_html
+from savgs_ident.inference.inference_data import inference_data
+from savgs_ident.inference.result import HarmonicPosterior
+from savgs_ident.report.posterior.page import posterior_html
+from savgs_ident.report.posterior.predicted import octave_rows
 from savgs_ident.report.posterior.record import posterior_record
 from savgs_ident.report.posterior.text import scope_sentence
 from savgs_ident.report.spectra import predicted_spectrum, predicted_spectrum_figure
@@ -50,11 +52,11 @@ def _windows() -> HarmonicResponse:
 
 
 @pytest.fixture(scope="module")
-def posterior() -> Posterior:
+def posterior() -> HarmonicPosterior:
     return synthetic_posterior(_windows(), length=200)
 
 
-def test_root_mean_squares_are_over_the_windows_of_what_is_compared(posterior: Posterior) -> None:
+def test_root_mean_squares_are_over_the_windows_of_what_is_compared(posterior: HarmonicPosterior) -> None:
     measured = posterior.measured
     used = posterior.predictive.used[:, 0].copy()
     used[0, 5] = False
@@ -67,7 +69,7 @@ def test_root_mean_squares_are_over_the_windows_of_what_is_compared(posterior: P
     np.testing.assert_allclose(over.rms(spread), 0.05 * np.sqrt(2.0))
 
 
-def test_of_repetitions_95_per_cent_lie_in_the_band(posterior: Posterior) -> None:
+def test_of_repetitions_95_per_cent_lie_in_the_band(posterior: HarmonicPosterior) -> None:
     for c in range(2):
         frequency, recorded, ends = predicted_spectrum(posterior, c)
         over = OverWindows.of(posterior.measured, posterior.predictive.used[:, c])
@@ -78,7 +80,7 @@ def test_of_repetitions_95_per_cent_lie_in_the_band(posterior: Posterior) -> Non
         assert frequency.size == NUMBERS - 2 - c
 
 
-def test_the_figure_draws_every_frequency_inside_its_panels(posterior: Posterior) -> None:
+def test_the_figure_draws_every_frequency_inside_its_panels(posterior: HarmonicPosterior) -> None:
     figure = predicted_spectrum_figure(posterior, 0)
     above, below = figure.axes
     assert above.get_ylabel() == "amplitude, rms over windows [m/s²]"
@@ -91,7 +93,7 @@ def test_the_figure_draws_every_frequency_inside_its_panels(posterior: Posterior
         assert low < values.min() <= values.max() < high
 
 
-def test_the_page_speaks_of_windows_and_octaves(posterior: Posterior) -> None:
+def test_the_page_speaks_of_windows_and_octaves(posterior: HarmonicPosterior) -> None:
     page = Reader(posterior_html(posterior, ORIGIN))
     text = " ".join(page.texts)
     assert (
@@ -109,13 +111,13 @@ def test_the_page_speaks_of_windows_and_octaves(posterior: Posterior) -> None:
     assert sum(inside) == posterior.predictive.count_inside[0]
 
 
-def test_the_record_and_the_data_of_arviz_hold_it(posterior: Posterior) -> None:
+def test_the_record_and_the_data_of_arviz_hold_it(posterior: HarmonicPosterior) -> None:
     assert "nan" not in to_json(posterior_record(posterior, ORIGIN)).lower()
     tree = inference_data(posterior)
     np.testing.assert_allclose(tree["observed_data"].coords["spacing"], SPACING)
 
 
-def test_a_channel_that_was_not_compared_has_no_picture(posterior: Posterior) -> None:
+def test_a_channel_that_was_not_compared_has_no_picture(posterior: HarmonicPosterior) -> None:
     used = posterior.predictive.used.copy()
     used[:, 0] = False
     less = replace(posterior, predictive=replace(posterior.predictive, used=used))

@@ -23,6 +23,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.errors import InputError
 from savgs_ident.inference.background.constants import BACKGROUND, BackgroundConstants
 from savgs_ident.inference.background.imposed import node_loads
 from savgs_ident.inference.background.locations import Linearisation, input_locations
@@ -93,6 +94,8 @@ def with_background(
     inputs' relative errors of one do to the rows [unit of the row], in all tests, ``curves`` (m, t) what relative
     errors of one do to them at points of curves of the sheet, ``drifts`` (m, n) what relative changes of one of what
     is identified do; ``recorded`` (t,) is when each test was recorded, in any unit of time.
+
+    Raises :class:`InputError` where these are no numbers: the model is far off there.
     """
     columns = []
     for location in locations:
@@ -102,18 +105,20 @@ def with_background(
     ratio = constants.input_error / constants.material_error
     tests = (data.test == test for test in range(data.tests))
     columns += [ratio * np.where(mine[:, None], inputs, 0.0) for mine in tests]
+    times = time_of(recorded)[data.test, None]
+    known = [constants.curve_tolerance * curves, constants.drift_tolerance * drifts * times]
+    shared, tolerated = (np.concatenate(each, axis=1) for each in (columns, known))
+    if not (np.isfinite(shared).all() and np.isfinite(tolerated).all()):
+        raise InputError(
+            "what small errors would do to the response of the model at these parameters is no number",
+            remedy="look at the units of the recordings and at the numbers of the plant",
+        )
     return replace(
         data,
         discrepancy_scale=constants.independent_error * data.discrepancy_scale,
         scales=Scales(discrepancy=constants.material_error),
-        shared=np.concatenate(columns, axis=1),
-        tolerated=np.concatenate(
-            [
-                constants.curve_tolerance * curves,
-                constants.drift_tolerance * drifts * time_of(recorded)[data.test, None],
-            ],
-            axis=1,
-        ),
+        shared=shared,
+        tolerated=tolerated,
     )
 
 

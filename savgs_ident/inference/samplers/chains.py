@@ -23,7 +23,7 @@ from jaxtyping import Array, Bool, Float
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.files import scratch_folder, write_bytes
-from savgs_ident.inference.likelihood import Likelihood
+from savgs_ident.inference.likelihood import RowLikelihood
 from savgs_ident.inference.near_mode import ExactModel
 from savgs_ident.inference.prior import Prior
 from savgs_ident.inference.result import Sampler
@@ -161,7 +161,7 @@ def decide(exact: ExactModel, prior: Prior, points: Float[np.ndarray, "W n+2"]) 
 
 
 @eqx.filter_jit
-def _densities(likelihood: Likelihood, prior: Prior, rows: Array, points: Array) -> Array:
+def _densities(likelihood: RowLikelihood, prior: Prior, rows: Array, points: Array) -> Array:
     return jax.vmap(lambda row, point: likelihood(row, point) + prior(point))(rows, points)
 
 

@@ -16,6 +16,7 @@ from rich.console import Group, RenderableType
 
 from savgs_ident.core.files import warning_record
 from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording, RecordingLayout
+from savgs_ident.report.campaigns.motions import motion_records, motion_table
 from savgs_ident.report.text import (
     ChannelLabel,
     counted,
@@ -69,6 +70,7 @@ def summary_record(summary: CampaignSummary) -> dict[str, object]:
             {"test": recording.name, "duration_s": recording.duration_s}
             for recording in campaign.of_kind("other")
         ],
+        "motions": motion_records(campaign),
         "warnings": [warning_record(warning) for warning in summary.warnings],
     }
 
@@ -158,6 +160,8 @@ def campaign_text(record: dict[str, Any], layout: RecordingLayout) -> Renderable
         parts.append(plain("Not recorded: " + ", ".join(record["missing_channels"]) + "\n"))
     if record["dwells"]:
         parts.append(_dwell_table(record["dwells"], layout))
+    if record["motions"]:
+        parts.append(motion_table(record["motions"], layout))
     parts += [plain(line) for line in _other_tests(record)]
     parts += _warnings(record["source"], record["warnings"])
     return Group(*parts)
@@ -226,7 +230,6 @@ def _other_tests(record: dict[str, Any]) -> list[str]:
         band = f", response from {span[0]:.2f} to {span[1]:.2f} Hz" if span else ""
         lines.append(f"Sweep {sweep['test']}: {sweep['duration_s']:.1f} s{band}")
     lines += [f"Standstill {each['test']}: {each['duration_s']:.1f} s" for each in record["standstills"]]
-    lines += [f"Other {each['test']}: {each['duration_s']:.1f} s" for each in record["others"]]
     return lines
 
 

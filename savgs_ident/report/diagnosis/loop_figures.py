@@ -41,6 +41,8 @@ def spread_loops(loops: tuple[ForceLoop, ...]) -> tuple[ForceLoop, ...]:
 
 def loop_time(diagnosis: Diagnosis, loop: ForceLoop) -> str:
     """Of which test a loop is, or of how much of a motion that was followed from its beginning."""
+    if not loop.inferred.size:
+        return f"over {1.0 / loop.frequency_hz:.3g} s of a window"
     if isinstance(diagnosis.responses, DriveForces):
         return f"over the first {1.0 / loop.frequency_hz:.3g} s"
     return f"at {loop.frequency_hz:.3g} Hz"
@@ -51,8 +53,11 @@ def force_figure(diagnosis: Diagnosis, loop: ForceLoop) -> Figure:
 
     The law with its 95 % band; beside a learned one the formula of the catalogue that comes nearest.
     """
-    unit, scale = _unit_for(loop.unit, loop.inferred)
+    unit, scale = _unit_for(
+        loop.unit, next(each for each in (loop.inferred, loop.law, loop.nearest) if each.size)
+    )
     motion_unit, factor = _unit_for(loop.motion_unit, loop.displacement)
+    closed = bool(loop.inferred.size)
     with styled():
         figure = new_figure(4.5, 3.0)
         figure.set_layout_engine("none")
@@ -66,15 +71,16 @@ def force_figure(diagnosis: Diagnosis, loop: ForceLoop) -> Figure:
             fontweight="bold",
         )
         for axes, motion in ((left, loop.velocity), (right, _from_middle(loop.displacement))):
-            _draw_diagnosis_force(axes, factor * motion, scale * loop.inferred, "inferred")
+            axes.axhline(0.0, color=INK, linewidth=0.6)
+            if loop.inferred.size:
+                _draw_inferred(axes, factor * motion, scale * loop.inferred)
             if loop.law.size:
                 _draw_band(axes, factor * motion, scale * loop.law, scale * WITHIN * loop.law_sd)
-                _draw_curve(
-                    axes, factor * motion, scale * loop.law, law_label(diagnosis, loop.port), **_NAMED
-                )
+                name = law_label(diagnosis, loop.port)
+                _draw_curve(axes, factor * motion, scale * loop.law, name, closed=closed, **_NAMED)
             if loop.nearest.size:
                 nearest = f"nearest: {diagnosis.verdict.effects[0]}"
-                _draw_curve(axes, factor * motion, scale * loop.nearest, nearest, **_NEAREST)
+                _draw_curve(axes, factor * motion, scale * loop.nearest, nearest, closed=closed, **_NEAREST)
             axes.xaxis.set_major_locator(MaxNLocator(4))
         left.set_ylabel(printable(f"{_quantity(loop.unit)} [{unit_text(unit)}]"))
         left.set_xlabel(f"velocity [{motion_unit}/s]")
@@ -101,11 +107,10 @@ def _from_middle(displacement: NDArray[np.float64]) -> NDArray[np.float64]:
     return displacement - 0.5 * (np.max(displacement) + np.min(displacement))
 
 
-def _draw_diagnosis_force(
-    axes: Axes, across: NDArray[np.float64], up: NDArray[np.float64], label: str
-) -> None:
-    axes.axhline(0.0, color=INK, linewidth=0.6)
-    axes.plot(np.append(across, across[:1]), np.append(up, up[:1]), color=BLUE, linewidth=1.5, label=label)
+def _draw_inferred(axes: Axes, across: NDArray[np.float64], up: NDArray[np.float64]) -> None:
+    axes.plot(
+        np.append(across, across[:1]), np.append(up, up[:1]), color=BLUE, linewidth=1.5, label="inferred"
+    )
     if across.size > 16:
         at = int(_ARROW_AT * across.size)
         look = {"arrowstyle": "-|>", "color": BLUE, "mutation_scale": 13, "shrinkA": 0.0, "shrinkB": 0.0}
@@ -125,8 +130,8 @@ def _draw_band(
 
 
 def _draw_curve(
-    axes: Axes, across: NDArray[np.float64], up: NDArray[np.float64], label: str, **look: Any
+    axes: Axes, across: NDArray[np.float64], up: NDArray[np.float64], label: str, closed: bool, **look: Any
 ) -> None:
-    """A closed curve beside the signal that is inferred."""
-    closed = (np.append(each, each[:1]) for each in (across, up))
-    axes.plot(*closed, label=printable(label), **look)
+    """A curve beside the signal that is inferred; closed but for a part of a window."""
+    ends = (np.append(each, each[:1]) if closed else each for each in (across, up))
+    axes.plot(*ends, label=printable(label), **look)

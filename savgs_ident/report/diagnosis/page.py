@@ -319,9 +319,12 @@ def _rig(diagnosis: Diagnosis) -> Picture:
 
 
 def _loop(diagnosis: Diagnosis, loop: ForceLoop) -> Picture:
-    largest = float(np.max(np.abs(loop.inferred), initial=0.0))
+    signal, what = (
+        (loop.inferred, "Signal inferred") if loop.inferred.size else (loop.law, "Law that is named")
+    )
+    largest = float(np.max(np.abs(signal), initial=0.0))
     words = (
-        f"Signal inferred at the {port_words(diagnosis, loop.port)} over velocity and displacement"
+        f"{what} at the {port_words(diagnosis, loop.port)} over velocity and displacement"
         f" {loop_time(diagnosis, loop)}; it reaches {largest:.3g} {loop.unit}."
     )
     return embed(force_figure(diagnosis, loop), words)

@@ -4,17 +4,13 @@ Whether the numbers may be used comes first, then the findings in words, the par
 and the origin. Every cell of a table is a text that was rounded here to what its error justifies.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from savgs_ident.core.presentation import Origin
-from savgs_ident.fit.result import OverWindows
 from savgs_ident.inference.result import Marginal, Posterior
-from savgs_ident.report.bode import predictive_band, predictive_figure
 from savgs_ident.report.html import Picture, embed, render_page
 from savgs_ident.report.posterior.figures import (
     MOST_TRACES,
@@ -24,11 +20,12 @@ from savgs_ident.report.posterior.figures import (
     rank_surplus,
     trace_figure,
 )
+from savgs_ident.report.posterior.predicted import predicted_of
 from savgs_ident.report.posterior.text import (
     GOOD_R_HAT,
-    NORMAL_95,
     NUISANCE_WORDS,
     SAMPLERS,
+    before,
     chance_of_inside,
     checks,
     interval_words,
@@ -39,21 +36,17 @@ from savgs_ident.report.posterior.text import (
     short,
     verdict_line,
 )
-from savgs_ident.report.spectra import predicted_spectrum, predicted_spectrum_figure
 from savgs_ident.report.text import (
     DASH,
-    channel_labels,
     count,
     decimal,
     interval,
     numeral,
-    per_input_words,
     percentage,
     signed,
     unit_text,
     with_error,
 )
-from savgs_ident.responses.selection import by_kind
 
 _LEAST_WIDE = 1.2
 
@@ -111,14 +104,6 @@ class DiagnosticRow:
     over_laplace: str
 
 
-@dataclass(frozen=True)
-class InsideRow:
-    """How many measured harmonics of one order, or in one octave, lie inside; a cell for each channel."""
-
-    where: str
-    cells: tuple[str, ...]
-
-
 def marginal_row(each: Marginal) -> MarginalRow:
     """One line of the table of identified parameters or of the likelihood's scales."""
     return MarginalRow(
@@ -135,12 +120,10 @@ def marginal_row(each: Marginal) -> MarginalRow:
 
 def tolerance_row(each: Marginal) -> ToleranceRow:
     """One line of the table of what was known to a tolerance."""
-    low, high = each.prior
-    middle, deviation = 0.5 * (low + high), (high - low) / (2.0 * NORMAL_95)
     return ToleranceRow(
         name=each.name,
         about=short(each.about),
-        before=with_error(middle, deviation),
+        before=before(each),
         after=with_error(each.median, each.sd),
         unit=unit_text(each.unit),
         shift=signed(shift_in_sd(each), 1),
@@ -158,37 +141,6 @@ def diagnostic_row(each: Marginal) -> DiagnosticRow:
         autocorrelation=decimal(each.autocorrelation, 1),
         over_laplace=decimal(each.sd / each.laplace_sd, 2) if each.laplace_sd > 0.0 else DASH,
     )
-
-
-def order_rows(posterior: Posterior) -> tuple[InsideRow, ...]:
-    """Measured harmonics inside the 95 % region, by order and channel; only orders that are compared."""
-    compared = np.flatnonzero(np.any(posterior.predictive.used, axis=(0, 1)))
-    return tuple(InsideRow(str(k), _inside(posterior, [int(k)])) for k in compared)
-
-
-def octave_rows(posterior: Posterior) -> tuple[InsideRow, ...]:
-    """The same of windows, by octaves."""
-    used = posterior.predictive.used
-    over = OverWindows.of(posterior.measured, np.any(used, axis=1))
-    octave = np.floor(np.log2(over.frequency / over.frequency[0]) + 1e-9).astype(int)
-    rows = []
-    for each in np.unique(octave):
-        hertz = over.frequency[octave == each]
-        rows.append(
-            InsideRow(f"{hertz[0]:.2g} to {hertz[-1]:.2g} Hz", _inside(posterior, over.known[octave == each]))
-        )
-    return tuple(rows)
-
-
-def _inside(posterior: Posterior, places: Sequence[int] | NDArray[np.int64]) -> tuple[str, ...]:
-    """How many of the harmonics at these places lie inside, a cell for each channel."""
-    used = posterior.predictive.used[:, :, places]
-    inside = posterior.predictive.inside[:, :, places] & used
-    return tuple(_count_inside(inside[:, c].sum(), used[:, c].sum()) for c in range(used.shape[1]))
-
-
-def _count_inside(part: int, whole: int) -> str:
-    return f"{part} of {whole}" if whole else DASH
 
 
 def _strip(each: Marginal) -> Strip | None:
@@ -212,9 +164,8 @@ def _strip(each: Marginal) -> Strip | None:
 
 def posterior_html(posterior: Posterior, origin: Origin) -> str:
     """The page: one file, no network, nothing executed; the same posterior gives the same bytes."""
-    identified, nuisance, tolerated = (
-        posterior.of_role(role) for role in ("identified", "nuisance", "tolerated")
-    )
+    identified, nuisance = (posterior.of_role(role) for role in ("identified", "nuisance"))
+    tolerated = posterior.known_before
     chains = next(iter(posterior.draws.values())).shape[0]
     return render_page(
         "posterior.html.j2",
@@ -238,9 +189,7 @@ def posterior_html(posterior: Posterior, origin: Origin) -> str:
             "traces": [_trace(posterior, each) for each in (*identified, *nuisance)],
             "profiles": _profiles(posterior),
             "predictive": predictive_sentence(posterior),
-            "predicted": _predicted(posterior),
-            "channels": [shown.title for shown in channel_labels(posterior.model).values()],
-            "per_input": per_input_words(posterior.model),
+            "predicted": predicted_of(posterior),
             "checks": checks(posterior),
             "diagnostics": [diagnostic_row(each) for each in (*identified, *nuisance)],
         },
@@ -250,7 +199,7 @@ def posterior_html(posterior: Posterior, origin: Origin) -> str:
 def _facts(posterior: Posterior) -> tuple[dict[str, object], ...]:
     """Four numbers for a first look."""
     c = posterior.convergence
-    inside, total = posterior.predictive.count_inside
+    inside, total = posterior.count_inside
     share = percentage(inside / total) if total else DASH
     return (
         {
@@ -307,51 +256,3 @@ def _profiles(posterior: Posterior) -> list[Picture]:
             words = f"Profile, marginal and Laplace parabola of {each.name} from {ends}; it rises to {highest:.1f}."
             pictures.append(embed(profile_figure(posterior, each, each.profile), words))
     return pictures
-
-
-@dataclass(frozen=True)
-class Predicted:
-    """What is predicted of the dwells, or of the windows: by channel, and how much is inside by what."""
-
-    windows: bool
-    pictures: list[Picture]
-    inside: tuple[InsideRow, ...]
-
-
-def _predicted(posterior: Posterior) -> list[Predicted]:
-    """Of each kind of test that is compared, in the channels in which anything is; of dwells, first harmonics."""
-    dwells, windows = by_kind(posterior)
-    channels, found = range(len(posterior.model.channels)), []
-    if dwells is not None:
-        first = dwells.predictive.used[..., 1]
-        pictures = [predicted_picture(dwells, c) for c in channels if first[:, c].any()]
-        found.append(Predicted(False, pictures, order_rows(dwells)))
-    if windows is not None:
-        used = windows.predictive.used
-        pictures = [predicted_spectrum_picture(windows, c) for c in channels if used[:, c].any()]
-        found.append(Predicted(True, pictures, octave_rows(windows)))
-    return found
-
-
-def predicted_spectrum_picture(posterior: Posterior, c: int) -> Picture:
-    """What is predicted for one channel in windows, against what was measured."""
-    title = tuple(channel_labels(posterior.model).values())[c].title
-    _, recorded, ends = predicted_spectrum(posterior, c)
-    within = int(np.sum((ends[0] <= recorded) & (recorded <= ends[1])))
-    words = (
-        f"Spectrum of the {title} over the windows, measured against the 95 % predictive band: at {within} of "
-        f"{recorded.size} frequencies it is inside."
-    )
-    return embed(predicted_spectrum_figure(posterior, c), words)
-
-
-def predicted_picture(posterior: Posterior, c: int) -> Picture:
-    """What is predicted for one channel in dwells, against what was measured."""
-    title = tuple(channel_labels(posterior.model).values())[c].title
-    band = predictive_band(posterior, c)
-    compared = np.isfinite(band.measured)
-    words = (
-        f"Magnitude and phase of the {title} over frequency, measured against the 95 % predictive band:"
-        f" {np.sum(band.inside & compared)} of {np.sum(compared)} first harmonics are inside."
-    )
-    return embed(predictive_figure(posterior, c), words)

@@ -11,8 +11,7 @@ def posterior_record(posterior: Posterior, origin: Origin) -> dict[str, object]:
     ``parameters`` holds all marginals, the identified ones first, then the likelihood's scales, then what was
     known to a tolerance.
     """
-    convergence, predictive = posterior.convergence, posterior.predictive
-    inside, compared = predictive.count_inside
+    convergence, (inside, compared) = posterior.convergence, posterior.count_inside
     return {
         "parameters": {each.name: _marginal(each) for each in posterior.marginals},
         "sampler": posterior.sampler,

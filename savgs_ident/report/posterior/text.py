@@ -6,14 +6,14 @@ The terminal shows whether the sampler converged, the parameters, the convergenc
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
-from math import floor, log10, sqrt
+from math import floor, log, log10, sqrt
 from types import MappingProxyType
 
 import numpy as np
 from rich.console import Group, RenderableType
 
 from savgs_ident.fit.result import OverWindows
-from savgs_ident.inference.result import Marginal, Posterior
+from savgs_ident.inference.result import HarmonicPosterior, Marginal, MotionPosterior, Posterior
 from savgs_ident.report.fit import value_with_error
 from savgs_ident.report.text import DASH, count, counted, decimal, numeral, percentage, plain, table
 from savgs_ident.responses.selection import by_kind
@@ -24,8 +24,9 @@ NUISANCE_WORDS: Mapping[str, str] = MappingProxyType(
             "Factor on the noise that was estimated from the recordings; 1 if that estimate is right."
         ),
         "discrepancy": (
-            "Size of the small errors that the model may have at each of its ports and inputs, as a share of the"
-            " response; 0 for a perfect model. They keep intervals from becoming absurdly narrow."
+            "Size of the small errors that the model may have, as a share of the response, at each of its ports and"
+            " inputs, or of the force of a drive; 0 for a perfect model. They keep intervals from becoming absurdly"
+            " narrow."
         ),
     }
 )
@@ -70,20 +71,29 @@ def reasons(posterior: Posterior) -> tuple[str, ...]:
 
 def scope_sentence(posterior: Posterior) -> str:
     """What was estimated from what."""
-    identified, tolerated = (len(posterior.of_role(role)) for role in ("identified", "tolerated"))
+    identified, tolerated = len(posterior.of_role("identified")), len(posterior.known_before)
     along = (
-        f"; {tolerated} more that are known to a tolerance were sampled too and marginalised"
+        f"; {tolerated} more that are known to a tolerance or an order of magnitude were sampled too and marginalised"
         if tolerated
         else "; everything else was held at its value"
     )
     were = "was" if identified == 1 else "were"
+    return f"{counted(identified, 'parameter')} {were} identified from {_compared(posterior)}{along}."
+
+
+def _compared(posterior: Posterior) -> str:
+    """With what the model was compared."""
+    if isinstance(posterior, MotionPosterior):
+        time = posterior.motion.row_times
+        return f"{posterior.measured.size} rows of the drive's force over {time[-1] - time[0]:.3g} s"
+    assert isinstance(posterior, HarmonicPosterior), posterior
     dwells, windows = by_kind(posterior)
     compared = [_dwells(dwells)] if dwells else []
     compared += [_windows(windows)] if windows else []
-    return f"{counted(identified, 'parameter')} {were} identified from {' and '.join(compared)}{along}."
+    return " and ".join(compared)
 
 
-def _dwells(posterior: Posterior) -> str:
+def _dwells(posterior: HarmonicPosterior) -> str:
     measured, used = posterior.measured, posterior.predictive.used
     orders = np.flatnonzero(np.any(used, axis=(0, 1)))
     span = f"orders {orders[0]} to {orders[-1]}" if orders.size > 1 else f"order {' '.join(map(str, orders))}"
@@ -93,7 +103,7 @@ def _dwells(posterior: Posterior) -> str:
     )
 
 
-def _windows(posterior: Posterior) -> str:
+def _windows(posterior: HarmonicPosterior) -> str:
     measured, used = posterior.measured, posterior.predictive.used
     frequency = OverWindows.of(measured, np.any(used, axis=1)).frequency
     return (
@@ -109,10 +119,11 @@ def chance_of_inside(total: int) -> tuple[int, int]:
 
 
 def predictive_sentence(posterior: Posterior) -> str:
-    """How many measured harmonics the posterior would have predicted, and what that says about the model."""
-    inside, total = posterior.predictive.count_inside
+    """How much of what was measured the posterior would have predicted, and what that says about the model."""
+    inside, total = posterior.count_inside
     if not total:
         return "No measured harmonic was compared with a prediction."
+    what = "rows of force" if isinstance(posterior, MotionPosterior) else "harmonics"
     low, high = chance_of_inside(total)
     verdict = ""
     if inside < low:
@@ -122,7 +133,7 @@ def predictive_sentence(posterior: Posterior) -> str:
             " That is more than chance allows: the model errs by less than small errors of every model may."
         )
     return (
-        f"Of {total} measured harmonics {inside} ({percentage(inside / total)}) lie where 95 % of the repetitions"
+        f"Of {total} measured {what} {inside} ({percentage(inside / total)}) lie where 95 % of the repetitions"
         f" lie that the posterior predicts; for a perfect model it would be {low} to {high}.{verdict}"
     )
 
@@ -140,9 +151,14 @@ def correlation_sentence(posterior: Posterior) -> str | None:
 
 
 def shift_in_sd(each: Marginal) -> float:
-    """How far the median has moved from the middle of the prior interval, in prior standard deviations [1]."""
-    low, high = each.prior
-    return (each.median - 0.5 * (low + high)) / ((high - low) / (2.0 * NORMAL_95))
+    """How far the median has moved from the middle of the prior interval, in prior standard deviations [1].
+
+    Of what is known to an order of magnitude those of the logarithm.
+    """
+    low, high, median = *each.prior, each.median
+    if each.role == "typical":
+        low, high, median = log(low), log(high), log(median)
+    return (median - 0.5 * (low + high)) / ((high - low) / (2.0 * NORMAL_95))
 
 
 def checks(posterior: Posterior) -> tuple[Check, ...]:
@@ -219,13 +235,13 @@ def _sampler_checks(posterior: Posterior) -> tuple[Check, ...]:
             "Exact evaluations",
             count(c.evaluations),
             DASH,
-            "How often the full model was solved, all dwells each time.",
+            "How often the full model was solved, for all that was measured each time.",
         ),
         Check(
             "Not solved",
             count(c.unsolved),
             "few",
-            "Proposals at which the model has no periodic motion that the solver found; they were rejected.",
+            "Proposals at which the solver found no motion of the model; they were rejected.",
         ),
     )
 
@@ -307,12 +323,12 @@ def _nuisance(posterior: Posterior) -> RenderableType:
 
 
 def _tolerances(posterior: Posterior) -> list[RenderableType]:
-    known = posterior.of_role("tolerated")
+    known = posterior.known_before
     if not known:
         return []
     moved = [each for each in known if abs(shift_in_sd(each)) >= 0.5]
     title = (
-        f"Known to a tolerance and sampled too: {len(known)},"
+        f"Known beforehand, to a tolerance or an order of magnitude, and sampled too: {len(known)},"
         f" of which {len(moved)} changed by half a tolerance or more"
     )
     if not moved:
@@ -320,7 +336,7 @@ def _tolerances(posterior: Posterior) -> list[RenderableType]:
     rows = [
         (
             each.name,
-            _before(each),
+            before(each),
             value_with_error(each.median, each.sd),
             each.unit,
             f"{shift_in_sd(each):+.1f}",
@@ -331,8 +347,12 @@ def _tolerances(posterior: Posterior) -> list[RenderableType]:
     return [table(title, headers, rows, texts=(0, 3))]
 
 
-def _before(each: Marginal) -> str:
+def before(each: Marginal) -> str:
+    """What was known of a parameter before the data."""
     low, high = each.prior
+    if each.role == "typical":
+        middle = sqrt(low * high)
+        return f"about {numeral(middle, 0.1 * middle)}, within a factor {numeral(high / middle, 0.1 * high / middle)}"
     return value_with_error(0.5 * (low + high), (high - low) / (2.0 * NORMAL_95))
 
 
