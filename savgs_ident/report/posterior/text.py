@@ -131,6 +131,8 @@ def predictive_sentence(posterior: Posterior) -> str:
     if inside > high:
         verdict = (
             " That is more than chance allows: the model errs by less than small errors of every model may."
+            if posterior.explained
+            else " That is more than chance allows, for so large errors as this model would have to make are allowed for."
         )
     return (
         f"Of {total} measured {what} {inside} ({percentage(inside / total)}) lie where 95 % of the repetitions"
