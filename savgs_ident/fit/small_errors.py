@@ -75,7 +75,7 @@ Origin: computing time; the labelled recordings of two missing effects are at 4.
 
 
 SETTLED = 1e-3
-"""Rise of the log density below which the fit has ended: 0.045 standard errors. Friction makes it as rough as that."""
+"""Rise of the log density at which a fit has ended: 0.045 standard errors. Friction makes it as rough as that."""
 
 SOFTER = (0.75, 0.5)
 """Shares to which the orders of magnitude are lowered in turn by which a contact is harder than a typical one."""

@@ -132,7 +132,7 @@ def predictive_sentence(posterior: Posterior) -> str:
         verdict = (
             " That is more than chance allows: the model errs by less than small errors of every model may."
             if posterior.explained
-            else " That is more than chance allows, for so large errors as this model would have to make are allowed for."
+            else " That is more than chance allows: errors as large as this model would have to make are allowed for."
         )
     return (
         f"Of {total} measured {what} {inside} ({percentage(inside / total)}) lie where 95 % of the repetitions"
