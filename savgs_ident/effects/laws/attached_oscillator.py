@@ -20,6 +20,9 @@ from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import AbstractForceLaw, Family, InternalState, Port, PortSignals, Role
 
+_INERTIA = {("N", "m"): "kg", ("N m", "rad"): "kg m^2"}
+"""Unit of what swings by those of force and displacement."""
+
 
 class AttachedOscillator(AbstractForceLaw):
     """What swings on a body."""
@@ -36,7 +39,8 @@ class AttachedOscillator(AbstractForceLaw):
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
         """The typical force at the acceleration of the typical motion, at 5 Hz."""
         mass = port.force * port.displacement / port.velocity**2
-        unit = f"{port.force_unit} s^2/{port.displacement_unit}"
+        units = port.force_unit, port.displacement_unit
+        unit = _INERTIA.get(units, f"{units[0]} s^2/{units[1]}")
         return {
             "mass": Parameter("mass", mass, unit, lower=0.0, upper=100.0 * mass, about="swinging mass"),
             "frequency": Parameter(
