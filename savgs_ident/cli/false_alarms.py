@@ -52,8 +52,8 @@ def false_alarms(
     """Count false alarms: how often would `diagnose` find something in campaigns like CAMPAIGN with nothing missing?
 
     The baseline is recalibrated on CAMPAIGN; campaigns are drawn from it (its frequencies, its noise, parameters
-    within what it leaves open) and diagnosed. The odds that CAMPAIGN itself gives are put beside theirs. Takes some
-    seconds a draw.
+    within what it leaves open) and diagnosed. The odds that CAMPAIGN itself gives are put beside theirs. Takes as
+    long as a diagnosis for each draw, and once before.
 
     Writes false_alarms.json, false_alarms.png, false_alarms.pdf and draws.jsonl, from which --resume goes on.
 

@@ -1,8 +1,23 @@
 """What a reader must know before using a verdict: its warnings."""
 
 from savgs_ident.diagnosis.evidence import DiagnosisEvidence, DiagnosisProblem
+from savgs_ident.diagnosis.gap import FurtherShrink, Shrink
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.inference.laplace_fit import LaplaceFit
+
+FURTHER, FURTHER_AT_LEAST = 3.0, 0.02
+"""A recording that took no part is missed by more where its gap is so many times that of the tests held out, and so
+much of its response [1]. Origin: by choice; a sweep is missed by 0.8 % by the error of its prediction alone."""
+
+
+def write_further(further: FurtherShrink | None, held_out: Shrink) -> tuple[str, ...]:
+    """What a recording that took no part says against what is named, a sentence; none where it says nothing."""
+    if further is None or not further.after > max(FURTHER * held_out.after, FURTHER_AT_LEAST):
+        return ()
+    return (
+        f"{further.name}, which took no part, is missed by {100.0 * further.after:.3g} % of its response with what "
+        f"is named, and tests that were held out by {100.0 * held_out.after:.3g} %: it does not hold there.",
+    )
 
 
 def write_warnings(

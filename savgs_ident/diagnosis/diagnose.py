@@ -21,7 +21,7 @@ from savgs_ident.core.errors import InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import NO_ORIGIN, Origin, Progress, no_progress
 from savgs_ident.diagnosis.candidates import candidates_of, confusable_of, estimates_among, not_judgeable_of
-from savgs_ident.diagnosis.caveats import write_warnings
+from savgs_ident.diagnosis.caveats import write_further, write_warnings
 from savgs_ident.diagnosis.conclusion import (
     CorrectedModel,
     FurtherRecording,
@@ -271,7 +271,10 @@ def _concluded(
         responses=plant.responses(data, problem.given, recalibrated, model.rows),
         measured=measured,
         converged=all(each.status.ok for each in _decisive_fits(problem, selected, evidence, found.law)),
-        warnings=write_warnings(found.problem, evidence, model.fit, beyond),
+        warnings=(
+            *write_warnings(found.problem, evidence, model.fit, beyond),
+            *write_further(found.further, found.gap),
+        ),
         learned=None if found.law is None else _offered(found.problem, found.law),
         drifts=problem.drifts,
         wall_s=time.perf_counter() - began,

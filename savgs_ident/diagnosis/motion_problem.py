@@ -38,6 +38,7 @@ from savgs_ident.inference.background.port_functions import (
 )
 from savgs_ident.inference.drive_force import force_data, force_rows, relative_miss, relative_noise
 from savgs_ident.inference.laplace_fit import LaplaceFit, Search
+from savgs_ident.inference.likely_mistake import mistaken_drive
 from savgs_ident.inference.observations import Data, Prediction, Term
 from savgs_ident.plants.base import AbstractPlant, AtPorts
 from savgs_ident.responses.driven_motion import DrivenMotion
@@ -308,6 +309,10 @@ class MotionProblem(AbstractProblem):
         """None: which motions the axis could be given is not known."""
         del search, one, other
         return ()
+
+    def mistaken(self, given: NDArray[np.float64]) -> str:
+        """Whether the drive's force goes the other way than the model says, or has another unit, in words."""
+        return mistaken_drive(self.motion.rows(self.motion.drive), given, self.plant)
 
     def responses(self, data: Data, *rows: NDArray[np.float64]) -> DriveForces:
         """The force along the motion, measured and needed by three models."""

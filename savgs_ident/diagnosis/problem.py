@@ -113,13 +113,20 @@ class DrawnLaw:
 
 
 def drawn_law(effect: Effect, values: Mapping[str, float], fit: LaplaceFit, search: Search) -> DrawnLaw:
-    """The law of an effect with the errors that a ``fit`` leaves its numbers; ``values`` [SI] are all parameters."""
+    """The law of an effect with the errors that a ``fit`` leaves its numbers; ``values`` [SI] are all parameters.
+
+    Without errors where the covariance of the fit is none.
+    """
     own = {each.name for each in effect.parameters}
     mine = np.array([each.name in own for each in fit.coordinates], bool)
-    spread = np.linalg.cholesky(search.covariance(fit)[np.ix_(mine, mine)])
+    covariance = search.covariance(fit)[np.ix_(mine, mine)]
+    if not np.isfinite(covariance).all():
+        return DrawnLaw(effect, values)
+    # Of a number that the data do not move the variance may come out as a rounding below zero.
+    sizes, axes = np.linalg.eigh(covariance)
     lower, upper = bounds_of(fit.coordinates)
     erring = []
-    for error in spread.T:
+    for error in (axes * np.sqrt(np.maximum(sizes, 0.0))).T:
         x = fit.x.copy()
         x[mine] += error
         moved = values_at(fit.coordinates, np.clip(x, lower, upper))

@@ -251,7 +251,9 @@ def check_rest(found: Root, model: ExportedModel) -> None:
         ]
         state = f"its nominal state ({', '.join(nominal)})" if nominal else "its nominal state"
         raise InputError(
-            f"the rig finds no rest in {state}", remedy="mend its springs, its masses or its geometry"
+            f"the plant finds no rest in {state}, from which what is exported begins",
+            remedy="mend what it is held by: its springs, masses or geometry; what nothing holds is moved for ever "
+            "by a constant force, as the offset of a drive: give `export` the model without that effect",
         )
 
 

@@ -41,6 +41,7 @@ from savgs_ident.inference.drive_force import (
 from savgs_ident.inference.find_map import find_map
 from savgs_ident.inference.laplace import spread_of
 from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
+from savgs_ident.inference.likely_mistake import mistaken_drive
 from savgs_ident.inference.prior import sheet_coordinate, slopes_at
 from savgs_ident.inference.problem import check_free, used_parameters
 from savgs_ident.plants.model import Model
@@ -86,6 +87,11 @@ class MotionFit(Identified):
     def unsolved(self) -> str:
         """Nowhere: that states were not found is in the status."""
         return ""
+
+    @property
+    def mistaken(self) -> str:
+        """Whether the drive's force goes the other way than the model says, or has another unit, in words."""
+        return mistaken_drive(self.measured, self.as_given, self.estimated.plant)
 
     @property
     def compared(self) -> Mapping[str, object]:

@@ -200,6 +200,13 @@ def _describe_along_motion(
 ) -> tuple[str, ...]:
     """The same along a measured motion; which other motion would help is not known."""
     del posed, mode
+    scale = next(each for each in marginals if each.name == "discrepancy")
+    if scale.q025 > BACKGROUND.largest_error:
+        return (
+            *_discrepancy(marginals, MotionPosterior.errs_in, ""),
+            "What is missing errs alike in many rows, so that the intervals are too narrow by far: the errors of "
+            "`fit` allow for all of it along each parameter.",
+        )
     return sentences_of(marginals, draws, (), MotionPosterior.errs_in, "")
 
 

@@ -333,7 +333,7 @@ def layout_of(plant: AbstractPlant | type[AbstractPlant]) -> RecordingLayout:
         (*driving, *read),
         driving[0].name,
         tuple(each.name for each in read),
-        checks=(partial(check_input_sizes, _input_sizes(plant)),),
+        checks=(partial(check_sizes, _typical_sizes(plant)),),
     )
 
 
@@ -342,9 +342,16 @@ UNLIKE = 100.0
 millimetres taken for metres are seen and no declaration has to be exact."""
 
 
-def _input_sizes(plant: AbstractPlant | type[AbstractPlant]) -> tuple[tuple[str, str, float], ...]:
-    """Name and unit of each input, and how large it typically is by the sizes of what it moves [unit]."""
-    found = []
+def _typical_sizes(plant: AbstractPlant | type[AbstractPlant]) -> tuple[tuple[str, str, float], ...]:
+    """Name and unit of each input, and how large it typically is by the sizes of what it moves [unit].
+
+    And of a reading of the one coordinate that has its unit.
+    """
+    sizes = {each.unit: each.size for each in plant.coordinates}
+    alone = len(plant.coordinates) == 1
+    found = [
+        (each.name, each.unit, sizes[each.unit]) for each in plant.channels if alone and each.unit in sizes
+    ]
     for each in plant.inputs:
         moved = [one.size / abs(by) for one, by in zip(plant.coordinates, each.moves, strict=False) if by]
         if moved:
@@ -352,10 +359,10 @@ def _input_sizes(plant: AbstractPlant | type[AbstractPlant]) -> tuple[tuple[str,
     return tuple(found)
 
 
-def check_input_sizes(
+def check_sizes(
     sizes: Sequence[tuple[str, str, float]], recordings: Sequence[Recording], source: str
 ) -> tuple[DataWarning, ...]:
-    """Warnings ``implausible_unit`` of inputs that are far from the size (name, unit, size) that a plant declares."""
+    """Warnings ``implausible_unit`` of signals that are far from the ``sizes`` (name, unit, size) of a plant."""
     found = []
     for name, unit, size in sizes:
         moves = [float(np.std(each.channels[name].values)) for each in recordings if name in each.channels]

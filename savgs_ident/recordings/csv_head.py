@@ -186,7 +186,7 @@ def _check_columns(columns: tuple[str, ...], layout: RecordingLayout, source: st
 def _is_unit_row(row: tuple[str, ...], columns: tuple[str, ...], layout: RecordingLayout) -> bool:
     """A second line such as ``s;mm;g``: what stands below a known column is a unit or empty.
 
-    So is one with a time below a column without a name.
+    So is one with a time below a column without a name; and where no column is known, one of nothing but units.
     """
     if len(row) != len(columns) or any(_is_number(cell) for cell in row):
         return False
@@ -197,7 +197,9 @@ def _is_unit_row(row: tuple[str, ...], columns: tuple[str, ...], layout: Recordi
         for cell, name in zip(row, columns, strict=True)
         if layout.canonical_name(layout.split_header(name).label)
     ]
-    return bool(known) and all(not cell or find_unit(cell) for cell in known) and any(known)
+    if not known:
+        known = [cell.strip("[]() ") for cell in row]
+    return all(not cell or find_unit(cell) for cell in known) and any(known)
 
 
 def _is_number(text: str) -> bool:

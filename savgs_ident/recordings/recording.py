@@ -326,11 +326,11 @@ class Campaign:
 
 _FREQUENCY = re.compile(r"(?<![\d.])(\d+(?:[.,p]\d+)?)\s*_?hz", re.IGNORECASE)
 _SWEEP = re.compile(r"sweep|chirp", re.IGNORECASE)
-_ROAD = re.compile(r"road|random|track|ride|drive|8608|broad_?band", re.IGNORECASE)
+_ROAD = re.compile(r"road|random|track|ride|drive|8608|broad_?band|multi[ _-]?sin", re.IGNORECASE)
 _STANDSTILL = re.compile(r"stand_?still|at_?rest|idle", re.IGNORECASE)
 _PULSE = re.compile(r"square|pulse|bump", re.IGNORECASE)
 _STEP = re.compile(r"step", re.IGNORECASE)
-_DWELL = re.compile(r"dwell|harmonic|sine|sinus", re.IGNORECASE)
+_DWELL = re.compile(r"dwell|harmonic|(?<!multi)(?<!multi[ _-])(sine|sinus)", re.IGNORECASE)
 
 
 def classify_test(name: str) -> tuple[TestKind, float | None]:

@@ -146,6 +146,9 @@ def sweep_columns(sweep: SimulatedSweep) -> dict[str, Sequence[object]]:
 def sweep_text(sweep: SimulatedSweep) -> RenderableType:
     """The largest readings and where they are."""
     record: Mapping[str, Any] = sweep_record(sweep)
+    title = f"Sweep from {record['from_hz']:g} to {record['to_hz']:g} Hz in {record['duration_s']:g} s"
+    if record["status"] != "converged":
+        return plain(f"{title}: {record['status'].replace('_', ' ')}")
     labels = channel_labels(sweep.model)
     rows = [
         (
@@ -157,9 +160,6 @@ def sweep_text(sweep: SimulatedSweep) -> RenderableType:
         )
         for name, channel in record["channels"].items()
     ]
-    title = f"Sweep from {record['from_hz']:g} to {record['to_hz']:g} Hz in {record['duration_s']:g} s"
-    if record["status"] != "converged":
-        return plain(f"{title}: {record['status'].replace('_', ' ')}")
     return table(title, ("channel", "unit", "largest", "smallest", "peak at [Hz]"), rows, texts=(0, 1))
 
 

@@ -84,7 +84,7 @@ def motion_of(campaign: Campaign, model: Model) -> DrivenMotion:
         raise refused[0]
     motion = joined(found, campaign.source)
     left_out = tuple(error.as_warning("tests_not_used") for error in refused)
-    return replace(motion, warnings=(*motion.warnings, *left_out))
+    return replace(motion, warnings=(*campaign.warnings, *motion.warnings, *left_out))
 
 
 def _refuse_undriven(model: Model, source: str) -> None:

@@ -200,7 +200,7 @@ def test_a_rig_that_finds_no_rest_is_code_2_and_names_its_file(invoke: Invoke) -
     done = invoke("export", "soft.toml", "--to", "casadi", "--quiet")
     assert done.exit_code == 2
     assert done.stderr.startswith(
-        "Error: soft.toml: the rig finds no rest in its nominal state (link angle 1.571 rad)"
+        "Error: soft.toml: the plant finds no rest in its nominal state (link angle 1.571 rad)"
     )
     assert not list(Path("out/export").iterdir())
 

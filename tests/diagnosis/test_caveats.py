@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 
 from savgs_ident.core.status import Status
-from savgs_ident.diagnosis.caveats import write_warnings
+from savgs_ident.diagnosis.caveats import write_further, write_warnings
 from savgs_ident.diagnosis.evidence import counted_with_more
 from savgs_ident.diagnosis.findings import LostHypothesis
+from savgs_ident.diagnosis.gap import FurtherShrink, Shrink
 from savgs_ident.diagnosis.result import Hypothesis
 from savgs_ident.diagnosis.thresholds import DEFAULTS
 from savgs_ident.diagnosis.verdict import probabilities
@@ -82,3 +83,12 @@ def test_what_is_named_is_as_probable_as_it_is_with_something_small_besides(
     assert any("Something more may be missing" in each for each in said) == warned
     alone = evidence_of("rail_viscous", "law", weights)
     assert counted_with_more(replace(alone, kind="effect")).weighed == alone.weighed
+
+
+@pytest.mark.parametrize(("after", "said"), [(0.418, True), (0.05, False), (float("nan"), False)])
+def test_a_recording_that_took_no_part_and_is_missed_by_far_is_a_warning(after: float, said: bool) -> None:
+    held_out = Shrink(0.9, 0.5, 0.019, 0.002, 0.99, (0.98, 1.0))
+    found = write_further(FurtherShrink("moves_b.mat", 0.9, 0.6, after, 0.002), held_out)
+    assert len(found) == said
+    assert all("moves_b.mat" in each and "41.8 %" in each and "1.9 %" in each for each in found)
+    assert write_further(None, held_out) == ()

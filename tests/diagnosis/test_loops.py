@@ -1,6 +1,7 @@
 """The force that is drawn for a named effect is the force of the plant, its damper and its bristle included."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +12,7 @@ from savgs_ident.core.values import Values, as_values
 from savgs_ident.diagnosis.dwell_problem import DwellProblem
 from savgs_ident.diagnosis.effect_sensitivities import marched_effect
 from savgs_ident.diagnosis.loops import effect_forces
+from savgs_ident.diagnosis.problem import drawn_law, term_of
 from savgs_ident.effects.effect import Effect
 from savgs_ident.effects.learned_functions import OF_A_CONTACT, coefficients_at, functions_at
 from savgs_ident.inference.background.imposed import impose
@@ -137,3 +139,14 @@ def test_forces_at_several_parameters_are_those_at_each_and_in_some_tests_those_
     (some,) = effect_forces(model, [first], start, effect, tests=(3,))  # type: ignore[misc]
     third = start.mesh.layout.nodes_of([3])
     np.testing.assert_allclose(some[third], both[0][third], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("rounding", "errors"), [(0.0, 1), (-1e-18, 1), (np.nan, 0)])
+def test_a_law_is_drawn_whatever_the_covariance_of_its_numbers(rounding: float, errors: int) -> None:
+    effect = CATALOGUE["rail_stribeck"]
+    own = term_of(effect).coordinates[:1]
+    fit = SimpleNamespace(coordinates=own, x=np.full(1, 0.5))
+    search = SimpleNamespace(covariance=lambda _: np.full((1, 1), rounding))
+    drawn = drawn_law(effect, {own[0].name: 1.0}, fit, search)  # type: ignore[arg-type]
+    assert len(drawn.erring) == errors
+    assert all(np.isfinite(each[own[0].name]) for each in drawn.erring)

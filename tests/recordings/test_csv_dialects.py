@@ -248,6 +248,7 @@ def test_a_file_much_larger_than_a_block(
         ("harmonic", "dwell", None), ("sweep_0_3Hz_60s", "sweep", None), ("Chirp 3 Hz", "sweep", None),
         ("standstill", "standstill", None), ("at_rest", "standstill", None), ("monday", "other", None),
         ("step_up", "step", None), ("square_0.5Hz", "step", None), ("speed bump", "step", None),
+        ("multisine", "road", None), ("multi-sine run 3", "road", None), ("Multi_Sinus", "road", None),
         ("step_03_1.2Hz", "dwell", 1.2), ("stepped_sine", "dwell", None),
         ("dwell_0Hz", "dwell", None), ("dwell_" + 400 * "9" + "Hz", "dwell", None),
     ],

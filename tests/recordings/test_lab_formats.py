@@ -185,3 +185,17 @@ def test_signals_without_a_time_are_refused(tmp_path: Path) -> None:
     savemat(path, {"t": TIME, "pressure": VOLTS})
     with pytest.raises(InputError, match="no signal is known: found 't', 'pressure'"):
         read_campaign(path, LAYOUT)
+
+
+@pytest.mark.parametrize("title", ["", "Messung 3; 12.11.2026\n"])
+def test_a_row_of_units_below_names_that_only_the_map_knows_is_read(tmp_path: Path, title: str) -> None:
+    path, channels = tmp_path / "dwell_2Hz.csv", tmp_path / "channels.toml"
+    rows = zip(TIME, VOLTS, DEGREES, strict=True)
+    text = "".join(";".join(f"{value:.12g}".replace(".", ",") for value in row) + "\n" for row in rows)
+    path.write_text(f"{title}Zeit;Spannung;Winkel\ns;V;deg\n{text}")
+    channels.write_text(
+        '[channels.voltage]\ncolumn = "Spannung"\n[channels.angle]\ncolumn = "Winkel"\n[time]\ncolumn = "Zeit"\n'
+    )
+    campaign = read_campaign(path, LAYOUT, channels)
+    _checked(campaign, exact=False)
+    assert not [each for each in campaign.warnings if each.code == "unit_assumed"]

@@ -1,8 +1,8 @@
-"""A constant force or torque beside what a drive is said to exert: an offset of its amplifier, a weight to be held.
+"""A constant force beside what a drive is said to exert: an offset of its amplifier, a weight to be held.
 
     u = recorded u + b
 
-with the offset b [N, or N m].
+with the offset b in the unit of the input: N, N m, or what a motor is driven with, as A or V.
 
 Source: Janot, Gautier and Brunot 2019, Data set and reference models of EMPS, nonlinearbenchmark.org, eq. (1).
 """
@@ -16,9 +16,12 @@ from savgs_ident.core.parameter import Parameter
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import AbstractInputLaw, Family, Fundamental, InputSignal, Port, PortKind, Role
 
+_MOTIONS = ("m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2")
+"""Units of what is moved, not driven."""
+
 
 class InputOffset(AbstractInputLaw):
-    """A constant error of a force that is recorded as an input."""
+    """A constant error of a drive that is recorded as an input."""
 
     name: ClassVar[str] = "offset"
     words: ClassVar[str] = "a constant error of the input"
@@ -36,8 +39,8 @@ class InputOffset(AbstractInputLaw):
         }
 
     def suits(self, port: Port) -> bool:
-        """Only where the input is a force or a torque: a road that lies higher is the same road."""
-        return port.kind is PortKind.INPUT and port.displacement_unit in ("N", "N m")
+        """Only where the input is no motion: a road that lies higher is the same road."""
+        return port.kind is PortKind.INPUT and port.displacement_unit not in _MOTIONS
 
     def shift(self, v: Values, signal: InputSignal, fundamental: Fundamental) -> InputSignal:
         """The constant."""
