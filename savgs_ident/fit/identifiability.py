@@ -312,7 +312,7 @@ def _verdict(
     if per_datum <= EXPLAINED:
         return verdict
     beyond = (
-        f"The model misses by {percent(missed)} of the response beyond the noise (chi2/dof = {per_datum:.3g}), "
+        f"The model misses by {percent(missed)} of the response beyond the noise (chi2/dof = {per_datum:.4g}), "
         "no more than small errors of any model; the errors of the parameters contain it."
     )
     return replace(verdict, sentences=(beyond, *verdict.sentences))
@@ -329,7 +329,7 @@ def unexplained(per_datum: float, missed: float) -> str:
     """That a model misses its data, by chi2 per datum and as a share of the response [1]."""
     return (
         f"The model does not explain these data: it misses by {percent(missed)} of the response beyond the "
-        f"noise (chi2/dof = {per_datum:.3g}). Where units and signs are sure, look with `diagnose` for what is "
+        f"noise (chi2/dof = {per_datum:.4g}). Where units and signs are sure, look with `diagnose` for what is "
         "missing, or follows another law. Until then the parameters make up for it, and may be off by more than "
         "their errors."
     )

@@ -49,7 +49,9 @@ def drive_figure(
             drawn(below, measured - force, **line)
         middle.set_ylabel(f"force of the drive [{units[0]}]")
         below.set_ylabel(f"measured less\nneeded [{units[0]}]")
-        below.set_xlabel("time since the first sample [s]")
+        whole = float(time[-1] - time[0])
+        part = f", the first {SHOWN_S:g} of {whole:.3g} s" if whole > SHOWN_S else ""
+        below.set_xlabel(f"time since the first sample [s]{part}")
         _explain_lines(figure, middle, band)
         figure.align_ylabels()
         return figure
