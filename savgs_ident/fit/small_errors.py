@@ -19,19 +19,18 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Progress
-from savgs_ident.core.status import Status
 from savgs_ident.fit.minimise import Minimiser, Minimum
 from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.inference.background.shared_errors import drifts_of
-from savgs_ident.inference.find_map import LAST_STEPS, LEVEL, find_map
 from savgs_ident.inference.harmonic_model import SampledHarmonics
 from savgs_ident.inference.laplace import linearised_optimum
-from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
+from savgs_ident.inference.laplace_fit import LaplaceFit
 from savgs_ident.inference.likelihood import likelihood_of
+from savgs_ident.inference.near_mode import LinearisationPoint
 from savgs_ident.inference.observations import Data
 from savgs_ident.inference.posterior_mode import (
     PosteriorDensity,
-    PosteriorPlant,
+    find_mode_with_background,
     linearisation_point,
     with_background,
 )
@@ -100,42 +99,42 @@ def fit_with_errors(
     )
     at = linearisation_point(plain, best.u, best.solution)
     drifting = task.problem.free.identified
+    widths = np.asarray(task.problem.free.widths)
     try:
-        density, data = with_background(plain, at, drifting)
+        known = with_background(plain, at, drifting)
+        roughly = _rough_error(at, *known, widths)
+        if roughly > HOPELESS * BACKGROUND.largest_error:
+            return LargeErrors(roughly)
+        there = find_mode_with_background(plain, at, drifting, progress, SETTLED, known)
     except InputError:
         # As far off as least squares ends where a channel has another unit.
         return None
-    widths = np.asarray(task.problem.free.widths)
-    roughly = linearised_optimum(
-        density.likelihood.data,
-        data.turned(data.measured - at.rows),
-        data.turned(at.slopes * widths),
-        np.asarray(best.u) / widths,
-        (np.full(widths.size, -np.inf), np.full(widths.size, np.inf)),
-    ).noise_scales.discrepancy
-    if roughly > HOPELESS * BACKGROUND.largest_error:
-        return LargeErrors(roughly)
-    values = {name: float(value) for name, value in task.problem.parameters(best.u).items()}
-    search = search_of(PosteriorPlant(density), density.likelihood.data)
-    found = find_map(search, (), values, best.solution, level=SETTLED, steps=LAST_STEPS, progress=progress)
-    if found.status is Status.MAX_ITERATIONS:
-        # Along a contact as hard as any nothing rises any more, for as many steps as one likes.
-        found = find_map(
-            search, (), found.values, found.prediction.warm_start, level=LEVEL, progress=progress
-        )
+    found, scale = there.found, np.outer(widths, widths)
     if not found.status.ok:
         return None
     if found.noise_scales.discrepancy > BACKGROUND.largest_error:
         return LargeErrors(found.noise_scales.discrepancy)
-    there = minimiser.evaluate(jnp.asarray(found.x * widths), found.prediction.warm_start)
-    if not there.evaluation.ok:
+    ended = minimiser.evaluate(jnp.asarray(found.x * widths), found.prediction.warm_start)
+    if not ended.evaluation.ok:
         return None
-    scale = np.outer(widths, widths)
     return FitWithErrors(
-        best=there._replace(status=found.status),
-        covariance=scale * search.covariance(found),
-        own=scale * _own_covariance(found, data, len(drifting)),
+        best=ended._replace(status=found.status),
+        covariance=scale * there.covariance,
+        own=scale * _own_covariance(found, there.data, len(drifting)),
     )
+
+
+def _rough_error(
+    at: LinearisationPoint, density: PosteriorDensity, data: Data, widths: NDArray[np.float64]
+) -> float:
+    """How large errors would have to be to first order about a point, as a share of the response [1]."""
+    return linearised_optimum(
+        density.likelihood.data,
+        data.turned(data.measured - at.rows),
+        data.turned(at.slopes * widths),
+        at.point[:-2] / widths,
+        (np.full(widths.size, -np.inf), np.full(widths.size, np.inf)),
+    ).noise_scales.discrepancy
 
 
 def _softened(task: Task, minimiser: Minimiser, best: Minimum) -> Minimum:

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from savgs_ident.core.executor import in_parallel
 from savgs_ident.core.presentation import Progress
 from savgs_ident.core.status import Status
+from savgs_ident.inference.background.constants import BACKGROUND
 from savgs_ident.inference.find_map import LAST_STEPS, find_map
 from savgs_ident.inference.laplace import principal_axes
-from savgs_ident.inference.laplace_fit import LaplaceFit, search_of
+from savgs_ident.inference.laplace_fit import LaplaceFit, Search, search_of
 from savgs_ident.inference.likelihood import RowLikelihood
 from savgs_ident.inference.near_mode import (
     ExactModel,
@@ -185,13 +186,91 @@ def with_background(
     return PosteriorDensity(problem, likelihood, posterior.prior), data
 
 
-def find_mode_again(posterior: PosteriorDensity, known: PosteriorMode, report: Progress) -> PosteriorMode:
-    """The mode from that of another density of the same model."""
-    at = known.linearisation_point
-    search = search_of(PosteriorPlant(posterior), posterior.likelihood.data)
-    start = _values_at(posterior, jnp.asarray(at.point[:-2]))
-    found = find_map(search, (), start, at.warm_start, steps=LAST_STEPS, level=LEVEL, progress=report)
-    return PosteriorMode(_linearisation_point(posterior, found), found.status, found.solved)
+NEAR = 1.0
+"""Standard deviations by which a mode may lie off the point about which its background was found."""
+
+PASSES = 4
+"""Most points about which the background is found. Origin: computing time; one is the rule."""
+
+
+class ModeWithBackground(NamedTuple):
+    """A mode of rows that share small errors, found about itself.
+
+    Attributes:
+        density: that of these rows.
+        data: what errors they share.
+        search: what was searched.
+        found: the mode.
+        earlier: coordinates of the modes from other backgrounds [1], (k, n); none where the last is that of its own.
+    """
+
+    density: PosteriorDensity
+    data: Data
+    search: Search
+    found: LaplaceFit
+    earlier: Float[np.ndarray, "k n"]
+
+    @property
+    def settled(self) -> bool:
+        """Whether the background was found about the mode."""
+        return not self.earlier.size
+
+    @property
+    def covariance(self) -> Float[np.ndarray, "n n"]:
+        """Covariance of the coordinates [1], of the backgrounds that lead elsewhere, too, where none settles."""
+        own = self.search.covariance(self.found)
+        off = self.earlier - self.found.x
+        return own if self.settled else own + off.T @ off / len(off)
+
+    @property
+    def mode(self) -> PosteriorMode:
+        """The mode, as a sampler takes it."""
+        return PosteriorMode(
+            _linearisation_point(self.density, self.found), self.found.status, self.found.solved
+        )
+
+
+def find_mode_with_background(
+    plain: PosteriorDensity,
+    at: LinearisationPoint,
+    drifting: Sequence[str],
+    report: Progress,
+    level: float = LEVEL,
+    known: tuple[PosteriorDensity, Data] | None = None,
+) -> ModeWithBackground:
+    """The mode with the small errors that any model has, from a point ``at`` that a search without them led to.
+
+    What small errors do depends on how the model moves. Where the mode lies far from the point about which they were
+    found, they are found again about the mode, until it stays; where it does not, no background is the right one, and
+    all of their modes say what is known. Not where errors would have to be larger than small ones are. ``drifting``
+    are free parameters that may change while the recordings are made. ``known`` is what :func:`with_background` gives
+    about the first point, where that was asked for already.
+
+    Raises :class:`InputError` where the errors do no finite thing.
+    """
+    modes: list[Float[np.ndarray, " n"]] = []
+    for _ in range(PASSES):
+        density, data = known or with_background(plain, at, drifting)
+        known = None
+        search = search_of(PosteriorPlant(density), density.likelihood.data)
+        u = jnp.asarray(at.point[:-2])
+        start = _values_at(density, u)
+        found = find_map(search, (), start, at.warm_start, steps=LAST_STEPS, level=level, progress=report)
+        if found.status is Status.MAX_ITERATIONS:
+            # Along a contact as hard as any nothing rises any more, for as many steps as one likes.
+            found = find_map(search, (), found.values, found.prediction.warm_start, progress=report)
+        there = ModeWithBackground(density, data, search, found, np.array(modes).reshape(-1, found.x.size))
+        if not found.solved or found.noise_scales.discrepancy > BACKGROUND.largest_error:
+            break
+        moved = (found.x - np.asarray(u) / plain.problem.free.widths) / np.sqrt(np.diag(found.covariance()))
+        if np.max(np.abs(moved)) < NEAR:
+            return there._replace(earlier=np.zeros((0, found.x.size)))
+        modes.append(found.x)
+        report("finding what small errors do there")
+        at = linearisation_point(
+            plain, jnp.asarray(found.x * plain.problem.free.widths), found.prediction.warm_start
+        )
+    return there
 
 
 def _values_at(posterior: PosteriorDensity, u: Float[Array, " n"]) -> dict[str, float]:

@@ -41,8 +41,7 @@ from savgs_ident.inference.posterior_mode import (
     PosteriorDensity,
     PosteriorMode,
     expand,
-    find_mode_again,
-    with_background,
+    find_mode_with_background,
 )
 from savgs_ident.inference.result import Marginal, Posterior, Sampler
 from savgs_ident.inference.samplers.chains import (
@@ -101,6 +100,12 @@ class AnyQuestion(Protocol):
         """The question with what is to be compared."""
 
 
+UNSETTLED = (
+    "what small errors of the model do depends on the parameters by more than these are known: the intervals are too "
+    "narrow, and the errors of `fit` allow for it"
+)
+"""Why a posterior is not to be trusted whose background is not that of its own mode."""
+
 Describe = Callable[
     [Any, PosteriorMode, Sequence[Marginal], Mapping[str, NDArray[np.float64]]], tuple[str, ...]
 ]
@@ -115,6 +120,7 @@ class _Answer(NamedTuple):
     mode: PosteriorMode
     expansion: Expansion
     chains: Chains
+    settled: bool
 
 
 def sample_posterior(
@@ -139,13 +145,13 @@ def sample_posterior(
     mode = posed.mode(report)
     report("looking for the mode with a background of small errors")
     drifting = posed.density.problem.free.identified
-    posterior, _ = with_background(posed.density, mode.linearisation_point, drifting)
-    mode = find_mode_again(posterior, mode, report)
+    located = find_mode_with_background(posed.density, mode.linearisation_point, drifting, report)
+    posterior, mode = located.density, located.mode
     expansion = expand(posterior, mode.linearisation_point, report)
     chains = _run(expansion, settings, checkpoint, began, report)
     wall_s = time.perf_counter() - began
     report("summing up")
-    answer = _Answer(posed, posterior, mode, expansion, chains)
+    answer = _Answer(posed, posterior, mode, expansion, chains, located.settled)
     return _summed_up(answer, question, settings, wall_s, describe or _nothing, origin)
 
 
@@ -221,7 +227,8 @@ def _summed_up(
     count = len(posterior.problem.free.identified)
     identified, others = mixing_of_identified(chains, count), mixing_of_others(chains, count)
     status = answer.mode.status
-    doubts = () if status.ok else (f"the mode was not found: {status.advice}",)
+    doubts = [] if status.ok else [f"the mode was not found: {status.advice}"]
+    doubts += [] if answer.settled else [UNSETTLED]
     convergence = assess_convergence(chains, identified, others, settings.target_ess, doubts)
     marginals = marginals_of(posterior, answer.expansion.surrogate, chains, mixing)
     draws = {name: values[name].T for name in roles}
