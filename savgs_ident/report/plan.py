@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.console import Group, RenderableType
 
-from savgs_ident.report.text import fixed, plain, significant, table
+from savgs_ident.report.text import fixed, plain, significant, stacked, table
 from savgs_ident.report.theme import INK, ORANGE, magnitude_axis, new_figure, styled
 from savgs_ident.validation.plan import CampaignPlan
 
@@ -87,7 +87,12 @@ def plan_text(plan: CampaignPlan) -> RenderableType:
         )
         for place, each in enumerate(plan.tests)
     ]
-    headers = ("", "f\n[Hz]", f"{driven.name}\n[{driven.unit}]", *(f"{name}\n[%]" for name in plan.free))
+    headers = (
+        "",
+        "f\n[Hz]",
+        f"{driven.name}\n[{driven.unit}]",
+        *(f"{stacked(name)}\n[%]" for name in plan.free),
+    )
     title = f"Dwells of {plan.offered}, and standard errors with each and all before it"
     noise = ", ".join(
         f"{each.name} {significant(plan.noise[each.name], 2)} {each.unit}" for each in plan.model.channels

@@ -49,6 +49,20 @@ def numeral(value: float, error: float) -> str:
     return _scaled("{}", (value,), error)
 
 
+def stacked(name: str, width: int = 14) -> str:
+    """A long name in lines, broken behind its underscores, for the head of a narrow column.
+
+    >>> stacked("guide_breakaway_force").split()
+    ['guide_', 'breakaway_', 'force']
+    """
+    lines = [""]
+    for part in name.replace("_", "_ ").split(" "):
+        if lines[-1] and len(lines[-1]) + len(part) > width:
+            lines.append("")
+        lines[-1] += part
+    return "\n".join(lines)
+
+
 def with_error(value: float, error: float) -> str:
     """A value and its error in the same unit, both to the second significant digit of the error."""
     return _scaled("{} ± {}", (value, error), error)
