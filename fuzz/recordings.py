@@ -12,11 +12,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from mcap.writer import CompressionType
 from numpy.typing import NDArray
-from scipy.io import savemat
 
 from fuzz.cdr import IMU, JOINTS, imu_message, joint_message, number_message, text_message
 from fuzz.loader import Original
 from fuzz.mcap_files import Message, Topic, mcap_bytes
+from fuzz.mutators.matlab import written
 from savgs_ident.plants.quarter_car.inputs import read_road
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT, load_campaign
 from savgs_ident.recordings.axis_recording import read_axis
@@ -171,12 +171,7 @@ def axis() -> Original:
     """A recording of a servo axis, packed and not."""
     t = 1e-3 * np.arange(60)[:, None]
     arrays = {"t": t, "qm": 0.1 * np.sin(t), "qg": 0.1 * np.sin(t) + 1e-5, "vir": np.cos(t), "gtau": 35.0}
-    contents = []
-    for packed in (True, False):
-        stream = BytesIO()
-        savemat(stream, arrays, do_compression=packed)
-        contents.append(stream.getvalue())
-    return Original(tuple(contents))
+    return Original(tuple(written(arrays, packed) for packed in (True, False)))
 
 
 def parquet() -> Original:

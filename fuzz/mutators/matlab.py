@@ -2,7 +2,7 @@
 
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from io import BytesIO
 from typing import Any
@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 from scipy.io import loadmat, savemat
+
+_HEAD = 116
+"""Bytes of text at the head of a file."""
 
 
 def damage_matlab(content: bytes, random: Generator) -> bytes:
@@ -27,9 +30,15 @@ def damage_matlab(content: bytes, random: Generator) -> bytes:
         arrays[name] = _CHANGES[int(random.integers(len(_CHANGES)))](arrays[name], random)
         if arrays[name] is None:
             del arrays[name]
+    return written(arrays, random.random() < 0.5)
+
+
+def written(arrays: Mapping[str, Any], packed: bool) -> bytes:
+    """A MATLAB file of arrays, the same whenever it is written: its head says no time."""
     stream = BytesIO()
-    savemat(stream, arrays, do_compression=random.random() < 0.5)
-    return stream.getvalue()
+    savemat(stream, dict(arrays), do_compression=packed)
+    content = stream.getvalue()
+    return b"MATLAB 5.0 MAT-file".ljust(_HEAD) + content[_HEAD:]
 
 
 def _within(content: bytes, random: Generator) -> list[bytes]:
