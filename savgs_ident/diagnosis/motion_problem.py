@@ -311,7 +311,7 @@ class MotionProblem(AbstractProblem):
         return ()
 
     def mistaken(self, given: NDArray[np.float64]) -> str:
-        """Whether the drive's force goes the other way than the model says, or has another unit, in words."""
+        """Whether the drive's force goes the other way than the model says, in words."""
         return mistaken_drive(self.motion.rows(self.motion.drive), given, self.plant)
 
     def responses(self, data: Data, *rows: NDArray[np.float64]) -> DriveForces:

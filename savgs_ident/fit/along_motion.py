@@ -90,7 +90,7 @@ class MotionFit(Identified):
 
     @property
     def mistaken(self) -> str:
-        """Whether the drive's force goes the other way than the model says, or has another unit, in words."""
+        """Whether the drive's force goes the other way than the model says, in words."""
         return mistaken_drive(self.measured, self.as_given, self.estimated.plant)
 
     @property

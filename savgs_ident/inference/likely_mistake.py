@@ -121,24 +121,22 @@ AGAINST = -0.3
 """Correlation of a drive's force with that which is needed below which its sign is wrong; a friction that the model
 lacks turns round with the motion, too."""
 
-ALONG, FAR_OFF = 0.5, float(np.log(20.0))
-"""Correlation from which, and logarithm of the ratio of the two above which, it is a unit that is wrong."""
-
 
 def mistaken_drive(
     measured: NDArray[np.float64], needed: NDArray[np.float64], plant: AbstractPlant | type[AbstractPlant]
 ) -> str:
-    """The same of the force of a drive along a motion (m,); ``needed`` is what the model as given asks for."""
-    drive = _Recorded(plant.inputs[0].name, plant.inputs[0].unit)
+    """Whether the force of a drive along a motion (m,) goes the other way than ``needed`` by the model, (m,).
+
+    Its unit tells nothing: where masses and frictions are to be identified, any unit of force will do.
+    """
     one, other = measured - np.mean(measured), needed - np.mean(needed)
     sizes = float(np.linalg.norm(one)), float(np.linalg.norm(other))
     if not (np.isfinite(sizes).all() and min(sizes) > 0.0):
         return ""
-    alike = float(one @ other) / (sizes[0] * sizes[1])
-    if alike < AGAINST:
-        return _sign(drive, "the measured motion")
-    factor = float(np.log(sizes[0] / sizes[1]))
-    return _unit(drive, factor, "the measured motion") if alike > ALONG and abs(factor) > FAR_OFF else ""
+    opposed = float(one @ other) < AGAINST * sizes[0] * sizes[1]
+    return (
+        _sign(_Recorded(plant.inputs[0].name, plant.inputs[0].unit), "the measured motion") if opposed else ""
+    )
 
 
 def _scatter(ratios: Sequence[_Ratio | None]) -> float:

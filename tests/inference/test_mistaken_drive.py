@@ -1,4 +1,4 @@
-"""A drive whose force has another sign or unit is told from a model that lacks a friction."""
+"""A drive whose force has another sign is told from a model that lacks a friction."""
 
 import numpy as np
 import pytest
@@ -22,11 +22,9 @@ def test_a_wrong_sign_is_said_whatever_the_friction(friction: float) -> None:
     assert "look at its sign" in mistaken_drive(-(NEEDED + friction * np.sign(SPEED)), NEEDED, Axis)
 
 
-@pytest.mark.parametrize("factor", [1e-3, 1e3])
-def test_a_wrong_unit_is_said_with_its_factor(factor: float) -> None:
-    said = mistaken_drive(factor * NEEDED, NEEDED, Axis)
-    assert "look at its unit" in said
-    assert f"{factor:.3g} times" in said
+@pytest.mark.parametrize("factor", [1e-2, 1e2])
+def test_another_unit_of_force_is_no_mistake(factor: float) -> None:
+    assert mistaken_drive(factor * NEEDED, NEEDED, Axis) == ""
 
 
 def test_nothing_is_said_of_what_is_no_number() -> None:
