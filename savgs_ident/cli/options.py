@@ -103,7 +103,8 @@ MaxFrequencyOption = Annotated[
     typer.Option(
         "--max-frequency",
         metavar="HZ",
-        help="Leave out faster dwells. In windows: compare up to this, 15 Hz by default, 40 Hz at most.",
+        help="Leave out faster dwells. In windows: compare up to this; by default 15 Hz, and 40 Hz at most, for a "
+        "plant as fast as a quarter car.",
     ),
 ]
 OrdersOption = Annotated[int, typer.Option("--orders", min=1, help="Highest harmonic order to compare.")]

@@ -89,7 +89,7 @@ class DwellProblem(AbstractProblem):
     @cached_property
     def layout(self) -> Layout:
         """How nodes share arrays."""
-        return layout_of(self.excitation, self.settings)
+        return layout_of(self.excitation, self.settings, self.model(()))
 
     @cached_property
     def dwells(self) -> NDArray[np.intp]:

@@ -90,7 +90,7 @@ class DiagnosisProblem:
 
     def port(self, name: str) -> Port:
         """The port of a name."""
-        return next(each for each in self.plant.plant.ports if each.name == name)
+        return next(each for each in self.plant.plant.scaled_ports if each.name == name)
 
     def terms(self, hypothesis: Hypothesis) -> tuple[Term, ...]:
         """The candidates that a hypothesis consists of."""

@@ -283,7 +283,8 @@ def _alike(effect: Effect, problem: AbstractProblem) -> list[Effect]:
     """The learned laws of all that gives way, whose programs serve each other, if this is one of them."""
     if effect.port.kind is not PortKind.SERIES:
         return [effect]
-    series = (each for each in problem.plant.ports if each.kind is PortKind.SERIES and not each.resonant)
+    ports = problem.plant.scaled_ports
+    series = (each for each in ports if each.kind is PortKind.SERIES and not each.resonant)
     return [learned_effect(each) for each in series]
 
 
@@ -334,7 +335,7 @@ def _blocked_play(
     blocking = blocking_at(port)
     if blocking is None:
         return None
-    lags = tuple(replace(each, centre=constants.lag_of_play) for each in blank.shapes)
+    lags = tuple(replace(each, centre=constants.lag_of_play * port.time_scale) for each in blank.shapes)
     blocked = Logarithmic(blocking, "1", constants.blocking_of_play, constants.shape_width, 0.0, np.inf)
     names, shapes = coefficients_of(port, Family.PLAY), (*lags, blocked)
     start = {**base.values, **{each.name: each.centre for each in shapes}}

@@ -62,7 +62,7 @@ class SharedPrograms:
     def _forces(self) -> Mapping[str, SharedForce]:
         """The learned forces of the catalogue."""
         learned = {name: each for name, each in self.catalogue.items() if isinstance(each.law, LearnedForce)}
-        return placed({name: shared_force(each, self.model.ports) for name, each in learned.items()})
+        return placed({name: shared_force(each, self.model.scaled_ports) for name, each in learned.items()})
 
     @cached_property
     def _alternatives(self) -> Mapping[str, Alternatives]:

@@ -99,8 +99,8 @@ def swept_motions(point: ModelPoint, sweep: SweepResponse, frequencies: Signal) 
     for name in others:
         swept[name][:, 0] = np.mean(np.asarray(dwells.harmonics[name])[:, 0])
     driven = {name: jnp.asarray(each) for name, each in swept.items()}
-    there, layout = Excitation(jnp.asarray(frequencies), driven), layout_of(dwells, problem.settings)
     model, p = problem.model(()), problem.values(point.values)
+    there, layout = Excitation(jnp.asarray(frequencies), driven), layout_of(dwells, problem.settings, model)
     return simulate_periodic(model, p, there, problem.settings, layout)
 
 

@@ -121,6 +121,7 @@ class Port:
         numbers: parameters that may be others than the sheet's, at a number port.
         inertias: at a number port, the masses among the numbers as forces at other ports.
         resonant: whether what is in series there has a mass of its own: then it swings under its load.
+        time_scale: that of its plant [1]: laws take their typical times times it, and their frequencies over it.
         motion: name of the force port whose motion a report draws where the port has none of its own; where it is
             empty, the force port at the same location or else the first of the plant.
     """
@@ -142,6 +143,7 @@ class Port:
     inertias: tuple[Inertia, ...] = ()
     resonant: bool = False
     motion: str = ""
+    time_scale: float = 1.0
 
 
 class PortSignals(NamedTuple):
@@ -220,8 +222,6 @@ class AbstractLaw(eqx.Module):
 
     ``words`` say what a plant with it has, for a reader who does not know its name; where there are none its family
     must do.
-    ``tried`` are values [SI] of shaping roles at which a diagnosis looks for the law, where multiples of the typical
-    ones would leave some out: natural frequencies, say.
     """
 
     kind: eqx.AbstractClassVar[PortKind]
@@ -229,7 +229,6 @@ class AbstractLaw(eqx.Module):
     family: eqx.AbstractClassVar[Family]
     roles: eqx.AbstractClassVar[tuple[Role, ...]]
     words: ClassVar[str] = ""
-    tried: ClassVar[tuple[tuple[str, float], ...]] = ()
 
     @abstractmethod
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
@@ -237,6 +236,13 @@ class AbstractLaw(eqx.Module):
 
     def states(self, port: Port) -> tuple[InternalState, ...]:
         """Its internal states at a port."""
+        return ()
+
+    def tried(self, port: Port) -> tuple[tuple[str, float], ...]:
+        """Values [SI] of shaping roles at which a diagnosis looks for the law at a port.
+
+        Where multiples of the typical ones would leave some out: natural frequencies, say.
+        """
         return ()
 
     def suits(self, port: Port) -> bool:
@@ -250,6 +256,8 @@ class AbstractForceLaw(AbstractLaw):
     kind: ClassVar[PortKind] = PortKind.FORCE
     holds_states: ClassVar[bool] = False
     """Whether the motion alone holds the states, between :meth:`bounds_of_states`."""
+    drags_anchors: ClassVar[bool] = False
+    """Whether the states are anchors that a :func:`bristle` drags, as fast as the time scale of the port says."""
 
     @abstractmethod
     def force(self, v: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, ""]:
@@ -350,12 +358,13 @@ def per(unit: str, other: str) -> str:
 
 
 DRAG_TIME = 2e-4
-"""How fast the anchor follows an over-stretched bristle [s]: short beside the 4 ms of a reversal, and
-without effect on the force, which is held meanwhile."""
+"""How fast the anchor follows an over-stretched bristle [s], on a time scale of 1: short beside the 4 ms of a
+reversal, and without effect on the force, which is held meanwhile."""
 
 CREEP = 1e-2
-"""Creep of a stuck bristle [1/s]. Without it a rig that never slides has as many periodic motions as places
-to stick; over the tenths of a second of a stick it moves the anchor by less than a hundredth of the stretch.
+"""Creep of a stuck bristle [1/s], on a time scale of 1. Without it a rig that never slides has as many periodic
+motions as places to stick; over the tenths of a second of a stick it moves the anchor by less than a hundredth of the
+stretch.
 """
 
 
@@ -389,7 +398,7 @@ def _not_below_zero(x: Float[Array, ""]) -> Float[Array, ""]:
 def bristle(
     stick: Presliding, signals: PortSignals, limit: FrictionLimit, anchor: Float[Array, ""]
 ) -> Bristle:
-    """The bristle's force and how fast its ``anchor`` [m] is dragged."""
+    """The bristle's force and how fast its ``anchor`` [m] is dragged on a time scale of 1."""
     up, down = _not_below_zero(limit.against_up), -_not_below_zero(limit.against_down)
     stretch = signals.displacement - anchor
     resisting = held_within(stick.stiffness * stretch + stick.damping * signals.velocity, down, up)

@@ -149,7 +149,9 @@ def contact_bristle(
     there = (each for each in effects if each.loads_contact and each.port.name == port.name)
     for share in (*(each.friction_limit(p, signals) for each in there), *beside):
         up, down = up + share.against_up, down + share.against_down
-    return bristle(Presliding(*(p[name] for name in port.contact)), signals, FrictionLimit(up, down), anchor)
+    stick = Presliding(*(p[name] for name in port.contact))
+    force, rate = bristle(stick, signals, FrictionLimit(up, down), anchor)
+    return Bristle(force, rate / port.time_scale)
 
 
 class EffectsAtInstant:
@@ -244,7 +246,8 @@ class EffectsAtInstant:
         contacts = [each.name for each in self._contacts]
         if port.name in contacts:
             place, beside = contacts.index(port.name), [each.limit for each in pushes]
-            held = contact_bristle(self._effects, port, self.p, signals, self._s[place], beside)
+            contact = self._contacts[place]
+            held = contact_bristle(self._effects, contact, self.p, signals, self._s[place], beside)
             total = total + held.force
             self._out_of_balance[_anchor_of(port)] = self._sd[place] - held.rate
         self.forces[port.name] = total

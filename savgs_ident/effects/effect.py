@@ -130,7 +130,7 @@ class Effect(eqx.Module):
     def tried(self) -> tuple[Mapping[str, float], ...]:
         """Values [SI] of its shapes at which a diagnosis looks for it, if not at multiples of the typical ones."""
         names = dict(self.numbers)
-        return tuple({str(names[role]): value} for role, value in self.law.tried)
+        return tuple({str(names[role]): value} for role, value in self.law.tried(self.port))
 
     def force(self, p: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, ""]:
         """Its force in the sense of the port [the port's unit], with parameters ``p``."""
@@ -140,7 +140,8 @@ class Effect(eqx.Module):
     def rate(self, p: Values, signals: PortSignals, state: Float[Array, " s"]) -> Float[Array, " s"]:
         """Time derivatives of its states where it is a force, (s,) [unit of each per second]."""
         assert isinstance(self.law, AbstractForceLaw), self.name
-        return self.law.rate(self.by_role(p), signals, state)
+        rate = self.law.rate(self.by_role(p), signals, state)
+        return rate / self.port.time_scale if self.law.drags_anchors else rate
 
     @property
     def holds_states(self) -> bool:

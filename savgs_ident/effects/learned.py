@@ -79,6 +79,12 @@ BLOCKED_AS = 8
 """Exponent with which a play is blocked at its ends [1]."""
 
 
+def _time(name: str, usual: float, lower: float, upper: float, port: Port, about: str) -> Parameter:
+    """A time [s] that is estimated along, and its bounds, each of them on a time scale of 1."""
+    scale = port.time_scale
+    return Parameter(name, usual * scale, "s", lower=lower * scale, upper=upper * scale, about=about)
+
+
 def _coefficients(port: Port, unit: str) -> dict[str, Parameter | float]:
     """By role, a coefficient for every function of the port: nothing learned yet."""
     return {
@@ -105,6 +111,7 @@ class LearnedForce(AbstractForceLaw):
     name: ClassVar[str] = "learned"
     family: ClassVar[Family] = Family.LEARNED
     holds_states: ClassVar[bool] = True
+    drags_anchors: ClassVar[bool] = True
     roles: ClassVar[tuple[Role, ...]] = _roles(
         ("middle", "stroke", "speed", "carried", "typical", "turn", "give", "gap", "fall", "lag"),
         len(
@@ -140,7 +147,7 @@ class LearnedForce(AbstractForceLaw):
             "give": Parameter("give", 1.0, "1", lower=0.05, upper=5.0, about=give),
             "gap": Parameter("gap", GAP, "1", lower=0.02, upper=0.9, about=gap),
             "fall": Parameter("fall", FALL, "1", lower=0.02, upper=1.0, about=fall),
-            "lag": Parameter("lag", LAG, "s", lower=1e-5, upper=0.03, about=lag),
+            "lag": _time("lag", LAG, 1e-5, 0.03, port, lag),
         }
         return {role.name: 0.0 for role in self.roles} | spans | _coefficients(port, force)
 
@@ -221,7 +228,7 @@ class LearnedCompliance(AbstractSeriesLaw):
         """Nothing learned yet."""
         spans = {
             "carried": Parameter("carried", 1.0, port.force_unit, lower=SMALLEST, about="largest load seen"),
-            "lag": Parameter("lag", 3e-3, "s", lower=1e-5, upper=0.1, about="time in which it gives way"),
+            "lag": _time("lag", 3e-3, 1e-5, 0.1, port, "time in which it gives way"),
         }
         about = "typical displacement over that at which it is blocked"
         blocking = Parameter("blocking", 0.0, "1", lower=0.0, upper=1e3, about=about)
@@ -291,7 +298,7 @@ class LearnedTransfer(AbstractSensorLaw):
 
     def transfer(self, v: Values, frequency: Float[Array, "*f"]) -> Complex[Array, "*f"]:
         """Reading over truth at frequencies [Hz]."""
-        found = filters(2.0 * jnp.pi * frequency)
+        found = filters(2.0 * jnp.pi * frequency * self.port.time_scale)
         real, imaginary = (_sum(v, [part(each) for each in found]) for part in (jnp.real, jnp.imag))
         return lax.complex(1.0 + real, imaginary)
 

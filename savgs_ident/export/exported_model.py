@@ -214,7 +214,7 @@ class ExportedModel:
 
 def learned_effects(model: Model) -> dict[str, Effect]:
     """The corrections by name that a diagnosis learns at the ports of the model's plant."""
-    found = (learned_effect(port) for port in model.plant.ports if functions_at(port))
+    found = (learned_effect(port) for port in model.build().scaled_ports if functions_at(port))
     return {effect.name: effect for effect in found}
 
 

@@ -71,7 +71,8 @@ def fit(
         orders: highest harmonic order to fit.
         peak_to_peak: fit peak-to-peak values only, as the paper did.
         fixed_tolerances: hold what is known to a tolerance at its value instead of estimating it along.
-        max_frequency: leave out faster dwells [Hz]; of windows, compare up to this, 15 Hz by default, 40 Hz at most.
+        max_frequency: leave out faster dwells [Hz]; of windows, compare up to this; by default 15 Hz, and 40 Hz at
+            most, for a plant as fast as a quarter car.
         command: the command line that the result says it was made by.
         progress: called with a sentence on what is being done.
 

@@ -73,7 +73,8 @@ def sample(
         time_limit: stop sampling after this [s].
         patience: go on beyond the target up to this [s], for medians to a fortieth of their standard deviation.
         fixed_tolerances: hold what is known to a tolerance at its value.
-        max_frequency: leave out faster dwells [Hz]; of windows, compare up to this, 15 Hz by default, 40 Hz at most.
+        max_frequency: leave out faster dwells [Hz]; of windows, compare up to this; by default 15 Hz, and 40 Hz at
+            most, for a plant as fast as a quarter car.
         orders: highest harmonic order to compare.
         seed: of all random numbers.
         chain: file in which the chain is kept after every step.

@@ -53,7 +53,7 @@ def sized_to(model: Model, measured: HarmonicResponse) -> tuple[Model, tuple[Dat
     if not isinstance(model, PlantModel):
         return model, ()
     bare, p = replace(model.build(), effects=()), as_values(model.table.as_dict())
-    ports = [port for port in bare.ports if port.kind in (PortKind.FORCE, PortKind.SERIES)]
+    ports = [port for port in bare.scaled_ports if port.kind in (PortKind.FORCE, PortKind.SERIES)]
     solution = simulate_periodic(bare, p, measured_excitation(bare, measured, model.table))
     if not ports or not all(each.ok for each in solution.status()):
         return model, ()

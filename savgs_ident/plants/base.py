@@ -192,6 +192,7 @@ class AbstractPlant(eqx.Module):
     ``conditions`` are those among which the next test is chosen; ``location_words`` say what reports call the
     locations of ports, where not by their names.
     ``own_states`` are internal states of the plant itself, as the current of a motor.
+    ``time_scale`` [1] is that of :mod:`savgs_ident.plants.time_scale`; None, which counts as 1, where nobody looked.
     ``alternatives`` are further effects of which one acts each, so that solvers need one program for all of them.
     ``coordinate_type`` makes n scalars a tuple with names. :meth:`prepare`, :meth:`drive` and :meth:`cold_start` have
     defaults that serve a plant without costly kinematics; one that has them may replace these three. What exports
@@ -210,6 +211,7 @@ class AbstractPlant(eqx.Module):
     conditions: ClassVar[tuple[OperatingCondition, ...]] = SAME_OR_SCALED
     location_words: ClassVar[Mapping[str, str]] = MappingProxyType({})
     effects: tuple[Effect, ...] = eqx.field(default=(), kw_only=True)
+    time_scale: float | None = eqx.field(default=None, static=True, kw_only=True)
     alternatives: tuple[Alternatives | AtOnePort, ...] = eqx.field(default=(), kw_only=True)
 
     @abstractmethod
@@ -270,6 +272,14 @@ class AbstractPlant(eqx.Module):
         """
         alternatives = (state for each in self.alternatives for state in each.states)
         return (*self.own_states, *states_of(self.effects), *alternatives)
+
+    @property
+    def scaled_ports(self) -> tuple[Port, ...]:
+        """Its ports on its time scale."""
+        scale = self.time_scale or 1.0
+        return tuple(
+            port if port.time_scale == scale else replace(port, time_scale=scale) for port in self.ports
+        )
 
     @property
     def sensors_have_dynamics(self) -> bool:

@@ -10,6 +10,7 @@ the quarter car has its own, with a rig file (:mod:`savgs_ident.plants.quarter_c
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import isfinite
@@ -23,6 +24,7 @@ from savgs_ident.core.presentation import Origin
 from savgs_ident.effects.base import Port
 from savgs_ident.effects.effect import Effect, generic_effects
 from savgs_ident.plants.base import AbstractPlant, Channel
+from savgs_ident.plants.time_scale import time_scale_of
 from savgs_ident.recordings.checks_signal import DataLocation
 from savgs_ident.recordings.recording import Campaign, ChannelSpec, Recording, RecordingLayout
 
@@ -143,9 +145,11 @@ class PlantModel:
     source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
+        if self.plant.time_scale is None:
+            object.__setattr__(self, "plant", replace(self.plant, time_scale=self._time_scale()))
         if not self.catalogue:
             # As a dictionary, for a view of one cannot be sent to another process.
-            object.__setattr__(self, "catalogue", dict(generic_effects(self.plant.ports)))
+            object.__setattr__(self, "catalogue", dict(generic_effects(self.plant.scaled_ports)))
         _ = self.table
 
     def __add__(self, effect: str | Effect) -> "PlantModel":
@@ -161,6 +165,12 @@ class PlantModel:
             return self
         catalogue = {**self.catalogue, effect.name: effect}
         return replace(self, plant=self.plant + effect, catalogue=catalogue)
+
+    def _time_scale(self) -> float:
+        # What is wrong with a user's equations is told where they are solved, and by check-plant.
+        with suppress(Exception):
+            return time_scale_of(replace(self.plant, effects=()), self.parameters.as_dict())
+        return 1.0
 
     def __str__(self) -> str:
         return " + ".join((self.name, *self.effects))

@@ -20,12 +20,16 @@ that is smooth over some rows is gone. That the noise is white is then assumed, 
 Where the plant is slower than its sensor resolves, nobody can tell which way it goes, or whether it goes at all: a
 friction there may have any force between its bounds. Such rows are left out, but for a motion so steady that the mean
 of its speed over a longer time says which way it goes.
+
+Times and frequencies below are those of a motion up to :data:`FAST_HZ`; a faster one has a time scale of its own
+(:func:`time_scale_of_motion`), by which its times are multiplied and its frequencies divided.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from math import ceil, log2
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +42,9 @@ from savgs_ident.responses.resolution import NORMAL, noise_of_rate, noise_of_spe
 
 CUTOFF_HZ = 100.0
 """The position passes up to here [Hz]."""
+
+FAST_HZ = 5.0
+"""Above this the middle of a motion's spectrum [Hz] is that of a fast one: a row and a cutoff of twenty a period."""
 
 SHARE_OF_RATE = 0.4
 """Or up to this share of the sampling rate, where that is less."""
@@ -89,6 +96,7 @@ class DrivenMotion:
         still: 1 where the motion is slower than its sensor resolves, 0 elsewhere, (n,).
         warnings: what is to be known of it.
         starts: places of the samples with which tests begin, several that were recorded one after the other.
+        time_scale: by what times that are meant for a slow motion are multiplied [1].
 
     Position and force of a plant that turns are an angle [rad] and a torque [N m].
     """
@@ -104,11 +112,16 @@ class DrivenMotion:
     still: NDArray[np.float64]
     warnings: tuple[DataWarning, ...] = ()
     starts: tuple[int, ...] = (0,)
+    time_scale: float = 1.0
 
     @property
     def every(self) -> int:
         """Samples to a row."""
-        return _samples_to_a_row(self.step)
+        return _samples_to_a_row(self._scaled_step)
+
+    @property
+    def _scaled_step(self) -> float:
+        return self.step / self.time_scale
 
     @property
     def _tests(self) -> list[slice]:
@@ -120,7 +133,9 @@ class DrivenMotion:
         return self._every_row(signals)[..., self._moving]
 
     def _every_row(self, signals: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.concatenate([_thinned(signals[..., test], self.step) for test in self._tests], axis=-1)
+        return np.concatenate(
+            [_thinned(signals[..., test], self._scaled_step) for test in self._tests], axis=-1
+        )
 
     @cached_property
     def _moving(self) -> NDArray[np.bool_]:
@@ -140,14 +155,15 @@ class DrivenMotion:
     @property
     def row_times(self) -> NDArray[np.float64]:
         """Time of each row since the first sample [s], (m,), as if tests followed each other."""
-        edge = round(CUT_S / self.step)
+        edge = round(CUT_S / self._scaled_step)
         samples = [np.arange(test.start + edge, test.stop - edge, self.every) for test in self._tests]
         return self.step * np.concatenate(samples).astype(np.float64)[self._moving]
 
     @property
     def blocks(self) -> NDArray[np.intp]:
         """The block of time that each row belongs to, (m,); none is of two tests."""
-        long, edge = round(BLOCK_S / (self.every * self.step)), round(CUT_S / self.step)
+        step = self._scaled_step
+        long, edge = round(BLOCK_S / (self.every * step)), round(CUT_S / step)
         found, first = list[NDArray[np.intp]](), 0
         for test in self._tests:
             rows = np.arange(len(range(test.start + edge, test.stop - edge, self.every)))
@@ -184,6 +200,7 @@ def joined(motions: Sequence[DrivenMotion], source: str) -> DrivenMotion:
         still,
         _said_once([warning for each in motions for warning in each.warnings], source),
         tuple(np.cumsum([0, *sizes[:-1]]).tolist()),
+        min(each.time_scale for each in motions),
     )
 
 
@@ -231,6 +248,7 @@ def driven_motion(recording: AxisRecording) -> DrivenMotion:
 
     Raises :class:`InputError` for one that is too short, and where the reference does not repeat.
     """
+    step, scale = recording.step, time_scale_of_motion(recording.position, recording.step)
     period = period_of(recording.reference, SAME)
     if period is None:
         raise InputError(
@@ -238,8 +256,8 @@ def driven_motion(recording: AxisRecording) -> DrivenMotion:
             source=recording.source,
             remedy="record two cycles or more",
         )
-    unclear = noise_of_rate(recording.position, recording.step, _cutoff(recording.step))
-    return _driven(recording.source, recording.step, recording.position, recording.force, period, unclear)
+    unclear = noise_of_rate(recording.position, step, _cutoff(step, scale))
+    return _driven(recording.source, step, scale, recording.position, recording.force, period, unclear)
 
 
 def recorded_motion(recording: Recording, motion: str, drive: str, source: str) -> DrivenMotion:
@@ -249,9 +267,9 @@ def recorded_motion(recording: Recording, motion: str, drive: str, source: str) 
     is too short.
     """
     step, position, force = _even(recording, motion, drive, source)
-    period = period_of(position, SAME_AS_MEASURED)
-    unclear = noise_of_rate(position, step, _cutoff(step))
-    return _driven(f"{source}, {recording.name}", step, position, force, period, unclear)
+    period, scale = period_of(position, SAME_AS_MEASURED), time_scale_of_motion(position, step)
+    unclear = noise_of_rate(position, step, _cutoff(step, scale))
+    return _driven(f"{source}, {recording.name}", step, scale, position, force, period, unclear)
 
 
 def recorded_speed(recording: Recording, speed: str, drive: str, source: str) -> DrivenMotion:
@@ -261,9 +279,9 @@ def recorded_speed(recording: Recording, speed: str, drive: str, source: str) ->
     """
     step, velocity, force = _even(recording, speed, drive, source)
     position = np.concatenate([[0.0], np.cumsum(0.5 * step * (velocity[1:] + velocity[:-1]))])
-    period = period_of(velocity, SAME_AS_MEASURED)
-    unclear = noise_of_speed(velocity, step, _cutoff(step))
-    return _driven(f"{source}, {recording.name}", step, position, force, period, unclear)
+    period, scale = period_of(velocity, SAME_AS_MEASURED), time_scale_of_motion(position, step)
+    unclear = noise_of_speed(velocity, step, _cutoff(step, scale))
+    return _driven(f"{source}, {recording.name}", step, scale, position, force, period, unclear)
 
 
 def _even(
@@ -293,14 +311,24 @@ def _at(time: NDArray[np.float64], channel: RecordedChannel) -> NDArray[np.float
     return channel.values if same else np.interp(time, channel.time, channel.values)
 
 
-def _cutoff(step: float) -> float:
+def time_scale_of_motion(position: NDArray[np.float64], step: float) -> float:
+    """That of a motion (n,), sampled every ``step`` [s]: a power of two, 1 for one up to :data:`FAST_HZ`."""
+    power = np.abs(np.fft.rfft(position - position.mean())) ** 2
+    if not power.sum() > 0.0:
+        return 1.0
+    middle = float(np.average(np.fft.rfftfreq(position.size, step), weights=power))
+    return 2.0 ** -ceil(max(log2(middle / FAST_HZ), 0.0)) if middle > 0.0 else 1.0
+
+
+def _cutoff(step: float, time_scale: float) -> float:
     """Up to where the position passes [Hz]."""
-    return min(CUTOFF_HZ, SHARE_OF_RATE / step)
+    return min(CUTOFF_HZ / time_scale, SHARE_OF_RATE / step)
 
 
 def _driven(
     source: str,
     step: float,
+    time_scale: float,
     measured: NDArray[np.float64],
     force: NDArray[np.float64],
     period: int | None,
@@ -310,19 +338,22 @@ def _driven(
 
     ``unclear`` is the standard deviation of the noise of its speed.
     """
-    if measured.size * step < 2.0 * CUT_S + _FEWEST * _samples_to_a_row(step) * step:
+    scaled = step / time_scale
+    if measured.size * scaled < 2.0 * CUT_S + _FEWEST * _samples_to_a_row(scaled) * scaled:
         raise InputError("is too short", source=source, remedy="record some seconds at least")
-    position = _low_passed(2.0 * _cutoff(step) * step, measured)
+    cutoff = _cutoff(step, time_scale)
+    position = _low_passed(2.0 * cutoff * step, measured)
     velocity = np.gradient(position, step)
     acceleration = np.gradient(velocity, step)
-    still = unresolved(velocity, unclear, step, _cutoff(step)).astype(np.float64)
+    still = unresolved(velocity, unclear, scaled, cutoff * time_scale).astype(np.float64)
     warnings = [] if still.mean() < SELDOM else [_at_rest(source, float(still.mean()))]
     left = _beyond(force, np.stack([acceleration, velocity], axis=1))
     signals = position, velocity, acceleration, force
     if period is not None:
-        noise = _repeatability(left, period, step)
-        return _moving(DrivenMotion(source, step, *signals, period * step, noise, still, tuple(warnings)))
-    noise = roughness(_thinned(left, step))
+        noise = _repeatability(left, period, scaled)
+        found = DrivenMotion(source, step, *signals, period * step, noise, still, tuple(warnings))
+        return _moving(replace(found, time_scale=time_scale))
+    noise = roughness(_thinned(left, scaled))
     assumed = DataWarning(
         "noise_assumed",
         "the motion does not repeat: its noise is taken from what is rough in the force, as if it were white",
@@ -330,7 +361,8 @@ def _driven(
         remedy="record the same motion twice, so that the noise is measured",
     )
     whole = measured.size * step
-    return _moving(DrivenMotion(source, step, *signals, whole, noise, still, (assumed, *warnings)))
+    found = DrivenMotion(source, step, *signals, whole, noise, still, (assumed, *warnings))
+    return _moving(replace(found, time_scale=time_scale))
 
 
 def _moving(motion: DrivenMotion) -> DrivenMotion:

@@ -40,6 +40,7 @@ class EvenRecord:
         gaps: spans without samples of each channel [s], pairs of their ends.
         noise: standard deviation of each channel's noise at one instant [its unit], which neighbours share where the
             channel has fewer samples than there are instants; the amplitudes have as much of it as if they did not.
+        rest: at its beginning it has to rest so long to be taken for one that rested before [s].
         before: how much of it is rest before the test began [s].
     """
 
@@ -50,6 +51,7 @@ class EvenRecord:
     values: dict[str, Array]
     gaps: dict[str, list[tuple[float, float]]]
     noise: dict[str, float]
+    rest: float
     before: float = 0.0
 
     @property
@@ -65,7 +67,7 @@ class EvenRecord:
     @property
     def begins_at_rest(self) -> bool:
         """Whether no channel shows anything but noise at the beginning."""
-        beginning = ceil(REST_S * self.rate)
+        beginning = ceil(self.rest * self.rate)
         return all(
             np.ptp(each[:beginning]) <= max(RESTING * np.ptp(each), _NOISY * self.noise[name])
             for name, each in self.values.items()
@@ -73,7 +75,7 @@ class EvenRecord:
 
     def rested(self, seconds: float) -> "EvenRecord":
         """The same with so much rest before it [s], as it began."""
-        beginning, count = ceil(REST_S * self.rate), ceil(seconds * self.rate)
+        beginning, count = ceil(self.rest * self.rate), ceil(seconds * self.rate)
         before = count / self.rate
         return replace(
             self,
@@ -95,11 +97,12 @@ def even_record(
     still: dict[str, float],
     least_s: float,
     highest_hz: float,
+    time_scale: float,
 ) -> EvenRecord | DataWarning:
     """The channels of a test at even instants, or why it cannot be used.
 
     It has to be ``least_s`` [s] long, and its channels sampled for what is compared up to ``highest_hz`` [Hz];
-    ``still`` is the noise of channels at rest, where it is known.
+    ``still`` is the noise of channels at rest, where it is known; ``time_scale`` that of the plant [1].
     """
 
     def refuse(what: str, remedy: str) -> DataWarning:
@@ -129,7 +132,7 @@ def even_record(
             f"{last} is sampled at {rates[last]:.3g} Hz, too slow for what is compared up to {highest_hz:g} Hz",
             f"sample every channel at {4.0 * highest_hz:g} Hz or faster",
         )
-    rate = min(max(rates.values()), _RATE_HZ)
+    rate = min(max(rates.values()), _RATE_HZ / time_scale)
     instants = start + np.arange(floor((end - start) * rate) + 1) / rate
     even = {name: _at(instants, *each) for name, each in usable.items()}
     noise = {
@@ -138,7 +141,7 @@ def even_record(
         for name, (time, values) in usable.items()
     }
     gaps = {name: _gaps(each[0], start) for name, each in usable.items()}
-    return EvenRecord(recording.name, start, rate, rates[last], even, gaps, noise)
+    return EvenRecord(recording.name, start, rate, rates[last], even, gaps, noise, REST_S * time_scale)
 
 
 def _at(instants: Array, time: Array, values: Array) -> Array:

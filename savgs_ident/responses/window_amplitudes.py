@@ -6,7 +6,7 @@ A window leads up to that part, in which its inputs are as they were recorded, a
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, floor
+from math import ceil, floor, log10
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,11 @@ from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicRespon
 Array = NDArray[np.float64]
 
 CLOSING_S = 0.5
-"""Length in which the inputs are led over to where the window began [s]."""
+"""Length in which the inputs are led over to where the window began [s].
+
+This and all other times and frequencies of windows are those of a plant whose time scale is 1
+(:mod:`savgs_ident.plants.time_scale`).
+"""
 
 LOWEST_HZ, HIGHEST_HZ = 0.4, 15.0
 """Between these is compared where nothing else is asked for [Hz]: above body and wheel a model of two masses says
@@ -57,27 +61,29 @@ class _Window:
 
 @dataclass(frozen=True)
 class Windows:
-    """Windows of one length [s], of which a part is compared, after a lead [s]."""
+    """Windows of one length [s], of which a part is compared, after a lead [s], of a plant with a time scale [1]."""
 
     length: float
     lead: float
     windows: tuple[_Window, ...]
+    time_scale: float
 
     @property
     def imposed_hz(self) -> float:
         """Up to which frequency the inputs are imposed [Hz]."""
-        return min(IMPOSED_HZ, 0.45 * min(each.record.slowest for each in self.windows))
+        return min(IMPOSED_HZ / self.time_scale, 0.45 * min(each.record.slowest for each in self.windows))
 
     @classmethod
-    def of(cls, cut: Sequence[Cut], lead: float) -> "Windows":
+    def of(cls, cut: Sequence[Cut], lead: float, time_scale: float) -> "Windows":
         """The windows of what is cut, each after a ``lead`` [s]."""
-        length = lead + max(each.compared for each in cut) + CLOSING_S
+        closing = CLOSING_S * time_scale
+        length = lead + max(each.compared for each in cut) + closing
         windows = []
         for record, end, compared in cut:
             last = min(round(end * record.rate), record.count - 1)
             first = last - round((lead + compared) * record.rate)
-            windows.append(_Window(record, max(first, round(CLOSING_S * record.rate)), compared))
-        return cls(length, lead, tuple(windows))
+            windows.append(_Window(record, max(first, round(closing * record.rate)), compared))
+        return cls(length, lead, tuple(windows), time_scale)
 
     def part(self, window: _Window) -> tuple[float, float]:
         """Between these phases a window is compared [rad]."""
@@ -154,14 +160,15 @@ class Windows:
 
     def _name(self, window: _Window) -> str:
         # Rounded to what is printed, and no negative zero.
-        begin = round(self._begin(window), 1) + 0.0
-        return f"{window.record.test}, {begin:.1f} to {begin + window.compared:.1f} s"
+        digits = 1 + max(0, ceil(-log10(self.time_scale)))
+        begin = round(self._begin(window), digits) + 0.0
+        return f"{window.record.test}, {begin:.{digits}f} to {begin + window.compared:.{digits}f} s"
 
     def _compared(self, readings: int, highest_hz: float) -> tuple[int, NDArray[np.bool_]]:
         """From one order that is compared to the next, and which of them are, from 0 to the last."""
         last = floor(highest_hz * self.length)
         every = max(2, ceil(2 * len(self.windows) * readings * last / NUMBERS))
-        return every, every * np.arange(last // every + 1) >= LOWEST_HZ * self.length
+        return every, every * np.arange(last // every + 1) >= LOWEST_HZ / self.time_scale * self.length
 
     def _signal(self, window: _Window, name: str, led_over: bool) -> tuple[Array, Array]:
         """A channel at the instants of a window [its unit], and the share with which each counts [1], (n,) both.

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.core.errors import DataWarning, InputError
-from savgs_ident.recordings.recording import Campaign, TestKind
+from savgs_ident.recordings.recording import Campaign, Recording, TestKind
 from savgs_ident.responses.even_record import EvenRecord, even_record
 from savgs_ident.responses.harmonic_response import HarmonicResponse
 from savgs_ident.responses.outliers import estimate_standstill_noise
@@ -44,7 +44,7 @@ BESIDE_DWELLS: tuple[TestKind, ...] = ("road", "step")
 """Those of them that are where there are dwells: there a sweep is kept to see what is predicted of it."""
 
 LEAD_S = 3.0
-"""From the beginning of a window to what is compared of it [s].
+"""From the beginning of a window to what is compared of it [s]; times are those of a plant whose time scale is 1.
 
 Origin: the body of a quarter car, at 1.3 Hz with a fifth of critical damping, has kept 0.7 % of what it began with,
 the wheel nothing; friction shortens both.
@@ -55,6 +55,9 @@ COMPARED = 3.0
 
 LEAST_S = 2.0
 """Less than this is not worth a window [s]."""
+
+SAMPLES = 4.0
+"""Samples in a period of the highest frequency that is compared, where nothing else is asked for."""
 
 MOST_HZ = 0.5 * IMPOSED_HZ
 """Up to this may be compared [Hz]: what the readings show there has to come from inputs that are imposed."""
@@ -69,49 +72,55 @@ def estimate_windows(
     campaign: Campaign,
     inputs: Sequence[str],
     readings: Sequence[str],
-    highest_hz: float = HIGHEST_HZ,
-    lead_s: float = LEAD_S,
+    highest_hz: float | None = None,
+    lead_s: float | None = None,
     kinds: Collection[TestKind] = KINDS,
+    time_scale: float = 1.0,
 ) -> HarmonicResponse:
     """The response of all tests of ``campaign`` of these ``kinds``, which do not repeat, in windows.
 
     ``inputs`` are the channels that drive the plant, the first of which has to move; ``readings`` are what its
     sensors read. The noise is that of the standstill; where none was recorded, it is read from how rough the channels
-    are. Up to ``highest_hz`` is compared [Hz], from ``lead_s`` [s] after the beginning of each window on.
+    are. Up to ``highest_hz`` is compared [Hz], from ``lead_s`` [s] after the beginning of each window on; where they
+    are left out, up to :data:`HIGHEST_HZ`, or as far as the channels are sampled, and from :data:`LEAD_S` on, for a
+    plant with a ``time_scale`` [1].
 
     Raises :class:`InputError` where no test is long enough, the first input does not move, or nothing is compared.
     """
-    tests, first = _Tests.of(campaign, inputs, readings, highest_hz, kinds), lead_s + CLOSING_S
-    if tests.need_no_cut(COMPARED * lead_s * _NEAR):
+    tests = _Tests.of(campaign, inputs, readings, highest_hz, kinds, time_scale)
+    lead = LEAD_S * time_scale if lead_s is None else lead_s
+    first = lead + tests.closing
+    if tests.need_no_cut(COMPARED * lead * _NEAR):
         return _whole(tests)
     found = [each.rested(first) if each.begins_at_rest else each for each in tests.records]
-    compared = _compared_s([each.duration - first for each in found], COMPARED * lead_s)
+    compared = _compared_s([each.duration - first for each in found], COMPARED * lead, tests.least)
     if compared == 0.0:
-        raise _no_window(campaign, found, tests.warnings, lead_s)
+        raise _no_window(campaign, found, tests.warnings, first + tests.least)
     short = (each for each in found if each.duration - first < compared)
     warnings = [_too_short(campaign.source, each, first + compared) for each in short]
     cut = [Cut(each, end, compared) for each in found for end in _ends(each.duration, first, compared)]
-    return tests.response(cut, lead_s, warnings)
+    return tests.response(cut, lead, warnings)
 
 
 def estimate_whole_tests(
     campaign: Campaign,
     inputs: Sequence[str],
     readings: Sequence[str],
-    highest_hz: float = HIGHEST_HZ,
+    highest_hz: float | None = None,
     kinds: Collection[TestKind] = KINDS,
+    time_scale: float = 1.0,
 ) -> HarmonicResponse:
     """The same of the tests that begin at rest, each in one window from its beginning to its end.
 
     For a plant that forgets nothing. Of each :data:`WHOLE_S` are compared at most. Raises :class:`InputError` also
     where no test begins at rest.
     """
-    return _whole(_Tests.of(campaign, inputs, readings, highest_hz, kinds))
+    return _whole(_Tests.of(campaign, inputs, readings, highest_hz, kinds, time_scale))
 
 
 def _whole(tests: "_Tests") -> HarmonicResponse:
-    source = tests.campaign.source
-    rested = [each.rested(LEAD_S + CLOSING_S) for each in tests.records if each.begins_at_rest]
+    source, lead, longest = tests.campaign.source, LEAD_S * tests.time_scale, WHOLE_S * tests.time_scale
+    rested = [each.rested(lead + tests.closing) for each in tests.records if each.begins_at_rest]
     if not rested:
         raise InputError(
             "no test begins at rest",
@@ -119,26 +128,27 @@ def _whole(tests: "_Tests") -> HarmonicResponse:
             remedy="let each test begin with a second of rest",
         )
     warnings = [_begins_moving(source, each) for each in tests.records if not each.begins_at_rest]
-    lasting = [min(each.duration - each.before, WHOLE_S) for each in rested]
+    lasting = [min(each.duration - each.before, longest) for each in rested]
     warnings += [
-        _shortened(source, each)
+        _shortened(source, each, longest)
         for each, compared in zip(rested, lasting, strict=True)
         if compared < each.duration - each.before
     ]
     cut = [
         Cut(each, each.before + compared, compared) for each, compared in zip(rested, lasting, strict=True)
     ]
-    return tests.response(cut, LEAD_S, warnings)
+    return tests.response(cut, lead, warnings)
 
 
 @dataclass(frozen=True)
 class _Tests:
-    """Tests of a campaign that can be used, in inputs and readings, up to a frequency [Hz]."""
+    """Tests of a campaign that can be used, in inputs and readings, up to a frequency [Hz]; times are in [s]."""
 
     campaign: Campaign
     inputs: Sequence[str]
     readings: Sequence[str]
     highest_hz: float
+    time_scale: float
     still: Mapping[str, float]
     records: tuple[EvenRecord, ...]
     warnings: tuple[DataWarning, ...]
@@ -149,31 +159,50 @@ class _Tests:
         campaign: Campaign,
         inputs: Sequence[str],
         readings: Sequence[str],
-        highest_hz: float,
+        wanted_hz: float | None,
         kinds: Collection[TestKind],
+        time_scale: float,
     ) -> "_Tests":
         """Those of some kinds. Raises :class:`InputError` for a frequency up to which nothing can be compared."""
-        if not 2.0 * LOWEST_HZ <= highest_hz <= MOST_HZ:
+        tests = [each for each in campaign.recordings if each.kind in kinds]
+        names = (*inputs, *readings)
+        least, most = 2.0 * LOWEST_HZ / time_scale, MOST_HZ / time_scale
+        usual = HIGHEST_HZ / time_scale
+        highest = _as_sampled(tests, names, usual) if wanted_hz is None else wanted_hz
+        if not least <= highest <= most:
             raise InputError(
-                f"windows cannot be compared up to {highest_hz:g} Hz",
+                f"windows cannot be compared up to {highest:g} Hz",
                 source="--max-frequency",
-                remedy=f"choose it from {2.0 * LOWEST_HZ:g} to {MOST_HZ:g} Hz",
+                remedy=f"choose it from {least:g} to {most:g} Hz",
             )
         still, warnings = estimate_standstill_noise(campaign)
-        names = (*inputs, *readings)
         found = [
-            even_record(campaign.source, each, inputs[0], names, still, LEAST_S, highest_hz)
-            for each in campaign.recordings
-            if each.kind in kinds
+            even_record(
+                campaign.source, each, inputs[0], names, still, LEAST_S * time_scale, highest, time_scale
+            )
+            for each in tests
         ]
         refused = tuple(each for each in found if isinstance(each, DataWarning))
         records = tuple(each for each in found if isinstance(each, EvenRecord))
-        return cls(campaign, inputs, readings, highest_hz, still, records, (*warnings, *refused))
+        told = (*warnings, *refused)
+        if wanted_hz is None and highest < usual:
+            told += (_compared_less(campaign.source, highest, usual),)
+        return cls(campaign, inputs, readings, highest, time_scale, still, records, told)
+
+    @property
+    def closing(self) -> float:
+        """In so long inputs are led over to where a window began."""
+        return CLOSING_S * self.time_scale
+
+    @property
+    def least(self) -> float:
+        """Less than this is not worth a window."""
+        return LEAST_S * self.time_scale
 
     def need_no_cut(self, longest_s: float) -> bool:
         """Whether there are some, each of which begins at rest and is no longer than a window may be [s]."""
         return bool(self.records) and all(
-            each.begins_at_rest and LEAST_S <= each.duration <= longest_s for each in self.records
+            each.begins_at_rest and self.least <= each.duration <= longest_s for each in self.records
         )
 
     def response(
@@ -189,7 +218,7 @@ class _Tests:
         told = (*self.warnings, *warnings)
         if assumed:
             told += (_noise_assumed(self.campaign.source, assumed),)
-        windows = Windows.of(cut, lead_s)
+        windows = Windows.of(cut, lead_s, self.time_scale)
         names = (*self.inputs, *self.readings)
         channels = tuple(name for name in names if any(name in each.values for each in here))
         response = replace(
@@ -198,6 +227,25 @@ class _Tests:
             beside=windows.beside(self.campaign),
         )
         return _with_readings(self.campaign.source, response, self.readings)
+
+
+def _as_sampled(tests: Sequence[Recording], names: Sequence[str], usual: float) -> float:
+    """Up to which frequency is compared [Hz]: the usual one, or as far as the slowest channel is sampled.
+
+    A channel that is sampled too slowly for a third of the usual is refused later, with what to do.
+    """
+    rates = [each.channels[name].rate_hz for each in tests for name in names if name in each.channels]
+    sampled = min((rate / SAMPLES for rate in rates), default=usual)
+    return min(usual, sampled) if sampled >= usual / 3.0 else usual
+
+
+def _compared_less(source: str, highest: float, usual: float) -> DataWarning:
+    return DataWarning(
+        "compared_less",
+        f"is compared up to {highest:.3g} Hz in place of {usual:.3g} Hz, as far as the slowest channel is sampled",
+        source,
+        remedy=f"sample every channel at {SAMPLES * usual:.3g} Hz or faster",
+    )
 
 
 def _with_readings(source: str, response: HarmonicResponse, readings: Sequence[str]) -> HarmonicResponse:
@@ -218,16 +266,16 @@ def _with_readings(source: str, response: HarmonicResponse, readings: Sequence[s
     return replace(only_tests(response, np.flatnonzero(known)), warnings=(*response.warnings, *warnings))
 
 
-def _compared_s(lasting: Sequence[float], wanted: float) -> float:
-    """How much of every window is compared [s], where tests have so much that can be [s]; 0 where none has enough.
+def _compared_s(lasting: Sequence[float], wanted: float, worth_it: float) -> float:
+    """How much of every window is compared [s], where tests have so much that can be [s]; 0 where none is worth it.
 
     Windows are of one length. It is one near ``wanted`` that leaves least uncompared, of several such the nearest;
     where all tests are shorter, of theirs.
     """
     longest = max(lasting, default=0.0)
-    if longest < LEAST_S:
+    if longest < worth_it:
         return 0.0
-    least = max(min(wanted / _NEAR, longest), LEAST_S)
+    least = max(min(wanted / _NEAR, longest), worth_it)
     lengths = {
         each / count
         for each in lasting
@@ -265,8 +313,8 @@ def _begins_moving(source: str, even: EvenRecord) -> DataWarning:
     return _not_used(source, even, what, "let each test begin with a second of rest")
 
 
-def _shortened(source: str, even: EvenRecord) -> DataWarning:
-    what = f"is compared in its first {WHOLE_S:g} s only, for the model remembers how its motion began"
+def _shortened(source: str, even: EvenRecord, longest: float) -> DataWarning:
+    what = f"is compared in its first {longest:g} s only, for the model remembers how its motion began"
     return _not_used(source, even, what, "cut it into tests that begin at rest")
 
 
@@ -275,11 +323,10 @@ def _not_used(source: str, even: EvenRecord, what: str, remedy: str) -> DataWarn
 
 
 def _no_window(
-    campaign: Campaign, found: list[EvenRecord], warnings: tuple[DataWarning, ...], lead: float
+    campaign: Campaign, found: list[EvenRecord], warnings: tuple[DataWarning, ...], least: float
 ) -> InputError:
     if found:
         longest = max(each.duration - each.before for each in found)
-        least = lead + CLOSING_S + LEAST_S
         return InputError(
             f"the longest test has {longest:.3g} s, {least:.3g} s are needed",
             source=campaign.source,

@@ -126,7 +126,7 @@ def origin_along(model: Model, motion: DrivenMotion, command: Sequence[str] = ()
 
 
 def sized_along(model: Model, motion: DrivenMotion) -> Model:
-    """The model with effects as large as matters along a motion, whatever unit its force was recorded in.
+    """The model with effects as large, and as fast, as matters along a motion, whatever unit its force is in.
 
     Raises :class:`InputError` for a plant that is not held against its drive.
     """
@@ -134,14 +134,16 @@ def sized_along(model: Model, motion: DrivenMotion) -> Model:
     if not isinstance(model, PlantModel):
         return model
     force = float(np.sqrt(np.mean(motion.rows(motion.drive) ** 2)))
+    model = replace(model, plant=replace(model.plant, time_scale=motion.time_scale))
     bare, p = replace(model.build(), effects=()), as_values(model.table.as_dict())
 
     def sized(port: Port) -> Port:
         if port.kind is PortKind.INPUT:
             return replace(port, displacement=DRIVE_SHARE * force)
+        if port.kind is not PortKind.FORCE:
+            return port
         along = np.asarray(force_gain(bare, p, samples_of(motion), motion.step, port.name))
         gain = float(np.sqrt(np.mean(along**2)))
         return replace(port, force=FORCE_SHARE * force / gain) if gain > 0.0 else port
 
-    kinds = (PortKind.FORCE, PortKind.INPUT)
-    return model.sized({port.name: sized(port) for port in bare.ports if port.kind in kinds})
+    return model.sized({port.name: sized(port) for port in bare.scaled_ports})

@@ -24,7 +24,6 @@ from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, SweepResponse
 from savgs_ident.responses.selection import join_tests, only_tests
 from savgs_ident.responses.sweeps import estimate_sweep_response
-from savgs_ident.responses.window_amplitudes import HIGHEST_HZ
 from savgs_ident.responses.windows import (
     BESIDE_DWELLS,
     KINDS,
@@ -327,8 +326,8 @@ def response_of_tests(
 ) -> HarmonicResponse:
     """The same, and beside dwells that of roads, in windows; without dwells that of sweeps and other tests, too.
 
-    Windows are those that ``cut`` makes of the campaign, its inputs and readings, up to 15 Hz or ``max_frequency``
-    [Hz], of tests of some ``kinds``. With a warning where roads beside dwells cannot be used.
+    Windows are those that ``cut`` makes of the campaign, its inputs and readings, up to ``max_frequency`` [Hz] or the
+    usual one, of tests of some ``kinds``. With a warning where roads beside dwells cannot be used.
     """
     if isinstance(measured, HarmonicResponse):
         return measured_response(measured, plant, orders, max_frequency, progress)
@@ -338,12 +337,13 @@ def response_of_tests(
         return measured_response(measured, plant, orders, max_frequency, progress)
     response = measured_response(measured, plant, orders, max_frequency, progress) if dwells else None
     progress("cutting windows")
+    scale = plant.time_scale or 1.0
     inputs, readings = ([each.name for each in listed] for listed in (plant.inputs, plant.channels))
-    highest = HIGHEST_HZ if max_frequency is None else max_frequency
-    highest = min(highest, MOST_HZ) if dwells else highest
+    # Beside dwells their limit is given for them: windows keep within theirs.
+    highest = min(max_frequency, MOST_HZ / scale) if dwells and max_frequency is not None else max_frequency
     only = measured.only((*recorded_names(plant), *measured.layout.free))
     try:
-        windows = cut(only, inputs, readings, highest, kinds=kinds)
+        windows = cut(only, inputs, readings, highest, kinds=kinds, time_scale=scale)
     except InputError as error:
         if response is None:
             raise

@@ -22,7 +22,7 @@ REMEMBERED = 0.01
 """Largest share of how a motion began that may be left where the comparison in a window begins [1]."""
 
 LONGEST_LEAD_S = 45.0
-"""The longest lead that is tried [s]. Origin: computing time."""
+"""The longest lead that is tried [s], for a plant whose time scale is 1. Origin: computing time."""
 
 ENDURED = 0.5
 """Part of :data:`REMEMBERED` that a longer lead is to leave: a fit may find less damping than it begins with."""
@@ -88,7 +88,8 @@ def _forgetting(
     left, half, motion = _left(response, model)
     begun = _begun(response)
     if begun.any() and np.min(left[begun]) >= REMEMBERED and isinstance(measured, Campaign):
-        lead = _longer(LEAD_S, float(np.median(half[begun])), float(np.median(left[begun])))
+        scale = model.build().time_scale or 1.0
+        lead = _longer(scale, float(np.median(half[begun])), float(np.median(left[begun])))
         progress(f"cutting windows of which the first {lead:.3g} s are not compared")
         response = in_windows(partial(estimate_windows, lead_s=lead))
         if response.part is None:
@@ -143,21 +144,22 @@ def _left(
     return after(begin), after(0.5 * begin), solution
 
 
-def _longer(lead: float, half: float, left: float) -> float:
-    """The lead [s] after which little enough is left, where that is ``left`` after ``lead`` and ``half`` after half.
+def _longer(time_scale: float, half: float, left: float) -> float:
+    """The lead [s] after which little enough is left, where that is ``left`` after the usual and ``half`` after half.
 
     Raises :class:`InputError` if the motion does not forget, or not soon.
     """
+    lead, longest = LEAD_S * time_scale, LONGEST_LEAD_S * time_scale
     rate = np.log(half / left) / (0.5 * lead) if np.isfinite([half, left]).all() else 0.0
     longer = lead + np.log(left / (ENDURED * REMEMBERED)) / rate if rate > 0.0 else np.inf
-    if longer > LONGEST_LEAD_S:
+    if longer > longest:
         what = (
             "does not forget how a motion began"
             if np.isfinite(left)
             else "does not follow the recorded motion"
         )
         raise InputError(
-            f"the model {what}: {LONGEST_LEAD_S:g} s before what is compared would not do",
+            f"the model {what}: {longest:g} s before what is compared would not do",
             remedy="give the plant the damping that it has, or record tests that begin with a second of rest",
         )
     return float(longer)

@@ -91,7 +91,8 @@ def with_held_states(
         if effect.holds_states:
             mine = slice(first, first + len(effect.states))
             bounds = effect.bounds_of_states(p, signals[effect.port.name])
-            x = x.at[mine].set(_held(x[mine], *bounds, steps, solution.mesh))
+            scaled = steps / effect.port.time_scale
+            x = x.at[mine].set(_held(x[mine], *bounds, scaled, solution.mesh))
     return solution.trajectory._replace(x=x)
 
 
@@ -110,6 +111,7 @@ def _held(
 ) -> Float[Array, "s P"]:
     """The states of each test where they follow their bounds; else what does, over the second of two periods.
 
+    ``steps`` [s] from node to node are those on a time scale of 1.
     Those of a window that begins at rest begin without stretch.
     """
     layout, middle = mesh.layout, 0.5 * (lower + upper)

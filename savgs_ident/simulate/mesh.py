@@ -94,7 +94,7 @@ class Layout:
 def layout_for(frequency: NDArray[np.float64], nodes: int, slow: float) -> Layout:
     """``nodes`` per period, more in proportion to the period below the frequency ``slow`` [Hz].
 
-    ``frequency`` [Hz] is that of each dwell, (D,).
+    ``frequency`` [Hz] is that of each dwell on the time scale of its plant, (D,).
     """
     wanted = nodes * np.maximum(1.0, slow / np.asarray(frequency))
     return Layout(tuple(int(count) for count in CHUNK * np.ceil(wanted / CHUNK)))
@@ -190,6 +190,7 @@ def adapted_mesh(
 ) -> Mesh:
     """Nodes that follow ``accelerations`` (A, P) known on an earlier ``mesh``, dwells at ``frequency`` [Hz].
 
+    The frequency is that on the time scale of the plant.
     The accelerations may have any units: each counts by the share of its own total variation.
     """
     rates = np.abs(accelerations[:, mesh.layout.following] - accelerations)

@@ -157,8 +157,8 @@ class PeriodicSettings:
     """How finely to solve.
 
     ``nodes`` per period, more in proportion to the period of dwells below ``slow`` [Hz]; in windows of tests that do
-    not repeat ``window_rate`` a second [Hz]; ``adaptations`` of the nodes to the solution; at most ``iterations`` of
-    Newton's method on the last nodes.
+    not repeat ``window_rate`` a second [Hz], both for a plant whose time scale is 1; ``adaptations`` of the nodes to
+    the solution; at most ``iterations`` of Newton's method on the last nodes.
     """
 
     nodes: int = 256
@@ -168,9 +168,9 @@ class PeriodicSettings:
     iterations: int = 60
 
 
-def layout_of(excitation: Excitation, settings: PeriodicSettings) -> Layout:
+def layout_of(excitation: Excitation, settings: PeriodicSettings, model: AbstractPlant) -> Layout:
     """How many nodes each test has."""
-    frequency = np.asarray(excitation.frequency)
+    frequency = np.asarray(excitation.frequency) * (model.time_scale or 1.0)
     counts = np.array(layout_for(frequency, settings.nodes, settings.slow).counts)
     windows = excitation.windows
     counts[windows] = CHUNK * np.ceil(settings.window_rate / frequency[windows] / CHUNK)
@@ -348,7 +348,7 @@ def adapt(
     accelerations = np.asarray(solution.trajectory.y[: len(model.coordinates)])
     if not np.isfinite(accelerations).all():
         return solution
-    frequency = np.asarray(solution.excitation.frequency)
+    frequency = np.asarray(solution.excitation.frequency) * (model.time_scale or 1.0)
     mesh = adapted_mesh(solution.mesh, accelerations, frequency, layout)
     start = _carry_over(solution.trajectory, solution.mesh, mesh)
     return solve_on_mesh(model, as_values(p), solution.excitation, mesh, start, limit)
@@ -367,7 +367,7 @@ def simulate_periodic(
     """
     p, settings = as_values(p), settings or PeriodicSettings()
     if layout is None:
-        layout = layout_of(excitation, settings)
+        layout = layout_of(excitation, settings, model)
     mesh = uniform_mesh(layout)
     start = _cold_start(model, excitation, mesh)
     if excitation.windows.size:

@@ -108,7 +108,7 @@ def test_laws_are_weighed_against_two_effects_wherever_one_formula_explains_all(
 ) -> None:
     """A strut's mount, which the catalogue may not have, does nearly what a damper's end or the gear does."""
     absent: Any = None
-    plant: Any = SimpleNamespace(catalogue=CATALOGUE, plant=SimpleNamespace(ports=PORTS))
+    plant: Any = SimpleNamespace(catalogue=CATALOGUE, plant=SimpleNamespace(ports=PORTS, scaled_ports=PORTS))
     search: Any = SimpleNamespace(given=None)
     problem = DiagnosisProblem(plant, absent, search, absent, absent)
     singles = (

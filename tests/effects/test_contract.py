@@ -14,6 +14,7 @@ from savgs_ident.effects.base import (
     AbstractLaw,
     AbstractNumberLaw,
     AbstractSensorLaw,
+    Port,
 )
 from savgs_ident.effects.effect import LAWS, Effect
 from savgs_ident.plants.parameter_toml import KNOWN_UNITS
@@ -48,7 +49,7 @@ def test_a_law_says_what_it_is(law: AbstractLaw) -> None:
     names = [role.name for role in law.roles]
     assert len(set(names)) == len(names)
     assert any(role.null is not None for role in law.roles)
-    assert {role for role, _ in law.tried} <= set(names)
+    assert {role for role, _ in law.tried(Port("any", law.kind, "any"))} <= set(names)
 
 
 def test_something_that_swings_is_looked_for_at_frequencies_no_further_apart_than_it_is_wide() -> None:

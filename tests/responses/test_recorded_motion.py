@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.recording import RecordedChannel, Recording
-from savgs_ident.responses.driven_motion import ROWS_HZ, recorded_motion, recorded_speed
+from savgs_ident.responses.driven_motion import FAST_HZ, ROWS_HZ, recorded_motion, recorded_speed
 
 SEED = 3
 
@@ -132,3 +132,25 @@ def test_a_slow_steady_motion_is_compared_though_its_noise_turns_it_round() -> N
     }
     motion = recorded_speed(Recording("run", "other", None, channels), "v", "drive", "here")
     assert motion.still.mean() < 0.2
+
+
+@pytest.mark.parametrize("times", [16.0, 64.0])
+def test_a_motion_that_is_so_many_times_as_fast_has_as_many_rows_and_the_same_noise(times: float) -> None:
+    """That of a shaker beside that of a slow axis: rows and blocks of the same samples, of the same force."""
+    time = np.arange(20000) / 500.0
+    slow = _recording(time, False, 0.05)
+    channels = {
+        name: RecordedChannel(name, each.unit, each.time / times, each.values)
+        for name, each in slow.channels.items()
+    }
+    known = recorded_motion(slow, "x", "drive", "here")
+    found = recorded_motion(Recording("run", "other", None, channels), "x", "drive", "here")
+    assert known.time_scale == 1.0
+    x = slow.channels["x"].values
+    power = np.abs(np.fft.rfft(x - x.mean())) ** 2
+    middle = times * np.average(np.fft.rfftfreq(x.size, 1.0 / 500.0), weights=power)
+    assert 0.5 * FAST_HZ < middle * found.time_scale <= FAST_HZ
+    spacing = found.every * found.step / found.time_scale
+    assert spacing == pytest.approx(1.0 / ROWS_HZ, rel=0.3)
+    same = known.rows(known.drive), found.rows(found.drive)
+    assert abs(np.std(same[0]) / np.std(same[1]) - 1.0) < 0.02

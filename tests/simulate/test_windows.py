@@ -16,7 +16,7 @@ from savgs_ident.fit.least_squares import fit_least_squares
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
 from savgs_ident.recordings.recording import Campaign, Recording
 from savgs_ident.responses.harmonic_response import TAPER, HarmonicResponse, compared_share
-from savgs_ident.responses.windows import CLOSING_S, HIGHEST_HZ, LEAD_S, estimate_windows
+from savgs_ident.responses.windows import CLOSING_S, HIGHEST_HZ, LEAD_S, SAMPLES, estimate_windows
 from savgs_ident.simulate.excitation import SUMMED, measured_excitation, signals_at
 from savgs_ident.simulate.forgetting import REMEMBERED, forgetful_motion, forgetful_response, remembered
 from savgs_ident.simulate.mesh import uniform_mesh, waves
@@ -158,7 +158,7 @@ def test_peak_to_peak_values_of_a_road_are_refused() -> None:
         (lambda: campaign(seconds=4.0), "s are needed"),
         (lambda: Campaign("made", campaign().recordings[1:], (), ""), "there is no test"),
         (lambda: _standing(campaign()), "does not move"),
-        (lambda: _thinned(campaign()), "too slow"),
+        (lambda: _thinned(campaign(), 50), "too slow"),
         (lambda: _apart(campaign()), "overlap for 0 s"),
     ],
 )
@@ -166,6 +166,19 @@ def test_what_cannot_be_cut_is_refused_with_what_to_do(made, what: str) -> None:
     with pytest.raises(InputError, match=what) as refused:
         estimate_windows(made(), INPUTS, READINGS)
     assert refused.value.remedy
+
+
+def test_a_record_that_is_sampled_slowly_is_compared_as_far_as_it_goes_and_that_is_said() -> None:
+    """At 20 Hz up to 5 Hz, with a warning; what is asked for is compared, or refused."""
+    measured = estimate_windows(_thinned(campaign(noise=0.0)), INPUTS, READINGS)
+    order = np.flatnonzero(measured.valid[0, measured.channel("body_accel")])
+    assert measured.part is not None
+    highest = order[-1] * measured.part.every[0] * measured.frequency[0]
+    assert 4.7 < highest <= RATE / 25.0 / SAMPLES
+    (warning,) = (each for each in measured.warnings if each.code == "compared_less")
+    assert "5 Hz in place of 15 Hz" in warning.what
+    with pytest.raises(InputError, match="too slow"):
+        estimate_windows(_thinned(campaign()), INPUTS, READINGS, highest_hz=HIGHEST_HZ)
 
 
 def _standing(given: Campaign) -> Campaign:
@@ -219,7 +232,7 @@ def test_many_harmonics_by_a_table_are_the_sum() -> None:
     measured = estimate_windows(campaign(noise=0.0), INPUTS, READINGS)
     excitation = measured_excitation(TwoMass(), measured, PARAMETERS)
     assert excitation.harmonics["road_height"].shape[1] > SUMMED
-    mesh = uniform_mesh(layout_of(excitation, PeriodicSettings()))
+    mesh = uniform_mesh(layout_of(excitation, PeriodicSettings(), TwoMass()))
     ((height, rate),), _ = signals_at(TwoMass(), excitation, mesh)
     dwell, order = mesh.layout.dwell, np.arange(excitation.harmonics["road_height"].shape[1])
     some = np.arange(0, dwell.size, 97)

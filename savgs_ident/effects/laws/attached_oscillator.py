@@ -31,25 +31,32 @@ class AttachedOscillator(AbstractForceLaw):
     words: ClassVar[str] = "something that hangs there and swings"
     family: ClassVar[Family] = Family.OSCILLATOR
     roles: ClassVar[tuple[Role, ...]] = (Role("mass", 0.0), Role("frequency"), Role("damping_ratio"))
-    # A half-power bandwidth apart: one between two that are further apart would promise nothing.
-    tried: ClassVar[tuple[tuple[str, float], ...]] = tuple(
-        ("frequency", frequency) for frequency in np.geomspace(0.8, 40.0, 43).tolist()
-    )
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
-        """The typical force at the acceleration of the typical motion, at 5 Hz."""
+        """The typical force at the acceleration of the typical motion, at 5 Hz on a time scale of 1."""
         mass = port.force * port.displacement / port.velocity**2
         units = port.force_unit, port.displacement_unit
         unit = _INERTIA.get(units, f"{units[0]} s^2/{units[1]}")
         return {
             "mass": Parameter("mass", mass, unit, lower=0.0, upper=100.0 * mass, about="swinging mass"),
             "frequency": Parameter(
-                "frequency", 5.0, "Hz", lower=0.5, upper=80.0, about="natural frequency of what swings"
+                "frequency",
+                5.0 / port.time_scale,
+                "Hz",
+                lower=0.5 / port.time_scale,
+                upper=80.0 / port.time_scale,
+                about="natural frequency of what swings",
             ),
             "damping_ratio": Parameter(
                 "damping_ratio", 0.05, "1", lower=0.005, upper=1.0, about="damping ratio of what swings"
             ),
         }
+
+    def tried(self, port: Port) -> tuple[tuple[str, float], ...]:
+        """Natural frequencies [Hz], a half-power bandwidth apart: between two further apart it would look useless."""
+        return tuple(
+            ("frequency", frequency / port.time_scale) for frequency in np.geomspace(0.8, 40.0, 43).tolist()
+        )
 
     def states(self, port: Port) -> tuple[InternalState, ...]:
         """Displacement and velocity of what swings."""

@@ -28,9 +28,12 @@ class Delay(AbstractSensorLaw):
     roles: ClassVar[tuple[Role, ...]] = (Role("time", 0.0),)
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
-        """Two milliseconds."""
+        """Two milliseconds on a time scale of 1."""
+        usual, most = 2e-3 * port.time_scale, 0.2 * port.time_scale
         return {
-            "time": Parameter("time", 2e-3, "s", lower=0.0, upper=0.2, about="delay of the sensor's channel")
+            "time": Parameter(
+                "time", usual, "s", lower=0.0, upper=most, about="delay of the sensor's channel"
+            )
         }
 
     def transfer(self, v: Values, frequency: Float[Array, "*f"]) -> Complex[Array, "*f"]:

@@ -39,9 +39,9 @@ class MassiveCompliance(AbstractSeriesLaw):
     roles: ClassVar[tuple[Role, ...]] = (Role("compliance", 0.0), Role("damping"), Role("mass"))
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
-        """The typical displacement under the typical load; a natural frequency of 200 Hz, damped to its half."""
+        """The typical displacement under the typical load; damped to its half, at 200 Hz on a time scale of 1."""
         size, unit = port.displacement / port.force, per(port.displacement_unit, port.force_unit)
-        omega = 400.0 * pi
+        omega = 400.0 * pi / port.time_scale
         return {
             "compliance": Parameter(
                 "compliance", size, unit, lower=0.0, upper=100.0 * size, about="compliance"

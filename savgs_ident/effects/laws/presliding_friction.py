@@ -37,6 +37,7 @@ class PreslidingFriction(AbstractForceLaw):
     name: ClassVar[str] = "friction"
     words: ClassVar[str] = "friction that gives like a spring before it slides"
     family: ClassVar[Family] = Family.FRICTION
+    drags_anchors: ClassVar[bool] = True
     roles: ClassVar[tuple[Role, ...]] = (Role("force", 0.0), Role("stretch"), Role("lag"))
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
@@ -46,7 +47,7 @@ class PreslidingFriction(AbstractForceLaw):
                 "force", port.force, port.force_unit, lower=0.0, upper=100.0 * port.force, about="friction"
             ),
             "stretch": 1e-2 * port.displacement,
-            "lag": 1e-3,
+            "lag": 1e-3 * port.time_scale,
         }
 
     def states(self, port: Port) -> tuple[InternalState, ...]:

@@ -28,13 +28,10 @@ class Resonance(AbstractSeriesLaw):
     words: ClassVar[str] = "something that swings under the load"
     family: ClassVar[Family] = Family.OSCILLATOR
     roles: ClassVar[tuple[Role, ...]] = (Role("mobility", 0.0), Role("frequency"), Role("damping_ratio"))
-    tried: ClassVar[tuple[tuple[str, float], ...]] = tuple(
-        ("frequency", frequency) for frequency in np.geomspace(4.0, 60.0, 16).tolist()
-    )
 
     def typical(self, port: Port) -> Mapping[str, Parameter | float]:
-        """A mode at 12 Hz that gives the typical displacement under the typical load at rest."""
-        frequency = 12.0
+        """The typical displacement under the typical load at rest; a mode at 12 Hz on a time scale of 1."""
+        frequency = 12.0 / port.time_scale
         mobility = port.displacement * (2.0 * np.pi * frequency) ** 2 / port.force
         unit = per(f"{port.displacement_unit}/s^2", port.force_unit)
         return {
@@ -42,12 +39,23 @@ class Resonance(AbstractSeriesLaw):
                 "mobility", mobility, unit, lower=0.0, upper=100.0 * mobility, about="mobility of the mode"
             ),
             "frequency": Parameter(
-                "frequency", frequency, "Hz", lower=2.0, upper=80.0, about="natural frequency"
+                "frequency",
+                frequency,
+                "Hz",
+                lower=2.0 / port.time_scale,
+                upper=80.0 / port.time_scale,
+                about="natural frequency",
             ),
             "damping_ratio": Parameter(
                 "damping_ratio", 0.05, "1", lower=0.005, upper=1.0, about="damping ratio"
             ),
         }
+
+    def tried(self, port: Port) -> tuple[tuple[str, float], ...]:
+        """Natural frequencies [Hz] from below to far above those of the plant."""
+        return tuple(
+            ("frequency", frequency / port.time_scale) for frequency in np.geomspace(4.0, 60.0, 16).tolist()
+        )
 
     def states(self, port: Port) -> tuple[InternalState, ...]:
         """The displacement and its velocity."""

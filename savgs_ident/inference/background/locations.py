@@ -247,7 +247,8 @@ def _functions(port: Port, seen: _Seen) -> Iterator[Functions]:
     elif port.kind is PortKind.SERIES:
         beyond = np.asarray(seen.loads[port.name].beyond_rest)
         if port.resonant:
-            yield resonance_functions(beyond, seen.nodes, seen.constants)
+            scale = seen.about.model.time_scale or 1.0
+            yield resonance_functions(beyond, seen.nodes, seen.constants, scale)
         else:
             yield series_functions(seen.loads[port.name])
             yield damped_functions(beyond, seen.nodes, seen.about.solution)
@@ -274,13 +275,13 @@ def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> _Asked:
         changes = slopes * np.array([number.change for number in numbers])
         laws = laws_of_functions(changes, (Family.NUMBER,) * len(numbers), constants)
         return _Asked([], lambda _: InputLocation(name, laws, changes))
-    fields, swinging = [], []
+    fields, swinging, scale = [], [], seen.about.model.time_scale or 1.0
     for each in inertias:
         velocity = sum(np.asarray(seen.signals[where].velocity) for where in each.velocity)
         acceleration = rate_of(np.asarray(velocity), seen.nodes, seen.about.solution)
         fields.append((each.force, acceleration))
         swinging += [
-            (each.force, resonance(acceleration, natural, constants.resonance_damping, seen.nodes))
+            (each.force, resonance(acceleration, natural / scale, constants.resonance_damping, seen.nodes))
             for natural in constants.resonances
         ]
 
@@ -319,6 +320,7 @@ def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
     channels = [each.name for each in about.model.channels]
     read, order = about.read(), np.arange(about.orders + 1)
     omega = 2.0 * np.pi * np.asarray(seen.about.solution.excitation.spacing)[:, None] * order
+    time_scale = about.model.time_scale or 1.0
     along, locations = seen.readings, []
     for name in names:
         c = channels.index(name.removeprefix("sensor."))
@@ -329,7 +331,7 @@ def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
             return about.rows(out)
 
         mine = read[:, c]
-        dynamic = np.stack([rows(mine * each) for each in sensor_filters(omega)], axis=1)
+        dynamic = np.stack([rows(mine * each) for each in sensor_filters(time_scale * omega)], axis=1)
         static = np.stack([rows(each) for each in _static_errors(along[:, c], mine, omega, seen)], axis=1)
         counted = seen.dwells[:, None]
         unit = [counted * (order == k) * turn for k in range(1, about.orders + 1) for turn in (1.0, -1j)]

@@ -204,10 +204,15 @@ def damped_functions(beyond: Signal, nodes: MeshPoints, solution: PeriodicSoluti
     return Functions(values, (Family.COMPLIANCE,) * len(values), (0, 1))
 
 
-def resonance_functions(beyond: Signal, nodes: MeshPoints, constants: BackgroundConstants) -> Functions:
-    """What gives under a load [the port's unit of force], (P,), and what slightly damped modes would make of it."""
+def resonance_functions(
+    beyond: Signal, nodes: MeshPoints, constants: BackgroundConstants, time_scale: float
+) -> Functions:
+    """What gives under a load [the port's unit of force], (P,), and what slightly damped modes would make of it.
+
+    ``time_scale`` [1] is that of the plant.
+    """
     damping = constants.resonance_damping
-    modes = [resonance(beyond, natural, damping, nodes) for natural in constants.resonances]
+    modes = [resonance(beyond, natural / time_scale, damping, nodes) for natural in constants.resonances]
     return Functions([beyond, *modes], (Family.OSCILLATOR,) * (1 + len(modes)))
 
 
@@ -244,7 +249,7 @@ def input_size(recorded: Recorded) -> Functions:
 def sensor_filters(omega: Signal) -> list[NDArray[np.complex128]]:
     """Linear filters of a reading [1]: those of a learned transfer function.
 
-    Filters and angular frequencies ``omega`` [rad/s] are (dwells, orders) each.
+    Filters and angular frequencies ``omega`` [rad/s], on the time scale of the plant, are (dwells, orders) each.
     """
     return [np.asarray(each, np.complex128) for each in filters(jnp.asarray(omega))]
 
