@@ -1,17 +1,19 @@
 """Where a plant stands still: its nominal state, and the rest that it comes to under constant inputs."""
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.small_root import Root, find_root
 from savgs_ident.core.values import Values
 from savgs_ident.effects.base import InputSignal
-from savgs_ident.plants.base import AbstractPlant, Input, Motion, Scalar
+from savgs_ident.plants.base import AbstractPlant, Input, Motion, Scalar, input_size
 
 REST_PRECISION = 1e-9
 """Relative precision of a state of rest; forces of 1e7 N/m leave no more."""
@@ -19,6 +21,10 @@ REST_PRECISION = 1e-9
 
 NO_STIFFNESS = 1e-12
 """Stiffness over the largest one of a plant, each for typical motions, that is none [1]: what rounding leaves."""
+
+
+ALONG = 1e-9
+"""Change of what is out of balance, over all of it, that is none [1]: what rounding leaves."""
 
 
 class Rest(NamedTuple):
@@ -61,6 +67,41 @@ def find_rest(plant: AbstractPlant, p: Values, u: Any, prepared: Any = None) -> 
     # At rest a velocity among the states has nothing on the diagonal: rows have to be exchanged.
     root = find_root(residual, jnp.zeros_like(scale), scale, REST_PRECISION, jnp.linalg.solve)
     return Rest(plant.coordinate_type(*jnp.unstack(root.x[:n])), root.x[n:], root)
+
+
+def carried_along(plant: AbstractPlant, p: Values) -> tuple[bool, ...]:
+    """For each input, whether the plant moves along with it as a whole, as a car does with the height of its road.
+
+    Nothing is out of balance by more or less then where the input and the coordinates that it ``moves`` are shifted
+    together: its mean says nothing.
+    """
+    bare = replace(plant, effects=(), alternatives=())
+    n, count = len(bare.coordinates), len(bare.states)
+    # Somewhere in the middle of a motion, where no term vanishes by chance.
+    somewhere = np.cos(1.0 + np.arange(3 * n + 2 * count + 2 * len(bare.inputs)))
+    sizes = [
+        *(each.size for each in bare.coordinates),
+        *(each.rate_size for each in bare.coordinates),
+        *(each.acceleration_size for each in bare.coordinates),
+    ]
+    q, qd, qdd = np.split(somewhere[: 3 * n] * sizes, 3)
+    s, sd = (jnp.asarray(each) for each in np.split(somewhere[3 * n : 3 * n + 2 * count], 2))
+    levels = somewhere[-2 * len(bare.inputs) :]
+
+    def balance(place: int, shift: float) -> NDArray[np.float64]:
+        moved = q + shift * np.asarray(bare.inputs[place].moves)
+        motion = Motion(*(bare.coordinate_type(*jnp.asarray(each)) for each in (moved, qd, qdd)))
+        signals = tuple(
+            InputSignal(jnp.asarray(value + shift * (here == place)), jnp.asarray(rate))
+            for here, (value, rate) in enumerate(zip(levels[::2], levels[1::2], strict=True))
+        )
+        return np.asarray(bare.residual(p, motion, s, sd, bare.drive(signals)))
+
+    def along(place: int) -> bool:
+        known, shifted = balance(place, 0.0), balance(place, input_size(bare, bare.inputs[place]))
+        return bool(np.all(np.abs(shifted - known) <= ALONG * np.max(np.abs(known))))
+
+    return tuple(along(place) for place in range(len(bare.inputs)))
 
 
 def nominal_readings(plant: AbstractPlant, p: Values, prepared: Any = None) -> tuple[Scalar, ...]:

@@ -86,7 +86,8 @@ class Input:
         moves: typical motion of each coordinate per unit of this input, (n,) [coordinate's unit per ``unit``].
         rest: name of the parameter that holds its value at rest; empty where that is zero.
         required: whether a recording without it is refused; otherwise it stays at rest.
-        keeps_mean: whether its mean counts. A plate, say, has no absolute height.
+        keeps_mean: whether its mean counts; where it is None, it does unless the plant moves along with the input as
+            a whole (:func:`savgs_ident.plants.at_rest.carried_along`). A plate, say, has no absolute height.
         orders: highest order of its motion that is imposed; what lies above is below the sensor's resolution.
         stroke: name of the parameter that holds its motion in a test, peak to peak; empty where the sizes of the
             coordinates say how far it moves.
@@ -100,7 +101,7 @@ class Input:
     rate_name: str = ""
     rest: str = ""
     required: bool = True
-    keeps_mean: bool = False
+    keeps_mean: bool | None = None
     orders: int | None = None
     stroke: str = ""
 
@@ -383,6 +384,12 @@ class AbstractSource(eqx.Module):
     @abstractmethod
     def rate(self, p: Values, t: Scalar, state: Float[Array, " k"], loads: Any) -> Float[Array, " k"]:
         """Time derivatives of its states under the ``loads`` of the plant."""
+
+
+def input_size(plant: AbstractPlant | type[AbstractPlant], given: Input) -> float:
+    """The largest amplitude of an input [its unit] with which no coordinate moves by more than its typical size."""
+    moved = zip(plant.coordinates, given.moves, strict=True)
+    return min((each.size / abs(moves) for each, moves in moved if moves), default=1.0)
 
 
 def state_sizes(plant: AbstractPlant) -> tuple[float, ...]:

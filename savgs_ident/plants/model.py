@@ -12,11 +12,8 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
 from math import isfinite
 from typing import Any, Protocol, Self
-
-import numpy as np
 
 from savgs_ident.core.errors import DataWarning, InputError, blamed_on
 from savgs_ident.core.parameter import SIZED, TYPICAL, Parameter, ParameterTable, merge_parameters
@@ -24,9 +21,9 @@ from savgs_ident.core.presentation import Origin
 from savgs_ident.effects.base import Port
 from savgs_ident.effects.effect import Effect, generic_effects
 from savgs_ident.plants.base import AbstractPlant, Channel
+from savgs_ident.plants.layout import layout_of
 from savgs_ident.plants.time_scale import time_scale_of
-from savgs_ident.recordings.checks_signal import DataLocation
-from savgs_ident.recordings.recording import Campaign, ChannelSpec, Recording, RecordingLayout
+from savgs_ident.recordings.recording import Campaign, RecordingLayout
 
 
 class Model(Protocol):
@@ -333,60 +330,6 @@ def _times(number: Parameter, ratio: float) -> Parameter:
         upper=number.upper * ratio,
         source=SIZED,
     )
-
-
-def layout_of(plant: AbstractPlant | type[AbstractPlant]) -> RecordingLayout:
-    """The channels of recordings of a plant, as it declares them; a dwell or a sweep moves its first input."""
-    driving = tuple(ChannelSpec(each.name, each.unit, each.about) for each in plant.inputs)
-    read = tuple(ChannelSpec(each.name, each.unit, each.about) for each in plant.channels)
-    return RecordingLayout(
-        (*driving, *read),
-        driving[0].name,
-        tuple(each.name for each in read),
-        checks=(partial(check_sizes, _typical_sizes(plant)),),
-    )
-
-
-UNLIKE = 100.0
-"""Factor by which an input may be larger or smaller than the plant's declared sizes say. Origin: by choice, so that
-millimetres taken for metres are seen and no declaration has to be exact."""
-
-
-def _typical_sizes(plant: AbstractPlant | type[AbstractPlant]) -> tuple[tuple[str, str, float], ...]:
-    """Name and unit of each input, and how large it typically is by the sizes of what it moves [unit].
-
-    And of a reading of the one coordinate that has its unit.
-    """
-    sizes = {each.unit: each.size for each in plant.coordinates}
-    alone = len(plant.coordinates) == 1
-    found = [
-        (each.name, each.unit, sizes[each.unit]) for each in plant.channels if alone and each.unit in sizes
-    ]
-    for each in plant.inputs:
-        moved = [one.size / abs(by) for one, by in zip(plant.coordinates, each.moves, strict=False) if by]
-        if moved:
-            found.append((each.name, each.unit, float(np.median(moved))))
-    return tuple(found)
-
-
-def check_sizes(
-    sizes: Sequence[tuple[str, str, float]], recordings: Sequence[Recording], source: str
-) -> tuple[DataWarning, ...]:
-    """Warnings ``implausible_unit`` of signals that are far from the ``sizes`` (name, unit, size) of a plant."""
-    found = []
-    for name, unit, size in sizes:
-        moves = [float(np.std(each.channels[name].values)) for each in recordings if name in each.channels]
-        largest = max(moves, default=0.0)
-        if largest > 0.0 and not size / UNLIKE < largest < size * UNLIKE:
-            found.append(
-                DataLocation(source, channel=name).warning(
-                    "implausible_unit",
-                    f"has an rms of {largest:.2g} {unit}, where the sizes that the plant declares say about "
-                    f"{size:.2g} {unit}",
-                    "check its unit, in the header or in channels.toml, and the sizes of the plant's coordinates",
-                )
-            )
-    return tuple(found)
 
 
 def doubts_of_fit(name: str, provenance: Mapping[str, Any]) -> tuple[str, ...]:

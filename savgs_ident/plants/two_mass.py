@@ -132,7 +132,9 @@ class TwoMass(AbstractPlant):
         Coordinate("z_u", "m", "height of the unsprung mass", 1e-2, 1e-1, 3.0),
     )
     coordinate_type: ClassVar[type[Heights]] = Heights
-    inputs: ClassVar[tuple[Input, ...]] = (Input("road_height", "m", "road", moves=(1.0, 1.0)),)
+    inputs: ClassVar[tuple[Input, ...]] = (
+        Input("road_height", "m", "road", moves=(1.0, 1.0), keeps_mean=False),
+    )
     channels: ClassVar[tuple[Channel, ...]] = (
         Channel("body_accel", "m/s^2", "sprung-mass acceleration", decay=1),
         Channel("susp_deflection", "m", "suspension deflection", decay=2),

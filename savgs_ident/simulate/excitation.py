@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Progress, no_progress
+from savgs_ident.core.values import as_values
 from savgs_ident.effects.base import Fundamental, InputSignal
-from savgs_ident.plants.base import AbstractPlant, Excitation, Input
+from savgs_ident.plants.at_rest import carried_along
+from savgs_ident.plants.base import AbstractPlant, Excitation, Input, input_size
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, SweepResponse
@@ -134,10 +136,7 @@ def typical_amplitude(plant: AbstractPlant | type[AbstractPlant], table: Paramet
     Otherwise the largest with which no coordinate moves by more than its typical size.
     """
     driven = plant.inputs[0]
-    if driven.stroke:
-        return table[driven.stroke].value / 2.0
-    moved = zip(plant.coordinates, driven.moves, strict=True)
-    return min(each.size / abs(moves) for each, moves in moved if moves)
+    return table[driven.stroke].value / 2.0 if driven.stroke else input_size(plant, driven)
 
 
 def resting_values(plant: AbstractPlant | type[AbstractPlant], table: ParameterTable) -> dict[str, float]:
@@ -204,9 +203,22 @@ def measured_excitation(
     An input that was not recorded, and need not be, rests at the value that ``table`` has for it. Raises
     :class:`InputError` if an input that is required was not recorded.
     """
-    harmonics = {each.name: jnp.asarray(_recorded(each, measured, table)) for each in plant.inputs}
+    kept = means_that_count(plant, table)
+    harmonics = {
+        each.name: jnp.asarray(_recorded(each, mean, measured, table))
+        for each, mean in zip(plant.inputs, kept, strict=True)
+    }
     part = None if measured.part is None else cast(Any, ComparedPart)(*map(jnp.asarray, measured.part))
     return Excitation(jnp.asarray(measured.frequency), harmonics, part)
+
+
+def means_that_count(plant: AbstractPlant | type[AbstractPlant], table: ParameterTable) -> tuple[bool, ...]:
+    """Of each input whether its mean counts: whether the plant does not move along with it as a whole."""
+    said = [each.keeps_mean for each in plant.inputs]
+    if None in said and isinstance(plant, AbstractPlant):
+        along = carried_along(plant, as_values(table.as_dict()))
+        said = [not each if mean is None else mean for mean, each in zip(said, along, strict=True)]
+    return tuple(mean is True for mean in said)
 
 
 def only_driven(excitation: Excitation, kept: NDArray[np.intp]) -> Excitation:
@@ -228,7 +240,9 @@ def _that_move(harmonics: Array) -> Array:
     return harmonics[:, : max(int(highest), 1) + 1]
 
 
-def _recorded(given: Input, measured: HarmonicResponse, table: ParameterTable) -> NDArray[np.complex128]:
+def _recorded(
+    given: Input, keeps_mean: bool, measured: HarmonicResponse, table: ParameterTable
+) -> NDArray[np.complex128]:
     rest = table[given.rest].value if given.rest else 0.0
     if given.name not in measured.channels:
         if given.required:
@@ -245,7 +259,7 @@ def _recorded(given: Input, measured: HarmonicResponse, table: ParameterTable) -
     stands_out[:, 0] = True
     valid = measured.valid[:, place]
     harmonics[~(stands_out & valid)] = 0.0
-    if given.keeps_mean:
+    if keeps_mean:
         harmonics[~valid[:, 0], 0] = rest
     else:
         harmonics[:, 0] = _means(harmonics, measured)
@@ -312,7 +326,7 @@ def measured_response(
     if isinstance(measured, HarmonicResponse):
         return up_to_frequency(measured, max_frequency)
     progress("estimating responses")
-    only = measured.only((*recorded_names(plant), *measured.layout.free))
+    only = _with_inputs(measured, plant).only((*recorded_names(plant), *measured.layout.free))
     return up_to_frequency(estimate_response(only, orders, plant.inputs[0].name), max_frequency)
 
 
@@ -341,7 +355,7 @@ def response_of_tests(
     inputs, readings = ([each.name for each in listed] for listed in (plant.inputs, plant.channels))
     # Beside dwells their limit is given for them: windows keep within theirs.
     highest = min(max_frequency, MOST_HZ / scale) if dwells and max_frequency is not None else max_frequency
-    only = measured.only((*recorded_names(plant), *measured.layout.free))
+    only = _with_inputs(measured, plant).only((*recorded_names(plant), *measured.layout.free))
     try:
         windows = cut(only, inputs, readings, highest, kinds=kinds, time_scale=scale)
     except InputError as error:
@@ -349,6 +363,22 @@ def response_of_tests(
             raise
         return replace(response, warnings=(*response.warnings, error.as_warning("tests_not_used")))
     return windows if response is None else join_tests(response, windows)
+
+
+def _with_inputs(campaign: Campaign, plant: AbstractPlant | type[AbstractPlant]) -> Campaign:
+    """The campaign without tests that lack an input which others have and the plant requires."""
+    moving = [each for each in campaign.recordings if each.kind != "standstill"]
+    known = [
+        each.name
+        for each in plant.inputs
+        if each.required and any(each.name in one.channels for one in moving)
+    ]
+    kept = tuple(
+        each
+        for each in campaign.recordings
+        if each.kind == "standstill" or all(name in each.channels for name in known)
+    )
+    return replace(campaign, recordings=kept)
 
 
 def first_sweep(

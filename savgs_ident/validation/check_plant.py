@@ -18,10 +18,12 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.core.values import as_values
+from savgs_ident.plants.base import AbstractPlant, Excitation, input_size
 from savgs_ident.plants.model import PlantModel
-from savgs_ident.simulate.excitation import sine_excitation, typical_amplitude
+from savgs_ident.simulate.excitation import means_that_count, sine_excitation, typical_amplitude
 from savgs_ident.simulate.linearisation import nominal_rest, plant_signals, slopes
 from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
@@ -142,12 +144,10 @@ def _motions(model: PlantModel, frequency: NDArray[np.float64]) -> Iterator[Find
     plant, table, p = model.build(), model.table, as_values(model.table.as_dict())
     names = tuple(each.name for each in table.entries)
     scales = np.array([each.tolerance or abs(each.value) or 1.0 for each in table.entries])
-    driven, typical = plant.inputs[0].name, typical_amplitude(plant, table)
+    typical = typical_amplitude(plant, table)
     columns, lost = [], []
-    for share in AMPLITUDES:
-        solution = simulate_periodic(
-            plant, p, sine_excitation(plant, table, frequency, {driven: share * typical})
-        )
+    for excitation in _excitations(plant, table, frequency, typical):
+        solution = simulate_periodic(plant, p, excitation)
         ok = np.array([each.ok for each in solution.status()])
         lost += [f"{f:.3g} Hz" for f in frequency[~ok]]
         if not np.any(ok):
@@ -167,6 +167,23 @@ def _motions(model: PlantModel, frequency: NDArray[np.float64]) -> Iterator[Find
     if columns:
         rows = np.concatenate(columns, axis=1)
         yield from _identifiability(model, np.concatenate([rows.real, rows.imag], axis=1))
+
+
+def _excitations(
+    plant: AbstractPlant, table: ParameterTable, frequency: NDArray[np.float64], typical: float
+) -> Iterator[Excitation]:
+    """Sines of the first input at its amplitudes, other inputs at rest; and each of these at levels as high.
+
+    A current, say, without which a coil does nothing.
+    """
+    driven, *others = plant.inputs
+    counting = [each for each, mean in zip(others, means_that_count(plant, table)[1:], strict=True) if mean]
+    for share in AMPLITUDES:
+        moving = sine_excitation(plant, table, frequency, {driven.name: share * typical})
+        yield moving
+        for each in counting:
+            level = moving.harmonics[each.name] + share * input_size(plant, each)
+            yield moving._replace(harmonics={**moving.harmonics, each.name: level})
 
 
 def _identifiability(model: PlantModel, rows: NDArray[np.float64]) -> Iterator[Finding]:

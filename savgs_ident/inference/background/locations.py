@@ -203,7 +203,7 @@ def input_locations(about: Linearisation, constants: BackgroundConstants) -> lis
             asked.append(_signals(name, ports, seen))
     columns = about.imposed([field for each in asked for field in each.fields])
     ends = np.cumsum([len(each.fields) for each in asked], dtype=int)
-    parts = np.split(columns, ends[:-1], axis=1)
+    *parts, _ = np.split(columns, ends, axis=1)
     locations = [each.location(part) for each, part in zip(asked, parts, strict=True)]
     return locations + _sensors(sensors, seen)
 

@@ -109,6 +109,7 @@ INPUTS = (
         moves=(1.0, 3.0),
         details="height of the plate, up positive",
         rate_name="road_velocity",
+        keeps_mean=False,
         stroke="cam_peak_to_peak",
     ),
     # What a link of some 10 mm moves, seen over an arm of a third of a metre.
