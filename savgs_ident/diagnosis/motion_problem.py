@@ -184,8 +184,14 @@ class MotionProblem(AbstractProblem):
     def _functions(self, port: Port, seen: _Seen) -> Functions:
         """Functions of what a force port sees; at the drive, of the force that the model needs from it.
 
-        The recorded force is what is to be explained: a law of that would explain everything.
+        The recorded force is what is to be explained: a law of that would explain everything. At another input they
+        are of what was recorded.
         """
+        beside = self.motion.beside.get(port.location)
+        if beside is not None:
+            level = beside / max(float(np.abs(beside).max()), np.finfo(float).tiny)
+            families = (Family.SHAPE, Family.GAIN, Family.SHAPE)
+            return Functions([np.ones_like(level), level, level * np.abs(level)], families, (0, 1))
         if port.kind is PortKind.INPUT:
             drive = seen.drive / np.abs(seen.drive).max()
             families = (Family.SHAPE, Family.GAIN, Family.SHAPE)

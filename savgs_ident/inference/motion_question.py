@@ -138,6 +138,7 @@ class MotionQuestion:
         return {
             "position": motion.position,
             "drive": motion.drive,
+            **motion.beside,
             "step": motion.step,
             "noise": motion.noise,
         }

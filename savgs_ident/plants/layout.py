@@ -62,13 +62,14 @@ def check_sizes(
     """
     found = []
     for name, unit, size in sizes:
-        moving = (each.channels[name].values for each in recordings if name in each.channels)
-        largest = max((float(np.nanstd(each)) for each in moving if _moves(each)), default=0.0)
-        if largest > 0.0 and not size / UNLIKE < largest < size * UNLIKE:
+        values = {each.name: each.channels[name].values for each in recordings if name in each.channels}
+        moving = {test: float(np.nanstd(each)) for test, each in values.items() if _moves(each)}
+        test = max(moving, key=lambda each: moving[each], default="")
+        if test and not size / UNLIKE < moving[test] < size * UNLIKE:
             found.append(
-                DataLocation(source, channel=name).warning(
+                DataLocation(source, test, name).warning(
                     "implausible_unit",
-                    f"has an rms of {largest:.2g} {unit}, where the sizes that the plant declares say about "
+                    f"has an rms of {moving[test]:.2g} {unit}, where the sizes that the plant declares say about "
                     f"{size:.2g} {unit}",
                     "check its unit, in the header or in channels.toml, and the sizes of the plant's coordinates",
                 )

@@ -20,6 +20,9 @@ channel where the names do not say it::
     scale  = 1.02               # calibration: SI = unit * sign * (scale * raw + offset)
     offset = -12.5              # in the unit given, after scale
 
+    [channels.road_height]      # no column, no topic: of the signal that has the usual name
+    unit   = "mm"
+
     [channels.link_angle]
     topic  = "/joint_states"
     field  = "position[single_link]"    # by joint name, or position[0]
@@ -70,10 +73,14 @@ class ChannelRule:
 
 @dataclass(frozen=True)
 class ChannelMap:
-    """The content of ``channels.toml`` for a layout; an empty one leaves everything to the usual names."""
+    """The content of ``channels.toml`` for a layout; an empty one leaves everything to the usual names.
+
+    ``rules`` name a column or a topic; those in ``of_usual_names`` say unit, gain or sign of what is found without.
+    """
 
     layout: RecordingLayout
     rules: tuple[ChannelRule, ...] = ()
+    of_usual_names: tuple[ChannelRule, ...] = ()
     time_column: str | None = None
     time_unit: str | None = None
     clock: str | None = None
@@ -103,9 +110,11 @@ def read_channel_map(path: Path | str, layout: RecordingLayout) -> ChannelMap:
     if clock is not None and clock not in CLOCKS:
         raise InputError(f"clock '{clock}' is not known", source=path, remedy="choose " + ", ".join(CLOCKS))
     rules = [_rule(name, layout, _table(channels, name, path), path) for name in channels]
+    rules += [_free_rule(name, extended, table, path) for name, table in free.items()]
     return ChannelMap(
         extended,
-        rules=(*rules, *(_rule(name, extended, table, path) for name, table in free.items())),
+        rules=tuple(each for each in rules if each.column or each.topic),
+        of_usual_names=tuple(each for each in rules if not each.column and not each.topic),
         time_column=_text(time, "column", path),
         time_unit=_text(time, "unit", path),
         clock=clock,
@@ -136,6 +145,18 @@ def _free_channel(
     return ChannelSpec(name, unit, "recorded beside", free=True)
 
 
+def _free_rule(name: str, layout: RecordingLayout, table: dict[str, object], path: Path | str) -> ChannelRule:
+    found = _rule(name, layout, table, path)
+    if not found.column and not found.topic:
+        raise InputError(
+            "needs either a column or a topic",
+            source=path,
+            channel=name,
+            remedy="give exactly one of the two",
+        )
+    return found
+
+
 def _rule(name: str, layout: RecordingLayout, table: dict[str, object], path: Path | str) -> ChannelRule:
     if name not in layout.names:
         raise InputError(
@@ -143,12 +164,12 @@ def _rule(name: str, layout: RecordingLayout, table: dict[str, object], path: Pa
         )
     _only(table, (*_TEXTS, *_NUMBERS), path, f"key of [channels.{name}]")
     texts = {key: _text(table, key, path) for key in _TEXTS}
-    if (texts["column"] is None) == (texts["topic"] is None):
+    if (texts["column"] and texts["topic"]) or not table:
         raise InputError(
-            "needs either a column or a topic",
+            "names a column and a topic" if table else "says nothing",
             source=path,
             channel=name,
-            remedy="give exactly one of the two",
+            remedy="give a column or a topic, or unit, scale, offset or sign of the signal with the usual name",
         )
     numbers = {key: _number(table, key, path, name) for key in _NUMBERS if key in table}
     if numbers.get("sign", 1.0) not in (1.0, -1.0):
@@ -270,6 +291,7 @@ def bind(
     """
     layout = channel_map.layout
     mapped = {rule.channel for rule in channel_map.rules}
+    usual = {rule.channel: rule for rule in channel_map.of_usual_names}
     by_key = {candidate.key: candidate for candidate in candidates}
     bindings: dict[str, Binding] = {}
     warnings: list[DataWarning] = []
@@ -286,7 +308,8 @@ def bind(
             continue
         if earlier is not None and earlier.exact == exact:
             raise ambiguous(name, earlier.label, candidate.label, source)
-        bindings[name] = _by_name(name, layout, candidate, exact, source, warnings)
+        rule = usual.get(name, ChannelRule(name))
+        bindings[name] = replace(_by_rule(rule, layout, candidate, source, warnings), exact=exact)
     return tuple(bindings.values()), tuple(warnings)
 
 
@@ -336,16 +359,3 @@ def _by_rule(
     return Binding(
         rule.channel, candidate.key, factor * rule.scale, factor * rule.offset, candidate.label, exact=True
     )
-
-
-def _by_name(
-    name: str,
-    layout: RecordingLayout,
-    candidate: SignalCandidate,
-    exact: bool,
-    source: str,
-    warnings: list[DataWarning],
-) -> Binding:
-    unit = layout.split_header(candidate.text).unit or candidate.unit
-    factor = unit_factor_or_si(unit, name, layout, candidate.label, source, warnings)
-    return Binding(name, candidate.key, factor, 0.0, candidate.label, exact)

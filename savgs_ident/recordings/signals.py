@@ -141,6 +141,9 @@ def _clock(
     layout, wanted = channel_map.layout, channel_map.time_column
     if wanted is not None:
         found = [each for each in signals if wanted in (each.name, layout.split_header(each.name).label)]
+        if not found and all(each.time is not None for each in signals):
+            # A folder may have files of several formats, and one map.
+            return None
         if not found:
             raise InputError(
                 f"channels.toml names '{wanted}' as the time, the file does not have it",

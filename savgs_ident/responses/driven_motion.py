@@ -25,8 +25,8 @@ Times and frequencies below are those of a motion up to :data:`FAST_HZ`; a faste
 (:func:`time_scale_of_motion`), by which its times are multiplied and its frequencies divided.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from math import ceil, log2
@@ -97,6 +97,7 @@ class DrivenMotion:
         warnings: what is to be known of it.
         starts: places of the samples with which tests begin, several that were recorded one after the other.
         time_scale: by what times that are meant for a slow motion are multiplied [1].
+        beside: the plant's other inputs, by name [their units], (n,) each.
 
     Position and force of a plant that turns are an angle [rad] and a torque [N m].
     """
@@ -113,6 +114,7 @@ class DrivenMotion:
     warnings: tuple[DataWarning, ...] = ()
     starts: tuple[int, ...] = (0,)
     time_scale: float = 1.0
+    beside: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     @property
     def every(self) -> int:
@@ -201,6 +203,7 @@ def joined(motions: Sequence[DrivenMotion], source: str) -> DrivenMotion:
         _said_once([warning for each in motions for warning in each.warnings], source),
         tuple(np.cumsum([0, *sizes[:-1]]).tolist()),
         min(each.time_scale for each in motions),
+        {name: np.concatenate([each.beside[name] for each in even]) for name in even[0].beside},
     )
 
 
@@ -211,7 +214,8 @@ def _resampled(motion: DrivenMotion, step: float) -> DrivenMotion:
     old = motion.step * np.arange(motion.position.size)
     new = np.arange(0.0, old[-1], step)
     signals = {name: np.interp(new, old, getattr(motion, name)) for name in _SIGNALS}
-    return replace(motion, step=step, **signals)
+    beside = {name: np.interp(new, old, each) for name, each in motion.beside.items()}
+    return replace(motion, step=step, beside=beside, **signals)
 
 
 def _said_once(warnings: Sequence[DataWarning], source: str) -> tuple[DataWarning, ...]:
@@ -260,35 +264,40 @@ def driven_motion(recording: AxisRecording) -> DrivenMotion:
     return _driven(recording.source, step, scale, recording.position, recording.force, period, unclear)
 
 
-def recorded_motion(recording: Recording, motion: str, drive: str, source: str) -> DrivenMotion:
+def recorded_motion(
+    recording: Recording, motion: str, drive: str, source: str, others: Sequence[str] = ()
+) -> DrivenMotion:
     """The motion in a test of any plant with one coordinate: the channel ``motion``, driven by the channel ``drive``.
 
+    ``others`` are the channels of further inputs.
     Samples that are not even in time are interpolated. Raises :class:`InputError` for a test that lacks a channel or
     is too short.
     """
-    step, position, force = _even(recording, motion, drive, source)
+    step, (position, force, *beside) = _even(recording, (motion, drive, *others), source)
     period, scale = period_of(position, SAME_AS_MEASURED), time_scale_of_motion(position, step)
     unclear = noise_of_rate(position, step, _cutoff(step, scale))
-    return _driven(f"{source}, {recording.name}", step, scale, position, force, period, unclear)
+    found = _driven(f"{source}, {recording.name}", step, scale, position, force, period, unclear)
+    return replace(found, beside=dict(zip(others, beside, strict=True)))
 
 
-def recorded_speed(recording: Recording, speed: str, drive: str, source: str) -> DrivenMotion:
+def recorded_speed(
+    recording: Recording, speed: str, drive: str, source: str, others: Sequence[str] = ()
+) -> DrivenMotion:
     """The same where the channel ``speed`` has the velocity: the position is its integral, from zero.
 
     Raises :class:`InputError` as :func:`recorded_motion` does.
     """
-    step, velocity, force = _even(recording, speed, drive, source)
+    step, (velocity, force, *beside) = _even(recording, (speed, drive, *others), source)
     position = np.concatenate([[0.0], np.cumsum(0.5 * step * (velocity[1:] + velocity[:-1]))])
     period, scale = period_of(velocity, SAME_AS_MEASURED), time_scale_of_motion(position, step)
     unclear = noise_of_speed(velocity, step, _cutoff(step, scale))
-    return _driven(f"{source}, {recording.name}", step, scale, position, force, period, unclear)
+    found = _driven(f"{source}, {recording.name}", step, scale, position, force, period, unclear)
+    return replace(found, beside=dict(zip(others, beside, strict=True)))
 
 
-def _even(
-    recording: Recording, motion: str, drive: str, source: str
-) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-    """Time between samples [s], and both channels at even times."""
-    for name in (motion, drive):
+def _even(recording: Recording, names: Sequence[str], source: str) -> tuple[float, list[NDArray[np.float64]]]:
+    """Time between samples of the first channel [s], and all channels at even times."""
+    for name in names:
         if name not in recording.channels:
             raise InputError(
                 "was not recorded",
@@ -297,11 +306,12 @@ def _even(
                 channel=name,
                 remedy="map its channel in channels.toml",
             )
-    led, driven = recording.channels[motion], recording.channels[drive]
-    start, end = max(led.time[0], driven.time[0]), min(led.time[-1], driven.time[-1])
+    led, *driven = (recording.channels[name] for name in names)
+    start = max(each.time[0] for each in (led, *driven))
+    end = min(each.time[-1] for each in (led, *driven))
     step = float(led.time[-1] - led.time[0]) / max(led.time.size - 1, 1)
     time = start + step * np.arange(int((end - start) / step + 1e-6) + 1)
-    return step, _at(time, led), _at(time, driven)
+    return step, [_at(time, each) for each in (led, *driven)]
 
 
 def _at(time: NDArray[np.float64], channel: RecordedChannel) -> NDArray[np.float64]:

@@ -35,7 +35,8 @@ NEWTON_STEPS = 4
 class Samples(NamedTuple):
     """The measured motion at n even samples: q, qd, qdd, force of the drive and its rate, angle of the cycle; SI.
 
-    ``begins`` is 1 where a test begins and 0 elsewhere: there the states are at rest.
+    ``begins`` is 1 where a test begins and 0 elsewhere: there the states are at rest. ``beside`` are the plant's
+    other inputs, as a current is.
     """
 
     q: Float[Array, " n"]
@@ -46,6 +47,7 @@ class Samples(NamedTuple):
     angle: Float[Array, " n"]
     speed: Float[Array, " n"]
     begins: Float[Array, " n"]
+    beside: tuple[InputSignal, ...] = ()
 
 
 class Course(NamedTuple):
@@ -69,9 +71,10 @@ class NeededSlopes(NamedTuple):
     slopes: Float[Array, "k n"]
 
 
-def _at(model: AbstractPlant, now: Samples) -> tuple[Motion, tuple[InputSignal], Fundamental]:
+def _at(model: AbstractPlant, now: Samples) -> tuple[Motion, tuple[InputSignal, ...], Fundamental]:
     motion = Motion(*(model.coordinate_type(each) for each in (now.q, now.qd, now.qdd)))
-    return motion, (InputSignal(now.drive, now.drive_rate),), Fundamental(now.angle, now.speed)
+    signals = (InputSignal(now.drive, now.drive_rate), *now.beside)
+    return motion, signals, Fundamental(now.angle, now.speed)
 
 
 def _weights(model: AbstractPlant) -> Float[Array, " s"]:
@@ -178,10 +181,10 @@ def _force(
     """What the drive would have had to exert [N], with signals (n,) or (n, 2) ``imposed`` at ports [SI]."""
 
     def at(now: Samples, s: Array, sd: Array, imposed: Mapping[str, Array]) -> Array:
-        motion, (recorded,), fundamental = _at(model, now)
+        motion, (recorded, *beside), fundamental = _at(model, now)
 
         def out_of_balance(drive: Array) -> Array:
-            u = model.drive((recorded._replace(value=drive),), fundamental, imposed)
+            u = model.drive((recorded._replace(value=drive), *beside), fundamental, imposed)
             return model.residual(p, motion, s, sd, u)[0]
 
         r, slope = jax.jvp(out_of_balance, (now.drive,), (jnp.ones_like(now.drive),))

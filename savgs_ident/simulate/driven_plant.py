@@ -13,7 +13,7 @@ import numpy as np
 from savgs_ident.core.errors import InputError
 from savgs_ident.core.presentation import Origin
 from savgs_ident.core.values import as_values
-from savgs_ident.effects.base import Port, PortKind
+from savgs_ident.effects.base import InputSignal, Port, PortKind
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model, PlantModel
 from savgs_ident.recordings.recording import Campaign
@@ -29,11 +29,11 @@ DRIVE_SHARE = 0.1
 
 
 def is_driven(plant: AbstractPlant | type[AbstractPlant]) -> bool:
-    """Whether a plant can be held against the force of its drive along a measured motion.
+    """Whether a plant can be held against the force of its drive, its first input, along a measured motion.
 
     An input that is a motion itself, as a road is, is no drive.
     """
-    if len(plant.coordinates) != 1 or len(plant.inputs) != 1:
+    if len(plant.coordinates) != 1:
         return False
     unit = plant.coordinates[0].unit
     return plant.inputs[0].unit not in (unit, f"{unit}/s", f"{unit}/s^2")
@@ -60,7 +60,7 @@ def motion_of(campaign: Campaign, model: Model) -> DrivenMotion:
     """
     plant = model.plant
     _refuse_undriven(model, campaign.source)
-    (coordinate,), (drive,) = plant.coordinates, plant.inputs
+    (coordinate,), (drive, *others) = plant.coordinates, plant.inputs
     reading = _reading(plant)
     if not reading:
         raise InputError(
@@ -77,7 +77,7 @@ def motion_of(campaign: Campaign, model: Model) -> DrivenMotion:
     refused: list[InputError] = []
     for test in moving:
         try:
-            found.append(recorded(test, reading, drive.name, campaign.source))
+            found.append(recorded(test, reading, drive.name, campaign.source, [each.name for each in others]))
         except InputError as error:
             refused.append(error)
     if not found:
@@ -90,7 +90,7 @@ def motion_of(campaign: Campaign, model: Model) -> DrivenMotion:
 def _refuse_undriven(model: Model, source: str) -> None:
     if not is_driven(model.plant):
         raise InputError(
-            f"{model.name} is no plant with one coordinate and one input, its drive",
+            f"{model.name} is no plant with one coordinate whose first input is its drive",
             source=source,
             remedy="give a recording of dwells, or a plant that is driven along the measured motion",
         )
@@ -107,17 +107,19 @@ def samples_of(motion: DrivenMotion) -> Samples:
     """A measured motion as the equations take it."""
     speed = 2.0 * np.pi / motion.period
     angle = speed * motion.step * np.arange(motion.position.size)
-    signals = (
-        motion.position,
-        motion.velocity,
-        motion.acceleration,
-        motion.drive,
-        motion.rate(motion.drive),
-        angle,
-        np.full_like(angle, speed),
-        motion.begins,
+    return Samples(
+        q=jnp.asarray(motion.position),
+        qd=jnp.asarray(motion.velocity),
+        qdd=jnp.asarray(motion.acceleration),
+        drive=jnp.asarray(motion.drive),
+        drive_rate=jnp.asarray(motion.rate(motion.drive)),
+        angle=jnp.asarray(angle),
+        speed=jnp.full(angle.size, speed),
+        begins=jnp.asarray(motion.begins),
+        beside=tuple(
+            InputSignal(jnp.asarray(each), jnp.asarray(motion.rate(each))) for each in motion.beside.values()
+        ),
     )
-    return Samples(*(jnp.asarray(each) for each in signals))
 
 
 def origin_along(model: Model, motion: DrivenMotion, command: Sequence[str] = ()) -> Origin:
@@ -138,7 +140,7 @@ def sized_along(model: Model, motion: DrivenMotion) -> Model:
     bare, p = replace(model.build(), effects=()), as_values(model.table.as_dict())
 
     def sized(port: Port) -> Port:
-        if port.kind is PortKind.INPUT:
+        if port.kind is PortKind.INPUT and port.location == bare.inputs[0].name:
             return replace(port, displacement=DRIVE_SHARE * force)
         if port.kind is not PortKind.FORCE:
             return port

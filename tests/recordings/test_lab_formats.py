@@ -199,3 +199,34 @@ def test_a_row_of_units_below_names_that_only_the_map_knows_is_read(tmp_path: Pa
     campaign = read_campaign(path, LAYOUT, channels)
     _checked(campaign, exact=False)
     assert not [each for each in campaign.warnings if each.code == "unit_assumed"]
+
+
+def test_a_map_may_say_the_unit_of_what_has_its_usual_name(tmp_path: Path) -> None:
+    """Of a MATLAB file, which has no units; a sign and a gain go along."""
+    savemat(
+        tmp_path / "dwell_2Hz.mat",
+        {"t": 1e3 * TIME, "voltage": VOLTS, "angle": -0.5 * DEGREES - 1.0},
+    )
+    (tmp_path / "channels.toml").write_text(
+        '[channels.voltage]\nunit = "V"\n[channels.angle]\nunit = "deg"\nscale = 2.0\noffset = 2.0\nsign = -1\n'
+        '[time]\nunit = "ms"\n'
+    )
+    campaign = read_campaign(tmp_path, LAYOUT)
+    _checked(campaign, exact=False)
+    assert campaign.warnings == ()
+
+
+def test_a_map_of_a_folder_may_name_the_time_of_files_that_need_it(tmp_path: Path) -> None:
+    """Beside one of a format that has a clock for each channel."""
+    nptdms = pytest.importorskip("nptdms")
+    savemat(tmp_path / "dwell_2Hz.mat", {"clock": TIME, "voltage": VOLTS, "angle": np.deg2rad(DEGREES)})
+    stamps = {"wf_increment": 1.0 / RATE, "wf_start_offset": 0.0}
+    channels = [
+        nptdms.ChannelObject("g", name, values, {**stamps, "unit_string": unit})
+        for name, values, unit in (("voltage", VOLTS, "V"), ("angle", DEGREES, "deg"))
+    ]
+    with nptdms.TdmsWriter(tmp_path / "standstill.tdms") as writer:
+        writer.write_segment(channels)
+    (tmp_path / "channels.toml").write_text('[time]\ncolumn = "clock"\nunit = "s"\n')
+    campaign = read_campaign(tmp_path, LAYOUT)
+    assert sorted(each.name for each in campaign.recordings) == ["dwell_2Hz", "standstill"]

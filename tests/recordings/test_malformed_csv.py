@@ -243,10 +243,10 @@ MAPS = {
     "unknown table": ("[chanels.road_height]\n", "unknown table 'chanels'"),
     "unknown channel": ('[channels.wheel]\ncolumn = "x"', "'wheel' is not a known channel"),
     "unknown key": ('[channels.road_height]\ncolumn = "x"\ngain = 2', "unknown key.*'gain'"),
-    "neither column nor topic": ("[channels.road_height]\nscale = 2", "either a column or a topic"),
+    "nothing in it": ("[channels.road_height]\n", "says nothing"),
     "both column and topic": (
         '[channels.road_height]\ncolumn = "x"\ntopic = "y"',
-        "either a column or a topic",
+        "a column and a topic",
     ),
     "sign of two": ('[channels.road_height]\ncolumn = "x"\nsign = 2', "neither 1 nor -1"),
     "scale in words": (
