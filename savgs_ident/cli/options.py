@@ -225,10 +225,18 @@ def read_recorded(
 
 def numbers_by_name(option: str, words: Sequence[str]) -> dict[str, float]:
     """Values like ``angle=0.002`` by name; raises :class:`typer.BadParameter` for another word."""
+    return {name: numbers[-1] for name, numbers in several_by_name(option, words).items()}
+
+
+def several_by_name(option: str, words: Sequence[str]) -> dict[str, list[float]]:
+    """The same where a name may have several values."""
+    found: dict[str, list[float]] = {}
     for word in words:
         if not _is_named_number(word):
             raise typer.BadParameter(f"'{word}' is no NAME=NUMBER, such as angle=0.002", param_hint=option)
-    return {name: float(number) for name, _, number in (word.partition("=") for word in words)}
+        name, _, number = word.partition("=")
+        found.setdefault(name, []).append(float(number))
+    return found
 
 
 def effects_of(model: ModelName | None) -> Literal["simqc", "simtr"] | None:
@@ -264,6 +272,7 @@ SEVERAL: dict[str, Callable[[str], bool]] = {
     "--frequency": _is_number,
     "--amplitude": _is_number,
     "--noise": _is_named_number,
+    "--level": _is_named_number,
     "--to": _is_format,
 }
 """The options, and what a further value of each looks like; a word that does not is an argument."""

@@ -19,6 +19,7 @@ from savgs_ident.cli.options import (
     command_line,
     model_to_fit,
     numbers_by_name,
+    several_by_name,
 )
 
 
@@ -51,6 +52,15 @@ def plan(
             "--noise",
             metavar="CHANNEL=SD ...",
             help="Standard deviation of one sample of a channel [its unit]; a hundredth of its motion by default.",
+        ),
+    ] = None,
+    level: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--level",
+            metavar="INPUT=LEVEL ...",
+            help="Levels above rest of further inputs to choose among [their units], such as current=0.5 current=1; "
+            "half the typical one and the whole by default.",
         ),
     ] = None,
     tests: Annotated[int, typer.Option("--tests", min=1, help="Most dwells of the campaign.")] = 12,
@@ -87,6 +97,7 @@ def plan(
             frequencies=frequency or (),
             amplitudes=amplitude or (),
             noise=numbers_by_name("--noise", noise or ()),
+            levels=several_by_name("--level", level) if level else None,
             tests=tests,
             target=error / 100.0,
             command=command_line(),

@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.console import Group, RenderableType
 
+from savgs_ident.plants.base import Input
 from savgs_ident.report.text import fixed, plain, significant, stacked, table
 from savgs_ident.report.theme import INK, ORANGE, magnitude_axis, new_figure, styled
-from savgs_ident.validation.plan import CampaignPlan
+from savgs_ident.validation.plan import CampaignPlan, PlannedTest
 
 MANY = 999.0
 """Standard deviations beyond which their number says nothing more [1]."""
@@ -28,6 +29,7 @@ def plan_record(plan: CampaignPlan) -> dict[str, Any]:
                 "test": _name(each.frequency_hz, place),
                 "frequency_hz": each.frequency_hz,
                 "amplitude": each.amplitude,
+                "levels": dict(each.levels),
                 "errors": dict(zip(plan.free, each.errors, strict=True)),
             }
             for place, each in enumerate(plan.tests)
@@ -60,13 +62,29 @@ def plan_list(plan: CampaignPlan) -> str:
     out = io.StringIO()
     driven = plan.model.plant.inputs[0]
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["test", "frequency [Hz]", f"amplitude of {driven.name} [{driven.unit}]"])
-    ordered = sorted(enumerate(plan.tests), key=lambda each: (each[1].amplitude, each[1].frequency_hz))
-    for place, each in ordered:
-        writer.writerow(
-            [_name(each.frequency_hz, place), f"{each.frequency_hz:.5g}", f"{each.amplitude:.5g}"]
-        )
+    held = _held(plan)
+    writer.writerow(
+        [
+            "test",
+            "frequency [Hz]",
+            f"amplitude of {driven.name} [{driven.unit}]",
+            *(f"{each.name} above rest [{each.unit}]" for each in held),
+        ]
+    )
+
+    def order(given: tuple[int, PlannedTest]) -> tuple[float, ...]:
+        _, each = given
+        return (*(each.levels.get(one.name, 0.0) for one in held), each.amplitude, each.frequency_hz)
+
+    for place, each in sorted(enumerate(plan.tests), key=order):
+        numbers = each.frequency_hz, each.amplitude, *(each.levels.get(one.name, 0.0) for one in held)
+        writer.writerow([_name(each.frequency_hz, place), *(f"{number:.5g}" for number in numbers)])
     return out.getvalue()
+
+
+def _held(plan: CampaignPlan) -> list[Input]:
+    """The further inputs that any test holds at a level."""
+    return [each for each in plan.model.plant.inputs if any(each.name in one.levels for one in plan.tests)]
 
 
 def _name(hertz: float, place: int) -> str:
@@ -77,12 +95,13 @@ def _name(hertz: float, place: int) -> str:
 
 def plan_text(plan: CampaignPlan) -> RenderableType:
     """The dwells with the errors that they lead to, then what cannot be seen or told apart."""
-    driven = plan.model.plant.inputs[0]
+    driven, held = plan.model.plant.inputs[0], _held(plan)
     rows = [
         (
             str(place + 1),
             fixed(each.frequency_hz, 3),
             significant(each.amplitude),
+            *(significant(each.levels.get(one.name, 0.0)) for one in held),
             *(fixed(100.0 * error, 2) for error in each.errors),
         )
         for place, each in enumerate(plan.tests)
@@ -91,6 +110,7 @@ def plan_text(plan: CampaignPlan) -> RenderableType:
         "",
         "f\n[Hz]",
         f"{driven.name}\n[{driven.unit}]",
+        *(f"{stacked(one.name)}\n[{one.unit}]" for one in held),
         *(f"{stacked(name)}\n[%]" for name in plan.free),
     )
     title = f"Dwells of {plan.offered}, and standard errors with each and all before it"

@@ -7,6 +7,7 @@ A model is held against the response of the campaign's dwells, or of those of th
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import ceil, log2
+from types import MappingProxyType
 from typing import Any, cast
 
 import jax.numpy as jnp
@@ -139,6 +140,12 @@ def typical_amplitude(plant: AbstractPlant | type[AbstractPlant], table: Paramet
     return table[driven.stroke].value / 2.0 if driven.stroke else input_size(plant, driven)
 
 
+def typical_levels(plant: AbstractPlant, table: ParameterTable) -> dict[str, float]:
+    """How far from rest further inputs are typically held [their units], by name, of those whose mean counts."""
+    counting = zip(plant.inputs, means_that_count(plant, table), strict=True)
+    return {each.name: input_size(plant, each) for each, counts in list(counting)[1:] if counts}
+
+
 def resting_values(plant: AbstractPlant | type[AbstractPlant], table: ParameterTable) -> dict[str, float]:
     """What each input is at rest [its unit], by its name."""
     return {each.name: table[each.rest].value if each.rest else 0.0 for each in plant.inputs}
@@ -149,11 +156,16 @@ def sine_excitation(
     table: ParameterTable,
     frequency: NDArray[np.float64],
     amplitudes: Mapping[str, float],
+    levels: Mapping[str, float] = MappingProxyType({}),
 ) -> Excitation:
-    """Sines of ``amplitudes`` [unit of each input], by name, at D frequencies [Hz], about rest; other inputs rest."""
+    """Sines of ``amplitudes`` [unit of each input], by name, at D frequencies [Hz], about rest; other inputs rest.
+
+    ``levels`` are by how much inputs are above rest in the mean [their units].
+    """
     harmonics = {}
     for name, rest in resting_values(plant, table).items():
-        row = [rest, amplitudes[name]] if name in amplitudes else [rest]
+        mean = rest + levels.get(name, 0.0)
+        row = [mean, amplitudes[name]] if name in amplitudes else [mean]
         harmonics[name] = jnp.asarray(np.tile(np.array(row, np.complex128), (frequency.size, 1)))
     return Excitation(jnp.asarray(frequency), harmonics)
 

@@ -6,8 +6,9 @@ either side, their harmonics interpolated over frequency. As many frequencies ar
 widest gaps, for arrays of the same shape need no second compilation.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import ClassVar
 
 import jax
@@ -224,6 +225,7 @@ def simulate(
     progress: Progress = no_progress,
     *,
     amplitude: float | None = None,
+    levels: Mapping[str, float] = MappingProxyType({}),
 ) -> SimulatedResponse:
     """The periodic motions of a model under a sine in its plant's first input, the others at rest.
 
@@ -235,6 +237,7 @@ def simulate(
         progress: called with a sentence on what is being done.
         amplitude: of the first input [its unit]; if left out, what the plant declares: half the cam's stroke for the
             rig, what moves a coordinate by its typical size for others.
+        levels: by how much further inputs are held above rest [their units], by name.
 
     A motion that was not found has its status in the result. Raises :class:`InputError` for a frequency or an
     amplitude that is not above zero, for ``orders`` below 1, where a campaign is given besides a frequency or an
@@ -243,7 +246,7 @@ def simulate(
     use_persistent_cache()
     if orders < 1:
         raise InputError(f"orders is {orders}", source="orders", remedy="ask for at least order 1")
-    excitation = _excitation(model, frequency, campaign, orders, amplitude)
+    excitation = _excitation(model, frequency, campaign, orders, amplitude, levels)
     progress(f"solving {excitation.frequency.shape[0]} periodic motions")
     found = simulate_response(model, excitation, orders, origin=model.origin(campaign))
     if not found.ok.any():
@@ -286,6 +289,7 @@ def simulate_dwells(
     samples: int = 4000,
     orders: int = 9,
     seed: int = 1,
+    levels: Mapping[str, float] = MappingProxyType({}),
     progress: Progress = no_progress,
 ) -> HarmonicResponse:
     """Harmonic tests of a plant as they would be measured: what :func:`fit`, :func:`sample`, :func:`diagnose` take.
@@ -298,6 +302,7 @@ def simulate_dwells(
         samples: samples of each channel in a test.
         orders: highest harmonic order.
         seed: of all random numbers.
+        levels: by how much inputs are held above rest [their units], by name.
         progress: called with a sentence on what is being done.
 
     Raises :class:`InputError` for names that the plant does not have, a channel without noise, a frequency that is
@@ -305,14 +310,14 @@ def simulate_dwells(
     """
     use_persistent_cache()
     plant, table = model.build(), model.table
-    _check_names("input", amplitudes, [each.name for each in plant.inputs])
+    _check_names("input", [*amplitudes, *levels], [each.name for each in plant.inputs])
     _check_names("channel", noise, [each.name for each in plant.channels])
     for each in plant.channels:
         if not noise.get(each.name, 0.0) > 0.0:
             raise InputError(f"channel '{each.name}' has no noise", remedy="give its standard deviation")
     hertz = np.unique(_checked(frequency))
     every = {each.name: amplitudes.get(each.name, 0.0) for each in plant.inputs}
-    excitation, p = sine_excitation(plant, table, hertz, every), as_values(table.as_dict())
+    excitation, p = sine_excitation(plant, table, hertz, every, levels), as_values(table.as_dict())
     progress(f"solving {hertz.size} periodic motions")
     solution = simulate_periodic(plant, p, excitation)
     lost = [f"{f:g} Hz" for f, status in zip(hertz, solution.status(), strict=True) if not status.ok]
@@ -358,7 +363,7 @@ def _measured(
     )
 
 
-def _check_names(what: str, given: Mapping[str, float], known: Sequence[str]) -> None:
+def _check_names(what: str, given: Iterable[str], known: Sequence[str]) -> None:
     for name in given:
         if name not in known:
             raise InputError(f"the plant has no {what} '{name}'", remedy="choose among: " + ", ".join(known))
@@ -381,16 +386,23 @@ def _amplitude(model: Model, given: float | None) -> float:
 
 
 def _excitation(
-    model: Model, frequency: Sequence[float], campaign: Campaign | None, orders: int, amplitude: float | None
+    model: Model,
+    frequency: Sequence[float],
+    campaign: Campaign | None,
+    orders: int,
+    amplitude: float | None,
+    levels: Mapping[str, float],
 ) -> Excitation:
     driven = model.plant.inputs[0].name
+    _check_names("input", levels, [each.name for each in model.plant.inputs[1:]])
     if campaign is None:
         hertz = np.unique(_checked(frequency) if len(frequency) else DWELLS)
-        return sine_excitation(model.plant, model.table, hertz, {driven: _amplitude(model, amplitude)})
-    if len(frequency) or amplitude is not None:
+        size = _amplitude(model, amplitude)
+        return sine_excitation(model.plant, model.table, hertz, {driven: size}, levels)
+    if len(frequency) or amplitude is not None or levels:
         raise InputError(
-            "a campaign has frequencies and amplitudes of its own",
+            "a campaign has frequencies, amplitudes and levels of its own",
             source=campaign.source,
-            remedy="give a campaign, or a frequency and an amplitude",
+            remedy="give a campaign, or a frequency, an amplitude and levels",
         )
     return measured_excitation(model.plant, estimate_response(campaign, orders, driven), model.table)

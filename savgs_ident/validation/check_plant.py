@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from savgs_ident.core.parameter import ParameterTable
 from savgs_ident.core.presentation import Progress, Result, no_progress
 from savgs_ident.core.values import as_values
-from savgs_ident.plants.base import AbstractPlant, Excitation, input_size
+from savgs_ident.plants.base import AbstractPlant, Excitation
 from savgs_ident.plants.model import PlantModel
-from savgs_ident.simulate.excitation import means_that_count, sine_excitation, typical_amplitude
+from savgs_ident.simulate.excitation import sine_excitation, typical_amplitude, typical_levels
 from savgs_ident.simulate.linearisation import nominal_rest, plant_signals, slopes
 from savgs_ident.simulate.periodic import simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
@@ -176,14 +176,10 @@ def _excitations(
 
     A current, say, without which a coil does nothing.
     """
-    driven, *others = plant.inputs
-    counting = [each for each, mean in zip(others, means_that_count(plant, table)[1:], strict=True) if mean]
+    driven, levels = plant.inputs[0].name, typical_levels(plant, table)
     for share in AMPLITUDES:
-        moving = sine_excitation(plant, table, frequency, {driven.name: share * typical})
-        yield moving
-        for each in counting:
-            level = moving.harmonics[each.name] + share * input_size(plant, each)
-            yield moving._replace(harmonics={**moving.harmonics, each.name: level})
+        for held in ({}, *({name: share * level} for name, level in levels.items())):
+            yield sine_excitation(plant, table, frequency, {driven: share * typical}, held)
 
 
 def _identifiability(model: PlantModel, rows: NDArray[np.float64]) -> Iterator[Finding]:

@@ -19,7 +19,7 @@ sqrt(S_ee - S_ef^2 / S_ff). All is to first order and by noise and tolerances al
 are not in it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
@@ -36,7 +36,7 @@ from savgs_ident.inference.prior import slopes_at, values_at
 from savgs_ident.inference.problem import check_free, used_parameters
 from savgs_ident.plants.at_rest import require_return
 from savgs_ident.plants.model import Model, PlantModel
-from savgs_ident.simulate.excitation import typical_amplitude
+from savgs_ident.simulate.excitation import typical_amplitude, typical_levels
 from savgs_ident.simulate.program_cache import use_persistent_cache
 from savgs_ident.simulate.public import DWELLS, SimulatedResponse, simulate, simulate_dwells
 from savgs_ident.validation.check_plant import frequencies_about
@@ -59,11 +59,13 @@ class PlannedTest:
     Attributes:
         frequency_hz: of the first input [Hz].
         amplitude: of the first input [its unit].
+        levels: by how much further inputs are held above rest [their units], by name.
         errors: relative standard errors [1] of the free parameters with it and all before it, in their order.
     """
 
     frequency_hz: float
     amplitude: float
+    levels: Mapping[str, float]
     errors: tuple[float, ...]
 
 
@@ -147,6 +149,7 @@ def plan(
     frequencies: Sequence[float] = (),
     amplitudes: Sequence[float] = (),
     noise: Mapping[str, float] | None = None,
+    levels: Mapping[str, Sequence[float]] | None = None,
     tests: int = 12,
     target: float = 0.02,
     samples: int = 4000,
@@ -165,6 +168,8 @@ def plan(
         amplitudes: of the first input that it can be driven with [its unit]; the typical one if empty.
         noise: standard deviation of one sample of each channel [its unit], by name; a hundredth of the largest
             motion's rms where it is not given.
+        levels: by how much further inputs can be held above rest [their units], by name, one of them at a time; half
+            the typical level and the whole, where they are left out, of inputs whose mean counts.
         tests: most dwells of the campaign.
         target: relative standard error that is wanted of the free parameters [1].
         samples: samples of each channel in a dwell.
@@ -178,30 +183,31 @@ def plan(
     """
     use_persistent_cache()
     hertz, sizes = _offers(model, frequencies, amplitudes)
+    programmes = [_Programme(size, held) for size in sizes for held in _held(model, levels)]
     _above_zero({"tests": tests, "target": target, "samples": samples, "orders": orders})
     given, settings, _ = baseline_of(model, orders, (), constants)
     settings = replace(settings, free=given.free(free))
     check_free(settings.free, given.table, used_parameters(given.build(), given.table))
     _have_sizes(given, settings.free)
     solved = []
-    for size in sizes:
-        progress(f"solving {len(hertz)} dwells at {size:g} {given.plant.inputs[0].unit}")
-        solved.append(simulate(given, hertz, orders=orders, amplitude=size))
+    for each in programmes:
+        progress(f"solving {len(hertz)} dwells at {each.said(given)}")
+        solved.append(simulate(given, hertz, orders=orders, amplitude=each.amplitude, levels=each.levels))
     known, assumed = _noise(given, solved, dict(noise or {}))
     blocks = []
-    for size, response in zip(sizes, solved, strict=True):
+    for each, response in zip(programmes, solved, strict=True):
         there = [float(f) for f, ok in zip(response.frequency, response.ok, strict=True) if ok]
         if there:
-            progress(f"what {len(there)} dwells at {size:g} {given.plant.inputs[0].unit} would show")
-            blocks.append(_block(given, settings, size, there, known, samples))
+            progress(f"what {len(there)} dwells at {each.said(given)} would show")
+            blocks.append(_block(given, settings, each, there, known, samples))
     if not blocks:
         require_return(given.build(), as_values(given.table.as_dict()))
         raise InputError(
             "no dwell that was offered has a periodic motion", remedy="offer smaller amplitudes or others"
         )
     lost = [
-        f"{f:.3g} Hz at {size:g} {given.plant.inputs[0].unit}"
-        for size, response in zip(sizes, solved, strict=True)
+        f"{f:.3g} Hz at {each.said(given)}"
+        for each, response in zip(programmes, solved, strict=True)
         for f, ok in zip(response.frequency, response.ok, strict=True)
         if not ok
     ]
@@ -211,8 +217,8 @@ def plan(
     return CampaignPlan(
         model=given,
         tests=tuple(
-            PlannedTest(*every.dwells[each], tuple(after.tolist()))
-            for each, after in zip(chosen, errors, strict=True)
+            PlannedTest(hertz_of, run.amplitude, run.levels, tuple(after.tolist()))
+            for (hertz_of, run), after in zip((every.dwells[each] for each in chosen), errors, strict=True)
         ),
         free=settings.free,
         target=target,
@@ -224,6 +230,33 @@ def plan(
         unsolved=tuple(lost),
         origin=origin,
     )
+
+
+class _Programme(NamedTuple):
+    """How dwells are driven: the amplitude of the first input, and levels of others above rest [their units]."""
+
+    amplitude: float
+    levels: Mapping[str, float]
+
+    def said(self, model: Model) -> str:
+        """In words."""
+        units = {each.name: each.unit for each in model.plant.inputs}
+        held = (f"{name} {level:g} {units[name]} above rest" for name, level in self.levels.items())
+        return ", ".join((f"{self.amplitude:g} {model.plant.inputs[0].unit}", *held))
+
+
+def _held(model: Model, levels: Mapping[str, Sequence[float]] | None) -> Iterator[Mapping[str, float]]:
+    """Levels of further inputs to choose among, rest first."""
+    if levels is None:
+        typical = typical_levels(model.build(), model.table) if isinstance(model, PlantModel) else {}
+        levels = {name: [0.5 * level, level] for name, level in typical.items()}
+    yield {}
+    known = [each.name for each in model.plant.inputs[1:]]
+    for name, each in levels.items():
+        if name not in known:
+            among = ", ".join(known) or "it has one input only"
+            raise InputError(f"the plant has no further input '{name}'", remedy=f"choose among: {among}")
+        yield from ({name: level} for level in each if level)
 
 
 def _offers(
@@ -276,14 +309,14 @@ def _noise(
 
 
 class _Block(NamedTuple):
-    """Dwells linearised: their frequency [Hz] and amplitude, and the information of each, (T, n + k, n + k) [1].
+    """Dwells linearised: frequency [Hz] and how each is driven, and the information of each, (T, n + k, n + k) [1].
 
     That of n coordinates of the parameters comes first, then that of k effects of typical size. ``slopes`` are
     relative changes of the free parameters per unit of their coordinates [1]; ``units`` are by effect the size of its
     first amplitude and its unit.
     """
 
-    dwells: tuple[tuple[float, float], ...]
+    dwells: tuple[tuple[float, _Programme], ...]
     information: Array
     slopes: Array
     units: Mapping[str, tuple[float, str]]
@@ -292,14 +325,16 @@ class _Block(NamedTuple):
 def _block(
     given: Model,
     settings: DiagnosisSettings,
-    size: float,
+    run: _Programme,
     hertz: Sequence[float],
     noise: Mapping[str, float],
     samples: int,
 ) -> _Block:
-    """The dwells of one amplitude of the first input."""
-    driven = {given.plant.inputs[0].name: size}
-    measured = simulate_dwells(given, hertz, driven, noise, samples=samples, orders=settings.orders)
+    """The dwells that are driven in one way."""
+    driven = {given.plant.inputs[0].name: run.amplitude}
+    measured = simulate_dwells(
+        given, hertz, driven, noise, samples=samples, orders=settings.orders, levels=run.levels
+    )
     problem, data = problem_of_dwells(measured, given, settings)
     origin = np.zeros(len(problem.nuisances))
     at = values_at(problem.nuisances, origin)
@@ -313,7 +348,7 @@ def _block(
     typical = settings.constants.typical_coordinate
     sizes = [np.array([typical * each.scale for each in term.amplitudes]) for term in terms]
     effects = [each[0] @ by for each, by in zip(found, sizes, strict=True)]
-    columns = np.concatenate([parameters, np.stack(effects, axis=1)], axis=1)
+    columns = np.stack([*parameters.T, *effects], axis=1)
     columns /= np.sqrt(data.variance)[:, None]
     rows = [columns[data.test == test] for test in range(data.tests)]
     count = len(settings.free)
@@ -322,7 +357,7 @@ def _block(
         term.name: (float(by[0]), term.amplitudes[0].unit) for term, by in zip(terms, sizes, strict=True)
     }
     return _Block(
-        tuple((f, size) for f in measured.frequency.tolist()),
+        tuple((f, run) for f in measured.frequency.tolist()),
         np.stack([each.T @ each for each in rows]),
         relative,
         units,

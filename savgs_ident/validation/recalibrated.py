@@ -7,6 +7,7 @@ noise and the small errors that the recorded one has, of which a diagnosis knows
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import exp
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,11 @@ from savgs_ident.plants.model import Model
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.driven_motion import DrivenMotion
 from savgs_ident.simulate.driven_plant import origin_along
+
+MOST_TRUST = 3.0
+"""A noise is larger than measured by so many standard deviations of its logarithm at most.
+
+A baseline that lacks something takes what it misses for noise, as far as its prior lets it."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +61,11 @@ class RecalibratedCampaign:
     def recorded(self, rows: NDArray[np.float64], random: np.random.Generator) -> DiagnosisProblem | None:
         """A campaign that shows ``rows``, with errors, its baseline recalibrated; None where that has no motion."""
         known, scales = self.problem, self.problem.base.noise_scales
-        # Where something is missing, no more than what every model errs by; where rows share no errors, noise alone.
+        # Where something is missing, no more than what every model errs by, and no more noise than may have been
+        # measured; where rows share no errors, noise alone.
         errs = 0.0 if known.data.shared is None else min(scales.discrepancy, BACKGROUND.largest_error)
-        measured = rows + known.data.draw_errors(scales.noise, errs, random)
+        noise = min(scales.noise, exp(MOST_TRUST * known.data.scales.noise_trust))
+        measured = rows + known.data.draw_errors(noise, errs, random)
         data = replace(known.data, measured=measured, variance=self._estimated_variance(random))
         search = search_of(known.plant, data)
         base = find_map(search, (), known.base.values, known.base.prediction.warm_start)

@@ -65,7 +65,7 @@ def test_a_standstill_is_no_motion_and_the_longest_test_comes_first() -> None:
 @pytest.mark.parametrize(("scale", "said"), [(1.0, False), (1e3, True), (1e-4, True)])
 def test_an_input_in_another_unit_is_said_to_be_implausible(scale: float, said: bool) -> None:
     campaign = _campaign(scale)
-    (check,) = campaign.layout.checks
+    check = campaign.layout.checks[0]
     found = check(campaign.recordings, campaign.source)
     assert [each.code for each in found] == ["implausible_unit"] * said
     if said:

@@ -140,3 +140,30 @@ def test_windows_keep_the_level_of_an_input_too() -> None:
     excitation = measured_excitation(Seat(), measured, Seat.parameters)
     np.testing.assert_allclose(np.asarray(excitation.harmonics["current"][:, 0]), 0.5, rtol=1e-6)
     assert not np.any(np.asarray(excitation.harmonics["base"][:, 0]))
+
+
+def test_a_plan_holds_a_second_input_at_levels_where_that_tells_something() -> None:
+    model = si.PlantModel(Seat(), Seat.parameters)
+    noise = {"stroke": 2e-5}
+    found = si.plan(model, free=("c_0", "c_1"), tests=4, noise=noise)
+    assert found.trusted
+    assert {level for each in found.tests for level in each.levels.values()} <= {1.0, 2.0}
+    assert any(each.levels for each in found.tests)
+    without = si.plan(model, free=("c_0", "c_1"), tests=4, noise=noise, levels={})
+    assert without.errors["c_1"] > 30.0 * found.errors["c_1"], (
+        "without a current nothing is known of what it does"
+    )
+    with pytest.raises(InputError, match="no further input 'volts'"):
+        si.plan(model, free=("c_0",), levels={"volts": (1.0,)})
+
+
+def test_dwells_are_simulated_at_a_level() -> None:
+    """By the damping that they have there, from the transfer function."""
+    model = si.PlantModel(Seat(), Seat.parameters)
+    p, omega = Seat.parameters.as_dict(), 2.0 * np.pi * 2.0
+    found = si.simulate(model, (2.0,), amplitude=0.004, levels={"current": 0.5})
+    stiff = p["k"] + 1j * omega * (p["c_0"] + 0.5 * p["c_1"])
+    stroke = 0.004 * (stiff / (stiff - p["m"] * omega**2) - 1.0)
+    assert found.harmonics[0, 0, 1] == pytest.approx(stroke, rel=1e-3)
+    with pytest.raises(InputError, match="no input 'base'"):
+        si.simulate(model, (2.0,), levels={"base": 0.1})
