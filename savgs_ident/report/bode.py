@@ -38,6 +38,7 @@ from savgs_ident.report.theme import (
     printable,
     styled,
 )
+from savgs_ident.simulate.programmes import measured_programmes
 from savgs_ident.simulate.public import ModelCurve
 
 _COLUMN = 5.25
@@ -142,11 +143,27 @@ def draw_magnitude(
     magnitude_axis(axes)
     axes.set_ylabel(f"magnitude [{shown.per_input} of {shown.input}]")
     for curve, line in zip(curves, LINES, strict=False):
-        axes.plot(curve.frequency, np.abs(curve.transfer[:, c]), label=printable(curve.label), **line)
+        _draw_lines(axes, curve, np.abs(curve.transfer[:, c]), **line)
     if measured is not None:
         error = _SIGMAS * measured.magnitude_sd[:, c]
         label = f"measured, ± {_SIGMAS:g} sd"
         axes.errorbar(measured.frequency, np.abs(measured.transfer[:, c]), error, label=label, **_POINTS)
+
+
+def _phase_of(curve: ModelCurve, c: int) -> NDArray[np.float64]:
+    """Phase of a channel [deg], (F,), without jumps along each line."""
+    phase = np.full(curve.frequency.size, np.nan)
+    for places in curve.lines:
+        phase[places] = phase_deg(curve.transfer[places, c])
+    return phase
+
+
+def _draw_lines(axes: Axes, curve: ModelCurve, values: NDArray[np.float64], **look: Any) -> None:
+    """A line for each programme of a curve, the first one labelled."""
+    label = printable(curve.label)
+    for places in curve.lines:
+        axes.plot(curve.frequency[places], values[places], label=label, **look)
+        label = "_nolegend_"
 
 
 def draw_phase(
@@ -156,7 +173,7 @@ def draw_phase(
     axes.set_ylabel(f"phase to the {shown.input} [deg]")
     axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1.0, 1.5, 3.0, 4.5, 9.0, 10.0]))
     for curve, line in zip(curves, LINES, strict=False):
-        axes.plot(curve.frequency, phase_deg(curve.transfer[:, c]), **line)
+        _draw_lines(axes, curve, _phase_of(curve, c), **line)
     if measured is not None:
         error = _SIGMAS * np.degrees(measured.phase_sd[:, c])
         axes.errorbar(measured.frequency, phase_deg(measured.transfer[:, c]), error, **_POINTS)
@@ -168,7 +185,7 @@ def draw_peak_to_peak(
     """Peak to peak of the waveform, as the paper plots it."""
     axes.set_ylabel(f"peak to peak [{shown.unit}]")
     for curve, line in zip(curves, LINES, strict=False):
-        axes.plot(curve.frequency, shown.scale * curve.peak_to_peak[:, c], **line)
+        _draw_lines(axes, curve, shown.scale * curve.peak_to_peak[:, c], **line)
     if measured is not None:
         error = _SIGMAS * shown.scale * measured.peak_to_peak_sd[:, c]
         axes.errorbar(measured.frequency, shown.scale * measured.peak_to_peak[:, c], error, **_POINTS)
@@ -245,6 +262,7 @@ class Band:
         magnitude: ends of the 95 % band of the magnitude [unit/input], (2, D).
         phase: ends of the 95 % band of the phase about that of ``middle`` [rad], (2, D).
         inside: whether the measured magnitude and phase together lie within 95 %, (D,).
+        programme: number of the line that each dwell is on, (D,).
     """
 
     frequency: NDArray[np.float64]
@@ -253,6 +271,7 @@ class Band:
     magnitude: NDArray[np.float64]
     phase: NDArray[np.float64]
     inside: NDArray[np.bool_]
+    programme: NDArray[np.intp]
 
     @property
     def misses(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -278,6 +297,7 @@ def predictive_band(posterior: HarmonicPosterior, c: int) -> Band:
         magnitude=np.quantile(np.abs(repeated), PREDICTED, axis=0),
         phase=np.quantile(turned, PREDICTED, axis=0),
         inside=predictive.inside[:, c, 1],
+        programme=measured_programmes(measured, posterior.model.plant),
     )
 
 
@@ -294,9 +314,9 @@ def predictive_figure(posterior: HarmonicPosterior, c: int) -> Figure:
         magnitude.set_title(shown.title)
         draw_magnitude(magnitude, [curve], None, 0, shown)
         draw_phase(phase, [curve], None, 0, shown)
-        middle = phase_deg(band.middle)
-        _draw_band(magnitude, band.frequency, band.magnitude)
-        _draw_band(phase, band.frequency, middle + np.degrees(band.phase))
+        middle = _phase_of(curve, 0)
+        _draw_band(magnitude, curve, band.magnitude)
+        _draw_band(phase, curve, middle + np.degrees(band.phase))
         _draw_points(magnitude, band, np.abs(band.measured))
         _draw_points(phase, band, middle + np.degrees(np.angle(band.measured * np.conj(band.middle))))
         _draw_misses(misses, band)
@@ -313,7 +333,8 @@ def predictive_figure(posterior: HarmonicPosterior, c: int) -> Figure:
 
 def _curve(band: Band) -> ModelCurve:
     unknown = np.full((band.frequency.size, 1), np.nan)
-    return ModelCurve("model, mean of the draws", band.frequency, band.middle[:, None], unknown)
+    label = "model, mean of the draws"
+    return ModelCurve(label, band.frequency, band.middle[:, None], unknown, band.programme)
 
 
 def _in_half_widths(values: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -322,9 +343,13 @@ def _in_half_widths(values: NDArray[np.float64], ends: NDArray[np.float64]) -> N
     return np.asarray(np.divide(offset, half, out=np.full(values.shape, np.nan), where=half > 0.0))
 
 
-def _draw_band(axes: Axes, frequency: NDArray[np.float64], ends: NDArray[np.float64]) -> None:
+def _draw_band(axes: Axes, curve: ModelCurve, ends: NDArray[np.float64]) -> None:
     label = "95 % of repetitions"
-    axes.fill_between(frequency, *ends, color=BLUE, alpha=0.35, linewidth=0.0, label=label)
+    for places in curve.lines:
+        axes.fill_between(
+            curve.frequency[places], *ends[:, places], color=BLUE, alpha=0.35, linewidth=0.0, label=label
+        )
+        label = "_nolegend_"
 
 
 def _draw_points(axes: Axes, band: Band, values: NDArray[np.float64]) -> None:

@@ -170,21 +170,29 @@ def sine_excitation(
     return Excitation(jnp.asarray(frequency), harmonics)
 
 
-def interpolate_excitation(excitation: Excitation) -> Excitation:
-    """As many frequencies again, in the widest gaps on a logarithmic axis."""
-    known = np.asarray(excitation.frequency)
-    added = bisect_widest_gaps(known, known.size)
+def interpolate_excitation(excitation: Excitation, programme: NDArray[np.intp]) -> Excitation:
+    """As many frequencies again, in the widest gaps on a logarithmic axis of each ``programme`` (D,); growing."""
+    every = np.asarray(excitation.frequency)
+    lines = [np.flatnonzero(programme == each) for each in np.unique(programme)]
+    added = [bisect_widest_gaps(every[line], line.size) for line in lines]
+    order = np.argsort(np.concatenate(added), kind="stable")
 
     def interpolated(values: object) -> NDArray[np.complex128]:
-        columns = np.asarray(values).T
+        table = np.asarray(values)
         parts = [
-            np.interp(added, known, column.real) + 1j * np.interp(added, known, column.imag)
-            for column in columns
+            np.stack(
+                [
+                    np.interp(new, every[line], column.real) + 1j * np.interp(new, every[line], column.imag)
+                    for column in table[line].T
+                ],
+                axis=1,
+            )
+            for line, new in zip(lines, added, strict=True)
         ]
-        return np.stack(parts, axis=1)
+        return np.concatenate(parts)[order]
 
     harmonics = {name: jnp.asarray(interpolated(values)) for name, values in excitation.harmonics.items()}
-    return Excitation(jnp.asarray(added), harmonics)
+    return Excitation(jnp.asarray(np.concatenate(added)[order]), harmonics)
 
 
 def bisect_widest_gaps(known: NDArray[np.float64], count: int) -> NDArray[np.float64]:

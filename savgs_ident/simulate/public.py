@@ -7,7 +7,7 @@ widest gaps, for arrays of the same shape need no second compilation.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import ClassVar
 
@@ -39,6 +39,7 @@ from savgs_ident.simulate.excitation import (
 from savgs_ident.simulate.mesh import Layout, layout_for
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
+from savgs_ident.simulate.programmes import programmes_of
 from savgs_ident.simulate.readings import harmonics
 
 
@@ -51,12 +52,22 @@ class ModelCurve:
         frequency: [Hz], (F,), increasing.
         transfer: complex first harmonic per unit of the first input, (F, C); NaN where not solved.
         peak_to_peak: [unit], (F, C); NaN where not solved.
+        programme: number of the line that each frequency is on, (F,); one for all where left out.
     """
 
     label: str
     frequency: NDArray[np.float64]
     transfer: NDArray[np.complex128]
     peak_to_peak: NDArray[np.float64]
+    programme: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
+
+    @property
+    def lines(self) -> list[NDArray[np.intp]]:
+        """The places of the frequencies of each line."""
+        numbers = np.unique(self.programme)
+        return [np.flatnonzero(self.programme == each) for each in numbers] or [
+            np.arange(self.frequency.size)
+        ]
 
 
 def model_curve(
@@ -65,16 +76,18 @@ def model_curve(
     harmonics: NDArray[np.complex128],
     driven: NDArray[np.complex128],
     solved: NDArray[np.bool_],
+    programme: NDArray[np.intp] | None = None,
 ) -> ModelCurve:
     """The curve of ``harmonics`` (F, C, K) under an input whose first harmonics are ``driven`` (F,).
 
-    Frequencies that are not ``solved`` (F,) are left open.
+    Frequencies that are not ``solved`` (F,) are left open; ``programme`` (F,) is the line that each is on.
     """
     every = np.ones(harmonics.shape, dtype=np.bool_)
     known = solved & (driven != 0.0)
     transfer = np.where(known[:, None], harmonics[:, :, 1] / np.where(known, driven, 1.0)[:, None], np.nan)
     extent = np.where(solved[:, None], peak_to_peak(harmonics, every), np.nan)
-    return ModelCurve(label, frequency, transfer, extent)
+    lines = np.zeros(frequency.size, np.intp) if programme is None else programme
+    return ModelCurve(label, frequency, transfer, extent, lines)
 
 
 @dataclass(frozen=True)
@@ -126,7 +139,8 @@ class SimulatedResponse(Result):
 
     def curve(self, label: str) -> ModelCurve:
         """As a curve for a figure."""
-        return model_curve(label, self.frequency, self.harmonics, self.driven, self.ok)
+        lines = programmes_of(self.model.plant, self.excitation)
+        return model_curve(label, self.frequency, self.harmonics, self.driven, self.ok, lines)
 
 
 _DRAWN = PeriodicSettings(adaptations=1)
@@ -152,7 +166,7 @@ def simulate_between(known: SimulatedResponse) -> SimulatedResponse:
     """``known`` and as many frequencies again, see :func:`interpolate_excitation`, as one."""
     layout = layout_for(known.frequency, _DRAWN.nodes, _DRAWN.slow)
     orders = known.harmonics.shape[2] - 1
-    added = interpolate_excitation(known.excitation)
+    added = interpolate_excitation(known.excitation, programmes_of(known.model.plant, known.excitation))
     return merge_responses(known, simulate_response(known.model, added, orders, _DRAWN, layout))
 
 

@@ -30,6 +30,10 @@ MOST_TRUST = 3.0
 A baseline that lacks something takes what it misses for noise, as far as its prior lets it."""
 
 
+HALF_ERR = 0.6745
+"""Half of all models err by less than so many widths of the prior of small errors: the median of a half-normal."""
+
+
 @dataclass(frozen=True)
 class RecalibratedCampaign:
     """A recorded campaign, recalibrated: what campaigns like it are drawn from.
@@ -61,9 +65,11 @@ class RecalibratedCampaign:
     def recorded(self, rows: NDArray[np.float64], random: np.random.Generator) -> DiagnosisProblem | None:
         """A campaign that shows ``rows``, with errors, its baseline recalibrated; None where that has no motion."""
         known, scales = self.problem, self.problem.base.noise_scales
-        # Where something is missing, no more than what every model errs by, and no more noise than may have been
-        # measured; where rows share no errors, noise alone.
-        errs = 0.0 if known.data.shared is None else min(scales.discrepancy, BACKGROUND.largest_error)
+        # Where rows share no errors, there is noise alone.
+        errs = 0.0 if known.data.shared is None else scales.discrepancy
+        if errs > BACKGROUND.largest_error:
+            # Something is missing, and nothing is known of the small errors beside it.
+            errs = HALF_ERR * BACKGROUND.material_error
         noise = min(scales.noise, exp(MOST_TRUST * known.data.scales.noise_trust))
         measured = rows + known.data.draw_errors(noise, errs, random)
         data = replace(known.data, measured=measured, variance=self._estimated_variance(random))

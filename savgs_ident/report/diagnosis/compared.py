@@ -27,6 +27,7 @@ from savgs_ident.report.html import Picture, embed
 from savgs_ident.report.text import channel_labels
 from savgs_ident.report.theme import PALE, frequency_axis, magnitude_axis, new_figure, styled
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.simulate.programmes import measured_programmes
 from savgs_ident.simulate.public import ModelCurve, model_curve
 
 _MARKERS = ("o", "s", "^")
@@ -135,8 +136,9 @@ def _curves(diagnosis: Diagnosis) -> list[ModelCurve]:
     driven = measured.harmonics[:, measured.channel(diagnosis.given.plant.inputs[0].name), 1]
     # Responses are those of fits, which are solved in all dwells together.
     solved = np.ones(measured.frequency.size, dtype=np.bool_)
+    lines = measured_programmes(measured, diagnosis.given.plant)
     return [
-        model_curve(label, measured.frequency, harmonics, driven, solved)
+        model_curve(label, measured.frequency, harmonics, driven, solved, lines)
         for label, harmonics in (
             (model_label(diagnosis), answers.after),
             ("recalibrated", answers.recalibrated),
