@@ -71,8 +71,9 @@ if TYPE_CHECKING:
     from savgs_ident.recordings.channels import ChannelMap
     from savgs_ident.recordings.recording import Campaign, RecordedChannel, Recording, RecordingLayout
     from savgs_ident.report.presenters import plot_bode
-    from savgs_ident.responses.driven_motion import DrivenMotion, is_motion, load_motion
+    from savgs_ident.responses.driven_motion import DrivenMotion
     from savgs_ident.responses.harmonic_response import HarmonicResponse
+    from savgs_ident.responses.recorded_motion import is_motion, load_motion
     from savgs_ident.responses.summary import CampaignSummary, inspect
     from savgs_ident.simulate.public import (
         DWELLS,
@@ -87,7 +88,8 @@ if TYPE_CHECKING:
     from savgs_ident.validation.calibration import CalibrationStudy, calibrate
     from savgs_ident.validation.check_plant import PlantCheck, check_plant
     from savgs_ident.validation.false_alarms import AlarmStudy, false_alarms
-    from savgs_ident.validation.plan import CampaignPlan, PlannedEffect, PlannedTest, plan
+    from savgs_ident.validation.plan import CampaignPlan, PlannedTest, plan
+    from savgs_ident.validation.planned_dwells import PlannedEffect
     from savgs_ident.validation.plant_declaration import Finding
     from savgs_ident.validation.virtual_campaign import draw_truth, simulate_campaign, write_campaign
 
@@ -97,8 +99,8 @@ _PLACES = {
     "load_model": "plants.quarter_car.model",
     "load_baseline": "plants.quarter_car.model",
     "load_campaign": "plants.quarter_car.rig_recordings",
-    "load_motion": "responses.driven_motion",
-    "is_motion": "responses.driven_motion",
+    "load_motion": "responses.recorded_motion",
+    "is_motion": "responses.recorded_motion",
     "ChannelMap": "recordings.channels",
     "RecordingLayout": "recordings.recording",
     "default_campaign_path": "plants.quarter_car.rig",
@@ -200,7 +202,7 @@ _PLACES = {
     "NextTest": "diagnosis.result",
     "Origin": "core.presentation",
     "ParameterInterval": "diagnosis.result:Estimate",
-    "PlannedEffect": "validation.plan",
+    "PlannedEffect": "validation.planned_dwells",
     "PlannedTest": "validation.plan",
     "PortShare": "diagnosis.result",
     "RecordedChannel": "recordings.recording",

@@ -50,7 +50,8 @@ from savgs_ident.plants.quarter_car.rig_recordings import load_campaign
 from savgs_ident.recordings.channels import read_channel_map
 from savgs_ident.recordings.read import campaign_files, digest_files, map_digest
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.responses.driven_motion import DrivenMotion, is_motion, load_motion
+from savgs_ident.responses.driven_motion import DrivenMotion
+from savgs_ident.responses.recorded_motion import is_motion, load_motion
 from savgs_ident.simulate.program_cache import make_room_for_programs, use_persistent_cache
 
 QUARTER_CAR = "quarter_car"

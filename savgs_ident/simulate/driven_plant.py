@@ -17,7 +17,8 @@ from savgs_ident.effects.base import InputSignal, Port, PortKind
 from savgs_ident.plants.base import AbstractPlant
 from savgs_ident.plants.model import Model, PlantModel
 from savgs_ident.recordings.recording import Campaign
-from savgs_ident.responses.driven_motion import DrivenMotion, joined, recorded_motion, recorded_speed
+from savgs_ident.responses.driven_motion import DrivenMotion, joined
+from savgs_ident.responses.recorded_motion import recorded_motion, recorded_speed
 from savgs_ident.simulate.along_motion import Samples, force_gain
 
 FORCE_SHARE = 0.35

@@ -17,8 +17,8 @@ from savgs_ident.diagnosis.motion_problem import motion_problem
 from savgs_ident.diagnosis.thresholds import DEFAULTS, DecisionConstants
 from savgs_ident.inference import background
 from savgs_ident.plants.quarter_car.rig import Rig
-from savgs_ident.responses.driven_motion import driven_motion
 from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.recorded_motion import driven_motion
 from savgs_ident.simulate.along_motion import Needed, needed_forces
 
 from ..in_one_test import over

@@ -15,7 +15,7 @@ from savgs_ident.inference.find_map import find_map
 from savgs_ident.inference.laplace_fit import search_of
 from savgs_ident.inference.observations import Data
 from savgs_ident.recordings.axis_recording import AxisRecording
-from savgs_ident.responses.driven_motion import SAME, driven_motion, period_of
+from savgs_ident.responses.recorded_motion import SAME, driven_motion, period_of
 
 from ..relaxed import with_kept_programs
 from .recorded_axis import BASE, PERIOD_S, RATE_HZ, axis_with, recorded_axis

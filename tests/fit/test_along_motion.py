@@ -12,7 +12,8 @@ from savgs_ident.core.parameter import ParameterTable, merge_parameters
 from savgs_ident.core.values import as_values
 from savgs_ident.fit.along_motion import MotionFit
 from savgs_ident.recordings.axis_recording import AxisRecording
-from savgs_ident.responses.driven_motion import DrivenMotion, driven_motion
+from savgs_ident.responses.driven_motion import DrivenMotion
+from savgs_ident.responses.recorded_motion import driven_motion
 from savgs_ident.simulate.along_motion import needed_force
 from savgs_ident.simulate.driven_plant import samples_of
 

@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 
 from savgs_ident.core.errors import InputError
 from savgs_ident.recordings.recording import RecordedChannel, Recording
-from savgs_ident.responses.driven_motion import FAST_HZ, ROWS_HZ, recorded_motion, recorded_speed
+from savgs_ident.responses.driven_motion import ROWS_HZ
+from savgs_ident.responses.recorded_motion import FAST_HZ, recorded_motion, recorded_speed
 
 SEED = 3
 

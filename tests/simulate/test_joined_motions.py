@@ -7,7 +7,8 @@ import savgs_ident as si
 from savgs_ident.core.values import as_values
 from savgs_ident.inference.drive_force import force_rows
 from savgs_ident.recordings.recording import RecordedChannel, Recording
-from savgs_ident.responses.driven_motion import DrivenMotion, joined, recorded_motion, recorded_speed
+from savgs_ident.responses.driven_motion import DrivenMotion, joined
+from savgs_ident.responses.recorded_motion import recorded_motion, recorded_speed
 
 STEP = 0.01
 UNITS = {"position": "m", "speed": "m/s", "drive_force": "N"}

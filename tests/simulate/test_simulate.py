@@ -84,8 +84,14 @@ def test_the_rig_is_driven_by_its_cam_with_the_link_held() -> None:
         ({"frequency": (np.nan,)}, "nan Hz is no frequency"),
         ({"frequency": (2.0,), "amplitude": 0.0}, "an amplitude of 0 moves nothing"),
         ({"orders": 0}, "orders is 0"),
-        ({"frequency": (2.0,), "campaign": True}, "a campaign has frequencies, amplitudes and levels of its own"),
-        ({"amplitude": 0.01, "campaign": True}, "a campaign has frequencies, amplitudes and levels of its own"),
+        (
+            {"frequency": (2.0,), "campaign": True},
+            "a campaign has frequencies, amplitudes and levels of its own",
+        ),
+        (
+            {"amplitude": 0.01, "campaign": True},
+            "a campaign has frequencies, amplitudes and levels of its own",
+        ),
     ],
 )
 def test_what_contradicts_itself_is_refused(given: dict[str, Any], said: str) -> None:
