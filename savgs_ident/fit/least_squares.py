@@ -132,8 +132,10 @@ def _estimates(task: Task, outcome: Outcome) -> tuple[tuple[Estimate, ...], np.n
     widths, estimates = problem.free.widths, []
     for place, name in enumerate(problem.free.names):
         known = sd[place] < INFORMED * widths[place] or name in problem.free.tolerated
-        unit = abs(slope[place]) if known else np.inf
         before = task.table[name]
+        # Of a typical number at an end of its range nothing is known but that it would go further.
+        known &= not before.is_typical or abs(slope[place]) > AT_AN_END * abs(float(values[name]))
+        unit = abs(slope[place]) if known else np.inf
         estimates.append(
             Estimate(
                 name=name,
@@ -147,6 +149,10 @@ def _estimates(task: Task, outcome: Outcome) -> tuple[tuple[Estimate, ...], np.n
             )
         )
     return tuple(estimates), outcome.covariance * np.outer(slope, slope)
+
+
+AT_AN_END = 0.01
+"""Relative change of a typical number per unit of its coordinate [1] below which it is at an end of its range."""
 
 
 def _prior_sd(problem: Problem) -> np.ndarray:
@@ -214,9 +220,8 @@ def fit_least_squares(
             break
         report("trying another start")
         tried.append(_from_start(task, minimiser, u, min(EXPLORING, settings.steps), report))
-    best = min(tried, key=lambda each: (not each.evaluation.ok, np.nan_to_num(each.cost, nan=np.inf)))
     report("refining on nodes adapted to the result")
-    best = _refined(task, minimiser, best, settings.steps, report)
+    best = _best_refined(task, minimiser, tried, settings.steps, report)
     with_errors = fit_with_errors(task, minimiser, best, report)
     if isinstance(with_errors, FitWithErrors):
         best, information, own = with_errors.best, with_errors.information, with_errors.own
@@ -261,6 +266,20 @@ def _from_start(task: Task, minimiser: Minimiser, u: Array, steps: int, report: 
     p = task.problem.parameters(u)
     warm_start = simulate_periodic(task.problem.model, p, task.excitation, task.settings.periodic)
     return minimiser.minimise(u, warm_start, steps, report, enough=ROUGHLY)
+
+
+def _best_refined(
+    task: Task, minimiser: Minimiser, tried: list[Minimum], steps: int, report: Progress
+) -> Minimum:
+    """The lowest of several minima, refined, at which all motions are found; the lowest where they are at none."""
+    ranked = sorted(tried, key=lambda each: np.nan_to_num(each.cost, nan=np.inf))
+    refined = list[Minimum]()
+    for each in ranked:
+        # A motion that was lost on the way may be found on other nodes: a low minimum is not given up for it.
+        refined.append(_refined(task, minimiser, each, steps, report))
+        if refined[-1].evaluation.ok:
+            return refined[-1]
+    return refined[0]
 
 
 def _refined(task: Task, minimiser: Minimiser, best: Minimum, steps: int, report: Progress) -> Minimum:

@@ -34,7 +34,7 @@ _NEARLY = 0.2
 _TENS = ((10.0, "a tenth"), (100.0, "a hundredth"), (1000.0, "a thousandth"))
 _OF_ANY = tuple((factor, "a unit", f"another one {share} as large") for factor, share in _TENS)
 _UNITS: dict[str, tuple[tuple[float, str, str], ...]] = {
-    "m/s^2": ((9.80665, "g", "m/s^2"), *_OF_ANY),
+    "m/s^2": ((9.80665, "g", "m/s^2"), *_OF_ANY[1:]),
     "m": (
         (25.4, "inches", "millimetres"),
         (39.37, "metres", "inches"),

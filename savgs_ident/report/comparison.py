@@ -117,5 +117,5 @@ def bode_text(compared: Comparison) -> RenderableType:
     parts = [table(f"Residual of the model on {tests_counted(measured)} (rms)", headers, rows)]
     failed = [test for test, status in zip(tests, compared.model.status, strict=True) if not status.ok]
     if failed:
-        parts.append(plain("The model's periodic motion was not found in: " + ", ".join(failed)))
+        parts.append(plain("The model's motion was not found in: " + ", ".join(failed)))
     return Group(*parts)

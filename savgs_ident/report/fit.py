@@ -341,5 +341,5 @@ def _verdict(fit: Fit) -> list[str]:
     failed = [
         test for test, status in zip(fit.measured.tests, fit.dwell_status, strict=True) if not status.ok
     ]
-    unsolved = [f"The model's periodic motion was not found in: {', '.join(failed)}."] if failed else []
+    unsolved = [f"The model's motion was not found in: {', '.join(failed)}."] if failed else []
     return unsolved + verdict_sentences(fit)
