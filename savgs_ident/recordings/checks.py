@@ -207,13 +207,19 @@ def _few_periods(periods: float, place: DataLocation) -> tuple[DataWarning, ...]
     )
 
 
+_TIMES = {"ms": 1e3, "us": 1e6}
+_NEARLY = 0.05
+
+
 def _frequency_off(nominal: float | None, measured: float, place: DataLocation) -> tuple[DataWarning, ...]:
     if nominal is None or abs(measured / nominal - 1.0) <= _FREQUENCY_OFF:
         return ()
+    taken = [unit for unit, factor in _TIMES.items() if abs(nominal / measured / factor - 1.0) <= _NEARLY]
+    as_if = f", as if its time were in {taken[0]} and had been read as s" if taken else ""
     return (
         place.warning(
             "frequency_mismatch",
-            f"moves at {measured:.4g} Hz, the test is said to be at {nominal:.4g} Hz",
+            f"moves at {measured:.4g} Hz, the test is said to be at {nominal:.4g} Hz{as_if}",
             "check the name of the test and the unit of the time",
         ),
     )

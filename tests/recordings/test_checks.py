@@ -379,6 +379,16 @@ def test_spikes_of_the_road_are_no_other_frequency() -> None:
         assert [warning.code for warning in found] == codes
 
 
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e6, "us"), (7.0, "")])
+def test_a_time_in_another_unit_is_named_by_how_far_the_frequency_is_off(factor: float, unit: str) -> None:
+    time = np.arange(8000) / 4000.0
+    road = RecordedChannel("road_height", "m", factor * time, 1e-4 * np.sin(2 * np.pi * 25.0 * time))
+    recording = Recording("dwell_25Hz", "dwell", 25.0, {"road_height": road})
+    found = check_test(recording, RIG_LAYOUT, DataLocation("a.csv", "dwell_25Hz"))
+    (said,) = (each.what for each in found if each.code == "frequency_mismatch")
+    assert (f"as if its time were in {unit} " in said) if unit else "as if" not in said
+
+
 @pytest.mark.parametrize("condition", ["nominal", "stribeck_rail", "mount_compliance", "accel_lag"])
 def test_nothing_is_wrong_with_a_sound_campaign(condition: str, shared_rig: Path) -> None:
     campaign = load_campaign(shared_rig / condition / "campaign.csv.gz")
