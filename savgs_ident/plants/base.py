@@ -277,7 +277,7 @@ class AbstractPlant(eqx.Module):
     @property
     def scaled_ports(self) -> tuple[Port, ...]:
         """Its ports on its time scale."""
-        scale = self.time_scale or 1.0
+        scale = scale_of_time(self)
         return tuple(
             port if port.time_scale == scale else replace(port, time_scale=scale) for port in self.ports
         )
@@ -384,6 +384,11 @@ class AbstractSource(eqx.Module):
     @abstractmethod
     def rate(self, p: Values, t: Scalar, state: Float[Array, " k"], loads: Any) -> Float[Array, " k"]:
         """Time derivatives of its states under the ``loads`` of the plant."""
+
+
+def scale_of_time(plant: AbstractPlant | type[AbstractPlant]) -> float:
+    """The time scale of a plant [1]; 1 where nobody looked for it."""
+    return plant.time_scale or 1.0
 
 
 def input_size(plant: AbstractPlant | type[AbstractPlant], given: Input) -> float:

@@ -86,10 +86,11 @@ def check_inputs(
     for name in names:
         lack = [each.name for each in tests if name not in each.channels]
         if 0 < len(lack) < len(tests):
+            also = f"and in {len(lack) - 1} more " if len(lack) > 1 else "alone "
             found.append(
                 DataLocation(source, lack[0], name).warning(
                     "input_not_recorded",
-                    f"was not recorded here and in {len(lack) - 1} more of {len(tests)} tests: they are left out",
+                    f"was not recorded here {also}of {len(tests)} tests: left out",
                     "map its channel in channels.toml, or fill its column in where it stood still",
                 )
             )

@@ -21,7 +21,7 @@ from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.core.values import as_values
 from savgs_ident.effects.base import Fundamental, InputSignal
 from savgs_ident.plants.at_rest import carried_along
-from savgs_ident.plants.base import AbstractPlant, Excitation, Input, input_size
+from savgs_ident.plants.base import AbstractPlant, Excitation, Input, input_size, scale_of_time
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
 from savgs_ident.responses.harmonic_response import ComparedPart, HarmonicResponse, SweepResponse
@@ -371,7 +371,7 @@ def response_of_tests(
         return measured_response(measured, plant, orders, max_frequency, progress)
     response = measured_response(measured, plant, orders, max_frequency, progress) if dwells else None
     progress("cutting windows")
-    scale = plant.time_scale or 1.0
+    scale = scale_of_time(plant)
     inputs, readings = ([each.name for each in listed] for listed in (plant.inputs, plant.channels))
     # Beside dwells their limit is given for them: windows keep within theirs.
     highest = min(max_frequency, MOST_HZ / scale) if dwells and max_frequency is not None else max_frequency

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.errors import DataWarning, InputError
 from savgs_ident.core.presentation import Progress, no_progress
 from savgs_ident.core.values import as_values
+from savgs_ident.plants.base import scale_of_time
 from savgs_ident.plants.model import Model
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.harmonic_response import HarmonicResponse
@@ -88,7 +89,7 @@ def _forgetting(
     left, half, motion = _left(response, model)
     begun = _begun(response)
     if begun.any() and np.min(left[begun]) >= REMEMBERED and isinstance(measured, Campaign):
-        scale = model.build().time_scale or 1.0
+        scale = scale_of_time(model.build())
         lead = _longer(scale, float(np.median(half[begun])), float(np.median(left[begun])))
         progress(f"cutting windows of which the first {lead:.3g} s are not compared")
         response = in_windows(partial(estimate_windows, lead_s=lead))

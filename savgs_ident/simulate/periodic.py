@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from savgs_ident.core.status import Status
 from savgs_ident.core.values import Values, as_values
 from savgs_ident.plants.at_rest import find_rest
-from savgs_ident.plants.base import AbstractPlant, Excitation
+from savgs_ident.plants.base import AbstractPlant, Excitation, scale_of_time
 from savgs_ident.simulate.collocation import (
     CyclicFactors,
     Linearised,
@@ -170,7 +170,7 @@ class PeriodicSettings:
 
 def layout_of(excitation: Excitation, settings: PeriodicSettings, model: AbstractPlant) -> Layout:
     """How many nodes each test has."""
-    frequency = np.asarray(excitation.frequency) * (model.time_scale or 1.0)
+    frequency = np.asarray(excitation.frequency) * scale_of_time(model)
     counts = np.array(layout_for(frequency, settings.nodes, settings.slow).counts)
     windows = excitation.windows
     counts[windows] = CHUNK * np.ceil(settings.window_rate / frequency[windows] / CHUNK)
@@ -348,7 +348,7 @@ def adapt(
     accelerations = np.asarray(solution.trajectory.y[: len(model.coordinates)])
     if not np.isfinite(accelerations).all():
         return solution
-    frequency = np.asarray(solution.excitation.frequency) * (model.time_scale or 1.0)
+    frequency = np.asarray(solution.excitation.frequency) * scale_of_time(model)
     mesh = adapted_mesh(solution.mesh, accelerations, frequency, layout)
     start = _carry_over(solution.trajectory, solution.mesh, mesh)
     return solve_on_mesh(model, as_values(p), solution.excitation, mesh, start, limit)

@@ -50,7 +50,7 @@ from savgs_ident.inference.background.port_functions import (
     series_functions,
 )
 from savgs_ident.inference.likelihood import Likelihood
-from savgs_ident.plants.base import AbstractPlant, Excitation
+from savgs_ident.plants.base import AbstractPlant, Excitation, scale_of_time
 from savgs_ident.simulate.excitation import signals_at
 from savgs_ident.simulate.mesh import Mesh
 from savgs_ident.simulate.periodic import PeriodicSolution
@@ -247,7 +247,7 @@ def _functions(port: Port, seen: _Seen) -> Iterator[Functions]:
     elif port.kind is PortKind.SERIES:
         beyond = np.asarray(seen.loads[port.name].beyond_rest)
         if port.resonant:
-            scale = seen.about.model.time_scale or 1.0
+            scale = scale_of_time(seen.about.model)
             yield resonance_functions(beyond, seen.nodes, seen.constants, scale)
         else:
             yield series_functions(seen.loads[port.name])
@@ -275,7 +275,7 @@ def _numbers(name: str, ports: Sequence[Port], seen: _Seen) -> _Asked:
         changes = slopes * np.array([number.change for number in numbers])
         laws = laws_of_functions(changes, (Family.NUMBER,) * len(numbers), constants)
         return _Asked([], lambda _: InputLocation(name, laws, changes))
-    fields, swinging, scale = [], [], seen.about.model.time_scale or 1.0
+    fields, swinging, scale = [], [], scale_of_time(seen.about.model)
     for each in inertias:
         velocity = sum(np.asarray(seen.signals[where].velocity) for where in each.velocity)
         acceleration = rate_of(np.asarray(velocity), seen.nodes, seen.about.solution)
@@ -320,7 +320,7 @@ def _sensors(names: Sequence[str], seen: _Seen) -> list[InputLocation]:
     channels = [each.name for each in about.model.channels]
     read, order = about.read(), np.arange(about.orders + 1)
     omega = 2.0 * np.pi * np.asarray(seen.about.solution.excitation.spacing)[:, None] * order
-    time_scale = about.model.time_scale or 1.0
+    time_scale = scale_of_time(about.model)
     along, locations = seen.readings, []
     for name in names:
         c = channels.index(name.removeprefix("sensor."))
