@@ -38,8 +38,7 @@ from savgs_ident.report.theme import (
     printable,
     styled,
 )
-from savgs_ident.simulate.programmes import measured_programmes
-from savgs_ident.simulate.public import ModelCurve
+from savgs_ident.simulate.curves import ModelCurve, measured_programmes
 
 _COLUMN = 5.25
 """Width of a column [in]."""

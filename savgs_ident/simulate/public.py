@@ -7,7 +7,7 @@ widest gaps, for arrays of the same shape need no second compilation.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import ClassVar
 
@@ -26,7 +26,8 @@ from savgs_ident.plants.model import Model
 from savgs_ident.plants.profiles import Constant, LinearSweep, Offset, ProfileSource, SweptAngle
 from savgs_ident.recordings.recording import Campaign
 from savgs_ident.responses.dwells import estimate_response
-from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak, unbiased_peak_to_peak
+from savgs_ident.responses.harmonic_response import HarmonicResponse, unbiased_peak_to_peak
+from savgs_ident.simulate.curves import ModelCurve, model_curve, programmes_of
 from savgs_ident.simulate.excitation import (
     interpolate_excitation,
     measured_excitation,
@@ -39,55 +40,7 @@ from savgs_ident.simulate.excitation import (
 from savgs_ident.simulate.mesh import Layout, layout_for
 from savgs_ident.simulate.periodic import PeriodicSettings, simulate_periodic
 from savgs_ident.simulate.program_cache import use_persistent_cache
-from savgs_ident.simulate.programmes import programmes_of
 from savgs_ident.simulate.readings import harmonics
-
-
-@dataclass(frozen=True)
-class ModelCurve:
-    """A model's response at F frequencies, in the C channels of its plant.
-
-    Attributes:
-        label: what the legend calls it.
-        frequency: [Hz], (F,), increasing.
-        transfer: complex first harmonic per unit of the first input, (F, C); NaN where not solved.
-        peak_to_peak: [unit], (F, C); NaN where not solved.
-        programme: number of the line that each frequency is on, (F,); one for all where left out.
-    """
-
-    label: str
-    frequency: NDArray[np.float64]
-    transfer: NDArray[np.complex128]
-    peak_to_peak: NDArray[np.float64]
-    programme: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
-
-    @property
-    def lines(self) -> list[NDArray[np.intp]]:
-        """The places of the frequencies of each line."""
-        numbers = np.unique(self.programme)
-        return [np.flatnonzero(self.programme == each) for each in numbers] or [
-            np.arange(self.frequency.size)
-        ]
-
-
-def model_curve(
-    label: str,
-    frequency: NDArray[np.float64],
-    harmonics: NDArray[np.complex128],
-    driven: NDArray[np.complex128],
-    solved: NDArray[np.bool_],
-    programme: NDArray[np.intp] | None = None,
-) -> ModelCurve:
-    """The curve of ``harmonics`` (F, C, K) under an input whose first harmonics are ``driven`` (F,).
-
-    Frequencies that are not ``solved`` (F,) are left open; ``programme`` (F,) is the line that each is on.
-    """
-    every = np.ones(harmonics.shape, dtype=np.bool_)
-    known = solved & (driven != 0.0)
-    transfer = np.where(known[:, None], harmonics[:, :, 1] / np.where(known, driven, 1.0)[:, None], np.nan)
-    extent = np.where(solved[:, None], peak_to_peak(harmonics, every), np.nan)
-    lines = np.zeros(frequency.size, np.intp) if programme is None else programme
-    return ModelCurve(label, frequency, transfer, extent, lines)
 
 
 @dataclass(frozen=True)

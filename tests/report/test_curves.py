@@ -11,7 +11,7 @@ from savgs_ident.fit.result import measured_points
 from savgs_ident.plants.quarter_car.rig_recordings import RIG_LAYOUT
 from savgs_ident.report.bode import phase_deg
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.public import model_curve
+from savgs_ident.simulate.curves import model_curve
 
 Response = Callable[[NDArray[np.float64], float], NDArray[np.complex128]]
 

@@ -19,7 +19,7 @@ from savgs_ident.report.campaigns.inspect import campaign_figure
 from savgs_ident.report.text import response_labels
 from savgs_ident.report.theme import DPI, frequency_axis, new_figure, printable, write_figure
 from savgs_ident.responses.summary import CampaignSummary, inspect
-from savgs_ident.simulate.public import ModelCurve, model_curve
+from savgs_ident.simulate.curves import ModelCurve, model_curve
 
 LABELS = tuple(response_labels(RIG_LAYOUT).values())
 

@@ -27,8 +27,7 @@ from savgs_ident.report.html import Picture, embed
 from savgs_ident.report.text import channel_labels
 from savgs_ident.report.theme import PALE, frequency_axis, magnitude_axis, new_figure, styled
 from savgs_ident.responses.harmonic_response import HarmonicResponse
-from savgs_ident.simulate.programmes import measured_programmes
-from savgs_ident.simulate.public import ModelCurve, model_curve
+from savgs_ident.simulate.curves import ModelCurve, measured_programmes, model_curve
 
 _MARKERS = ("o", "s", "^")
 

@@ -1,14 +1,64 @@
-"""Which dwells of a campaign are driven alike: one line of a figure each.
+"""Responses over frequency as curves, a line for each programme of a campaign.
 
 A campaign that repeats its frequencies at other amplitudes of the first input, or at other levels of the others, is
 several programmes in one. A line through all its dwells would go up and down between them.
 """
 
+from dataclasses import dataclass, field
+
 import numpy as np
 from numpy.typing import NDArray
 
 from savgs_ident.plants.base import AbstractPlant, Excitation
-from savgs_ident.responses.harmonic_response import HarmonicResponse
+from savgs_ident.responses.harmonic_response import HarmonicResponse, peak_to_peak
+
+
+@dataclass(frozen=True)
+class ModelCurve:
+    """A model's response at F frequencies, in the C channels of its plant.
+
+    Attributes:
+        label: what the legend calls it.
+        frequency: [Hz], (F,), increasing.
+        transfer: complex first harmonic per unit of the first input, (F, C); NaN where not solved.
+        peak_to_peak: [unit], (F, C); NaN where not solved.
+        programme: number of the line that each frequency is on, (F,); one for all where left out.
+    """
+
+    label: str
+    frequency: NDArray[np.float64]
+    transfer: NDArray[np.complex128]
+    peak_to_peak: NDArray[np.float64]
+    programme: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
+
+    @property
+    def lines(self) -> list[NDArray[np.intp]]:
+        """The places of the frequencies of each line."""
+        numbers = np.unique(self.programme)
+        return [np.flatnonzero(self.programme == each) for each in numbers] or [
+            np.arange(self.frequency.size)
+        ]
+
+
+def model_curve(
+    label: str,
+    frequency: NDArray[np.float64],
+    harmonics: NDArray[np.complex128],
+    driven: NDArray[np.complex128],
+    solved: NDArray[np.bool_],
+    programme: NDArray[np.intp] | None = None,
+) -> ModelCurve:
+    """The curve of ``harmonics`` (F, C, K) under an input whose first harmonics are ``driven`` (F,).
+
+    Frequencies that are not ``solved`` (F,) are left open; ``programme`` (F,) is the line that each is on.
+    """
+    every = np.ones(harmonics.shape, dtype=np.bool_)
+    known = solved & (driven != 0.0)
+    transfer = np.where(known[:, None], harmonics[:, :, 1] / np.where(known, driven, 1.0)[:, None], np.nan)
+    extent = np.where(solved[:, None], peak_to_peak(harmonics, every), np.nan)
+    lines = np.zeros(frequency.size, np.intp) if programme is None else programme
+    return ModelCurve(label, frequency, transfer, extent, lines)
+
 
 SAME = 5e-3
 """Frequencies that differ by less than this are one [1]."""
