@@ -7,6 +7,7 @@ character that the font lacks and none that would be read as a formula.
 
 import io
 from contextlib import AbstractContextManager
+from math import ceil, floor, log10
 from pathlib import Path
 
 import matplotlib
@@ -25,8 +26,14 @@ PALE = "#dedede"
 BLUE = "#0b5ea8"
 ORANGE = "#d95f02"
 
-_TICKS = (0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0, 50.0)
-_FEW_TICKS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+_TICKS = (0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0)
+"""Round numbers for a quarter car's frequencies [Hz]."""
+
+_IN_A_DECADE = (
+    (4.0, (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)),
+    (30.0, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)),
+)
+"""Round numbers in a decade for others, where the highest is less than so many times the lowest."""
 
 
 def styled() -> AbstractContextManager[None]:
@@ -65,8 +72,7 @@ def frequency_axis(axes: Axes, lowest: float, highest: float, labelled: bool = T
     axes.set_xscale("log")
     low, high = lowest / 1.06, highest * 1.06
     axes.set_xlim(low, high)
-    offered = _TICKS if high < 30.0 * low else _FEW_TICKS
-    ticks = [tick for tick in offered if low <= tick <= high]
+    ticks = [tick for tick in _offered_ticks(low, high) if low <= tick <= high]
     # Tests that lie close together, or one alone, may have no round number among them.
     axes.xaxis.set_major_locator(FixedLocator(ticks if len(ticks) > 1 else [lowest, highest]))
     axes.xaxis.set_minor_locator(NullLocator())
@@ -74,6 +80,15 @@ def frequency_axis(axes: Axes, lowest: float, highest: float, labelled: bool = T
     axes.tick_params(axis="x", labelbottom=labelled)
     if labelled:
         axes.set_xlabel("frequency [Hz]")
+
+
+def _offered_ticks(low: float, high: float) -> tuple[float, ...]:
+    """Round numbers [Hz] for an axis between two."""
+    if high < min(30.0 * low, 25.0) and low > 0.09:
+        return _TICKS
+    shares = next((each for span, each in _IN_A_DECADE if high < span * low), (1.0, 2.0, 5.0))
+    decades = range(floor(log10(low)), ceil(log10(high)) + 1)
+    return tuple(float(f"{share * 10.0**decade:.6g}") for decade in decades for share in shares)
 
 
 def magnitude_axis(axes: Axes) -> None:

@@ -189,3 +189,22 @@ def test_every_frequency_axis_has_numbers(lowest: float, highest: float, numbers
         if low <= place <= high
     ]
     assert list(dict.fromkeys(shown))[: len(numbers)] == numbers
+
+
+@pytest.mark.parametrize(
+    ("lowest", "highest", "some"),
+    [
+        (0.5, 6.0, [0.5, 1.0, 2.0, 5.0, 6.0]),
+        (25.0, 180.0, [30.0, 50.0, 100.0, 150.0]),
+        (0.008, 0.09, [0.01, 0.05]),
+    ],
+)
+def test_a_frequency_axis_has_round_numbers_wherever_it_lies(
+    lowest: float, highest: float, some: list[float]
+) -> None:
+    axes = Figure().subplots()
+    frequency_axis(axes, lowest, highest)
+    ticks = [float(each) for each in axes.get_xticks()]
+    assert set(some) <= set(ticks)
+    assert 4 <= len(ticks) <= 12
+    assert all(lowest / 1.07 < each < 1.07 * highest for each in ticks)
