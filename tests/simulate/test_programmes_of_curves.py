@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from savgs_ident.plants.two_mass import PARAMETERS, TwoMass
-from savgs_ident.simulate.curves import driven_alike, programmes_of, settings_of
+from savgs_ident.responses.programmes import driven_alike, settings_of
+from savgs_ident.simulate.curves import programmes_of
 from savgs_ident.simulate.excitation import interpolate_excitation, sine_excitation
 
 HERTZ = np.array([0.8, 1.2, 1.7, 2.4, 3.4, 4.8])

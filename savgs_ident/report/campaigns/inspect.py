@@ -12,6 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
+from numpy.typing import NDArray
 from rich.console import Group, RenderableType
 
 from savgs_ident.core.files import warning_record
@@ -40,6 +41,7 @@ from savgs_ident.report.theme import (
     styled,
 )
 from savgs_ident.responses.harmonic_response import HarmonicResponse, SweepResponse, signal_to_noise
+from savgs_ident.responses.programmes import driven_alike, settings_of
 from savgs_ident.responses.summary import LEAST_RATIO, CampaignSummary
 
 
@@ -252,15 +254,21 @@ def _warnings(source: str, warnings: list[dict[str, Any]]) -> list[RenderableTyp
     return shown
 
 
+_COLUMN = 4.6
+"""Width of a column [in]."""
+
+_MARKERS = "os^Dv<>p"
+"""Of the programmes of a campaign, one after the other."""
+
 _STEPS = (LEAST_RATIO, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)
 
 
 def campaign_figure(summary: CampaignSummary) -> Figure:
     """Response per metre of road, signal-to-noise by order, and noise; a column for each response."""
     with styled():
-        figure = new_figure(10.5, 9.5)
-        figure.suptitle(printable(f"What is in {summary.campaign.source}"), fontsize=11)
         labels = response_labels(summary.campaign.layout)
+        figure = new_figure(max(_COLUMN * len(labels) + 1.3, 7.5), 9.5)
+        figure.suptitle(printable(f"What is in {summary.campaign.source}"), fontsize=11)
         axes = figure.subplots(3, len(labels), squeeze=False, height_ratios=(1.25, 1.0, 0.8))
         span = _span(summary)
         for column, (name, label) in zip(axes.T, labels.items(), strict=True):
@@ -305,14 +313,30 @@ def _draw_response(axes: Axes, summary: CampaignSummary, name: str, label: Chann
         first = response.harmonics[d, response.channel(name), 1]
         road = np.abs(response.harmonics[d, response.channel(summary.campaign.layout.driven), 1])
         error = np.sqrt(0.5 * np.trace(response.covariance[d, response.channel(name), 1], axis1=1, axis2=2))
-        axes.errorbar(
-            response.frequency[d], np.abs(first) / road, 2.0 * error / road,
-            fmt="o", color=INK, markersize=4.5, capsize=2.5, linewidth=1.0, label="dwells, ± 2 sd",
-        )  # fmt: skip
+        programme, label_of_dwells = _programmes(summary, response)[d], "dwells, ± 2 sd"
+        for each in np.unique(programme):
+            mine = programme == each
+            axes.errorbar(
+                response.frequency[d][mine], (np.abs(first) / road)[mine], (2.0 * error / road)[mine],
+                fmt=_MARKERS[each % len(_MARKERS)], color=INK, markersize=4.5, capsize=2.5, linewidth=1.0,
+                markerfacecolor=INK if each == 0 else "white", label=label_of_dwells,
+            )  # fmt: skip
+            label_of_dwells = "_nolegend_"
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="best")
     else:
         axes.text(0.5, 0.5, "not recorded", transform=axes.transAxes, ha="center", color=GREY)
+
+
+def _programmes(summary: CampaignSummary, response: HarmonicResponse) -> NDArray[np.intp]:
+    """The programme of each dwell, (D,), by amplitudes of what is driven and levels of what is no response either."""
+    layout = summary.campaign.layout
+    levels = [
+        name for name in response.channels if name not in (layout.driven, *layout.responses, *layout.free)
+    ]
+    first = response.harmonics[:, response.channel(layout.driven), 1]
+    means = [response.harmonics[:, response.channel(name), 0] for name in levels]
+    return driven_alike(response.frequency, settings_of(first, means))
 
 
 def _draw_sweep(axes: Axes, sweep: SweepResponse, name: str) -> None:
