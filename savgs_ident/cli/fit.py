@@ -52,8 +52,8 @@ def fit(
 
     A road of at least six seconds is cut into windows; without dwells so is a sweep or any other motion.
 
-    A plant with one coordinate and one input is held against the force of its drive along the measured motion, where
-    there are no dwells.
+    A plant with one coordinate whose first input is the force of its drive is held against that along the measured
+    motion, where there are no dwells.
 
     Writes fit.json, model.toml (the identified model), bode.png and bode.pdf; of windows spectra.png and spectra.pdf,
     along a motion drive.png and drive.pdf.

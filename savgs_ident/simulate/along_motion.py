@@ -1,6 +1,6 @@
 """The force that a plant needs from its drive along a measured motion.
 
-The motion is imposed on a plant with one coordinate and one input, the force of its drive. Where the residual
+The motion is imposed on a plant with one coordinate whose first input is the force of its drive. Where the residual
 r(q, qd, qdd, s, sd, u; p) of the equation of motion does not vanish, the drive would have had to exert
 
     u - r / (dr/du)
