@@ -63,8 +63,8 @@ def fit(
         model: the rig, or another plant, with its effects; one that was identified before starts from what was known
             then, for its values would count the data twice.
         measured: the recordings, or the response of their dwells. A road is cut into windows, and without dwells so
-            is a sweep; without dwells a plant with one coordinate, driven by its first input, is held against the force
-            of its drive along the measured motion, or along one that is given.
+            is a sweep; without dwells a plant with one coordinate, driven by its first input, is held against the
+            force of its drive along the measured motion, or along one that is given.
         free: names of the parameters to identify; if empty the paper's four, as far as the rig has them, and what its
             further effects bring along; or those of another plant of which nothing is known but two bounds.
         held_out: another motion, that nothing is fitted to: its force is predicted, and compared.
